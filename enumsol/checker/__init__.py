@@ -41,10 +41,11 @@ What checker and search share
       ``trusted.arcs.only_branch``, the test by which the roots of arcs are the only solutions over a piece, with the
       form of ``trusted.piece_form`` (on maps, of which no proof is written, ``trusted.data_box`` has it, too);
       ``arithmetic.ball_arrays`` (in 3D, too);
-    - for problems in 3D, and loaded for their proofs only: ``trusted.space.sector_rows``, the rows and branchings and
-      the exclusion inequality; ``trusted.space.leaves`` and ``trusted.space.turning``, what a complete assignment holds
-      and which leaves share a root; ``trusted.space.space_uniqueness``, the test that a whole problem has one solution
-      only; ``trusted.space.boxed_solution``, the test that a box of forces holds exactly one, and which of these are
+    - for problems in 3D, and loaded for their proofs only: ``trusted.space.sector_rows``, the rows and branchings
+      and the exclusion inequality; ``trusted.space.slip_forms``, forms other than the energy;
+      ``trusted.space.leaves`` and ``trusted.space.turning``, what a complete assignment holds and which leaves
+      share a root; ``trusted.space.space_uniqueness``, the test that a whole problem has one solution only;
+      ``trusted.space.boxed_solution``, the test that a box of forces holds exactly one, and which of these are
       the same; ``model.sectors``, the ends of sectors; ``condensation.space_condensed``, balls for S and g in the
       variables in which friction is isotropic; of bodies that nothing holds ``condensation.floating_space``, the same
       with G and h, and ``trusted.space.resultants``, what multipliers and balance prove; ``model.problem3d``,

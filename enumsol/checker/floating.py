@@ -54,6 +54,9 @@ class WithinReach(TreeChecker):
         enclosure: CondensedEnclosure = self.problem.on_springs.enclosure
         return enclosure
 
+    def _declare(self, record: list[Any]) -> None:
+        raise RefusedError(f"a record {quoted(record)} that no leaf of this proof can refer to")
+
 
 @dataclass
 class FloatingChecker(WithinReach, Checker):
@@ -83,9 +86,6 @@ class FloatingChecker(WithinReach, Checker):
 
     def _limits(self, codes: Codes, kind: type[Record]) -> records.Limits:
         return records.Limits(codes, self.friction, modes=self.problem.modes.r)
-
-    def _declare(self, record: list[Any]) -> None:
-        raise RefusedError(f"a record {quoted(record)} that no leaf of this proof can refer to")
 
     def _tests(self) -> dict[type[Record], Test]:
         return super()._tests() | {records.Unbalanced: self._unbalanced}

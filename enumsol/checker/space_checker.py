@@ -15,10 +15,18 @@ from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.space_condensed import EnclosedSpace
 from enumsol.proof.reading import RefusedError, data_of, exponents_from, rational_from, shown_alpha
 from enumsol.proof.records import Limits, NoRoot, RegularRoot
-from enumsol.proof.space_records import LEAVES, BoxedRoot, ExcludedInSpace, OnlyRoot
+from enumsol.proof.space_records import (
+    LEAVES,
+    BoxedRoot,
+    DeclaredSlipForm,
+    ExcludedBySlipForm,
+    ExcludedInSpace,
+    OnlyRoot,
+)
 from enumsol.trusted.space.boxed_solution import apart_in_boxes, is_inside, solution_in_box
 from enumsol.trusted.space.leaves import Open, distinct_roots, settle
 from enumsol.trusted.space.sector_rows import STICK, UNDECIDED, is_sector_covering, sector_margin
+from enumsol.trusted.space.slip_forms import SlipForm
 from enumsol.trusted.space.space_uniqueness import OnlySolution, only_root, only_solution_in_space
 
 if TYPE_CHECKING:
@@ -43,6 +51,8 @@ class SpaceChecker(TreeChecker):
     boxed: list[tuple[tuple[int, ...], BoxedSolution]] = field(default_factory=list)
     #: What boxes hold that were tested.
     known: dict[bytes, BoxedSolution | None] = field(default_factory=dict)
+    #: The form that was declared last.
+    form: SlipForm | None = None
 
     # -- header and tree -------------------------------------------------------------------------------------------
 
@@ -81,6 +91,7 @@ class SpaceChecker(TreeChecker):
     def _tests(self) -> dict[type[Record], Test]:
         return {
             ExcludedInSpace: self._excluded,
+            ExcludedBySlipForm: self._excluded_by_form,
             NoRoot: self._no_root,
             RegularRoot: self._regular_root,
             BoxedRoot: self._in_box,
@@ -94,6 +105,22 @@ class SpaceChecker(TreeChecker):
     def _excluded(self, codes: Codes, said: ExcludedInSpace) -> str | None:
         positive = sector_margin(self.system, codes, said.rows, said.values) > 0
         return None if positive else "its multipliers do not exclude it"
+
+    def _declare(self, record: list[Any]) -> None:
+        system = self.system
+        try:
+            limits = Limits((UNDECIDED,) * self.problem.p, components=len(system.g))
+            directions = DeclaredSlipForm.read(record, limits).directions
+            if self.form is None or not np.array_equal(self.form.directions, directions):
+                self.form = SlipForm.of(system, directions)
+        except ValueError as error:
+            raise RefusedError(str(error)) from None
+
+    def _excluded_by_form(self, codes: Codes, said: ExcludedBySlipForm) -> str | None:
+        if self.form is None:
+            return "its form was not declared"
+        positive = sector_margin(self.system, codes, said.rows, said.values, form=self.form) > 0
+        return None if positive else "its multipliers and its form do not exclude it"
 
     def _no_root(self, codes: Codes, said: NoRoot) -> str | None:
         del said

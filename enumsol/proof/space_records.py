@@ -13,10 +13,12 @@ from enumsol.model.sectors import DEEPEST, RUN
 from enumsol.proof.reading import bytes_from, numbers_from, quoted
 from enumsol.proof.records import (
     ClosingRecord,
+    DeclaredForm,
     EnclosureRecord,
     Exclusion,
     Limits,
     NoRoot,
+    Record,
     RecordError,
     RegularRoot,
     Solved,
@@ -61,6 +63,30 @@ class ExcludedInSpace(Exclusion):
     def entries(self) -> Iterable[Any]:
         """Rows, and the multipliers as a text."""
         return self.rows, base64.b64encode(self.values.astype("<f8").tobytes()).decode()
+
+
+@dataclass(frozen=True, eq=False)
+class DeclaredSlipForm(Record):
+    """A form to which later leaves refer: a number for each tau."""
+
+    kind, sizes, unfit = DeclaredForm.kind, (2,), "a form has {} entries; expected {}"
+
+    directions: Array
+
+    @classmethod
+    def of(cls, entries: list[Any], limits: Limits) -> DeclaredSlipForm:
+        """The numbers; ValueError where there are not as many as tau."""
+        try:
+            return cls(numbers_from(entries[0], limits.components - limits.p))
+        except ValueError as error:
+            raise ValueError(f"a form cannot be read: {error}") from None
+
+
+@dataclass(frozen=True, eq=False)
+class ExcludedBySlipForm(ExcludedInSpace):
+    """The same with the form that was declared last in place of the energy."""
+
+    kind = "f"
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +156,9 @@ class BoxedRoot(Solved):
 
 
 #: All kinds of leaves in 3D.
-LEAVES = table_of(ExcludedInSpace, NoRoot, RegularRoot, BoxedRoot, OnlyRoot, Unloaded, UndecidedRecord)
+LEAVES = table_of(
+    ExcludedInSpace, ExcludedBySlipForm, NoRoot, RegularRoot, BoxedRoot, OnlyRoot, Unloaded, UndecidedRecord
+)
 #: The same of a body that nothing holds; others rest on a stiffness that is positive definite.
 FLOATING_LEAVES = table_of(ExcludedInSpace, Unbalanced, NoRoot, RegularRoot, UndecidedRecord)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.selections.solution import Codes
-    from enumsol.trusted.quadratic_forms import EnclosedForm
 
 #: Largest violation of a row (rows of unit length in the norm of S^{-1}) that the QP ignores.
 FEASIBILITY_TOLERANCE = 1e-11
@@ -43,8 +42,8 @@ class Relaxation(Protocol):
     bound: float
 
     @property
-    def form(self) -> EnclosedForm | None:
-        """The form that ``bound`` is about; None for the energy."""
+    def form(self) -> Any:
+        """The form that ``bound`` is about: an EnclosedForm, in 3D a SlipForm; None for the energy."""
 
     @property
     def forces(self) -> NDArray[np.float64]:

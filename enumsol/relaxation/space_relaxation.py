@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 from typing import TYPE_CHECKING
+from weakref import WeakSet
 
 import numpy as np
 
@@ -33,10 +35,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.space_condensed import SpaceSystem
-    from enumsol.relaxation._active_set import QPState
+    from enumsol.relaxation._active_set import QPData, QPState
     from enumsol.selections.solution import Codes
-    from enumsol.trusted.quadratic_forms import EnclosedForm
     from enumsol.trusted.space.sector_rows import Row
+    from enumsol.trusted.space.slip_forms import SlipForm
 
     Array = NDArray[np.float64]
     Children = dict[tuple[int, ...], "SpaceRelaxation"]
@@ -85,20 +87,12 @@ class SpaceEngine:
         self.system = system
         p = system.p
         self.slots = _ROWS // p
-        rows = self.slots * p
-        start = np.arange(rows + 1, dtype=np.intp) * _ENTRIES
-        zeros = np.zeros(rows * _ENTRIES)
-        self._state = _active_set.QPState
-        self.data = _active_set.QPData(
-            system.S,
-            system.g,
-            -system.S,
-            system.g,
-            start,
-            np.zeros(rows * _ENTRIES, dtype=np.intp),
-            zeros,
-            zeros[:rows],
-        )
+        self._state, self._programs = _active_set.QPState, _active_set.QPData
+        self.data = self._bounded(system.S, system.g)
+        #: The form that relaxations bound; None for the energy.
+        self.form: SlipForm | None = None
+        #: This engine and those with the same rows.
+        self._sharing = WeakSet([self])
         self._known: list[dict[tuple[int, int], int]] = [{} for _ in range(p)]
         self._imposed: dict[tuple[int, int], tuple[list[int], list[int]]] = {}
         self.tangents = np.sum(system.tau >= 0, axis=1).tolist()
@@ -108,7 +102,7 @@ class SpaceEngine:
         self._discs = nodes, system.tau[nodes].T, system.tau_scale[nodes].T, system.disc_scale[nodes] * (1.0 + _OUTSIDE)
         #: Row by number, for multipliers, and what the program's row is of it.
         self.rows: dict[int, Row] = {}
-        self.scale, self._unit = np.ones(rows), system.row_unit.tolist()
+        self.scale, self._unit = np.ones(self.slots * p), system.row_unit.tolist()
         self.limit = 400 + 20 * len(system.g)
         self.full = False
 
@@ -125,13 +119,33 @@ class SpaceEngine:
             self._put(slot * self.system.p + node, row)
         return known[kind, number]
 
+    def _bounded(self, H: Array, h: Array) -> QPData:
+        """Programs that bound y'H y - h'y, without rows."""
+        system, rows = self.system, self.slots * self.system.p
+        start, zeros = np.arange(rows + 1, dtype=np.intp) * _ENTRIES, np.zeros(rows * _ENTRIES)
+        return self._programs(H, h, -system.S, system.g, start, zeros.astype(np.intp), zeros, zeros[:rows])
+
+    def bounding(self, form: SlipForm) -> SpaceEngine:
+        """An engine with the same rows whose relaxations bound a form, which is convex, in place of the energy."""
+        other = copy.copy(self)
+        other.form, other.data = form, self._bounded(form.H, form.h)
+        for place, row in self.rows.items():
+            other.data.put_row(place, *self._stored(place, row))
+        self._sharing.add(other)
+        return other
+
     def _put(self, place: int, row: Row) -> None:
-        """Store a row in the units of y and w, scaled so that its largest coefficient stays of size one."""
+        """Store a row."""
+        indices, values = self._stored(place, row)
+        for engine in self._sharing:
+            engine.data.put_row(place, indices, values)
+
+    def _stored(self, place: int, row: Row) -> tuple[tuple[int, ...], list[float]]:
+        """A row in the units of y and w, scaled so that its largest coefficient stays of size one."""
         indices, coefficients = sector_row_terms(row, self.system.tau, len(self.system.g))
         units = [self._unit[i] for i in indices]
         scale = self.scale[place] = 1.0 / max(units)
-        values = [value * (unit * scale) for value, unit in zip(coefficients, units, strict=True)]
-        self.data.put_row(place, indices, values)
+        return indices, [value * (unit * scale) for value, unit in zip(coefficients, units, strict=True)]
 
     def imposed(self, node: int, code: int) -> tuple[list[int], list[int]]:
         """Numbers and modes of the rows that a node imposes in a (partial) status."""
@@ -195,8 +209,6 @@ class SpaceRelaxation:
 
     __slots__ = ("_engine", "_excluded", "_found", "_kept", "_shaving", "_state", "bound", "cut", "pruned", "stalled")
 
-    form: EnclosedForm | None = None
-
     def __init__(self, engine: SpaceEngine, state: QPState, rows: list[int], modes: list[int]) -> None:
         self._engine, self._state = engine, state
         #: Children solved already, by their rows.
@@ -231,6 +243,11 @@ class SpaceRelaxation:
             if slot is not None and not self._state.mode_of(slot * engine.system.p + node):
                 rows.append(slot * engine.system.p + node)
         return rows
+
+    @property
+    def form(self) -> SlipForm | None:
+        """The form that ``bound`` is about; None for the energy."""
+        return self._engine.form
 
     @property
     def forces(self) -> Array:

@@ -30,7 +30,6 @@ if TYPE_CHECKING:
     from enumsol.search.resume import Reader
     from enumsol.search.tree import TreeSearch
     from enumsol.support.workers import Job
-    from enumsol.trusted.quadratic_forms import EnclosedForm
 
 #: Nodes of a task, and those that are examined here before there are any.
 NODES, FIRST = 512, 64
@@ -84,15 +83,13 @@ class Searchable(Protocol):
 class _Sent:
     """What a worker makes its solvers from, and uses for many tasks."""
 
-    form: EnclosedForm | None
+    form: Any
     sliding: dict[int, int]
     data: bytes
     key: bytes
 
     @classmethod
-    def of(
-        cls, remake: Callable[[], Searchable], form: EnclosedForm | None, sliding: dict[int, int], known: Any
-    ) -> _Sent:
+    def of(cls, remake: Callable[[], Searchable], form: Any, sliding: dict[int, int], known: Any) -> _Sent:
         data = pickle.dumps((remake, form, sliding, known))
         return cls(form, dict(sliding), data, hashlib.sha256(data).digest())
 

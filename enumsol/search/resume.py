@@ -39,7 +39,7 @@ class RecordedBound:
 
     rows: NDArray[np.intp]
     values: NDArray[np.float64]
-    form: EnclosedForm | None = None
+    form: Any = None
     bound: float = np.inf
 
     def multipliers(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
@@ -61,7 +61,7 @@ class Reader(Protocol):
     def declare(self, record: list[Any]) -> None:
         """Take note of a form; ValueError where the record makes no sense."""
 
-    def form_over(self, codes: Codes) -> EnclosedForm | None:
+    def form_over(self, codes: Codes) -> Any:
         """The form that was used last of those that hold over a partial assignment."""
 
     def bound(self, codes: Codes, record: list[Any]) -> Bound:
@@ -95,7 +95,7 @@ class PlaneReader:
         # parts of one search declare the same form
         self._declared.append(next((known for known in self._used if known.same(said)), said))
 
-    def form_over(self, codes: Codes) -> EnclosedForm | None:
+    def form_over(self, codes: Codes) -> Any:
         """The form that was used last of those that hold over a partial assignment."""
         return next((form for said, form in reversed(self._used.items()) if said.holds(codes)), None)
 

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from enumsol.search.fathoming import Closer
     from enumsol.search.fathoming_in_contact import LoneProposal
     from enumsol.search.space.space_fathoming import SpaceCloser
-    from enumsol.trusted.quadratic_forms import EnclosedForm
+    from enumsol.search.space.space_forms import SpaceForms
 
 #: Progress is reported and limits on time are looked at after this many nodes.
 _REPORT_EVERY = 64
@@ -96,7 +96,7 @@ class TreeSearch:
     progress : called with a SearchProgress now and then
     closer : Closer, optional
         Closes subtrees by their only possible solution.
-    forms : Forms, optional
+    forms : Forms or SpaceForms, optional
         What a long search may bound with in place of the energy.
     """
 
@@ -110,7 +110,7 @@ class TreeSearch:
         limits: SearchLimits | None = None,
         progress: Callable[[SearchProgress], object] | None = None,
         closer: Closer | SpaceCloser | None = None,
-        forms: Forms | None = None,
+        forms: Forms | SpaceForms | None = None,
     ) -> None:
         self.system = system
         self.certifier = certifier
@@ -172,7 +172,7 @@ class TreeSearch:
             self.report(self.covered)
         return found is not None
 
-    def _begin(self, start: list[TreeNode], held: KeptRecords, forms: Forms) -> list[Any]:
+    def _begin(self, start: list[TreeNode], held: KeptRecords, forms: Forms | SpaceForms) -> list[Any]:
         """Search until it is known how the search goes on: from the beginning, if that is better; what still waits."""
 
         def due() -> bool:
@@ -190,7 +190,7 @@ class TreeSearch:
             return list(start)
         return stack
 
-    def _pays(self, forms: Forms) -> bool:
+    def _pays(self, forms: Forms | SpaceForms) -> bool:
         """Whether a form is found that is better than the energy, before the time is over."""
         try:
             with within(self.limits):
@@ -204,7 +204,7 @@ class TreeSearch:
         self.outcome.forget()
         self.covered = 0.0
 
-    def below(self, items: Sequence[TreeNode], form: EnclosedForm | None, *, trial: bool = False) -> None:
+    def below(self, items: Sequence[TreeNode], form: Any, *, trial: bool = False) -> None:
         """Examine subtrees, the last first, with a form that is known to hold for them; or on trial with a new one."""
         forms = self.forms
         if forms is not None:

@@ -67,8 +67,49 @@ class Equations:
 
 
 @dataclass(frozen=True, eq=False)
-class EnclosedForm:
-    """q(lambda) = lambda'H lambda - h'lambda + k for all data of an enclosure.
+class QuadraticForm:
+    """q(y) = y'H y - h'y + k for all data of an enclosure, as ``energy_bounds.form_bounds`` takes it.
+
+    Attributes
+    ----------
+    system : EnclosedSystem, in 3D EnclosedSpace
+        m components of y.
+    H, H_rad : (m, m) arrays, H symmetric
+    h, h_rad : (m,) arrays
+    k, k_rad : float
+    """
+
+    system: EnclosedSystem
+    H: Array
+    H_rad: Array
+    h: Array
+    h_rad: Array
+    k: float
+    k_rad: float
+
+    @cached_property
+    def smallest_eigenvalue(self) -> float:
+        """Proven lower bound on the smallest eigenvalue of every H; not positive when none was found."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            if not (np.all(np.isfinite(self.H)) and np.all(np.isfinite(self.H_rad))):
+                return 0.0
+            return float((dense_eigenvalue_bound(self.H) - float(upper_norm(self.H_rad))) / SAFE)
+
+    @cached_property
+    def inverse(self) -> Array:
+        """Approximate inverse of H; no claim rests on its accuracy."""
+        return np.asarray(np.linalg.inv(self.H))
+
+    @cached_property
+    def form_error(self) -> float:
+        """kappa with |fl(x'H x) - x'H x| <= kappa ||x||^2 for every H."""
+        size = 4 * len(self.h) + 4
+        return float((upper_norm(self.H_rad) + gamma(size) * upper_norm(self.H)) * SAFE)
+
+
+@dataclass(frozen=True, eq=False)
+class EnclosedForm(QuadraticForm):
+    """The form of a partial assignment in 2D; y is lambda, m = 2p.
 
     Attributes
     ----------
@@ -77,10 +118,6 @@ class EnclosedForm:
         mu, nu, alpha and beta of every node.
     weight : float
         That of the equations.
-    system : EnclosedSystem
-    H, H_rad : (2p, 2p) arrays, H symmetric
-    h, h_rad : (2p,) arrays
-    k, k_rad : float
     F_rad : (p,) array
         As of the system.
     """
@@ -88,13 +125,6 @@ class EnclosedForm:
     codes: tuple[int, ...]
     multipliers: Array
     weight: float
-    system: EnclosedSystem
-    H: Array
-    H_rad: Array
-    h: Array
-    h_rad: Array
-    k: float
-    k_rad: float
     F_rad: Array
 
     @classmethod
@@ -152,23 +182,4 @@ class EnclosedForm:
             h_rad = (h_rad + off * (1 + error) + 2 * UNIT * np.abs(h)) * SAFE + TINY
             k = float(np.sum(factor * b * b))
             k_rad = float(np.sum(factor * b_rad * (2 * b_size + b_rad)) + error * k) * (1 + error) * SAFE + TINY
-        return cls(tuple(codes), multipliers, weight, system, H, H_rad, h, h_rad, k, k_rad, system.F_rad)
-
-    @cached_property
-    def smallest_eigenvalue(self) -> float:
-        """Proven lower bound on the smallest eigenvalue of every H; not positive when none was found."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            if not (np.all(np.isfinite(self.H)) and np.all(np.isfinite(self.H_rad))):
-                return 0.0
-            return float((dense_eigenvalue_bound(self.H) - float(upper_norm(self.H_rad))) / SAFE)
-
-    @cached_property
-    def inverse(self) -> Array:
-        """Approximate inverse of H; no claim rests on its accuracy."""
-        return np.asarray(np.linalg.inv(self.H))
-
-    @cached_property
-    def form_error(self) -> float:
-        """kappa with |fl(x'H x) - x'H x| <= kappa ||x||^2 for every H."""
-        size = 4 * len(self.h) + 4
-        return float((upper_norm(self.H_rad) + gamma(size) * upper_norm(self.H)) * SAFE)
+        return cls(system, H, H_rad, h, h_rad, k, k_rad, tuple(codes), multipliers, weight, system.F_rad)

@@ -8,12 +8,14 @@ from math import ceil, floor
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from problems3d import from_compliance
-from proof_tools import copied, leaves_of, proof_of
+from problems3d import from_compliance, random_coupled
+from proof_tools import copied, leaves_of, proof_of, records_of
 from space_proofs import case, of_kind, values_of, with_values
+from trees import by_the_tree, forms_at_once
 
-from enumsol import ContactProblem3D, verify
+from enumsol import ContactProblem3D, enumerate_roots, verify
 from enumsol.checker.space_checker import SpaceChecker
+from enumsol.proof.reading import RefusedError
 
 
 def solved(A, B):
@@ -98,10 +100,32 @@ class Space:
             return "+" if a <= c and d <= b else "."
         return (table[code] if code < 8 else "E+....+")[kind]
 
-    def bound(self, codes, rows, values, force, length):
+    def form(self, c):
+        """H and h of the form that c declares; None where c is longer than one or H is not positive definite."""
+        share, p, size = [Fraction(x) for x in c], len(self.F[0]), len(self.g)
+        rows, h = copied(self.S), list(self.g)
+        for i in range(p):
+            own = [t for k in range(2) if (t := self.tau.get((i, k))) is not None]
+            if sum(share[t - p] ** 2 for t in own) > 1:
+                return None
+            for t in own:
+                rows[i] = [x - share[t - p] * y for x, y in zip(rows[i], self.S[t], strict=True)]
+                h[i] -= share[t - p] * self.g[t]
+        H = [[(rows[i][j] + rows[j][i]) / 2 for j in range(size)] for i in range(size)]
+        left = copied(H)
+        for k in range(size):  # pivots
+            if left[k][k] <= 0:
+                return None
+            for i in range(k + 1, size):
+                factor = left[i][k] / left[k][k]
+                left[i] = [x - factor * y for x, y in zip(left[i], left[k], strict=True)]
+        return H, h
+
+    def bound(self, codes, rows, values, force, length, form=None):
         """The bound under Exclusion in the document, or None where a multiplier is not allowed."""
         size = len(self.g)
-        v, constant = list(self.g), Fraction(0)
+        H, h = form or (self.S, self.g)
+        v, constant = list(h), Fraction(0)
         for (kind, node, number), value in zip(rows, values, strict=True):
             sign = self.allowed(codes[node], kind, number)
             if sign == "." or (sign == "+" and value < 0):
@@ -114,7 +138,7 @@ class Space:
                 constant += u * c * self.g[i]
                 for j in range(size):
                     v[j] -= u * c * self.S[i][j]
-        z = solved(self.S, [[x] for x in v])
+        z = solved(H, [[x] for x in v])
         return -constant - sum(x * y[0] for x, y in zip(v, z, strict=True)) / 4
 
 
@@ -188,6 +212,40 @@ def test_exclusions_hold_in_rationals(name):
     assert of_kind(records, "x")
     assert excluded(problem, records)
     covers(problem, records)
+
+
+def test_exclusions_by_a_form_hold_in_rationals_and_no_others_are_accepted():
+    rng = np.random.default_rng(3)
+    S, g, F = random_coupled(np.random.default_rng(6), 2)
+    problem = from_compliance(S, g, (F[:, 0], F[:, 1]))
+    with by_the_tree(), forms_at_once():
+        records = records_of(enumerate_roots(problem, 0).proof)
+    (declared, *_), places = of_kind(records, "q"), of_kind(records, "f")
+    space, header, codes = Space(problem), records[0], dict(leaves_of(records))
+    checker = SpaceChecker(problem, None)
+    checker._read_header(header)
+    counts = [0, 0]
+    for factor in (1.0, 0.8, 1.05, 0.0):
+        c = [factor * x for x in records[declared][1]]
+        form = space.form(c)
+        try:
+            checker._declare(["q", c])
+        except RefusedError:
+            assert form is None
+            continue
+        for k in places:
+            rows = records[k][1]
+            if factor == 1.0:
+                bound = space.bound(codes[k], rows, values_of(records[k]), header["force"], header["length"], form)
+                assert bound > 0
+            for _ in range(6):
+                values = values_of(records[k])
+                values[int(rng.integers(len(values)))] *= float(rng.choice((0.0, 0.5, 1.01, 2.0, -1.0)))
+                accepted = checker._leaf(codes[k], with_values(records[k], values)) is None
+                bound = form and space.bound(codes[k], rows, values, header["force"], header["length"], form)
+                assert accepted == (bound is not None and bound > 0)
+                counts[accepted] += 1
+    assert min(counts) > 5
 
 
 def test_sectors_are_cut_otherwise_than_in_halves():

@@ -58,6 +58,8 @@ def leaves_of(records):
     p = records[0]["p"]
     stack, found = [(6,) * p], []
     for k, record in enumerate(records[1:-1], start=1):
+        if record[0] == "q":
+            continue
         codes = stack.pop()
         if record[0] == "b":
             _, node, children = record

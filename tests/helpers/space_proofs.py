@@ -79,7 +79,7 @@ def values_of(record):
 
 def with_values(record, values):
     """The exclusion with other multipliers."""
-    return ["x", record[1], base64.b64encode(struct.pack(f"<{len(values)}d", *values)).decode()]
+    return [record[0], record[1], base64.b64encode(struct.pack(f"<{len(values)}d", *values)).decode()]
 
 
 # -- mutants -----------------------------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ from enumsol.branches.enclosed.single_branches import ClosedPieces
 from enumsol.search import fathoming as closing
 from enumsol.search.fathoming import Closer
 from enumsol.search.reduction import WeightSource
+from enumsol.search.space import space_forms
 from enumsol.search.space.known_boxes import KnownBoxes
 from enumsol.search.space.space_fathoming import SpaceCloser
 
@@ -47,4 +48,13 @@ def above_known_roots():
         patch.setattr(Closer, "whole", whole)
         patch.setattr(Closer, "closed", closed)
         patch.setattr(closing, "_FEW", 0)
+        yield
+
+
+@contextmanager
+def forms_at_once():
+    """In this context searches in 3D look for a form after one node, and use the best one that there is."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(space_forms, "NODES", 1)
+        patch.setattr(space_forms, "_SHARE", 1.0)
         yield

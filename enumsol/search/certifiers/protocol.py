@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from enumsol.proof.compressed_parts import Part, Recorder
     from enumsol.proof.records import Record
     from enumsol.selections.solution import Codes
-    from enumsol.trusted.quadratic_forms import EnclosedForm
 
 
 #: The balls written into a proof are wider than those found by this factor, so that a checker's own balls fit in.
@@ -104,8 +103,8 @@ class Bound(Protocol):
         """A lower bound that is positive."""
 
     @property
-    def form(self) -> EnclosedForm | None:
-        """The form that ``bound`` is about; None for the energy."""
+    def form(self) -> Any:
+        """The form that ``bound`` is about: an EnclosedForm, in 3D a SlipForm; None for the energy."""
 
     def multipliers(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
         """Rows and their multipliers, which prove ``bound``."""

@@ -84,9 +84,13 @@ class FloatingSpaceSolvers(SpaceSolvers):
     def _closer(self, certifier: Certifier) -> None:
         """There may be no solution: no certificate takes the place of a tree."""
 
+    def _forms(self) -> None:
+        """Bounds of these bodies are of the energy."""
+
     def reader(self) -> FloatingSpaceReader:
         """Understands the records of an earlier proof."""
-        return FloatingSpaceReader(self._engine, len(self.problem.modes.held) if self.problem.modes else 0)
+        modes = len(self.problem.modes.held) if self.problem.modes else 0
+        return FloatingSpaceReader(self._engine, self.enclosed, modes)
 
     def unloaded(self) -> bool:
         """Without load the body may be moved: there is no one solution."""
@@ -102,15 +106,20 @@ class FloatingSpaceReader(SpaceReader):
 
     Parameters
     ----------
-    engine : SpaceEngine
+    engine, enclosed : as of SpaceReader
     modes : number of rigid modes
     """
 
     kinds = FLOATING_LEAVES
 
-    def __init__(self, engine: SpaceEngine, modes: int) -> None:
-        super().__init__(engine)
+    def __init__(self, engine: SpaceEngine, enclosed: EnclosedSpace, modes: int) -> None:
+        super().__init__(engine, enclosed)
         self._modes = modes
+
+    def declare(self, record: list[Any]) -> None:
+        """There are no forms."""
+        del record
+        raise ValueError("a form in a proof about a body in 3D that nothing holds")
 
     def bound(self, codes: Codes, record: list[Any]) -> Bound:
         """What is said to exclude a partial assignment; ValueError where the record makes no sense."""

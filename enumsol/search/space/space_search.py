@@ -10,7 +10,14 @@ from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.model.sectors import DEEPEST, RUN, SECTORS, around, direction, end_number, is_sector, level_of, nearest
 from enumsol.model.statuses import CONTACT, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.proof.records import EnclosureRecord, Limits, NoRoot, RegularRoot, UndecidedRecord
-from enumsol.proof.space_records import LEAVES, BoxedRoot, ExcludedInSpace, OnlyRoot
+from enumsol.proof.space_records import (
+    LEAVES,
+    BoxedRoot,
+    DeclaredSlipForm,
+    ExcludedBySlipForm,
+    ExcludedInSpace,
+    OnlyRoot,
+)
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
 from enumsol.search.certifiers.protocol import WIDEN, Certified, RecordingCertifier, Refine, UndecidedPart
@@ -18,6 +25,7 @@ from enumsol.search.resume import RecordedBound
 from enumsol.search.space.known_boxes import KnownBoxes
 from enumsol.trusted.space.leaves import Cause, Open, SpaceRoot, settle
 from enumsol.trusted.space.sector_rows import is_sector_covering, sector_margin, sector_row_terms
+from enumsol.trusted.space.slip_forms import SlipForm
 from enumsol.trusted.space.space_uniqueness import OnlySolution, only_root, only_solution_in_space
 from enumsol.trusted.space.turning import turned_by
 
@@ -92,20 +100,30 @@ class SpaceReader:
     Parameters
     ----------
     engine : SpaceEngine
+    enclosed : EnclosedSpace
+        Balls for its system, by which forms are proven.
     """
 
     kinds = LEAVES
 
-    def __init__(self, engine: SpaceEngine) -> None:
-        self._engine = engine
+    def __init__(self, engine: SpaceEngine, enclosed: EnclosedSpace) -> None:
+        self._engine, self._enclosed = engine, enclosed
+        #: The form that was declared last.
+        self._form: SlipForm | None = None
 
     def declare(self, record: list[Any]) -> None:
-        """There are no forms in 3D."""
-        del record
-        raise ValueError("a form in a proof in 3D")
+        """Take note of a form; ValueError where the record makes no sense."""
+        system = self._engine.system
+        limits = Limits((UNDECIDED,) * system.p, components=len(system.g))
+        directions = DeclaredSlipForm.read(record, limits).directions
+        # parts of one search declare the same form
+        if self._form is None or not np.array_equal(self._form.directions, directions):
+            self._form = SlipForm.of(self._enclosed, directions)
 
-    def form_over(self, codes: Codes) -> None:
-        """No form."""
+    def form_over(self, codes: Codes) -> SlipForm | None:
+        """The form that was declared last, which holds over all partial assignments."""
+        del codes
+        return self._form
 
     def lone(self, codes: Codes, record: list[Any]) -> tuple[LoneProposal, Bound]:
         """No root is proven to be alone so in 3D."""
@@ -115,7 +133,10 @@ class SpaceReader:
     def bound(self, codes: Codes, record: list[Any]) -> Bound:
         """What is said to exclude a partial assignment; ValueError where the record makes no sense."""
         engine, p = self._engine, len(codes)
-        said = ExcludedInSpace.read(record, Limits(codes))
+        by_form = record[0] == ExcludedBySlipForm.kind
+        if by_form and self._form is None:
+            raise ValueError("its form was not declared")
+        said = (ExcludedBySlipForm if by_form else ExcludedInSpace).read(record, Limits(codes))
         rows = said.rows
         for row in rows:
             sector_row_terms(row, engine.system.tau, len(engine.system.g))  # there is such a row
@@ -123,7 +144,7 @@ class SpaceReader:
         numbers = [slot * p + row[1] for slot, row in zip(slots, rows, strict=True) if slot is not None]
         if len(numbers) < len(rows):
             raise ValueError("no room for its rows")
-        return RecordedBound(np.array(numbers, dtype=np.intp), said.values)
+        return RecordedBound(np.array(numbers, dtype=np.intp), said.values, self._form if by_form else None)
 
 
 def _towards(code: int, vector: np.ndarray) -> float:
@@ -148,6 +169,8 @@ class SpaceCertifier(RecordingCertifier):
         super().__init__(recorder)
         self._engine, self.enclosed = engine, enclosed
         self._boxes = KnownBoxes(engine.system, enclosed)
+        #: The form that was written last.
+        self._form: SlipForm | None = None
 
     @property
     def certified(self) -> Certified:
@@ -160,10 +183,24 @@ class SpaceCertifier(RecordingCertifier):
             return False
         numbers, values = relaxation.multipliers()
         rows = [self._engine.rows[number] for number in numbers.tolist()]
-        if not sector_margin(self.enclosed, codes, rows, values, errors=2.0) > 0:
+        form = relaxation.form
+        if not sector_margin(self.enclosed, codes, rows, values, 2.0, form) > 0:
             return False
-        self._leaf(ExcludedInSpace(rows, values))
+        if form is not None and form is not self._form:
+            self._form = form
+            self.recorder.write(DeclaredSlipForm(form.directions).write())
+        self._leaf((ExcludedInSpace if form is None else ExcludedBySlipForm)(rows, values))
         return True
+
+    def add(self, part: Certified) -> None:
+        """Take over what the certifier of a subtree has proven, which may have declared another form."""
+        super().add(part)
+        self._form = None
+
+    def forget(self) -> None:
+        """Forget what was proven, and what was declared."""
+        super().forget()
+        self._form = None
 
     def selection(self, codes: Codes) -> SpaceRoot | BoxedSolution | UndecidedPart | Refine | None:
         """The root of a leaf, a sector to halve, or why the leaf stays open."""

@@ -15,6 +15,7 @@ from enumsol.proof.writer import point_header, unit_exponents
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.certifiers.protocol import Unrecorded
 from enumsol.search.space.space_fathoming import SpaceCloser
+from enumsol.search.space.space_forms import SpaceForms
 from enumsol.search.space.space_search import SpaceCertifier, SpaceReader, SpaceSplitting
 from enumsol.search.tree import TreeSearch
 
@@ -115,11 +116,16 @@ class SpaceSolvers:
             limits=limits,
             progress=progress,
             closer=self._closer(certifier),
+            forms=self._forms(),
         )
 
     def _closer(self, certifier: Certifier) -> SpaceCloser | None:
         """What decides the whole problem without a tree, where that serves."""
         return SpaceCloser(self.system, cast("SpaceClosing", certifier), regular=self.arithmetic == "fast")
+
+    def _forms(self) -> SpaceForms | None:
+        """What a long search may bound with in place of the energy."""
+        return SpaceForms(self.system, self.enclosed)
 
     def remake(self) -> Callable[[], SpaceSolvers]:
         """Makes the same again, also in another process."""
@@ -137,7 +143,7 @@ class SpaceSolvers:
 
     def reader(self) -> SpaceReader:
         """Understands the records of an earlier proof."""
-        return SpaceReader(self._engine)
+        return SpaceReader(self._engine, self.enclosed)
 
     def proof_header(self) -> dict[str, Any]:
         """First record of a proof (see enumsol.proof.proof_file).

@@ -23,7 +23,7 @@ from enumsol.model.sectors import (
     level_of,
     span,
 )
-from enumsol.trusted.energy_bounds import energy_bounds
+from enumsol.trusted.energy_bounds import energy_bounds, form_bounds
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.space_condensed import EnclosedSpace
+    from enumsol.trusted.space.slip_forms import SlipForm
 
     Array = NDArray[np.float64]
 
@@ -187,16 +188,30 @@ class Multiplied:
 
 @np.errstate(over="ignore", invalid="ignore")
 def sector_margin(
-    system: EnclosedSpace, codes: Sequence[int], rows: Sequence[Row], values: Array, errors: float = 1.0
+    system: EnclosedSpace,
+    codes: Sequence[int],
+    rows: Sequence[Row],
+    values: Array,
+    errors: float = 1.0,
+    form: SlipForm | None = None,
 ) -> float:
     """Proven lower bound on the energy over a partial assignment; positive means that it holds no solution.
 
-    ``errors`` as in ``energy_bounds``; -inf where a multiplier has the wrong sign.
+    ``errors`` as in ``energy_bounds``; -inf where a multiplier has the wrong sign. With a ``form`` of the same system
+    the bound is on that form, and -inf where it is not proven convex.
     """
+    if form is not None and not form.smallest_eigenvalue > 0:
+        return -np.inf
     added = Multiplied.of(system, codes, rows, values)
     if added is None:
         return -np.inf
     y, y_rad, c, c_rad = added.y, added.y_rad, added.c, added.c_rad
+    if form is not None:
+        # y and what it is off by act on S y - g
+        c_rad = (c_rad + (np.abs(system.S) + system.S_rad) @ y_rad * (1 + gamma(len(y)))) * SAFE
+        bound = float(form_bounds(form, y[None], c[None], c_rad[None], errors)[0])
+        bound -= errors * float(upper_sum(y_rad * (np.abs(system.g) + system.g_rad))) * SAFE
+        return bound if np.isfinite(bound) else -np.inf
     bound = float(energy_bounds(system, y[None], c[None], c_rad[None], errors)[0])
     # rounded y are not quite multipliers: the bound is quadratic in y with the gradient g - v / 2, v = g + c + S y
     v = np.abs(system.g + c + system.S @ y) + system.product_error @ np.abs(y)

@@ -1,0 +1,212 @@
+"""Searches in 3D that bound another form than the energy (theory, (12.2a)): bodies on weak springs."""
+
+from fractions import Fraction
+
+import numpy as np
+import oracles3d
+import pytest
+from problems3d import forces, from_compliance, random_coupled, unmatched
+from proof_tools import bytes_of, copied, leaves_of, proof_of, records_of
+from space_proofs import of_kind, values_of, with_values
+from trees import by_the_tree, forms_at_once
+
+from enumsol import enumerate_roots, fem, verify
+from enumsol.arithmetic.balls import SAFE
+from enumsol.checker.space_checker import SpaceChecker
+from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.trusted.space.slip_forms import SlipForm
+
+
+def on_springs(seed, p=3, spring=1e-3):
+    """S, g, F of nodes on a common body on weak springs, which is pressed and pulled."""
+    rng = np.random.default_rng([seed, 3])
+    X = rng.normal(size=(3 * p, 3 * p))
+    together = np.kron(np.eye(3), np.ones((p, 1)))
+    S = X @ X.T / p + 0.2 * np.eye(3 * p) + together @ together.T / spring
+    load = np.array([1.0, *rng.uniform(-0.4, 0.4, 2)])
+    return S, together @ load / spring + 0.3 * rng.normal(size=3 * p), np.full((p, 2), rng.uniform(0.3, 1.5))
+
+
+def problem_of(data):
+    S, g, F = data
+    return from_compliance(S, g, (F[:, 0], F[:, 1]))
+
+
+@pytest.fixture(scope="module")
+def with_form():
+    """Problem, roots and records of a search whose proof has a form."""
+    problem = problem_of(on_springs(0))
+    with by_the_tree(), forms_at_once():
+        roots = enumerate_roots(problem, 0)
+    records = records_of(roots.proof)
+    assert of_kind(records, "q")
+    assert len(of_kind(records, "f")) > 3
+    return problem, roots, records
+
+
+@pytest.mark.slow
+def test_the_same_roots_as_by_the_energy_and_by_newton():
+    used = 0
+    for seed in range(8):
+        data = on_springs(seed, 2) if seed % 2 else random_coupled(np.random.default_rng(seed), 2)
+        problem = problem_of(data)
+        with by_the_tree():
+            plain = enumerate_roots(problem, 0)
+            with forms_at_once():
+                roots = enumerate_roots(problem, 0)
+        assert plain.complete
+        assert roots.complete
+        assert (len(roots), roots.index_sum) == (len(plain), 1)
+        assert [root.statuses for root in roots] == [root.statuses for root in plain]
+        missed, _ = unmatched(list(roots), oracles3d.newton_set(*data, 20, np.random.default_rng(seed)))
+        assert not missed
+        report = verify(problem, roots.proof)
+        assert report.complete
+        assert report.roots == len(roots)
+        used += bool(of_kind(records_of(roots.proof), "f"))
+    assert used >= 4
+
+
+def test_a_form_is_at_most_zero_at_solutions_and_what_the_theory_says():
+    rng = np.random.default_rng(1)
+    for seed in range(6):
+        S, g, F = random_coupled(np.random.default_rng(seed), 2)
+        F[0, seed % 2] = 0.0 if seed > 3 else F[0, seed % 2]
+        problem = from_compliance(S, g, (F[:, 0], F[:, 1]))
+        solvers, p = SpaceSolvers(problem, 0.0, "verified"), 2
+        enclosed, system = solvers.enclosed, solvers.system
+        angle = rng.uniform(0, 2 * np.pi, p)
+        c = 0.999 * np.column_stack([np.cos(angle), np.sin(angle)])
+        form = SlipForm.of(enclosed, c[enclosed.tau >= 0])
+        for root in enumerate_roots(problem, 0):
+            lam, v = forces(root), np.where(F > 0, F * root.u_t, 0.0)
+            tau = lam[p:].reshape(2, p).T / np.where(F > 0, F, 1.0)
+            y = np.concatenate([lam[:p] / system.force, (tau / system.force[:, None])[F > 0] / enclosed.unit[p:]])
+            wanted = np.sum(lam[:p] * (np.sum(np.where(F > 0, c, 0.0) * v, axis=1) - np.linalg.norm(v, axis=1)))
+            q = (y @ form.H @ y - form.h @ y) * system.force[0] * system.length[0]
+            assert q == pytest.approx(wanted, abs=1e-9 * max(1.0, np.max(np.abs(S)) * np.max(lam) ** 2))
+            assert wanted <= 1e-12
+
+
+def test_balls_of_a_form_hold_the_exact_one():
+    problem = problem_of(on_springs(3, 2))
+    enclosed, p = SpaceSolvers(problem, 0.0, "verified").enclosed, 2
+    c = np.array([0.3, -0.6, 0.123, 0.9])
+    form = SlipForm.of(enclosed, c)
+    S, g = [[Fraction(x) for x in row] for row in enclosed.S.tolist()], [Fraction(x) for x in enclosed.g.tolist()]
+    share = [Fraction(x) / Fraction(u) for x, u in zip(c.tolist(), enclosed.unit[p:].tolist(), strict=True)]
+    rows, load = copied(S), list(g)
+    for i in range(p):
+        for t in enclosed.tau[i].tolist():
+            rows[i] = [x - share[t - p] * y for x, y in zip(rows[i], S[t], strict=True)]
+            load[i] -= share[t - p] * g[t]
+    for i in range(3 * p):
+        assert abs(load[i] - Fraction(form.h[i])) <= Fraction(form.h_rad[i])
+        for j in range(3 * p):
+            exact = (rows[i][j] + rows[j][i]) / 2
+            assert abs(exact - Fraction(form.H[i, j])) <= Fraction(form.H_rad[i, j])
+    # no more than some roundings wider than the balls of S and g
+    assert np.max(form.H_rad) < 8 * np.max(enclosed.S_rad) + 1e-14 * np.max(np.abs(enclosed.S))
+
+
+@pytest.mark.parametrize("c", [[1.0, 1e-6, 0.0, 0.0], [0.0, 0.0, -1.0 * SAFE, 0.0], [0.0] * 3])
+def test_no_vector_is_longer_than_one(c):
+    enclosed = SpaceSolvers(problem_of(on_springs(3, 2)), 0.0, "verified").enclosed
+    with pytest.raises(ValueError, match=r"longer than one|3 numbers; expected 4"):
+        SlipForm.of(enclosed, np.array(c))
+
+
+def test_proofs_that_say_something_else_of_a_form_are_refused(with_form):
+    problem, roots, records = with_form
+    assert verify(problem, proof_of(records)).complete
+    (declared, *_), (first, *_) = of_kind(records, "q"), of_kind(records, "f")
+
+    def report(change):
+        changed = copied(records)
+        change(changed)
+        return verify(problem, proof_of(changed))
+
+    def lengthen(changed):
+        changed[declared][1][:2] = [0.8, 0.8]
+
+    def shorten(changed):
+        changed[declared][1].pop()
+
+    def turn(changed):
+        changed[declared][1] = [-x for x in changed[declared][1]]
+
+    def take_away(changed):
+        del changed[declared]
+
+    def late(changed):
+        changed.insert(first + 1, changed.pop(declared))
+
+    def by_energy(changed):
+        for k in of_kind(changed, "f"):
+            changed[k][0] = "x"
+
+    def weaken(changed):
+        changed[first] = with_values(changed[first], [0.0 for _ in values_of(changed[first])])
+
+    for change in (lengthen, shorten, turn, take_away, late, by_energy, weaken):
+        assert not report(change).ok, change.__name__
+    assert "longer than one" in str(report(lengthen))
+    assert len(roots) >= 1
+
+
+def test_a_form_that_is_not_convex_proves_nothing(with_form):
+    problem, _, records = with_form
+    checker = SpaceChecker(problem, None)
+    checker._read_header(records[0])
+    (place, *_), codes = of_kind(records, "f"), dict(leaves_of(records))
+    checker._declare(records[of_kind(records, "q")[0]])
+    assert checker._leaf(codes[place], records[place]) is None
+    object.__setattr__(checker.form, "H", checker.form.H - 10.0 * np.eye(len(checker.form.h)))
+    del checker.form.__dict__["smallest_eigenvalue"]
+    assert "do not exclude" in checker._leaf(codes[place], records[place])
+
+
+@pytest.mark.slow
+def test_a_search_goes_on_with_the_form_of_an_earlier_one(with_form, tmp_path):
+    problem, roots, records = with_form
+    with by_the_tree(), forms_at_once():
+        for most in (3, len(records) // 4):
+            path = tmp_path / f"{most}.proof"
+            begun = enumerate_roots(problem, 0, max_nodes=most, proof_path=path)
+            assert not begun.complete
+            again = enumerate_roots(problem, 0, proof_path=path, resume=True)
+            assert again.complete
+            assert len(again) == len(roots)
+            assert verify(problem, again.proof).complete
+
+
+def test_fast_arithmetic_finds_the_same(with_form):
+    problem, roots, _ = with_form
+    with by_the_tree(), forms_at_once():
+        assert len(enumerate_roots(problem, 0, "fast")) == len(roots)
+
+
+@pytest.mark.slow
+def test_a_body_on_weak_springs_takes_few_nodes():
+    """A box of tetrahedra with 9 contact nodes."""
+    problem = fem.mesh_problem(
+        fem.box(2, 2, 1, (1.0, 1.0, 0.5), "tetrahedra"),
+        young=1.0,
+        poisson=0.3,
+        contact="bottom",
+        spring={"top": (5e-4, 5e-4)},
+        load={"top": (3e-4, 1e-4, -1e-3)},
+        friction=1.0,
+    )
+    with by_the_tree():
+        roots = enumerate_roots(problem, 0)
+    assert roots.complete
+    assert of_kind(records_of(roots.proof), "f")
+    assert roots.stats.nodes <= 600
+    assert verify(problem, roots.proof).complete
+
+
+def test_forms_are_deterministic(with_form):
+    problem, roots, _ = with_form
+    with by_the_tree(), forms_at_once():
+        assert bytes_of(enumerate_roots(problem, 0).proof) == bytes_of(roots.proof)
