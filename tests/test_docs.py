@@ -87,7 +87,7 @@ def prose(source):
     return [joined(block) for block in (*blocks, " ".join(comment)) if block]
 
 
-@pytest.mark.few(93, 331)
+@pytest.mark.few(93)
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_references_in_sources(path):
     assert [c for block in prose(path.read_text(encoding="utf-8")) for c in unresolved(block)] == []

@@ -47,7 +47,7 @@ class JudgedSolution:
     ...     numpy.savez(f"{folder}/triangle-3.npz", lambda_n=[1.0], lambda_t=[-4.0])
     ...     (answer,) = enumsol.collection.check(folder).problems[0].answers
     >>> answer.found, answer.nearest, answer.distance, answer.reason
-    (False, ('root', 2), 0.125, 'its largest residual is 3.0e-01 (penetration)')
+    (False, ('root', 2), 0.125, 'its largest residual is 1.8e-01 (dissipation)')
     """
 
     file: str
@@ -177,7 +177,7 @@ class CollectionReport:
     triangle-3: missed root 1 (slip-; largest lambda_n 0.333)
     triangle-3: missed root 2 (stick; largest lambda_n 1.5)
     triangle-3: answer 1 of triangle-3.npz is none: the nearest is root 1, at a distance of 1.7e-01; its largest \
-residual is 4.4e-01 (dissipation)
+residual is 3.1e-01 (dissipation)
     1 problem tried, 0 of them with all solutions and no other answer; tolerance 0.0001
     """
 

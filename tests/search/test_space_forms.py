@@ -1,4 +1,4 @@
-"""Searches in 3D that bound another form than the energy (theory, (12.2a)): bodies on weak springs."""
+"""Searches in 3D that bound another form than the energy (theory, section 12.2): bodies on weak springs."""
 
 from fractions import Fraction
 
