@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class SlipForm(QuadraticForm):
-    """q(y) = e(y) + sum of lambda_n c . v over all nodes, which is at most zero at every solution; theory, section 12.2.
+    """q(y) = e(y) + sum of lambda_n c . v over all nodes, at most zero at every solution; theory, section 12.2.
 
     Attributes
     ----------
