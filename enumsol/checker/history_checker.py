@@ -162,8 +162,9 @@ class HistoryChecker:
         checker.locate_rational_roots()
         stage.roots, stage.complete = report.roots, report.complete and not report.families
         before = stage.start.ball
-        for forces, still in checker.located:
-            stage.ends.append(tangential_positions(enclosure, step.alpha, forces, still, before))
+        for forces, still, codes in checker.located:
+            end = tangential_positions(enclosure, step.alpha, forces, still, before, codes, share=0.5)
+            stage.ends.append(end)
 
     def _said(self, number: int, count: int, record: Any) -> _Stage:
         """What the record of a stage says."""

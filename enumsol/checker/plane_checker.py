@@ -23,6 +23,7 @@ from enumsol.proof.proof_file import fraction_text
 from enumsol.proof.reading import RefusedError, data_of, friction_at, rational_from, same, units_from
 from enumsol.trusted.at_alpha import holds_no_root, solve_selection
 from enumsol.trusted.exclusion import Leaves, exclusion_margins
+from enumsol.trusted.positions import certain_statuses
 from enumsol.trusted.quadratic_forms import EnclosedForm
 from enumsol.trusted.status_rows import ROW_KINDS, UNDECIDED, is_covering, row_signs
 from enumsol.trusted.uniqueness_in_contact import lone_root
@@ -243,8 +244,14 @@ class Checker(TreeChecker):
     def _locate(self, ball: VerifiedSelection | ClosedSolution) -> None:
         if self.located is not None:
             p = self.problem.p
-            forces = Ball(ball.force.mid * self.force, ball.force.rad * self.force + TINY)
-            self.locate(forces, (ball.w.mid[p:] == 0) & (ball.w.rad[p:] == 0))
+            mid, rad = ball.force.mid, ball.force.rad
+            rad = np.where((mid == 0) & (rad == 0), 0.0, rad * self.force + TINY)
+            self._locate_by(Ball(mid * self.force, rad), ball.w[p:])
+
+    def _locate_by(self, forces: Ball, slips: Ball) -> None:
+        """Take note of a root by its forces in the problem's units, and by its slips in any unit."""
+        still = (slips.mid == 0) & (slips.rad == 0)
+        self.locate(forces, still, certain_statuses(forces, slips))
 
     def locate_rational_roots(self) -> None:
         """Add the isolated roots that rationals have found to ``located``."""
@@ -255,7 +262,9 @@ class Checker(TreeChecker):
             exact = [Fraction(x) for x in points[0]]
             forces = np.array([float(x) for x in exact])
             w = [Fraction(0)] * p if not any(exact) and self.problem.is_unloaded(self.alpha) else self._slips(exact)
-            self.locate(Ball(forces, np.abs(forces) * 2 * UNIT + TINY), np.array([x == 0 for x in w]))
+            signs = np.array([float(x > 0) - float(x < 0) for x in w])
+            rad = np.where([x == 0 for x in exact], 0.0, np.abs(forces) * 2 * UNIT + TINY)
+            self._locate_by(Ball(forces, rad), Ball(signs, np.zeros(p)))
 
     def _slips(self, point: list[Fraction]) -> list[Any]:
         """w_t at a point, exactly."""

@@ -52,7 +52,7 @@ class TreeChecker:
     data: Data = "problem"
     #: What was found of the roots, if someone wants to know where they leave the contact nodes: forces in the
     #: problem's units, and tangential components with u_t = 0 for certain.
-    located: list[tuple[Ball, NDArray[np.bool_]]] | None = None
+    located: list[tuple[Ball, NDArray[np.bool_], tuple[int, ...] | None]] | None = None
     #: The problem's balls, where whoever asks for the check has made them already.
     enclosure: CondensedEnclosure | None = None
 
@@ -221,10 +221,10 @@ class TreeChecker:
         self._at_rest()
         return None if unloaded else "the problem is not unloaded"
 
-    def locate(self, forces: Ball, still: NDArray[np.bool_]) -> None:
-        """Take note of where a root is, if anybody wants to know."""
+    def locate(self, forces: Ball, still: NDArray[np.bool_], codes: tuple[int, ...] | None = None) -> None:
+        """Take note of where a root is, and of its statuses if they are certain, if anybody wants to know."""
         if self.located is not None:
-            self.located.append((forces, still))
+            self.located.append((forces, still, codes))
 
     def fail(self, message: str) -> None:
         """Take note of a failure.

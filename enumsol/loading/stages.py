@@ -13,7 +13,7 @@ from enumsol.arithmetic.balls import SAFE, UNIT
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.model.restart import SlipStart
 from enumsol.model.statuses import ContactStatus
-from enumsol.trusted.positions import tangential_positions
+from enumsol.trusted.positions import certain_statuses, tangential_positions
 
 if TYPE_CHECKING:
     from collections.abc import Hashable
@@ -115,7 +115,9 @@ def _enclosed_positions(stage: Stage, root: Root) -> Ball | None:
         return before
     try:
         enclosure = stage.problem.enclosure
-        moved = tangential_positions(enclosure, Fraction(root.alpha), _forces(root), still, before)
+        forces = _forces(root)
+        codes = certain_statuses(forces, _middle(low, high)) if root.u_t.ndim == 1 else None
+        moved = tangential_positions(enclosure, Fraction(root.alpha), forces, still, before, codes)
     except NotEnclosedError:
         return None
     return moved if np.all(np.isfinite(moved.rad)) else None
@@ -126,6 +128,11 @@ def _forces(root: Root) -> Ball:
     assert root.enclosure is not None
     bounds = [root.enclosure.lambda_n, root.enclosure.lambda_t]
     low, high = (np.concatenate([b[..., k].ravel(order="F") for b in bounds]) for k in (0, 1))
+    return _middle(low, high)
+
+
+def _middle(low: Array, high: Array) -> Ball:
+    """Balls that hold what lies between bounds."""
     mid = 0.5 * low + 0.5 * high
     return Ball(mid, np.maximum(high - mid, mid - low) * SAFE)
 

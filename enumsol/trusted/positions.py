@@ -7,22 +7,62 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.ball_arrays import Ball
+from enumsol.trusted.status_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from fractions import Fraction
 
     from numpy.typing import NDArray
 
     from enumsol.condensation.enclosure import CondensedEnclosure
+    from enumsol.model.problem import ContactProblem
+
+#: Positions known to within this share of the largest of them are known well enough.
+_WELL_KNOWN = 2.0**-30
+
+
+def certain_statuses(forces: Ball, slips: Ball) -> tuple[int, ...] | None:
+    """Status codes that a root in 2D has for certain, read off its balls; None where one of them is not certain.
+
+    Parameters
+    ----------
+    forces : Ball of shape (2p,)
+        lambda_n, then lambda_t [force].
+    slips : Ball of shape (p,)
+        u_t [length].
+    """
+    codes = []
+    normal = zip(forces.mid.tolist(), forces.rad.tolist(), strict=True)
+    for (force, near), slip, far in zip(normal, slips.mid.tolist(), slips.rad.tolist(), strict=False):
+        if force == near == 0:
+            codes.append(OPEN)
+        elif not force > near:
+            return None
+        elif slip == far == 0:
+            codes.append(STICK)
+        elif abs(slip) > far:
+            codes.append(SLIP_PLUS if slip > 0 else SLIP_MINUS)
+        else:
+            return None
+    return tuple(codes)
 
 
 def tangential_positions(
-    enclosure: CondensedEnclosure, alpha: Fraction, forces: Ball, still: NDArray[np.bool_], before: Ball
+    enclosure: CondensedEnclosure,
+    alpha: Fraction,
+    forces: Ball,
+    still: NDArray[np.bool_],
+    before: Ball,
+    codes: Sequence[int] | None = None,
+    *,
+    share: float = 1.0,
 ) -> Ball:
     """Bt u at a root whose forces lie in a ball, for every slip offset in a ball.
 
     A node with u_t = 0 for certain stays where it was: its ball is carried over unchanged. Any other is where the load
-    and the forces move it, theory, (13.2), whatever its own offset was.
+    and the forces move it, theory, (13.2), whatever its own offset was. Where this says little because the body is
+    held by weak springs, and the statuses of all nodes are certain, balls of many digits say it.
 
     Parameters
     ----------
@@ -35,9 +75,24 @@ def tangential_positions(
         Tangential components for which u_t = 0 at the root, whatever the data in their balls are.
     before : Ball of the same shape
         The slip offset [length].
+    codes : p status codes or None
+        Those of the root, in 2D, if they are certain.
+    share : float
+        Of the radius from which on more digits are asked for.
     """
     p = len(enclosure.problem.gap)
     S = Ball(enclosure.S, enclosure.S_rad)
     with np.errstate(over="ignore", invalid="ignore"):
         moved = (enclosure.moved_freely(alpha) - (S @ forces[:, None])[:, 0])[p:]
+    if codes is not None and not np.max(moved.rad) <= share * _WELL_KNOWN * np.max(np.abs(moved.mid)):
+        moved = _by_many_digits(enclosure.problem, alpha, codes, before) or moved
     return Ball(np.where(still, before.mid, moved.mid), np.where(still, before.rad, moved.rad))
+
+
+def _by_many_digits(problem: ContactProblem, alpha: Fraction, codes: Sequence[int], before: Ball) -> Ball | None:
+    """Positions of all nodes at the regular root of a selection; None where many digits do not enclose it."""
+    from enumsol.trusted.arcs.precise import PreciseSelection, PreciseSystem
+    from enumsol.trusted.arcs.refined import affordable
+
+    system = PreciseSystem.of(problem) if affordable(problem) else None
+    return None if system is None else PreciseSelection(system, codes).positions(alpha, before)

@@ -72,7 +72,7 @@ SHARED = {
     "trusted.over_interval": {"EnclosedPiece", "as_computed"},
     "trusted.arcs.precise": None,
     "trusted.arcs.refined": {"affordable"},
-    "trusted.positions": {"tangential_positions"},
+    "trusted.positions": {"certain_statuses", "tangential_positions"},
     "trusted.selection": None,
     "trusted.uniqueness_in_contact": {"lone_root", "numbers_of"},
     "trusted.uniqueness": {"ClosedSolution", "closed_solution", "only_solution", "same_solution"},

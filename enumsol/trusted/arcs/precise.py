@@ -15,6 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from flint import arb, arb_mat
 
+from enumsol.arithmetic.ball_arrays import Ball
+from enumsol.arithmetic.balls import SAFE, upper_sum
 from enumsol.arithmetic.rationals import as_objects
 from enumsol.trusted.arcs.many_digits import (
     ball_of,
@@ -26,6 +28,7 @@ from enumsol.trusted.arcs.many_digits import (
     sign_of,
     signs_of,
     taylor_around,
+    upper,
 )
 from enumsol.trusted.arcs.over_parts import OverInterval
 from enumsol.trusted.arcs.refined import refined_table
@@ -286,6 +289,38 @@ class PreciseSelection:
             moved = system.S * column(forces)
             w = [system.g0[r] + a * system.g1[r] - moved[r, 0] for r in range(len(forces))]
             return forces, w
+
+    def positions(self, alpha: Fraction, offset: Ball) -> Ball | None:
+        """Bt u of all nodes for every slip offset in a ball around the system's own; theory, (13.2).
+
+        The root is an affine function of the offsets of the sticking nodes: its value at the middle of the ball and
+        its slopes are computed with many digits, before anything is widened by the radii.
+        """
+        system, rows = self.system, self.rows
+        p, stick = rows.p, rows.stick.tolist()
+        found = self.forces(alpha)
+        if found is None:
+            return None
+        with precision():
+            a = ball_of(alpha)
+            moved = [found[1][p + i] + arb(float(offset.mid[i])) for i in range(p)]
+            spread = np.zeros(p)
+            if any(offset.rad[i] for i in stick):
+                parts = ((system.F0, 1), (system.F1, 0))
+                W0, W1 = (matrix(rows.columns(system.rows, as_objects(F), unit).tolist()) for F, unit in parts)
+                place = {row: k for k, row in enumerate(rows.unknown.tolist())}
+                units = arb_mat(len(place), len(stick))
+                for column_of, i in enumerate(stick):
+                    units[place[p + i], column_of] = arb(1)
+                try:
+                    slopes = (W0 + W1 * a) * (self._M[0] + self._M[1] * a).solve(units)
+                except ZeroDivisionError:
+                    return None
+                sizes = [[upper(slopes[p + k, j]) for j in range(len(stick))] for k in range(p)]
+                spread = upper_sum(np.array(sizes) * offset.rad[stick] * SAFE, axis=1)
+            mid = np.array([float(x.mid()) for x in moved])
+            rad = np.array([upper(x - arb(m)) for x, m in zip(moved, mid.tolist(), strict=True)])
+            return Ball(mid, (rad + spread) * SAFE)
 
 
 class PreciseExpansion:
