@@ -34,6 +34,7 @@ def test_the_commands(seen):
     assert seen["body"].p == seen["block"].p
 
 
+@pytest.mark.slow
 def test_a_block(seen):
     assert seen["roots"].complete
     assert seen["block"].node_ids == (1, 2, 3, 4, 5, 6)

@@ -49,7 +49,7 @@ def test_a_problem_loads_sparse_matrices_and_nothing_rare():
     assert "scipy.sparse.linalg" not in modules
 
 
-@pytest.mark.few(0, 2)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize(
     ("problem", "alpha", "roots"),
     [
@@ -104,6 +104,7 @@ def test_a_branch_graph_loads_algebra_and_graphs_only():
     assert not modules & (RARE - {"flint", "networkx"})
 
 
+@pytest.mark.slow
 def test_continuation_loads_no_graph():
     code = "import enumsol; problem = enumsol.gallery.one_node_triangle(); "
     code += "enumsol.follow(problem, enumsol.newton(problem, 1.0), interval=(0.0, 4.0))"
@@ -124,7 +125,7 @@ def test_every_public_name_is_found():
     assert {"enumerate_roots", "branch_graph", "gallery", "__version__"} < set(enumsol.__all__)
 
 
-@pytest.mark.few(7)
+@pytest.mark.few(7, 5)
 @pytest.mark.parametrize("name", MODULES)
 def test_modules_are_attributes_after_a_plain_import(name):
     assert f"enumsol.{name}" in modules_after(f"import enumsol; enumsol.{name}")

@@ -123,6 +123,7 @@ def test_brake_shoe_that_is_pressed_on_has_one_solution():
     assert len(proven(gallery.brake_shoe(pull=-50.0), 0.3)) == 1
 
 
+@pytest.mark.slow
 def test_clip_holds_by_friction_steeper_than_its_lips():
     """Normal forces on the upper half of the bar push the clip off; friction at most F N along the bar holds it."""
     problem = gallery.clip()
@@ -163,6 +164,7 @@ def test_rings_press_on_each_other_as_lame_says(cells, close):
     assert np.allclose(root.lambda_t, 0, atol=1e-9 * root.lambda_n.sum())
 
 
+@pytest.mark.slow
 def test_rings_transmit_a_torque_up_to_that_of_friction():
     most = lame_pressure() * 2 * math.pi * 20.0 * 10.0 * 20.0
     for share in (0.9, 1.1):

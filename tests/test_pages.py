@@ -117,6 +117,7 @@ def test_results(results):
 def test_reports(command_line):
     assert {path.name for path in command_line["folder"].iterdir()} == {
         "FILE",
+        "FOLDER",
         "node.proof",
         "roots.html",
         "wedge.html",

@@ -65,6 +65,7 @@ def test_a_name_that_is_close_is_suggested(complaints):
     assert '"enumerate_roots"' in complaints["enumsol.enumerate_root"]
 
 
+@pytest.mark.slow
 def test_what_exists_is_none(complaints):
     assert set(complaints) == set(WRONG)
 

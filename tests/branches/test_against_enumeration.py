@@ -12,7 +12,7 @@ from enumsol.branches import branch_graph
 KINDS = ("friction", "load", "both")
 
 
-@pytest.mark.few(10)
+@pytest.mark.few(10, 7)
 @pytest.mark.parametrize("seed", range(30))
 def test_generic_problems_at_random_alphas(seed):
     rng = np.random.default_rng(seed)
@@ -36,7 +36,7 @@ def test_exact_arithmetic_proves_generic_graphs_complete(seed):
     assert_same_roots(graph.roots_at(alpha), enumerate_roots(problem, alpha, "exact"))
 
 
-@pytest.mark.few(0, 2)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("block", range(6))
 def test_degenerate_problems_at_their_critical_alphas_too(block):
     for seed in range(20 * block, 20 * block + 20):
@@ -65,6 +65,7 @@ def test_gallery_problems(name, rng):
         assert_same_roots(graph.roots_at(alpha), enumerate_roots(problem, alpha, "fast"))
 
 
+@pytest.mark.slow
 def test_the_wedge_over_its_whole_path(rng):
     problem = gallery.get("wedge-14-5").build()
     graph = branch_graph(problem, (0.0, 5.0))

@@ -59,6 +59,7 @@ def test_blocks_need_no_tree(traction, length, interval):
     assert "with one solution, by one certificate" in repr(report)
 
 
+@pytest.mark.slow
 def test_numbers_are_sought_where_plain_ones_do_not_serve():
     problem = gallery.clamped_block(32, 16, 0.5, traction=(1.0, -0.3))
     graph = branch_graph(problem, (1, 2))
@@ -145,7 +146,7 @@ def test_what_the_kernel_says_is_true():
     assert several > 10
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_what_the_kernel_says_is_true_of_many():
     yes, several = only_where_alone(2, 50)
     assert yes > 75

@@ -19,7 +19,7 @@ def quantity_of(arc, alpha, quantity):
     return pair[0 if quantity.endswith("_n") else 1]
 
 
-@pytest.mark.few(0, 6)
+@pytest.mark.few(0, 3)
 @pytest.mark.parametrize("quantity", ["lambda_n", "lambda_t", "u_n", "u_t"])
 @pytest.mark.parametrize(("name", "interval"), GRAPHS)
 def test_points_between_are_near_the_polygon(name, interval, quantity):

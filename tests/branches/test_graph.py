@@ -166,7 +166,7 @@ def test_files_that_are_no_graphs_are_refused(tmp_path):
             BranchGraph.load(file)
 
 
-@pytest.mark.few(0, 3)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("quantity", ["lambda_n", "lambda_t", "u_n", "u_t"])
 def test_figures(square, quantity, tmp_path):
     file = tmp_path / "graph.png"
@@ -178,6 +178,7 @@ def test_figures(square, quantity, tmp_path):
     assert {"-", "--"} <= styles
 
 
+@pytest.mark.slow
 def test_figures_of_families_and_sheets(tmp_path):
     branch_graph(one_node((1.0, -2.0)), (0.0, 5.0)).plot("u_t", file=tmp_path / "family.png")
     sheet = branch_graph(one_node((0.0, 0.0), friction=2.0, load_slope=[1.0, -2.0]), (-1.0, 1.0))

@@ -77,7 +77,7 @@ def test_pushed_to_the_other_side_both_statuses_hold():
     assert Counter(v.kind for v in graph.vertices if not v.border) == {"bifurcation": 1, "fold": 1}
 
 
-@pytest.mark.few(0, 2)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("block", range(3))
 def test_no_complete_graph_has_a_vertex_that_is_broken(block):
     """Small numbers full of coincidences: folds, corners, sheets and arcs of degree 0."""

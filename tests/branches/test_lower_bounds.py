@@ -232,6 +232,7 @@ def test_the_enumeration_of_roots_agrees():
         assert graph.at_least(alpha) <= len(roots) + len(roots.families) == full.multiplicity_at(alpha)
 
 
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize(("n", "p"), [(24, 1), (25, 1), (25, 12), (80, 5), (251, 1)])
 def test_a_body_that_the_load_leaves_at_rest_has_one_solution(n, p):
     graph = branch_graph(at_rest(n, p), (0.0, 1.0))
@@ -293,7 +294,7 @@ def test_where_all_selections_hold_a_search_cut_short_knows_no_kind():
         assert graph.at_least(0.0) == 1
 
 
-@pytest.mark.few(0, 3)
+@pytest.mark.few(0, 2)
 @pytest.mark.parametrize(("n", "beyond"), [(2, 2.0**-59), (25, 2.0**-59), (25, 2.0**-70), (251, 2.0**-59)])
 def test_an_event_just_outside_the_interval_is_no_solution(n, beyond):
     third, beyond = Fraction(1, 3), Fraction(beyond)

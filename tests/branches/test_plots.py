@@ -29,7 +29,7 @@ def numbers_of(axis):
     return [text for text in axis.texts if text.get_gid() == "branch number"]
 
 
-@pytest.mark.few(0, 2)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize(
     ("name", "quantity"),
     [*((name, q) for name in ("square", "chain", "oblique") for q in (None, "lambda_n", "u_t")), ("spike", None)],
@@ -48,7 +48,7 @@ def test_numbers_neither_overlap_nor_leave_their_panel(graphs, name, quantity):
     assert labelled > 0
 
 
-@pytest.mark.few(0, 2)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("name", ["square", "chain", "oblique"])
 def test_every_branch_is_named_beside_its_curve_or_in_the_note(graphs, name):
     graph = graphs[name]
@@ -64,6 +64,7 @@ def test_every_branch_is_named_beside_its_curve_or_in_the_note(graphs, name):
         assert str(branch.number) in named or "side by side" in note
 
 
+@pytest.mark.slow
 def test_branches_that_coincide_are_drawn_apart_and_said_to(graphs):
     figure = graphs["square"].plot("lambda_n")
     figure.draw_without_rendering()

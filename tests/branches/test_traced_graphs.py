@@ -115,7 +115,7 @@ FAMILIES = {
 }
 
 
-@pytest.mark.few(0, 2)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__)
 def test_graphs_from_balls_are_those_from_exact_algebra(family, monkeypatch):
     count, decided, boxes = FAMILIES[family]
@@ -147,7 +147,7 @@ def _compared(family, seeds, boxes, monkeypatch):
         yield graphs
 
 
-@pytest.mark.few(0, 3)
+@pytest.mark.few(0, 2)
 @pytest.mark.parametrize("push", [0.0, 1e-16, 1e-12, 1e-6, 1e-3])
 def test_a_pitchfork_is_left_open(push):
     graphs = two_graphs(pair(push), (0, 6))

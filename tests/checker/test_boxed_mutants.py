@@ -57,7 +57,7 @@ def shifted(step):
     return lambda values: [value + step for value in values]
 
 
-@pytest.mark.few(0, 2)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_changed_leaves_are_refused(seed):
     assert proven(seed)[2]
@@ -85,7 +85,7 @@ def test_changed_leaves_are_refused(seed):
         assert refused(seed, change), number
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 2)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_boxes_at_other_leaves(seed):
     """Leaves that hold nothing, or a regular root, and parts of the tree that are not decided, said to be in a box."""
@@ -122,7 +122,7 @@ def test_leaves_that_are_left_out(seed):
     assert not report.complete
 
 
-@pytest.mark.few(0, 2)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("part", range(4))
 def test_random_changes(part):
     """Accepted, at most, where the box is one of the same root."""

@@ -136,6 +136,7 @@ def agree(seeds, **options):
     return closed
 
 
+@pytest.mark.slow
 def test_both_checkers_agree_on_random_graphs():
     """Integer data, mirror symmetry and several conditions that vanish together among them."""
     assert agree([302, 304, 309, 311, 317, 328, 330, 339]) > 6
@@ -184,7 +185,7 @@ def test_forged_numbers(name):
                 verify(body, proof_of(forged))
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 3)
 @pytest.mark.parametrize("name", BODIES)
 def test_other_numbers(name):
     """What the checker in floats accepts the one in rationals does; what makes Q indefinite both refuse."""
@@ -220,7 +221,7 @@ def test_nu_at_the_bound_of_friction(name):
 # -- forgeries: the piece ----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.few(0, 3)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("name", BODIES)
 def test_what_stands_beside_the_record(name):
     body, records = proven(name)
@@ -293,6 +294,7 @@ def test_proofs_without_arcs(name):
 # -- forgeries: the arcs -----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(0, 3)
 @pytest.mark.parametrize("name", BODIES)
 def test_parts_left_open(name):
     """Without any part over a piece that shows a solution no arcs lead through it."""
@@ -358,6 +360,7 @@ def without_trace(records, codes, a, b):
     return changed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", EVENTFUL)
 def test_events_without_partners(name):
     """One of two partners given up: arcs end at the other, which alone shows nothing beyond its zero."""
@@ -468,7 +471,7 @@ def whole(name):
     return body, p, body_records, interval
 
 
-@pytest.mark.few(0, 3)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("believing", [False, True])
 @pytest.mark.parametrize("name", SEVERAL)
 def test_several_solutions(name, believing, monkeypatch):

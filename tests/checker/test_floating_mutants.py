@@ -144,6 +144,7 @@ def enclosed(problem):
     return FloatingSystem.on(held, RigidRows.of(problem, Fraction(0), system.force, system.length))
 
 
+@pytest.mark.slow
 def test_no_multipliers_exclude_a_solution():
     rng, tried = np.random.default_rng(0), 0
     for seed in range(25):

@@ -50,6 +50,7 @@ def test_exclusions_are_needed_as_they_are():
         assert "do not exclude" in refusal(records)
 
 
+@pytest.mark.slow
 def test_a_root_cannot_be_left_out_or_moved():
     for place in places("r"):
         records = copied(RECORDS)

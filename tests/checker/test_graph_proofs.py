@@ -41,7 +41,7 @@ def proven(request):
     return problem, branch_graph(problem, interval)
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 2)
 def test_a_verified_graph_is_complete_and_its_proof_verifies(proven):
     problem, graph = proven
     assert graph.complete
@@ -55,6 +55,7 @@ def test_a_verified_graph_is_complete_and_its_proof_verifies(proven):
     assert report.leaves > 0
 
 
+@pytest.mark.few(0, 2)
 def test_statuses_of_all_roots_are_among_the_selections_handed_on(proven):
     problem, graph = proven
     selections = verify(problem, graph.proof).selections

@@ -181,7 +181,7 @@ def test_theta_that_does_not_serve(name):
     assert tried > 0
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("name", NAMES)
 def test_balls_and_indices(name):
     _, records = proven(name)
@@ -239,7 +239,7 @@ def test_a_root_among_several_is_never_the_only_one(name):
             assert "not proven to be the only one" in " ".join(report.failures)
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 2)
 @pytest.mark.parametrize("name", NAMES)
 def test_random_mutants_are_refused_or_true(name):
     rng, (problem, records), judge = np.random.default_rng(9), proven(name), LeafJudge(name)

@@ -229,6 +229,7 @@ def test_wrong_claims_about_leaves():
             assert "still open" in refused(SEVERAL, changed)
 
 
+@pytest.mark.slow
 def test_roots_moved_and_turned():
     _, _, records, _ = case(SEVERAL)
     for k in of_kind(records, "r"):
@@ -248,6 +249,7 @@ def test_roots_moved_and_turned():
         assert "expected 6 numbers" in refused(SEVERAL, changed)
 
 
+@pytest.mark.slow
 def test_multipliers_of_the_wrong_sign_and_rows_of_others():
     _, _, records, _ = case(SEVERAL)
     for k in of_kind(records, "x"):

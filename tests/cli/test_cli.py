@@ -141,6 +141,7 @@ def test_a_proof_can_be_written_and_checked(capsys, tmp_path):
     assert verify(gallery.get("two-node-5").build(), Proof.load(file)).ok
 
 
+@pytest.mark.slow
 def test_gallery_list_and_write(capsys, tmp_path):
     status, out, _ = run(capsys, "gallery", "list")
     assert status == 0
@@ -271,6 +272,7 @@ def test_statuses_of_the_process(tmp_path):
         assert_refused(bad.returncode, bad.stdout, bad.stderr, part)
 
 
+@pytest.mark.slow
 def test_a_reader_that_stops_early_does_no_harm():
     command = f"{sys.executable} -m enumsol gallery list | head -1"
     done = subprocess.run(command, shell=True, capture_output=True, text=True, timeout=60, check=False)
@@ -467,7 +469,7 @@ def test_verify_refuses_a_damaged_proof(capsys, tmp_path):
 # -- bare commands -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("group", [(), ("gallery",)])
 def test_it_is_the_help_on_stdout(group):
     bare, asked = call(*group), call(*group, "--help")

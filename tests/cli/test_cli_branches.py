@@ -261,7 +261,7 @@ def draw(capsys, tmp_path, name, *options):
     return status, out
 
 
-@pytest.mark.few(2, 4)
+@pytest.mark.few(0, 2)
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("nodes", [1, 2, 5, 7])
 def test_after_so_many_nodes(capsys, tmp_path, tree_only, name, nodes):

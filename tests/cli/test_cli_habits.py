@@ -107,7 +107,7 @@ def test_the_table_of_exit_statuses_is_complete():
     assert [(int(number), name) for number, name in rows] == [(status.value, status.name) for status in ExitStatus]
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
@@ -186,6 +186,7 @@ def test_a_bar_goes_on_between_two_reports(monkeypatch):
     ]
 
 
+@pytest.mark.slow
 def test_the_bar_of_a_graph_never_falls_back_nor_is_full_before_the_end(monkeypatch):
     done, stages = [], []
     monkeypatch.setattr("sys.stderr.isatty", lambda: True)

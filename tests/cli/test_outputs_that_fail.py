@@ -148,7 +148,7 @@ def test_stdout_that_nobody_reads(outcomes, name):
     assert status == 141
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("name", ["help", "roots csv"])
 def test_stdout_on_a_full_disk_from_a_shell(place, name):
     with open(FULL, "w") as full:
@@ -167,7 +167,7 @@ def closing(*streams):
     return {"preexec_fn": close, **{name: None for k, name in ((1, "stdout"), (2, "stderr")) if k in streams}}
 
 
-@pytest.mark.few(1, 2)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("name", ["nothing", "roots", "roots json", "gallery list"])
 def test_stdout_that_was_closed(place, name):
     done = enumsol_command(place, *PRINTING[name], **closing(1))
@@ -188,7 +188,7 @@ def test_stderr_that_was_closed_or_is_full_is_not_missed(place, name):
         assert lines == [line for line in expected.stdout.splitlines() if "seconds" not in line]
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("arguments", [("rots",), ("roots", "gallery:nothing", "--alpha", 5)])
 def test_a_mistake_keeps_its_status_when_there_is_nowhere_to_tell_it(place, arguments):
     with open(FULL, "w") as full:
@@ -211,7 +211,7 @@ WRITING = [
 ]
 
 
-@pytest.mark.few(4, 6)
+@pytest.mark.few(4, 3)
 @pytest.mark.parametrize(("verb", "option", "file"), WRITING)
 def test_a_file_on_a_full_disk(place, capsys, monkeypatch, verb, option, file):
     monkeypatch.chdir(place)
@@ -283,6 +283,7 @@ def test_a_proof_that_has_no_room_leaves_the_roots():
     assert partial.proof is None
 
 
+@pytest.mark.slow
 def test_statuses_are_documented(capsys):
     for verb in ("roots", "table", "graph", "follow", "audit", "history", "verify"):
         text = " ".join(run(capsys, verb, "--help")[1].split())

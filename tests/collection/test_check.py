@@ -254,6 +254,7 @@ def test_the_command_reports_and_ends_with_a_status(tmp_path, capsys):
     assert [answer["found"] for answer in found["problems"][0]["answers"]] == [True, False]
 
 
+@pytest.mark.slow
 def test_the_list_and_the_export(tmp_path, capsys):
     status, out, _ = run(capsys, "collection", "list")
     assert status == 0

@@ -54,7 +54,7 @@ def test_the_files_are_those_of_the_index_and_small():
     assert sum((DATA / file).stat().st_size for file in files) < 5e6
 
 
-@pytest.mark.few(8)
+@pytest.mark.few(8, 22)
 @pytest.mark.parametrize("name", NAMES)
 def test_both_files_hold_the_problem_and_the_counts_are_those_listed(name):
     entry = get(name)
@@ -69,6 +69,7 @@ def test_both_files_hold_the_problem_and_the_counts_are_those_listed(name):
     assert sum(not root["regular"] for root in listed["roots"]) == entry.degenerate
 
 
+@pytest.mark.few(0, 10)
 @pytest.mark.parametrize("name", [pytest.param(n, marks=[pytest.mark.slow] if n in LONG else []) for n in NAMES[::3]])
 def test_proofs_hold(name):
     entry = get(name)
@@ -78,13 +79,13 @@ def test_proofs_hold(name):
     assert (report.roots, report.families) == (entry.roots, entry.families)
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 8)
 @pytest.mark.parametrize("name", [name for k, name in enumerate(NAMES) if k % 3])
 def test_all_other_proofs_hold(name):
     test_proofs_hold(name)
 
 
-@pytest.mark.few(8)
+@pytest.mark.few(8, 16)
 @pytest.mark.parametrize("name", NAMES)
 def test_a_problem_can_be_made_again(name):
     """Up to rounding, which differs from processor to processor."""
@@ -151,6 +152,6 @@ def test_the_documents_show_the_collection():
     assert f"{len(NAMES)} contact problems" in text
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_all_solutions_can_be_told_apart():
     make_collection.check_separations()

@@ -172,7 +172,7 @@ class TestBranchGraph:
     def branch_graph(self):
         return pytest.importorskip("enumsol.branches.construction").branch_graph
 
-    @pytest.mark.few(0, 3)
+    @pytest.mark.few(0, 1)
     @pytest.mark.parametrize("loading", [False, True])
     @pytest.mark.parametrize("seed", range(5))
     def test_follow_all_visits_every_arc(self, branch_graph, seed, loading, random_problems):
@@ -182,7 +182,7 @@ class TestBranchGraph:
         assert result.complete
         assert result.report.max_distance < 1e-8
 
-    @pytest.mark.few(3)
+    @pytest.mark.few(0, 2)
     @pytest.mark.parametrize(
         "name", ["one-node-6.1", "one-node-6.2", "two-node-6.4", "two-node-6.5", "chain-2-coupled"]
     )

@@ -177,7 +177,7 @@ def test_two_points_that_a_graph_with_a_hole_does_not_join_are_no_jump():
     assert [item["rows"] for item in report.summary()["unjoined"]] == [pair.rows]
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("name", ["one-node-6.1", "two-node-6.4", "chain-2-coupled"])
 def test_what_is_said_against_a_cut_graph_is_true_of_the_complete_one(name):
     problem = gallery.get(name).build()

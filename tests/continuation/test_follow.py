@@ -202,7 +202,7 @@ def test_smooth_path_wrong_derivative_is_named():
         follow(problem, (2.0, [0.0], [0.0]), 1, (1, 3), smooth_path=smooth)
 
 
-@pytest.mark.few(6, 6)
+@pytest.mark.few(6, 3)
 @pytest.mark.parametrize("loading", [False, True])
 @pytest.mark.parametrize("seed", range(12))
 def test_points_are_enumerated_roots(seed, loading, random_problems):
@@ -298,6 +298,7 @@ def test_printed_algorithm_passes_the_fold_with_short_steps():
     assert on_solutions(problem, path) < 1e-5
 
 
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("name", ["two-node-6.4", "two-node-6.7-minus"])
 def test_printed_algorithm_passes_folds_that_its_corrections_overstepped(name):
     problem = gallery.get(name).build()

@@ -192,11 +192,12 @@ def folds_met(load, most):
     return met
 
 
+@pytest.mark.slow
 def test_a_fold_of_one_node_is_that_of_the_closed_form():
     assert folds_met(False, 1) == 1
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("load", [False, True])
 def test_many_folds_of_one_node_are_those_of_the_closed_form(load):
     assert folds_met(load, 6) == 6
@@ -205,6 +206,7 @@ def test_many_folds_of_one_node_are_those_of_the_closed_form(load):
 # -- paths -------------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("seed", [4, pytest.param(1, marks=pytest.mark.slow), pytest.param(9, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("load", [False, True])
 def test_paths_hold_solutions_and_lead_back(seed, load):
@@ -219,6 +221,7 @@ def test_paths_hold_solutions_and_lead_back(seed, load):
         assert any(np.allclose(forces(one), forces(root), rtol=1e-7, atol=1e-7) for one in found)
 
 
+@pytest.mark.slow
 def test_the_jammed_and_the_sliding_root_lie_on_one_branch_and_the_open_one_on_another():
     problem = enumsol.gallery.get("one-node-3d-3").build().replace(friction=0.0, friction_slope=1.0)
     jammed, sliding, free = enumsol.enumerate_roots(problem, 5)
@@ -272,6 +275,7 @@ def test_a_problem_in_2d_with_a_second_tangent_that_nothing_loads_has_the_same_p
         assert not np.any(space.lambda_t[..., 1])
 
 
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize(
     "form", [lambda F: [[F, F]], *(pytest.param(form, marks=pytest.mark.slow) for form in (float, lambda F: [F]))]
 )

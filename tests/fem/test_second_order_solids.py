@@ -32,7 +32,7 @@ def total(root, problem):
     return -(problem.contact_rows.T @ rows) @ np.eye(3)[problem.mesh.dofs % 3]
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0, 2)
 @pytest.mark.parametrize("kind", [4, 8, *SECOND])
 def test_patch_test(kind):
     """Constant stress is in equilibrium with its own tractions, on distorted cells."""
@@ -82,7 +82,7 @@ def test_contact_nodes_of_six_node_triangles_lie_between_their_corners():
     assert np.allclose(np.sort(whole.areas) * 36, [1] * 4 + [4] * 4 + [16])
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("kind", SECOND)
 def test_springs_are_positive_and_carry_their_share(kind):
     mesh = solid((1, 1, 1), kind, (2.0, 1.0, 1.0))
@@ -99,7 +99,7 @@ def test_springs_are_positive_and_carry_their_share(kind):
     assert np.allclose(moves.T @ full @ moves, np.diag([4, 4, 2]), atol=1e-10)
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("kind", SECOND)
 def test_a_turned_body_has_the_same_roots(kind):
     mesh = solid((1, 1, 1), kind)
@@ -155,7 +155,7 @@ def test_first_and_second_order_agree():
         assert np.allclose(forces[kind], forces[8], rtol=0, atol=0.02 * forces[8][2])
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("kind", SECOND)
 def test_a_curved_contact_boundary(kind):
     """A shell inside of a cylinder: normals and areas are those of the circle nearly to second order."""
@@ -241,6 +241,7 @@ def test_files(kind, name, facet, suffix, tmp_path):
     assert one.fingerprint == two.fingerprint
 
 
+@pytest.mark.slow
 def test_hexahedra_of_20_nodes_are_completed():
     few, all_nodes = solid((2, 1, 1), 20, shake=0.1), solid((2, 1, 1), 27, shake=0.1)
     corner = few.nodes("left")
@@ -264,6 +265,7 @@ def test_hexahedra_of_20_nodes_are_completed():
         fem.read_mesh(lonely)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", SECOND)
 def test_problems_of_second_order_are_written_and_drawn(kind, tmp_path):
     problem = fem.mesh_problem(

@@ -74,7 +74,7 @@ def test_proven_roots_in_2d(spring, seed):
 @pytest.mark.parametrize("spring", [0.1, 1e-3])
 def test_proven_roots_in_3d(spring, seed):
     problem = block_on_springs(np.random.default_rng([seed, 41]), spring)
-    roots = enumsol.enumerate_roots(problem, 0, max_nodes=300)  # with weak springs others may stay undecided
+    roots = enumsol.enumerate_roots(problem, 0, max_nodes=900)  # with weak springs others may stay undecided
     assert len(roots) == 1
     found = enumsol.successive_approximations(problem, 0)
     assert found.converged
@@ -101,7 +101,7 @@ def planted(rng, spring):
     return problem, SimpleNamespace(lambda_n=normal, lambda_t=tangential.T)
 
 
-@pytest.mark.few(5, 5)
+@pytest.mark.few(2, 2)
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("spring", [1e-4, 1e-6, 1e-8])
 def test_planted_solutions_in_3d(spring, seed):
@@ -143,7 +143,7 @@ def moved(rng, problem, found, size):
     return SimpleNamespace(alpha=0, lambda_n=normal, lambda_t=lambda_t, u_t=found.u_t)
 
 
-@pytest.mark.few(2, 4)
+@pytest.mark.few(0, 2)
 @pytest.mark.parametrize("spring", [1e-1, 1e-4, 1e-5, 1e-6, 1e-7])
 @pytest.mark.parametrize("body", [square, block_on_springs])
 def test_roots_and_limits_are_fixed_points_and_nothing_beside_them(body, spring):

@@ -249,6 +249,7 @@ def test_without_lame_coefficients_there_are_no_stresses(tmp_path):
         BodyMesh(problem.mesh.points, problem.mesh.cells, problem.mesh.motion, lame=[1, 2, 3])
 
 
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("name", ["wedge-8-5", "wedge3d-4-9"])
 def test_all_roots_in_one_call(tmp_path, name):
     entry = gallery.get(name)

@@ -37,6 +37,7 @@ def test_every_value_is_what_enumerate_roots_counts(over_gap):
     assert "says nothing about those between" in repr(over_gap)
 
 
+@pytest.mark.slow
 def test_uniqueness_between_values_is_proven_or_said_not_to_be(over_gap):
     """Where strips claim it, enumerate_roots finds one root at random values between; folds are not claimed."""
     import dataclasses

@@ -107,7 +107,7 @@ def test_values_agree_with_an_interior_point_solver(seed):
     assert min(seen.values()) > 7
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(3, 4)
 @pytest.mark.parametrize("engine", [ActiveSetEngine, InteriorPointEngine])
 @pytest.mark.parametrize("seed", range(4))
 def test_multipliers_prove_the_bound(engine, seed):
@@ -197,6 +197,7 @@ def test_every_program_of_a_path_has_its_own_limit():
     assert path() == counts
 
 
+@pytest.mark.slow
 def test_infeasible_assignment_comes_with_a_proof():
     # pressed together by a gap of -1 at a node without load: open is impossible
     S, F = np.eye(2), np.array([1.0])

@@ -138,6 +138,7 @@ def test_pointing_and_clicking(browser, pages, graphs):
     assert browser.complaints() == []
 
 
+@pytest.mark.slow
 def test_every_quantity_and_node_is_drawn(browser, pages, graphs):
     browser.size(1280, 900)
     browser.open(pages["bare"])

@@ -91,6 +91,7 @@ def test_interpolated_values_are_near_the_roots(wedge, wedge_page):
             assert min(np.max(np.abs(values - exact)) for values in found) < 3 * data["tolerance"] * largest
 
 
+@pytest.mark.slow
 def test_bodies_move_as_the_roots_say(wedge, wedge_page):
     body = data_of(wedge_page)["body"]
     mesh = wedge.problem.mesh
@@ -256,6 +257,7 @@ def test_what_cannot_be_written_is_refused(tmp_path, monkeypatch):
     assert not (tmp_path / "page.html").exists()
 
 
+@pytest.mark.slow
 def test_the_command(tmp_path, capsys):
     page, proof = tmp_path / "a page.html", tmp_path / "square.proof"
     command = ["report", "gallery:two-node-6.4", "--from", "0", "--to", "10", "-o", str(page), "--proof", str(proof)]

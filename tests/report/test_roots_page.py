@@ -52,7 +52,7 @@ def pages(found, tmp_path_factory):
 # -- the text of the page ---------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("name", ["wedge", "plane"])
 def test_bodies_and_forces_are_those_of_the_roots(found, pages, name):
     data, roots = data_of(pages[name].read_text()), found[name]
@@ -94,6 +94,7 @@ def test_the_surface_is_closed(pages):
     assert volume == pytest.approx(1 + np.tan(np.radians(20)), rel=1e-5)
 
 
+@pytest.mark.slow
 def test_words_and_tables(found, pages):
     reader = Reader(pages["wedge"].read_text())
     assert "The problem has 9 isolated solutions at this alpha, and no other." in reader.text

@@ -158,6 +158,7 @@ def test_bodies_in_space_are_compared_in_one_view():
     assert entries == {"open", "stick", "slip", "contact force on the body", "direction of slip", "undeformed"}
 
 
+@pytest.mark.slow
 def test_slips_in_global_axes():
     problem = enumsol.gallery.get("wedge3d-4-9").build()
     for root in enumsol.enumerate_roots(problem, 3.0):

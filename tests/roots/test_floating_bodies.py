@@ -48,13 +48,13 @@ def failures(seeds, alpha):
     return found
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize(("first", "alpha"), [(0, 0), (10, 0.5)])
 def test_all_solutions_of_random_bodies(first, alpha):
     assert not failures(range(first, first + 8), alpha)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_all_solutions_of_many_random_bodies():
     assert not failures(range(100, 180), 0.25)
 
@@ -139,6 +139,7 @@ def test_solutions_do_not_depend_on_the_basis_of_the_modes():
     assert np.allclose(one.lambda_n, two.lambda_n, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_workers_limits_and_resumption(tmp_path):
     problem, path = block_on_table(cells=4, push=0.5), tmp_path / "block.proof"
     whole = enumsol.enumerate_roots(problem, 0)
@@ -174,6 +175,7 @@ def test_what_is_kept_of_a_body_that_nothing_holds(tmp_path):
         enumsol.write_problem(problem, tmp_path / "block.h5")
 
 
+@pytest.mark.slow
 def test_a_sweep_over_loads_factorizes_once():
     problem = block_on_table()
     for push in (0.25, 0.9):

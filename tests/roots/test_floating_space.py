@@ -53,7 +53,7 @@ def test_a_body_with_two_solutions():
     assert disagreement(113) is None
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_more_random_bodies():
     # with 203 the balance alone fixes the force of a slipping node: the body slides as far as one likes
     assert not enumsol.enumerate_roots(known_body(203).problem, 0).complete
@@ -77,7 +77,7 @@ def test_friction_along_one_axis_is_that_of_the_plane(seed):
         assert np.allclose(nearest(plane, root.u).u, root.u, atol=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize(("push", "count"), [(0.5, 1), (1.1, 0)])
 def test_a_block_below_and_above_sliding(push, count):
     problem = block_on_table3d(1, push=(0.8 * push, 0.6 * push))
@@ -113,7 +113,7 @@ def test_as_springs_become_weaker_the_solution_tends_to_that_without_any():
     assert far[2] < 0.02 * far[1]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_block_of_which_all_nodes_but_one_slip():
     """Its equations leave a turn about that node free, whatever the directions are."""
     problem = block_on_table3d(2, push=(0.9, 0.225))
@@ -137,6 +137,7 @@ def test_what_the_text_says():
     assert "rigid modes         6, of displacements up to 4" in repr(block_on_table3d(1, max_rigid_displacement=4.0))
 
 
+@pytest.mark.slow
 def test_executors_and_resumed_searches_find_the_same(tmp_path):
     problem = known_body(113).problem
     alone = enumsol.enumerate_roots(problem, 0)

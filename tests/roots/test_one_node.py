@@ -56,7 +56,7 @@ def test_the_fold_of_example_6_1_is_one_root(method):
         assert len(enumsol.enumerate_roots(problem, alpha, "exact", method)) == count
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("seed", range(4))
 def test_random_data_against_the_closed_form(seed):
     rng = np.random.default_rng(seed)
@@ -74,7 +74,7 @@ def test_random_data_against_the_closed_form(seed):
     assert counts == {1, 3}
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("seed", range(3))
 def test_criterion_for_the_number_of_branches(seed):
     # (j) one root for every alpha; (jj) one below |f_t| / f_n and three above

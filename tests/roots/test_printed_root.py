@@ -40,6 +40,7 @@ def test_labels_are_those_of_the_problem(capsys):
     assert lines[3].startswith("       17 open")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("size", "more"), [(16, 0), (32, 12), (100, 80)])
 def test_large_roots_are_cut(capsys, size, more):
     entry = gallery.get(f"clamped-block-{size}")

@@ -48,7 +48,7 @@ def test_five_nodes_tree_only():
     assert check(200, 50, (5,), methods=("tree",)) >= 50 / 3
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("method", ["tree", "exhaustive"])
 def test_exact_arithmetic(method):
     rng = np.random.default_rng(300)

@@ -46,7 +46,7 @@ def test_blocks_take_one_leaf(cells, p, F):
     assert np.max(np.abs(limit.lambda_t - root.lambda_t)) < 1e-9 * np.max(root.lambda_n)
 
 
-@pytest.mark.few(0, 5)
+@pytest.mark.few(0, 2)
 @pytest.mark.parametrize(("cells", "p"), [((6, 6, 2), 42), ((8, 8, 2), 72)])
 @pytest.mark.parametrize("F", [0.1, 0.3, 0.5, 1])
 def test_larger_blocks_take_one_leaf(cells, p, F):
@@ -129,7 +129,7 @@ def test_the_same_as_the_tree(part):
     assert not all(did)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_one_node_against_the_closed_form():
     rng, count, several = np.random.default_rng(31), 0, 0
     for _ in range(150):
@@ -241,7 +241,7 @@ def served(root, F):
     return np.where(length > 1 - 1e-9, theta / np.maximum(length, 0.1), theta)
 
 
-@pytest.mark.few(0, 3)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("name", [name for name, roots in RANDOM.items() if roots > 1], ids=str)
 def test_no_numbers_close_a_problem_with_several_roots(name):
     """Whatever is proposed for any of its roots, the right theta among it."""

@@ -100,6 +100,7 @@ def test_one_region_that_holds_what_is_known(name):
     assert (found.complete, found.undecided) == (False, region.leaves)
 
 
+@pytest.mark.slow
 def test_bounds_are_narrow_where_the_root_is_isolated():
     for name in ("grazing", "stick at its limit", "twice stick at its limit", "unloaded beside a loaded one"):
         S, g = beside(CASES[name][0])
@@ -271,7 +272,7 @@ def test_the_reason_is_what_stands_in_the_way_and_the_hint_helps():
     assert undecided_and_perturbed(integers(8)) == ({(Cause.DIRECTIONS.value, perturb)}, True)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_body_that_is_almost_free_to_move():
     roots = enumerate_roots(body(1e-9, 0.1), 0, max_nodes=600)
     reasons = {(region.reason, region.hint) for region in roots.undecided}

@@ -26,7 +26,7 @@ KINDS = {
 REACHED = {"wedge3d-2-3": {0, 2}, "wedge3d-4-3": {0, 2}, "wedge3d-4-9": {0, 8}, "wedge3d-8-5": {4}}
 
 
-@pytest.mark.few(1, 1)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=[pytest.mark.slow] if name == "wedge3d-8-5" else []) for name in KINDS]
 )

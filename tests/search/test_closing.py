@@ -60,7 +60,7 @@ def test_a_row_of_unequal_discs(weights):
     assert verify(problem, roots.proof).complete
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("seed", range(2))
 def test_a_row_of_stiff_discs_of_any_weights(seed):
     problem = row_of_discs(20, weights=np.random.default_rng(seed).uniform(1.5, 3.0, 20), friction=0.9)
@@ -243,7 +243,7 @@ def test_fast_arithmetic():
         assert roots.index_sum == len(roots) == 1
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("workers", [1, 2])
 def test_sides_are_told_to_workers(workers, monkeypatch):
     problem = row_of_discs(12, weights=(2.0, 3.0), friction=0.9)

@@ -89,6 +89,7 @@ def test_options_out_of_range(option):
         enumsol.enumerate_roots(gallery.one_node_triangle(), 1.0, **option)
 
 
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("method", ["tree", "exhaustive"])
 def test_progress(method):
     seen = []
@@ -113,6 +114,7 @@ class Stop:
             raise KeyboardInterrupt
 
 
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("method", ["tree", "exhaustive"])
 def test_interruption_keeps_what_was_found(method):
     problem = gallery.chain(6, 0.0)

@@ -28,7 +28,7 @@ def whole(problem, alpha):
     return Reduction(system, (UNDECIDED,) * system.p, tuple(range(system.p)), {})
 
 
-@pytest.mark.few(1, 1)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("traction", [(0.3, -1.0), (1.0, -0.3)])
 @pytest.mark.parametrize("nx", [48, pytest.param(100, marks=pytest.mark.slow)])
 def test_blocks_take_one_node(nx, traction):
@@ -120,6 +120,7 @@ def test_without_a_solution_the_tree_finds_it(monkeypatch):
     assert roots.stats.nodes > 1
 
 
+@pytest.mark.slow
 def test_a_path_in_friction_where_newton_fails():
     found = 0
     for nx in (8, 16, 32, 64):

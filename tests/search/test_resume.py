@@ -127,6 +127,7 @@ def resumed(name, data, path, **options):
     return found
 
 
+@pytest.mark.slow
 def test_the_problems_have_all_kinds_of_records():
     kinds = {record[0] for name in PROBLEMS for record in records_of(known(name)[2].proof)[1:-1]}
     assert kinds == {"b", "q", "x", "f", "n", "r", "N", "D", "z", "a", "m", "M", "u"}  # "X": below
@@ -171,7 +172,7 @@ def test_a_file_cut_anywhere(data, tmp_path_factory):
     check(name, resumed(name, whole[:size], tmp_path_factory.mktemp("cut") / "x.proof"))
 
 
-@pytest.mark.few(2, 4)
+@pytest.mark.few(0, 2)
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_as_much_is_taken_as_the_file_holds(name, tmp_path):
     whole = bytes_of(known(name)[2].proof)
@@ -186,7 +187,7 @@ def test_as_much_is_taken_as_the_file_holds(name, tmp_path):
     assert taken[-1] == len(records)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @settings(QUICK, max_examples=60)
 @given(seed=st.integers(0, 2**32), name=st.sampled_from(list(PROBLEMS)))
 def test_a_forged_file_never_gives_a_wrong_answer(seed, name, tmp_path_factory):
@@ -266,7 +267,7 @@ def test_rows_that_do_not_exist_in_space(tmp_path):
 # -- limits ------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.few(4)
+@pytest.mark.few(4, 2)
 @pytest.mark.parametrize("name", ["wedge", "forms", "closed", "block in space"])
 @pytest.mark.parametrize("limits", [{"max_nodes": 7}, {"max_nodes": 40}])
 def test_a_search_in_small_parts(name, limits, tmp_path):
@@ -328,7 +329,7 @@ def test_a_time_limit_is_about_what_is_searched_anew(tmp_path, monkeypatch):
     check("wedge", found)
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 2)
 @pytest.mark.parametrize("name", ["wedge", "forms", "closed", "block in space", "closed in space"])
 def test_with_an_executor(name, tmp_path):
     problem, alpha, whole = known(name)

@@ -31,7 +31,7 @@ def test_loads_that_lift_part_of_the_block(p):
             assert roots.stats.nodes <= 8 * p * len(roots)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_hundred_nodes_with_high_friction():
     # branching by the largest violation alone takes 140,000 nodes here
     roots = enumsol.enumerate_roots(gallery.clamped_block(100, 50, 2.0, traction=(1.0, -0.3)), 10.0)

@@ -73,7 +73,7 @@ def assert_equal(one, other):
     assert [values(root) for root in one] == [values(root) for root in other]
 
 
-@pytest.mark.few(1, 1)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_the_same_roots_and_one_proof_whatever_the_number_of_workers(name, executors):
     problem, alpha = PROBLEMS[name]()
@@ -91,7 +91,7 @@ def test_the_same_roots_and_one_proof_whatever_the_number_of_workers(name, execu
     assert report.roots == len(alone)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_fast_arithmetic(executors, many):
     problem, _ = many
     assert_equal(enumerate_roots(problem, 0, "fast", executor=executors[0]), enumerate_roots(problem, 0, "fast"))

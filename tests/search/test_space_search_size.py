@@ -8,7 +8,7 @@ from enumsol import gallery
 pytestmark = pytest.mark.usefixtures("tree_only")
 
 
-@pytest.mark.few(1, 2)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize(
     ("cells", "F", "most"),
     [

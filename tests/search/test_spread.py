@@ -101,7 +101,7 @@ def test_one_proof(small_parts, wedge):
     check_one_proof(*wedge)
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("nodes", [0, 100])
 def test_one_proof_with_forms(small_parts, tree_only, monkeypatch, nodes):
     monkeypatch.setattr(policy, "NODES", nodes)

@@ -199,6 +199,7 @@ def check_table(table, problem):
     assert table.drop(columns="seconds").to_dict("records") == whole.drop(columns="seconds").to_dict("records")
 
 
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("death", DEATHS)
 def test_a_table_is_whole(square, death):
     # the loss is found when a task is handed in, or, after the last one, when its result is

@@ -31,7 +31,7 @@ def studies(monkeypatch):
     monkeypatch.syspath_prepend(Path(__file__).parents[2] / "studies")
 
 
-@pytest.mark.few(0, 2)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("group", SOME)
 def test_cases_of_the_study_are_right(group):
     from extremes.run import CASES
@@ -175,6 +175,7 @@ def test_large_bodies_are_certified_as_given():
     assert found.certified_data == "problem"
 
 
+@pytest.mark.slow
 def test_paths_with_huge_friction_and_tiny_loads():
     problem = gallery.two_node_square()
     for high in (1e6, 1e13):

@@ -50,6 +50,21 @@ CONCLUSIONS = {
     "workers": ("all complete and checked: yes; one proof whatever the number of workers: yes",),
     "uniqueness_vs_mesh": ("bound on F: 2D, nodes H^0.58, 0.54 between the finest (paper 0.5)",),
 }
+#: Studies that take more than five seconds at their smoke size.
+LONG = (
+    "accuracy_vs_speed",
+    "continuation_coverage",
+    "continuation_steps",
+    "extremes",
+    "fixed_points_scaling",
+    "histories",
+    "requirements",
+    "samples_vs_graph",
+    "search_in_3d",
+    "search_in_3d_choices",
+    "search_profile",
+    "uniqueness_vs_mesh",
+)
 #: Studies that read the peak memory from /proc.
 LINUX = ("fixed_points_scaling", "requirements")
 
@@ -78,13 +93,15 @@ def rows_of(file):
         return list(csv.DictReader(table))
 
 
-def on_this_platform(name):
-    marks = pytest.mark.skipif(sys.platform != "linux", reason="peak memory is read from /proc")
-    return pytest.param(name, marks=marks) if name in LINUX else name
+def on_this_platform(name, seldom=()):
+    marks = [pytest.mark.long] * (name in seldom)
+    if name in LINUX:
+        marks.append(pytest.mark.skipif(sys.platform != "linux", reason="peak memory is read from /proc"))
+    return pytest.param(name, marks=marks)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [on_this_platform(name) for name in NAMES])
+@pytest.mark.parametrize("name", [on_this_platform(name, LONG) for name in NAMES])
 def test_a_study_runs_at_its_smoke_size(name, tmp_path):
     before = results()
     versions = ("--rounds", "1", "--against", sys.executable) if name in VERSIONS else ()
@@ -105,7 +122,7 @@ def test_a_study_runs_at_its_smoke_size(name, tmp_path):
     assert results() == before
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("name", [on_this_platform(name) for name in PEERS])
 def test_a_study_without_its_peer_does_the_rest_and_says_so(name, tmp_path):
     library, sentence, column = PEERS[name]
@@ -133,7 +150,7 @@ def test_the_profile_knows_every_function_that_it_names(tmp_path):
     assert run("-c", code).splitlines()[1] == "[]"
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_one_part_of_a_study(tmp_path):
     run(STUDIES, "samples_vs_graph", "--smoke", "--results", tmp_path, "--part", "thin")
     assert {file.name for file in tmp_path.iterdir()} == {"branch_thin.csv", "branch_thin.txt", "branch_thin.png"}

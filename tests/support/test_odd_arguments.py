@@ -322,6 +322,7 @@ def test_any_object_as_any_argument(tmp_path, monkeypatch, function, good, name)
     assert accepted < len(ODD)
 
 
+@pytest.mark.slow
 def test_the_arguments_that_are_replaced_are_accepted_as_given(tmp_path, monkeypatch):
     """So that nothing above is refused for another reason."""
     monkeypatch.chdir(tmp_path)

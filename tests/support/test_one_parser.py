@@ -189,7 +189,7 @@ def _forces(problem, alpha):
     return root.lambda_n, root.lambda_t
 
 
-@pytest.mark.few(0, 8)
+@pytest.mark.few(0, 3)
 @pytest.mark.parametrize("name", TAKE)
 def test_every_function_takes_every_kind_of_number(problem, graph, name):
     known = {exact: TAKE[name](problem, graph, exact, exact) for exact in {exact for _, exact in NUMBERS.values()}}

@@ -145,7 +145,7 @@ def test_series_and_their_slopes_lie_within_their_errors():
     assert check_errors(300) > 400
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_many_series():
     check_errors(300, 1000)
 

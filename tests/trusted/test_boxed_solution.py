@@ -75,7 +75,7 @@ def natural(problem, y):
     return y - out
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("part", range(2))
 def test_steps_stay_within_their_bounds(part):
     """y - Y N(y) - c is what (12.13) says, and contracts, at random points of sets of all sizes."""
@@ -97,7 +97,7 @@ def test_steps_stay_within_their_bounds(part):
     assert tried > 20
 
 
-@pytest.mark.few(0, 2)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("part", range(4))
 def test_no_box_holds_two_solutions(part):
     """Newton's method from many points finds no second solution in a box, and no box with two is accepted."""

@@ -18,7 +18,7 @@ def system_of(problem):
     return CondensedEnclosure.from_problem(problem).at(0.0, scaled.force, scaled.length), scaled
 
 
-@pytest.mark.few(7)
+@pytest.mark.few(7, 7)
 @pytest.mark.parametrize("seed", range(30))
 def test_what_is_proven_is_so(seed):
     rng = np.random.default_rng(seed)

@@ -62,7 +62,7 @@ def float_roots(S, g, F, tolerance=1e-9):
     return points
 
 
-@pytest.mark.few(3)
+@pytest.mark.few(3, 4)
 @pytest.mark.parametrize(("seed", "load"), HUNTED)
 def test_false_roots_are_refused(seed, load):
     problem, planted = hunted(seed, load)
@@ -83,7 +83,7 @@ def test_false_roots_are_refused(seed, load):
     assert (report.roots, report.families) == (len(exact), len(exact.families))
 
 
-@pytest.mark.slow
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize(("seed", "load"), HUNTED[1:4])
 def test_exact_count_by_an_oracle_in_fractions(seed, load):
     problem, _ = hunted(seed, load)
