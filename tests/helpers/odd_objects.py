@@ -102,7 +102,7 @@ ODD = {
     "class": lambda: int,
     "module": lambda: types,
     "function": lambda: lambda *args: None,
-    "path": lambda: pathlib.Path("/nowhere/at/all"),
+    "path": lambda: pathlib.Path("/dev/null/at/all"),
     "slice": lambda: slice(1),
     "Ellipsis": lambda: ...,
     "exception": lambda: ValueError("x"),

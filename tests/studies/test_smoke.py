@@ -50,19 +50,26 @@ CONCLUSIONS = {
     "workers": ("all complete and checked: yes; one proof whatever the number of workers: yes",),
     "uniqueness_vs_mesh": ("bound on F: 2D, nodes H^0.58, 0.54 between the finest (paper 0.5)",),
 }
-#: Studies that take more than five seconds at their smoke size.
+#: Studies that take more than three and a half seconds at their smoke size.
 LONG = (
     "accuracy_vs_speed",
+    "branching_rule",
+    "certification_cost",
+    "condensation_cost",
     "continuation_coverage",
     "continuation_steps",
     "extremes",
     "fixed_points_scaling",
+    "grazing",
     "histories",
+    "one_certificate",
+    "proven_graphs",
     "requirements",
     "samples_vs_graph",
     "search_in_3d",
     "search_in_3d_choices",
     "search_profile",
+    "search_size",
     "uniqueness_vs_mesh",
 )
 #: Studies that read the peak memory from /proc.
@@ -156,7 +163,7 @@ def test_one_part_of_a_study(tmp_path):
     assert {file.name for file in tmp_path.iterdir()} == {"branch_thin.csv", "branch_thin.txt", "branch_thin.png"}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_a_smoke_run_without_a_folder_leaves_the_results_alone(tmp_path, monkeypatch):
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     before = results()
