@@ -140,8 +140,8 @@ class RigidBound:
     Examples
     --------
     >>> import enumsol
-    >>> enumsol.enumerate_roots(enumsol.gallery.block_on_table(), alpha=0).rigid_bound
-    RigidBound(largest=..., needed=False)
+    >>> enumsol.enumerate_roots(enumsol.gallery.block_on_table(), alpha=0).rigid_bound.largest
+    20.0
     """
 
     largest: float

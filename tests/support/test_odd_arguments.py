@@ -298,7 +298,7 @@ def named(function):
     return getattr(function, "__qualname__", type(function).__name__)
 
 
-@pytest.mark.few(15, 60)
+@pytest.mark.few(8, 60)
 @pytest.mark.parametrize(
     ("function", "good", "name"), CASES, ids=[f"{named(function)}-{name}" for function, _, name in CASES]
 )

@@ -79,6 +79,7 @@ def exact_floats(problem):
     return np.array([float(x) for x in exact_condense(problem, 0)[1]])
 
 
+@pytest.mark.few(8)
 @pytest.mark.parametrize("seed", range(20))
 def test_every_point_of_a_box_has_one_solution(seed):
     pair = Pair(seed)
@@ -138,6 +139,7 @@ def near(ball, values):
     return all(abs(Fraction(mid) - x) <= Fraction(rad) for mid, rad, x in pairs)
 
 
+@pytest.mark.few(6)
 @pytest.mark.parametrize("seed", range(16))
 def test_a_solution_is_enclosed_and_served(seed):
     """At points of a box one solution is in its balls, and some theta within reach of the one stated serves it."""
@@ -205,6 +207,7 @@ def served(theta, off, numbers, force, w, F, p, system):
     return True
 
 
+@pytest.mark.few(4)
 @pytest.mark.parametrize("seed", range(0, 20, 2))
 def test_regular_solutions_are_enclosed_to_first_order(seed):
     """The forces at points of a box, in rationals, are those of the expansion."""
