@@ -30,16 +30,16 @@ from enumsol.trusted.exclusion import Terms, exclusion_margin
 from enumsol.trusted.floating_bounds import is_unbalanced
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     from numpy.typing import NDArray
 
-    from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.proof.compressed_parts import Recorder
     from enumsol.relaxation.engine import Engine
     from enumsol.search.certifiers.margins import Margin
     from enumsol.search.certifiers.protocol import Bound, Certifier
     from enumsol.search.outcome import SearchLimits, SearchProgress
+    from enumsol.search.resume import Reader
     from enumsol.selections.rational_selections import ExactSelections
     from enumsol.selections.solution import Codes, SelectionSolution
     from enumsol.support.arguments import Alpha
@@ -149,7 +149,8 @@ class FloatingSolvers(Solvers):
 
     def reader(self) -> FloatingReader:
         """Understands the records of an earlier proof."""
-        return FloatingReader((self.scaled.F > 0).tolist(), self.enclosed, len(self.rows.unit))
+        held = PlaneReader((self.scaled.F > 0).tolist(), self.enclosed)
+        return FloatingReader(held, records.FLOATING_LEAVES, len(self.rows.unit))
 
     def unloaded(self) -> bool:
         """Without load the body may be moved: there is no one solution."""
@@ -160,20 +161,22 @@ class FloatingSolvers(Solvers):
         return super().proof_header() | {"max_rigid_displacement": self.problem.rigid_reach}
 
 
-class FloatingReader(PlaneReader):
-    """Of proofs about a body that nothing holds.
+class FloatingReader:
+    """Of proofs about a body that nothing holds, in 2D and 3D: those of other bodies, but for forms and balance.
 
     Parameters
     ----------
-    friction, enclosed : as of PlaneReader
+    held : Reader
+        Of proofs about a body that is held.
+    kinds : dict
+        The kinds of leaves, by their letters.
     modes : number of rigid modes
     """
 
-    kinds = records.FLOATING_LEAVES
-
-    def __init__(self, friction: Sequence[bool], enclosed: EnclosedSystem | None, modes: int) -> None:
-        super().__init__(friction, enclosed)
-        self._modes = modes
+    def __init__(self, held: Reader, kinds: dict[str, type[Any]], modes: int) -> None:
+        self.kinds = kinds
+        self.form_over, self.lone = held.form_over, held.lone
+        self._held, self._modes = held, modes
 
     def declare(self, record: list[Any]) -> None:
         """Refuse a form: it is that of a body that is held."""
@@ -182,7 +185,7 @@ class FloatingReader(PlaneReader):
     def bound(self, codes: Codes, record: list[Any]) -> Bound:
         """What is said to exclude a partial assignment; ValueError where the record makes no sense."""
         if record[0] != records.Unbalanced.kind:
-            return super().bound(codes, record)
+            return self._held.bound(codes, record)
         records.Unbalanced.read(record, records.Limits(codes, modes=self._modes))
         # the certifier finds a direction of its own
         return RecordedBound(np.zeros(0, dtype=np.intp), np.zeros(0))

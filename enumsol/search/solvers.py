@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from enumsol.search.certifiers.rational_certifier import ExactCertifier
     from enumsol.search.fathoming import Closing
     from enumsol.search.outcome import SearchLimits, SearchProgress
+    from enumsol.search.resume import Reader
     from enumsol.selections.rational_selections import ExactSelections
     from enumsol.support.arguments import Alpha
 
@@ -216,7 +217,7 @@ class Solvers:
             return not any(_present(self.exact).system.g)
         return self.problem.is_unloaded(self.alpha)
 
-    def reader(self) -> PlaneReader:
+    def reader(self) -> Reader:
         """Understands the records of an earlier proof."""
         return PlaneReader((self.scaled.F > 0).tolist(), self.enclosed)
 

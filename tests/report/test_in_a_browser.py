@@ -12,13 +12,6 @@ HOSTILE = "</script><script>document.title = 'broken'</script><img src=x onerror
 
 
 @pytest.fixture(scope="module")
-def browser():
-    browser = Browser(find_browser())
-    yield browser
-    browser.close()
-
-
-@pytest.fixture(scope="module")
 def graphs():
     square = gallery.two_node_square()
     bare = enumsol.ContactProblem(square.A, square.Bn, square.Bt, square.f, node_ids=[HOSTILE, "b"])

@@ -3,7 +3,7 @@
 import matplotlib.image
 import numpy as np
 import pytest
-from browser import Browser, find_browser
+from browser import find_browser
 from parted_meshes import grid
 
 from enumsol import enumerate_roots, fem, gallery, write_report
@@ -11,13 +11,6 @@ from enumsol import enumerate_roots, fem, gallery, write_report
 pytest.importorskip("plotly")
 pytestmark = pytest.mark.skipif(find_browser() is None, reason="no headless browser (Debian's package chromium)")
 CARDS = "[...document.querySelectorAll('.card')]"
-
-
-@pytest.fixture(scope="module")
-def browser():
-    browser = Browser(find_browser())
-    yield browser
-    browser.close()
 
 
 @pytest.fixture(scope="module")

@@ -13,13 +13,12 @@ import numpy as np
 
 from enumsol.condensation.floating_space import FloatingSpace
 from enumsol.errors import InvalidArgumentError
-from enumsol.proof.records import Limits, Unbalanced
+from enumsol.proof.records import Unbalanced
 from enumsol.proof.space_records import FLOATING_LEAVES, ExcludedInSpace
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.certifiers.protocol import Certified, Refine, UndecidedPart, Unrecorded
-from enumsol.search.floating import weakly_held
-from enumsol.search.resume import RecordedBound
-from enumsol.search.space.space_search import SpaceCertifier, SpaceReader
+from enumsol.search.floating import FloatingReader, weakly_held
+from enumsol.search.space.space_search import SpaceCertifier
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.confinement import motion_beside
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
@@ -87,10 +86,10 @@ class FloatingSpaceSolvers(SpaceSolvers):
     def _forms(self) -> None:
         """Bounds of these bodies are of the energy."""
 
-    def reader(self) -> FloatingSpaceReader:
+    def reader(self) -> FloatingReader:
         """Understands the records of an earlier proof."""
         modes = len(self.problem.modes.held) if self.problem.modes else 0
-        return FloatingSpaceReader(self._engine, self.enclosed, modes)
+        return FloatingReader(super().reader(), FLOATING_LEAVES, modes)
 
     def unloaded(self) -> bool:
         """Without load the body may be moved: there is no one solution."""
@@ -99,35 +98,6 @@ class FloatingSpaceSolvers(SpaceSolvers):
     def proof_header(self) -> dict[str, Any]:
         """First record of a proof: with the bound of the rigid displacement."""
         return super().proof_header() | {"max_rigid_displacement": self.problem.rigid_reach}
-
-
-class FloatingSpaceReader(SpaceReader):
-    """Of proofs about a body that nothing holds.
-
-    Parameters
-    ----------
-    engine, enclosed : as of SpaceReader
-    modes : number of rigid modes
-    """
-
-    kinds = FLOATING_LEAVES
-
-    def __init__(self, engine: SpaceEngine, enclosed: EnclosedSpace, modes: int) -> None:
-        super().__init__(engine, enclosed)
-        self._modes = modes
-
-    def declare(self, record: list[Any]) -> None:
-        """There are no forms."""
-        del record
-        raise ValueError("a form in a proof about a body in 3D that nothing holds")
-
-    def bound(self, codes: Codes, record: list[Any]) -> Bound:
-        """What is said to exclude a partial assignment; ValueError where the record makes no sense."""
-        if record[0] != Unbalanced.kind:
-            return super().bound(codes, record)
-        Unbalanced.read(record, Limits(codes, modes=self._modes))
-        # the certifier finds a direction of its own
-        return RecordedBound(np.zeros(0, dtype=np.intp), np.zeros(0))
 
 
 class SpaceExclusions:

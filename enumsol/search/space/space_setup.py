@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from enumsol.proof.compressed_parts import Recorder
     from enumsol.search.certifiers.protocol import Certifier
     from enumsol.search.outcome import SearchLimits, SearchProgress
+    from enumsol.search.resume import Reader
     from enumsol.search.space.space_fathoming import SpaceClosing
     from enumsol.support.arguments import Alpha
 
@@ -141,7 +142,7 @@ class SpaceSolvers:
         """Whether g = 0 for the data as given, so that only lambda = 0 solves."""
         return self.problem.is_unloaded(self.alpha)
 
-    def reader(self) -> SpaceReader:
+    def reader(self) -> Reader:
         """Understands the records of an earlier proof."""
         return SpaceReader(self._engine, self.enclosed)
 

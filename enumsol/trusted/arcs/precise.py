@@ -307,16 +307,16 @@ class PreciseSelection:
             spread = np.zeros(p)
             if any(offset.rad[i] for i in stick):
                 parts = ((system.F0, 1), (system.F1, 0))
-                W0, W1 = (matrix(rows.columns(system.rows, as_objects(F), unit).tolist()) for F, unit in parts)
+                W0, W1 = (matrix(rows.columns(system.rows[p:], as_objects(F), unit).tolist()) for F, unit in parts)
                 place = {row: k for k, row in enumerate(rows.unknown.tolist())}
                 units = arb_mat(len(place), len(stick))
-                for column_of, i in enumerate(stick):
-                    units[place[p + i], column_of] = arb(1)
+                for j, i in enumerate(stick):
+                    units[place[p + i], j] = arb(1)
                 try:
                     slopes = (W0 + W1 * a) * (self._M[0] + self._M[1] * a).solve(units)
                 except ZeroDivisionError:
                     return None
-                sizes = [[upper(slopes[p + k, j]) for j in range(len(stick))] for k in range(p)]
+                sizes = [[upper(slopes[k, j]) for j in range(len(stick))] for k in range(p)]
                 spread = upper_sum(np.array(sizes) * offset.rad[stick] * SAFE, axis=1)
             mid = np.array([float(x.mid()) for x in moved])
             rad = np.array([upper(x - arb(m)) for x, m in zip(moved, mid.tolist(), strict=True)])
