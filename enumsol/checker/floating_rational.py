@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from flint import fmpq, fmpq_mat
 
 from enumsol.arithmetic.rationals import rational
+from enumsol.checker.hull import HullTooLargeError, hull_of_selections
 from enumsol.checker.rational import RationalSystem, Vector
 
 if TYPE_CHECKING:
@@ -63,24 +64,53 @@ class FloatingRationalSystem(RationalSystem):
 
     def conditions(self, codes: Sequence[int], point: Vector) -> Vector:
         """The selection's inequalities at a point, then the bounds of the rigid displacement."""
+        return [*self.contact_conditions(codes, point), *self.bounds(point)]
+
+    def contact_conditions(self, codes: Sequence[int], point: Vector) -> Vector:
+        """The selection's inequalities at a point."""
+        return super().conditions(codes, point)
+
+    def bounds(self, point: Vector) -> Vector:
+        """What is left to the bounds of the rigid displacement."""
         moved = list(zip(point[2 * self.p :], self.reach, strict=True))
-        return [*super().conditions(codes, point), *(most - x for x, most in moved), *(most + x for x, most in moved)]
+        return [*(most - x for x, most in moved), *(most + x for x, most in moved)]
 
     def rests_on_reach(self, codes: Sequence[int], points: Sequence[Sequence[Fraction]]) -> bool:
-        """Whether the points that a selection holds, these, may be others without the bounds."""
+        """Whether a selection, which holds these points, holds others without the bounds.
+
+        True as well if it has too many candidate vertices to find out.
+        """
         if points:
             ends = [[rational(x) for x in point[2 * self.p :]] for point in points]
             return any(abs(x) == most for end in ends for x, most in zip(end, self.reach, strict=True))
-        M, b = self.equations(codes)
-        table = [[*row, x] for row, x in zip(M.tolist(), b, strict=True)]
-        reduced, rank = fmpq_mat(table).rref()
-        rows = reduced.tolist()[:rank]
-        if rows and not any(rows[-1][:-1]):
-            return False  # the equations contradict each other
-        if rank < self.size:
+        try:
+            return any(point[-1] > 0 for point in hull_of_selections(_Shares(self), codes).points)
+        except HullTooLargeError:
             return True
-        point = [row[-1] for row in rows]
-        return all(x >= 0 for x in super().conditions(codes, point))
+
+
+class _Shares:
+    """Points (s x, s) with x in a selection without the bounds, 0 <= s <= 1, and s x within the bounds.
+
+    Parameters
+    ----------
+    system : FloatingRationalSystem
+    """
+
+    def __init__(self, system: FloatingRationalSystem) -> None:
+        self._system, self.size = system, system.size + 1
+
+    def equations(self, codes: Sequence[int]) -> tuple[Any, Vector]:
+        """Matrix and right-hand side, which is zero."""
+        M, b = self._system.equations(codes)
+        return fmpq_mat([[*row, -x] for row, x in zip(M.tolist(), b, strict=True)]), [fmpq(0)] * len(b)
+
+    def conditions(self, codes: Sequence[int], point: Vector) -> Vector:
+        """The selection's inequalities times s, then the bounds of s x and of s."""
+        *x, share = point
+        there, constant = (self._system.contact_conditions(codes, at) for at in (x, [fmpq(0)] * len(x)))
+        scaled = [value + (share - 1) * more for value, more in zip(there, constant, strict=True)]
+        return [*scaled, *self._system.bounds(x), share, 1 - share]
 
 
 def _dot(row: list[float], column: Vector) -> Any:

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from fractions import Fraction
 from itertools import combinations
 from math import comb
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from flint import fmpq, fmpq_mat
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
-
-    from enumsol.checker.rational import RationalSystem
 
 Point = tuple[Fraction, ...]
 
@@ -23,6 +21,20 @@ MAX_CANDIDATES = 200_000
 
 class HullTooLargeError(ValueError):
     """A root set has more than MAX_CANDIDATES candidate vertices."""
+
+
+class Conditions(Protocol):
+    """Equations and inequalities of selections, as of a RationalSystem."""
+
+    @property
+    def size(self) -> int:
+        """Numbers of a point."""
+
+    def equations(self, codes: Sequence[int]) -> tuple[Any, Sequence[Any]]:
+        """Matrix and right-hand side."""
+
+    def conditions(self, codes: Sequence[int], point: list[Any]) -> Sequence[Any]:
+        """Values of the inequalities at a point, which must not be negative; affine in the point."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +52,7 @@ class Hull:
     dimension: int
 
 
-def hull_of_selections(system: RationalSystem, *selections: Sequence[int]) -> Hull:
+def hull_of_selections(system: Conditions, *selections: Sequence[int]) -> Hull:
     """The root set that the given selections have in common, a polytope.
 
     It is bounded, and therefore the hull of its vertices, because S is positive definite (theory, section 5.1), and
@@ -71,7 +83,7 @@ def hull_of_selections(system: RationalSystem, *selections: Sequence[int]) -> Hu
     return Hull(sorted(found), _dimension(sorted(found)))
 
 
-def _solution_set(system: RationalSystem, selections: Sequence[Sequence[int]]) -> tuple[list[Any], list[Any]] | None:
+def _solution_set(system: Conditions, selections: Sequence[Sequence[int]]) -> tuple[list[Any], list[Any]] | None:
     """A point that solves all equations and a basis of their kernel, or None if they contradict each other."""
     size = system.size
     table = []

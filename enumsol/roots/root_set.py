@@ -135,13 +135,14 @@ class RigidBound:
     largest : float
         Bound of the components of the rigid displacement [length].
     needed : bool
-        Whether anything rests on it. Otherwise there are no other solutions at all.
+        Whether anything rests on it. Otherwise there are no other solutions at all. Of a complete search of the tree
+        in 2D, up to 250 degrees of freedom, True says that there are solutions at the bound or beyond it.
 
     Examples
     --------
     >>> import enumsol
-    >>> enumsol.enumerate_roots(enumsol.gallery.block_on_table(), alpha=0).rigid_bound.largest
-    20.0
+    >>> enumsol.enumerate_roots(enumsol.gallery.block_on_table(), alpha=0).rigid_bound
+    RigidBound(largest=20.0, needed=False)
     """
 
     largest: float

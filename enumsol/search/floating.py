@@ -28,6 +28,7 @@ from enumsol.trusted.at_alpha import holds_no_root, solve_selection
 from enumsol.trusted.confinement import motion_against, without_bound
 from enumsol.trusted.exclusion import Terms, exclusion_margin
 from enumsol.trusted.floating_bounds import is_unbalanced
+from enumsol.trusted.status_rows import CONDITIONS
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -99,7 +100,11 @@ class FloatingSolvers(Solvers):
     @cached_property
     def exclusions(self) -> Exclusions | None:
         """What excludes assignments, for the certifiers of both arithmetics; None without balls."""
-        return None if self._enclosed[0] is None else Exclusions(self._enclosed[0])
+        return None if self._enclosed[0] is None else Exclusions(self._enclosed[0], self._rests_on_reach)
+
+    def _rests_on_reach(self, codes: Codes) -> bool:
+        """Whether a complete selection without a solution may have one beyond the bound."""
+        return self.exact is None or self.exact.rests_on_reach(codes, None)
 
     @cached_property
     def _enclosed(self) -> tuple[FloatingSystem | None, str]:
@@ -212,6 +217,7 @@ class Exclusions:
     Parameters
     ----------
     enclosed : FloatingSystem
+    rests_on_reach : of a complete selection without a solution, whether it may have one beyond the bound
 
     Attributes
     ----------
@@ -219,24 +225,31 @@ class Exclusions:
         With its bound, and with one beyond which there are no solutions.
     """
 
-    def __init__(self, enclosed: FloatingSystem) -> None:
+    def __init__(self, enclosed: FloatingSystem, rests_on_reach: Callable[[Codes], bool]) -> None:
+        self.rests_on_reach = rests_on_reach
         self.system, self.free = enclosed, without_bound(enclosed)
         self._margins: tuple[Margin, Margin] = (
             partial(exclusion_margin, self.free, errors=2.0),
             partial(exclusion_margin, enclosed, errors=2.0),
         )
 
-    def record(self, codes: Codes, bound: Bound) -> tuple[records.Exclusion, bool] | None:
-        """A record that excludes a partial assignment, and whether it needs the bound; or None."""
+    def record(self, codes: Codes, bound: Bound, *, within: bool) -> tuple[records.Exclusion, bool] | None:
+        """A record that excludes a partial assignment, and whether it needs the bound; or None.
+
+        Whether a bound is needed must not hang on the numbers that a relaxation came to. What is excluded with it only
+        is therefore split, down to complete selections, unless ``within``: it is known to be needed (theory, section
+        14.4).
+        """
         rows, values = bound.multipliers()
         usable = bound.form is None and len(rows)
         if usable and (kept := proven(self._margins[0], codes, rows, values)) is not None:
             return records.Excluded(Terms(rows, kept)), False
         if (unbalanced := self.unbalanced(codes)) is not None:
             return unbalanced, False
-        if usable and (kept := proven(self._margins[1], codes, rows, values)) is not None:
-            return records.Excluded(Terms(rows, kept)), True
-        return None
+        kept = proven(self._margins[1], codes, rows, values) if usable else None
+        if kept is None or not (within or (all(code in CONDITIONS for code in codes) and self.rests_on_reach(codes))):
+            return None
+        return records.Excluded(Terms(rows, kept)), True
 
     def unbalanced(self, codes: Codes) -> records.Unbalanced | None:
         """A record that no forces below a partial assignment are in balance with the load; or None."""
@@ -276,7 +289,7 @@ class FloatingCertifier(VerifiedCertifier):
 
     def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """Whether the relaxation's multipliers are proven to exclude the partial assignment."""
-        found = None if self._exclusions is None else self._exclusions.record(codes, relaxation)
+        found = None if self._exclusions is None else self._exclusions.record(codes, relaxation, within=self.bounded)
         if found is None:
             self._escalations.refined += 1
             return False
@@ -300,11 +313,12 @@ class FloatingCertifier(VerifiedCertifier):
             found: records.Exclusion | records.NoRoot | None = self._exclusions.unbalanced(codes)
             if found is None and _holds_none(self._exclusions.free, codes):
                 found = records.NoRoot()
-            if found is None and holds_no_root(system, codes, ball):
-                self._excluded_by_record(records.NoRoot(), bounded=True)
-                return None
             if found is not None:
                 self._excluded_by_record(found, bounded=False)
+                return None
+            # with the bound as in Exclusions.record
+            if holds_no_root(system, codes, ball) and (self.bounded or self._exclusions.rests_on_reach(codes)):
+                self._excluded_by_record(records.NoRoot(), bounded=True)
                 return None
         certifier = self._exactly()
         if certifier is None:
@@ -344,7 +358,7 @@ class FloatingExactCertifier(ExactCertifier):
 
     def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """Whether the multipliers prove that the partial assignment holds no solution."""
-        found = None if self._exclusions is None else self._exclusions.record(codes, relaxation)
+        found = None if self._exclusions is None else self._exclusions.record(codes, relaxation, within=self.bounded)
         self.bounded |= found is not None and found[1]
         return found is not None
 

@@ -14,7 +14,7 @@ from enumsol.arithmetic.rationals import as_objects, rational, to_fraction
 from enumsol.condensation.exact import ExactSystem, UncondensedSystem
 from enumsol.model.statuses import CONDITIONS, FINAL, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, RowKind
 from enumsol.selections.polytopes import polytope_vertices, value
-from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution
+from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution, VertexLimitError
 from enumsol.trusted.selection import Selection, row_values
 
 if TYPE_CHECKING:
@@ -37,6 +37,11 @@ def _outward(number: Any) -> tuple[float, float]:
 
 def _holds(conditions: Conditions, rows: Sequence[Any]) -> bool:
     return all(rows[k] == 0 for k in conditions.equations) and all(rows[k] >= 0 for k in conditions.inequalities)
+
+
+def _homogeneous(forms: Sequence[Form]) -> list[Form]:
+    """Forms with what is added as the coefficient of one variable more."""
+    return [([*form, constant], fmpq(0)) for form, constant in forms]
 
 
 class ExactSelections:
@@ -173,7 +178,10 @@ class ExactSelections:
         return rows
 
     def rests_on_reach(self, codes: Codes, found: SelectionSolution | None) -> bool:
-        """Whether what was found in a selection may be other without the bounds of the rigid displacement."""
+        """Whether a selection, in which this was found, holds other points without the bounds (theory, section 14.4).
+
+        True as well if more than MAX_BASES bases would have to be tried to find out.
+        """
         if not self.modes:
             return False
         if found is not None:
@@ -181,11 +189,16 @@ class ExactSelections:
             reach, places = self.system.reach, range(2 * self.p, 2 * self.p + self.modes)
             return any(abs(v[i]) == most for v in found.vertices for i, most in zip(places, reach, strict=True))
         equations, inequalities = self.forms(codes)
-        regular = self.solve_equations(codes)
-        if regular is not None:
-            return all(value(form, regular[0]) >= 0 for form in inequalities[: -2 * self.modes])
-        _, pivots = self.row_reduced([[*form, -constant] for form, constant in equations])
-        return 2 * self.p + self.modes not in pivots
+        own, bounds = inequalities[: -2 * self.modes], inequalities[-2 * self.modes :]
+        # (s x, s) with a solution x anywhere and some 0 < s <= 1 such that s x is within the bounds
+        size, none = len(self._zero), fmpq(0)
+        shares = [([*self._zero, fmpq(1)], none), ([*self._zero, fmpq(-1)], fmpq(1))]
+        rows = [*_homogeneous(own), *(([*form, none], most) for form, most in bounds), *shares]
+        try:
+            points = polytope_vertices(_homogeneous(equations), rows, self.row_reduced)
+        except VertexLimitError:
+            return True
+        return any(point[size] > 0 for point in points)
 
     # -- decisions -------------------------------------------------------------------------------------------------
 

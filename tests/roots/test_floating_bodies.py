@@ -59,6 +59,22 @@ def test_all_solutions_of_many_random_bodies():
     assert not failures(range(100, 180), 0.25)
 
 
+@pytest.mark.few(2, 5)
+@pytest.mark.parametrize("seed", [1, 3, 5, 7, 21, 33, 39, 40, 21366])
+def test_a_bound_is_needed_if_it_cuts_something_off(seed):
+    problem = random_body(seed)
+    # all numbers are small: nothing begins as far away as this
+    near, far = ({v for _, part in Oracle(p, 0).parts for v in part} for p in (problem, _reaching(problem, 2.0**20)))
+    for arithmetic in ("verified", "exact"):
+        roots = enumsol.enumerate_roots(problem, 0, arithmetic=arithmetic)
+        assert roots.complete
+        assert roots.rigid_bound.needed == (near != far)
+
+
+def _reaching(problem, largest):
+    return problem.replace(max_rigid_displacement=largest)
+
+
 @pytest.mark.parametrize(
     ("push", "statuses"),
     [

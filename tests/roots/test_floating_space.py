@@ -12,12 +12,12 @@ from enumsol.gallery import block_on_table3d
 
 
 def checked(problem, **options):
-    """All roots, whose proof the checker accepts; it may know that a bound was not needed where the search does not."""
+    """All roots, whose proof the checker accepts."""
     roots = enumsol.enumerate_roots(problem, 0, **options)
     report = enumsol.verify(problem, roots.proof)
     assert report.ok
     assert (report.roots, report.complete) == (len(roots), roots.complete)
-    assert report.within is None or roots.rigid_bound.needed
+    assert (report.within is not None) == roots.rigid_bound.needed
     return roots
 
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from enumsol.condensation.floating_space import FloatingSpace
 from enumsol.errors import InvalidArgumentError
-from enumsol.proof.records import Unbalanced
+from enumsol.model.statuses import CONTACT, UNDECIDED
+from enumsol.proof.records import NoRoot, Unbalanced
 from enumsol.proof.space_records import FLOATING_LEAVES, ExcludedInSpace
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.certifiers.protocol import Certified, Refine, UndecidedPart, Unrecorded
@@ -116,13 +117,22 @@ class SpaceExclusions:
     def __init__(self, enclosed: FloatingSpace) -> None:
         self.system, self.free = enclosed, unbounded(enclosed)
 
-    def record(self, codes: Codes, rows: Sequence[Row], values: Array) -> tuple[Exclusion, bool] | None:
-        """A record that excludes a partial assignment, and whether it needs the bound; or None."""
+    def record(
+        self, codes: Codes, rows: Sequence[Row], values: Array, *, within: bool
+    ) -> tuple[Exclusion | NoRoot, bool] | None:
+        """A record that excludes a partial assignment, and whether it needs the bound; or None.
+
+        ``within``: the bound is known to be needed. Otherwise it serves only where all statuses are told (theory,
+        section 14.4).
+        """
         if len(rows) and floating_margin(self.free, codes, rows, values, errors=2.0) > 0:
             return ExcludedInSpace(list(rows), values), False
         if (unbalanced := self.unbalanced(codes)) is not None:
             return unbalanced, False
-        if len(rows) and floating_margin(self.system, codes, rows, values, errors=2.0) > 0:
+        told = not any(code in (UNDECIDED, CONTACT) for code in codes)
+        if (within or told) and len(rows) and floating_margin(self.system, codes, rows, values, errors=2.0) > 0:
+            if told and settle(self.free, codes) is None:
+                return NoRoot(), False
             return ExcludedInSpace(list(rows), values), True
         return None
 
@@ -160,7 +170,8 @@ class FloatingSpaceCertifier(SpaceCertifier):
         if self._exclusions is None or not relaxation.bound > PRUNE_MARGIN:
             return False
         numbers, values = relaxation.multipliers()
-        found = self._exclusions.record(codes, [self._engine.rows[number] for number in numbers.tolist()], values)
+        rows = [self._engine.rows[number] for number in numbers.tolist()]
+        found = self._exclusions.record(codes, rows, values, within=self.bounded)
         if found is None:
             return False
         self.bounded |= found[1]
