@@ -8,53 +8,26 @@ from documents import ROOT
 
 
 def table(name):
-    return pd.read_csv(ROOT / "studies" / name, dtype=str)
+    """A table of results; ``STUDY`` alone stands for its table of that name."""
+    study, _, rest = name.partition("/")
+    return pd.read_csv(ROOT / "studies" / study / "results" / f"{rest or study}.csv", dtype=str)
+
+
+def notes(study, name=None):
+    return (ROOT / "studies" / study / "results" / f"{name or study}.txt").read_text(encoding="utf-8")
 
 
 def numbers(column):
     return pd.to_numeric(column)
 
 
-def largest_of(*names, column="any"):
-    found = table("one_certificate/results/largest.csv").set_index("series")
-    return numbers(found.loc[list(names), column])
-
-
-def certified(shape):
-    """Problems that one certificate decides, in less than a second: the largest p, the least and the largest F."""
-    found = table("one_certificate/results/one_certificate.csv")
-    found = found[found["problem"].str.startswith(shape) & (found["certificate"] == "yes")]
-    most = numbers(found["p"]).max()
-    found = found[numbers(found["p"]) == most]
-    assert max(numbers(found["seconds"])) < 1
-    return (most, *rounded(numbers(found["F"])))
-
-
-def nodes_of_wedges(p):
-    found = table("one_certificate/results/cost.csv")
-    return numbers(found[found["p"] == str(p)]["tree nodes"])
-
-
-def nodes_of_workers(p):
-    found = table("workers/results/workers.csv")
-    return numbers(found[found["p"] == str(p)]["nodes"])
-
-
-def nodes_of_discs(count):
-    found = table("discs/results/discs.csv")
-    chosen = (found[["unequal", "contacts", "discs"]] == ["weights", "stiff", str(count)]).all(axis=1)
-    return numbers(found[chosen]["nodes"])
-
-
-def wedges_in_3d(p, column):
-    found = table("search_in_3d/results/wedges.csv")
-    return numbers(found[found["p"] == str(p)][column])
-
-
-def feet_in_3d(column):
-    """Of those that take a tree and were finished, the least and the largest."""
-    found = table("search_in_3d/results/feet.csv")
-    return rounded(numbers(found[(found["complete"] == "True") & (numbers(found["nodes"]) > 1)][column]))
+def where(name, column, **values):
+    """Numbers of a column, in rows with these values."""
+    found = table(name)
+    for key, value in values.items():
+        found = found[found[key.replace("_", " ")] == value]
+    assert len(found)
+    return numbers(found[column])
 
 
 def rounded(values, digits=2):
@@ -62,53 +35,237 @@ def rounded(values, digits=2):
     return tuple(float(f"{value:.{digits}g}") for value in (min(values), max(values)))
 
 
-#: A sentence, with a place for each of its numbers, and what they are.
-CLAIMS = {
-    "blocks in 2D": (r"p = (\d+) in 2D and F from ([\d.]+) to ([\d.]+)", lambda: certified("256x")),
-    "blocks in 3D": (r"p = (\d+) in 3D and F from ([\d.]+) to ([\d.]+)", lambda: certified("3D block")),
-    "pressed": (r"up to F = (\d+), the largest value tried", lambda: rounded(largest_of("block pressed"))[:1]),
-    "dragged": (
-        r"up to F = ([\d.]+) to ([\d.]+) for blocks that are dragged",
-        lambda: rounded(largest_of("block dragged")),
-    ),
-    "wedges": (r"up to F = ([\d.]+) to ([\d.]+) for wedges", lambda: rounded(largest_of("wedge", "3D wedge"))),
-    "tree, p = 32": (
+def largest_of(*names, column="any"):
+    return numbers(table("one_certificate/largest").set_index("series").loc[list(names), column])
+
+
+def certified(shape):
+    """Problems that one certificate decides, in less than a second: the largest p, the least and the largest F."""
+    found = table("one_certificate")
+    found = found[found["problem"].str.startswith(shape) & (found["certificate"] == "yes")]
+    most = numbers(found["p"]).max()
+    found = found[numbers(found["p"]) == most]
+    assert max(numbers(found["seconds"])) < 1
+    return (most, *rounded(numbers(found["F"])))
+
+
+def tree_of_a_block(cells):
+    (found,) = table("one_certificate").query(f"problem == '3D block {cells}' and F == '0.3'")["tree nodes"]
+    return (float(found.removeprefix("> ")),)
+
+
+def nodes_of_discs(count):
+    return where("discs", "nodes", unequal="weights", contacts="stiff", discs=str(count))
+
+
+def feet_in_3d(column):
+    """Of those that take a tree and were finished, the least and the largest."""
+    found = table("search_in_3d/feet")
+    return rounded(numbers(found[(found["complete"] == "True") & (numbers(found["nodes"]) > 1)][column]))
+
+
+def measured(setting, column):
+    return tuple(where("accuracy_vs_speed", column, setting=setting))
+
+
+def wrong_near_a_degeneracy(nearer):
+    """Per cent of the answers of fast arithmetic."""
+    found = table("accuracy_vs_speed/accuracy_enumeration")
+    distance = numbers(found["distance"])
+    found = found[(found["setting"] == "fast 1e-09") & (distance > 0) & (distance < nearer)]
+    return (round(100 * numbers(found["wrong"]).sum() / numbers(found["problems"]).sum()),)
+
+
+def times_of_exact(*p):
+    found = dict(re.findall(r"p = (\d+): ([\d.]+)", notes("accuracy_vs_speed")))
+    return tuple(float(f"{float(found[size]):.3g}") for size in p)
+
+
+def decided_from(*kinds):
+    (line,) = re.findall("leaves nothing open from a distance of (.*)", notes("accuracy_vs_speed"))
+    found = {kind: float(distance) for distance, kind in re.findall(r"([\d.e-]+) \((\w+)\)", line)}
+    return tuple(found[kind] for kind in kinds)
+
+
+def samples_that_cost_as_much():
+    """The least number of samples tried that costs as much as a proven graph, and what 100 miss of its vertices."""
+    found = table("samples_vs_graph/accuracy_sampling")
+    found = found[found["method"] == "samples"]
+    missed = where("samples_vs_graph/accuracy_sampling", "transitions missed %", method="samples", samples="100")
+    return numbers(found[numbers(found["time ratio"]) > 1]["samples"]).min(), round(missed.item())
+
+
+def jumps_as_printed():
+    found = where("continuation_steps/accuracy_continuation", "jumps", varied="h_max", steps="as printed")
+    (problems,) = re.findall(r"(\d+) problems", notes("continuation_steps", "accuracy_continuation"))
+    return (*rounded(found), float(problems))
+
+
+def many_loads(n):
+    values = (where("condensation_cost/loads", column, n=str(n)).item() for column in ("n", "p", "ratio"))
+    return tuple(float(f"{value:.2g}") if value < 10 else value for value in values)
+
+
+def forms_in_3d(choice, digits=2):
+    """Nodes with forms by those with the energy, the least and the largest."""
+    found = table("search_in_3d_choices/forms").set_index(["choice", "problem"])["nodes"]
+    return rounded(numbers(found[choice]) / numbers(found["energy"]), digits)
+
+
+def slices_in_3d():
+    return (
+        *where("search_in_3d/wedges", "nodes", wedge="1x1x2", F="1"),
+        *where("search_in_3d/wedges", "nodes", wedge="2x1x2", F="1"),
+        *where("search_in_3d/wedges", "nodes", wedge="1x1x2", F="2"),
+        *where("search_in_3d/wedges", "nodes", wedge="1x1x2", F="3"),
+    )
+
+
+def wedges_in_3d(p, column):
+    return rounded(where("search_in_3d/wedges", column, p=p))
+
+
+def seconds_of_wedges_in_3d(p):
+    return rounded(where("search_in_3d/wedges", "search s", p=p).round())
+
+
+#: Where a page says so: a sentence, with a place for each of its numbers, and what they are.
+CLAIMS = [
+    ("arithmetic", r"p = (\d+) in 2D and F from ([\d.]+) to ([\d.]+)", lambda: certified("256x")),
+    ("arithmetic", r"p = (\d+) in 3D and F from ([\d.]+) to ([\d.]+)", lambda: certified("3D block")),
+    ("arithmetic", r"up to F = (\d+), the largest value tried", lambda: rounded(largest_of("block pressed"))[:1]),
+    ("arithmetic", r"F = ([\d.]+) to ([\d.]+) for blocks that are dr", lambda: rounded(largest_of("block dragged"))),
+    ("arithmetic", r"up to F = ([\d.]+) to ([\d.]+) for wedges", lambda: rounded(largest_of("wedge", "3D wedge"))),
+    (
+        "arithmetic",
         r"Wedges take ([\d,]+) to ([\d,]+) nodes of the tree at p = 32",
-        lambda: rounded(nodes_of_wedges(32), 1),
+        lambda: rounded(where("one_certificate/cost", "tree nodes", p="32"), 1),
     ),
-    "tree, p = 48": (r"([\d,]+) at p = 48", lambda: rounded(nodes_of_workers(48))[1:]),
-    "tree, p = 64": (r"and ([\d,]+) in half a minute at p = 64", lambda: rounded(nodes_of_workers(64), 3)[1:]),
-    "12 discs": (r"12 discs take (\d+) nodes", lambda: rounded(nodes_of_discs(12), 3)[1:]),
-    "20 discs": (r"20 discs (\d+) to (\d+)", lambda: rounded(nodes_of_discs(20), 3)),
-    "3D wedges, nodes": (
-        r"take ([\d,]+) to ([\d,]+) nodes of the tree and \d+ to \d+ s with eight",
-        lambda: rounded(wedges_in_3d(8, "nodes")),
-    ),
-    "3D wedges, time": (
-        r"nodes of the tree and (\d+) to (\d+) s with eight",
-        lambda: rounded(wedges_in_3d(8, "search s").round()),
-    ),
-    "3D wedges, p = 12": (
-        r"and ([\d,]+) to ([\d,]+) nodes and \d+ to \d+ s with twelve",
-        lambda: rounded(wedges_in_3d(12, "nodes")),
-    ),
-    "3D wedges, p = 12, time": (
-        r"nodes and (\d+) to (\d+) s with twelve",
-        lambda: rounded(wedges_in_3d(12, "search s").round()),
-    ),
-    "3D feet": (
+    ("arithmetic", r"([\d,]+) at p = 48", lambda: rounded(where("workers", "nodes", p="48"))[1:]),
+    ("arithmetic", r"([\d,]+) in half a minute at p = 64", lambda: rounded(where("workers", "nodes", p="64"), 3)[1:]),
+    ("arithmetic", r"12 discs take (\d+) nodes", lambda: rounded(nodes_of_discs(12), 3)[1:]),
+    ("arithmetic", r"20 discs (\d+) to (\d+)", lambda: rounded(nodes_of_discs(20), 3)),
+    ("arithmetic", r"at F = 0.3 takes ([\d,]+) nodes of the tree with p = 12", lambda: tree_of_a_block("4x2x2")),
+    ("arithmetic", r"more than ([\d,]+), where the study stops, with p = 30", lambda: tree_of_a_block("5x5x2")),
+    ("arithmetic", r"take ([\d,]+) to ([\d,]+) nodes of the tree and \d+ to", lambda: wedges_in_3d("8", "nodes")),
+    ("arithmetic", r"(\d+) to (\d+) s with eight", lambda: seconds_of_wedges_in_3d("8")),
+    ("arithmetic", r"([\d,]+) to ([\d,]+) nodes and \d+ to \d+ s with twelve", lambda: wedges_in_3d("12", "nodes")),
+    ("arithmetic", r"(\d+) to (\d+) s with twelve", lambda: seconds_of_wedges_in_3d("12")),
+    (
+        "arithmetic",
         r"with (\d+) to (\d+) contact nodes they take ([\d,]+) to ([\d,]+) nodes of the tree where no certificate",
         lambda: feet_in_3d("p") + feet_in_3d("nodes"),
     ),
+    (
+        "arithmetic",
+        r"([\d,]+) small problems with known answers",
+        lambda: (where("accuracy_vs_speed/accuracy_enumeration", "problems", setting="verified").sum(),),
+    ),
+    (
+        "arithmetic",
+        r"takes ([\d.]+) times the time of `.fast.` \|",
+        lambda: rounded(measured("verified", "time ratio"))[1:],
+    ),
+    ("arithmetic", r"never wrong farther than ([\d.e-]+) from", lambda: measured("fast 1e-09", "right from")),
+    ("arithmetic", r"nearer than 1e-10 (\d+) % of the answers are wrong", lambda: wrong_near_a_degeneracy(1e-10)),
+    ("arithmetic", r"at distances from ([\d.e-]+) on", lambda: measured("fast 1e-13", "right from")),
+    (
+        "arithmetic",
+        r"answers are wrong nearer than ([\d.e-]+) \|",
+        lambda: measured("float32, fast 1e-09", "right from"),
+    ),
+    (
+        "arithmetic",
+        r"nearer than (\S+) to folds, (\S+) to transitions, (\S+) to continua and (\S+) to bifurcations",
+        lambda: decided_from("fold", "transition", "family", "bifurcation"),
+    ),
+    (
+        "arithmetic",
+        r"takes ([\d.]+) times the time of `.fast.` at p = 1, (\S+) times at p = 4, and (\d+) times at p = 8",
+        lambda: times_of_exact("1", "4", "8"),
+    ),
+    ("arithmetic", r"less than (\d+) samples, and 100 samples miss (\d+) %", samples_that_cost_as_much),
+    ("arithmetic", r"made (\d+) to (\d+) jumps on (\d+) problems", jumps_as_printed),
+    (
+        "results",
+        r"took ([\d.]+) to ([\d.]+) of the time of the search",
+        lambda: rounded(numbers(table("certification_cost")["check / verified"])),
+    ),
+    (
+        "from_a_mesh",
+        r"body with ([\d,]+) degrees of freedom and (\d+) contact nodes, ten loads take ([\d.]+) times as long",
+        lambda: many_loads(51520),
+    ),
+    (
+        "histories",
+        r"falls from ([\d.]+) to ([\d.]+) per cent",
+        lambda: rounded(numbers(table("histories/fretting")["largest error %"]))[::-1],
+    ),
+    (
+        "histories",
+        r"takes (\d+) s of one core",
+        lambda: (round(where("histories/maps", "CPU seconds", map="block").item()),),
+    ),
+    (
+        "histories",
+        r"unique over (\d+) per cent of alpha; .* it is (\d+) per cent",
+        lambda: tuple(
+            int(where("histories/maps", "proven between %", map=m, p=p).item())
+            for m, p in (("block", "64"), ("wedge", "8"))
+        ),
+    ),
+    (
+        "histories",
+        r"([\d,]+) random histories of four",
+        lambda: re.findall(r"(\d+) histories, 0", notes("histories", "random")),
+    ),
+    (
+        "tutorial",
+        r"jams from a coefficient of ([\d.]+) to ([\d.]+) on",
+        lambda: rounded(numbers(table("jamming_wedge")["3 from"]), 3),
+    ),
+    (
+        "theory",
+        r"([\d,]+) nodes are left; of the 11,614 [^)]+\)` ([\d,]+)\. .* takes ([\d,]+), .* takes ([\d,]+)\. Cut",
+        slices_in_3d,
+    ),
+    ("theory", r"table `forms`, take ([\d.]+) to ([\d.]+) times", lambda: forms_in_3d("at the root", 3)),
+    ("theory", r"every six decisions they take ([\d.]+) to ([\d.]+) times", lambda: forms_in_3d("every 6")),
+    ("theory", r"after every three ([\d.]+) to ([\d.]+) times", lambda: forms_in_3d("every 3")),
+]
+#: Paragraphs that name a study without a number of its results.
+WITHOUT_NUMBERS = {
+    ("README.md", "peers"),
+    ("README.md", "same_body_by_other_codes"),
+    ("arithmetic.md", "extremes"),
+    ("from_a_mesh.md", "same_body_by_other_codes"),
+    ("theory.md", "discs"),
+    ("theory.md", "forms"),
 }
 
 
-@pytest.mark.parametrize("claim", CLAIMS)
-def test_numbers_are_those_of_the_results(claim):
-    pattern, expected = CLAIMS[claim]
-    text = " ".join((ROOT / "docs" / "arithmetic.md").read_text(encoding="utf-8").split())
-    (found,) = re.finditer(pattern, text)
-    assert tuple(float(number.replace(",", "")) for number in found.groups()) == expected()
+def read(path):
+    return " ".join(path.read_text(encoding="utf-8").split())
+
+
+@pytest.mark.parametrize(
+    ("page", "pattern", "expected"), CLAIMS, ids=[f"{page}: {text[:40]}" for page, text, _ in CLAIMS]
+)
+def test_numbers_are_those_of_the_results(page, pattern, expected):
+    (found,) = re.finditer(pattern, read(ROOT / "docs" / f"{page}.md"))
+    assert tuple(float(number.replace(",", "")) for number in found.groups()) == tuple(map(float, expected()))
+
+
+@pytest.mark.parametrize(
+    "path", [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))], ids=lambda path: path.name
+)
+def test_paragraphs_that_name_a_study_give_its_numbers(path):
+    ours = [pattern for page, pattern, _ in CLAIMS if page == path.stem]
+    for paragraph in re.split(r"\n\s*\n|\n(?=- )", path.read_text(encoding="utf-8")):
+        text = " ".join(paragraph.split())
+        for name in re.findall(r"\bstudies/(?!README)(\w+)", re.sub(r"!\[.*?\]\(.*?\)", "", text)):
+            assert (ROOT / "studies" / name).is_dir(), (path.name, name)
+            assert (path.name, name) in WITHOUT_NUMBERS or any(re.search(p, text) for p in ours), (path.name, text)
 
 
 def test_results_that_the_documents_name_are_there():
