@@ -210,7 +210,7 @@ def _vertex_record(v: Vertex) -> dict[str, Any]:
 def _fraction(text: str) -> Fraction:
     """The fraction written like "-8/3"; other texts are refused, such as numbers with an exponent."""
     if _FRACTION.fullmatch(text) is None:
-        raise ValueError(f"{text[:20]!r}, which is no fraction")
+        raise ValueError(f"{text[:20]!r}, which is not a fraction")
     return Fraction(text)
 
 

@@ -127,7 +127,7 @@ class Boxes:
         part, low, high = one
         if known is None or not _proven(known, part, alpha_number(low), alpha_number(high)):
             where = f"[{float(alpha_number(low))}, {float(alpha_number(high))}]"
-            self._fail(f"selection {_text(selection)}: what is said of {where} is not proven")
+            self._fail(f"selection {_text(selection)}: the claim about {where} is not proven")
         if part[0] != "e":
             return
         seen = [int(found.ends[0][part[3]]) for found in bounds] == _expected(part)
@@ -175,7 +175,7 @@ def check_entries(part: Any, conditions: int) -> None:
     """Refuse what is no part, or has entries that its kind has not."""
     kind = part[0] if isinstance(part, list) and part else None
     if not isinstance(kind, str) or kind not in _ENTRIES or len(part) != _ENTRIES[kind]:
-        raise ValueError(f"{quoted(part)} is no part of a box")
+        raise ValueError(f"{quoted(part)} is not a part of a box")
     if kind in ("h", "e") and (type(part[2]) is not int or part[2] not in (-1, 1)):
         raise ValueError("an index is neither 1 nor -1")
     if kind == "e" and not (

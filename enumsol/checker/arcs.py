@@ -191,7 +191,7 @@ class ArcChecker:
     def _box(self, record: list[Any], selection: BoxSelection, follower: _Follower, start: Fraction) -> Fraction:
         """Follow the arcs through the parts of a box, and keep what they say; the end of the last one."""
         if len(record) != 5 or type(record[3]) is not int or record[3] not in (0, 1) or not isinstance(record[4], list):
-            raise ValueError(f"{quoted(record)} is no box")
+            raise ValueError(f"{quoted(record)} is not a box")
         low, high = alpha_number(record[1]), alpha_number(record[2])
         if not low == start < high or not 0 < len(record[4]) <= _MOST_PARTS:
             raise ValueError("a box does not begin where the one before ends, or has no parts or too many")

@@ -319,7 +319,7 @@ class GraphChecker:
 
 def _interval_from(ends: Any) -> tuple[Fraction, Fraction]:
     if not isinstance(ends, list) or len(ends) != 2:
-        raise ValueError(f"{quoted(ends)} is no interval")
+        raise ValueError(f"{quoted(ends)} is not an interval")
     a, b = (rational_from(end) for end in ends)
     if not a < b:
         raise ValueError("an interval is empty")

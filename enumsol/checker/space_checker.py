@@ -213,5 +213,5 @@ def _units(header: dict[str, Any], p: int) -> tuple[NDArray[np.float64], NDArray
     """Units of forces and displacements of the nodes, powers of two with one product."""
     force, length = (exponents_from(header.get(key), p) for key in ("force", "length"))
     if len({a + b for a, b in zip(force, length, strict=True)}) != 1:
-        raise ValueError("the units are no common scaling of energy")
+        raise ValueError("the units are not a common scaling of energy")
     return np.ldexp(1.0, np.array(force)), np.ldexp(1.0, np.array(length))

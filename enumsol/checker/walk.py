@@ -213,7 +213,7 @@ class TreeChecker:
 
     def _undecided(self, codes: Codes, said: UndecidedRecord) -> str | None:
         self.undecided += 1
-        return None if isinstance(said.reason, str) else "its reason is no text"
+        return None if isinstance(said.reason, str) else "its reason is not a text"
 
     def _unloaded(self, codes: Codes, said: Unloaded) -> str | None:
         unloaded = all(code == UNDECIDED for code in codes) and self.problem.is_unloaded(self.alpha)

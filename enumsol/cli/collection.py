@@ -74,7 +74,7 @@ def check(
     csv_file: Annotated[str | None, csv("answer")] = None,
     quiet: Quiet = False,
 ) -> None:
-    """Say which solutions of the collection a solver found, which it missed, and which of its answers are none.
+    """Say which solutions of the collection a solver found, which it missed, and which of its answers are spurious.
 
     A file holds one or several answers: lambda_n and lambda_t, the contact forces of the nodes in the order of the
     problem; or r, the same in the order of fclib; or u, the displacements. docs/collection.md describes the files.
@@ -83,11 +83,11 @@ def check(
     Tolerance: an answer is a solution if no contact force differs from that solution's by more than the tolerance times
     the largest contact force of all solutions of the problem, or, for u, no displacement by more than the tolerance
     times the largest one of that solution. All solutions are known, which is proven; so an answer that is close to none
-    of them is none.
+    of them is spurious.
 
     Exit status: 0 if all solutions of every problem that was tried were found, and every answer is one; 3 if a solution
-    was missed or an answer is none; 2 on bad input; 74 if a result could not be written; 141 if the program that read
-    it has ended.
+    was missed or an answer is spurious; 2 on bad input; 74 if a result could not be written; 141 if the program that
+    read it has ended.
     """
     from enumsol import collection  # as above
 

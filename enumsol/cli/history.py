@@ -57,7 +57,9 @@ def history(
     ] = "all",
     merge: Annotated[
         float | None,
-        typer.Option(metavar="LENGTH", help="Join ends whose contact nodes are no further apart.", show_default=False),
+        typer.Option(
+            metavar="LENGTH", help="Join ends whose contact nodes are at most this far apart.", show_default=False
+        ),
     ] = None,
     refine: Annotated[
         bool, typer.Option("--refine", help="Halve the increments until the statuses no longer change.")
@@ -66,7 +68,7 @@ def history(
     max_nodes: MaxNodes = None,
     time_limit: Annotated[float | None, seconds("Stop after this time.")] = None,
     jobs: Annotated[int, count("Number of processes that search.")] = 1,
-    proof_file: Annotated[str | None, file("--proof", "Write the proof of the whole (verified).")] = None,
+    proof_file: Annotated[str | None, file("--proof", "Write one proof of the whole history (verified).")] = None,
     save: Annotated[str | None, file("--save", "Write the history for History.load.")] = None,
     report: Annotated[
         str | None, file("--report", "Write an HTML page with the tree, the figures and the bodies.")
@@ -74,8 +76,10 @@ def history(
     json_file: JsonFile = None,
     csv_file: Annotated[str | None, csv("root")] = None,
     plot: PlotFile = None,
-    x: Annotated[Drawn, typer.Option("--x", help="What is drawn across.", rich_help_panel=PLOT)] = "displacement",
-    y: Annotated[Drawn, typer.Option("--y", help="What is drawn upwards.", rich_help_panel=PLOT)] = "alpha",
+    x: Annotated[
+        Drawn, typer.Option("--x", help="Quantity on the horizontal axis.", rich_help_panel=PLOT)
+    ] = "displacement",
+    y: Annotated[Drawn, typer.Option("--y", help="Quantity on the vertical axis.", rich_help_panel=PLOT)] = "alpha",
     title: Annotated[
         str | None, typer.Option(metavar="TEXT", help="Heading of the page; default: PROBLEM.", rich_help_panel=OUTPUT)
     ] = None,

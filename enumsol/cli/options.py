@@ -120,4 +120,4 @@ Units = Annotated[
 ]
 PlotFile = Annotated[str | None, file("--plot", "Draw a figure: .png, .pdf, .svg.", PLOT)]
 Overview = Literal["norm", "sum_n", "sum_t", "lambda_n", "lambda_t", "u_n", "u_t"]
-DrawnQuantity = Annotated[Quantity, typer.Option(help="What is drawn against alpha.", rich_help_panel=PLOT)]
+DrawnQuantity = Annotated[Quantity, typer.Option(help="Quantity drawn against alpha.", rich_help_panel=PLOT)]

@@ -234,7 +234,7 @@ def check_mirror(problem: ContactProblem | ContactProblem3D, alpha: Alpha, mirro
 
 def _write_vtu(problem: ContactProblem | ContactProblem3D, found: RootSet, path: str) -> None:
     if not len(found):
-        note("--vtu: no isolated root was found, so that no file is written for ParaView")
+        note("--vtu: no isolated root was found, so no file is written for ParaView")
         return
     from enumsol.io.vtu import write_vtu  # numpy: not for --help
 

@@ -183,7 +183,7 @@ MESH_OPTIONS = {
     "max_rigid_displacement": Given(
         _SUPPORT,
         "LENGTH|auto",
-        "In 2D, lets bodies that nothing else holds move as a whole, so far or ten times the size of the mesh.",
+        "Let bodies that only contact holds move as a whole, by at most this length; auto: 10 times the mesh's size.",
         _auto_or_number,
     ),
     "load": Given(_LOAD, _PULL, _FORCE, _by_part, True),

@@ -28,7 +28,7 @@ def verify(
     json_file: JsonFile = None,
     quiet: Quiet = False,
 ) -> None:
-    """Check that PROOF shows its list of roots of PROBLEM, its arcs of a graph, or its history, to be complete.
+    """Check the PROOF that a list of roots of PROBLEM, a branch graph or a history is complete.
 
     The checker imports nothing from the search: it computes the condensed problem anew and checks every leaf of the
     search tree. It uses the same rigorous bounds; python -m pydoc enumsol.checker lists what the two share.

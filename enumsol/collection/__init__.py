@@ -2,8 +2,8 @@
 
 `COLLECTION` lists them by name; `get` finds one. Friction and load of each are fixed, its list of solutions is
 complete, and a proof comes with it. `check` says which of them a solver found, which it missed, and which of its
-answers are none; `export` writes everything to a folder. docs/collection.md has the table, and the formats that `check`
-reads.
+answers are spurious; `export` writes everything to a folder. docs/collection.md has the table, and the formats that
+`check` reads.
 """
 
 from enumsol.collection.comparison import check

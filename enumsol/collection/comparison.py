@@ -37,7 +37,7 @@ def check(solutions: str | os.PathLike[str], tolerance: float = TOLERANCE) -> Co
     contact force of all solutions of its problem, or, of an answer that gives displacements, no displacement by more
     than the tolerance times the largest displacement of that solution. A continuum is found by any answer that is as
     close to one of its points. As all solutions are listed, which is proven, an answer that is close to none of them is
-    none.
+    not a solution.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ class KnownSolutions:
         return np.array([self._problem.condensed.displacement(0, point.T.ravel()) for point in forces])
 
     def nearest(self, values: Floats) -> tuple[tuple[str, int] | None, float]:
-        """The nearest solution, as ("root", k) or ("family", k), and its distance; none of values that are not finite.
+        """The nearest solution, as ("root", k) or ("family", k), and its distance; None for values that are not finite.
 
         Parameters
         ----------

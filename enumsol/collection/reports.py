@@ -1,4 +1,4 @@
-"""What `check` found: for every problem which solutions were found and missed, and which answers are none."""
+"""What `check` found: for every problem which solutions were found and missed, and which answers are spurious."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from enumsol.collection.entries import CertifiedSolutions, CollectionEntry
 
-#: Lines about missed solutions, and about answers that are none, that are printed of every problem.
+#: Lines about missed solutions, and about spurious answers, that are printed for every problem.
 _PRINTED = 5
 
 
@@ -36,9 +36,9 @@ class JudgedSolution:
     distance : float
         Largest difference from it, in parts of the size of forces or displacements, as of `check` [-].
     found : bool
-        It is that solution; otherwise it is none.
+        It is that solution; otherwise it is spurious, that is, no solution at all.
     reason : str
-        Of an answer that is none: what it violates most, if it was given by its forces.
+        For a spurious answer that was given by its forces: what it violates most.
 
     Examples
     --------
@@ -67,7 +67,7 @@ class JudgedSolution:
             return f"answer {self.row} of {self.file} is {self.nearest_in_words}"
         near = "" if self.nearest is None else f"the nearest is {self.nearest_in_words}, at a distance of"
         parts = [f"{near} {self.distance:.1e}" if near else "", self.reason]
-        return f"answer {self.row} of {self.file} is none: {'; '.join(filter(None, parts))}"
+        return f"answer {self.row} of {self.file} is not a solution: {'; '.join(filter(None, parts))}"
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class ProblemReport:
     ...     problem, file = enumsol.collection.get("square-5").problem(), f"{folder}/square-5.csv"
     ...     enumsol.enumerate_roots(problem, 0).to_frame().to_csv(file)
     ...     (report,) = enumsol.collection.check(folder).problems
-    >>> report.found_roots, report.none, report.ok
+    >>> report.found_roots, report.spurious, report.ok
     ((0, 1, 2, 3, 4), (), True)
     """
 
@@ -120,26 +120,26 @@ class ProblemReport:
         return tuple(k for k in range(self.entry.families) if not self._found["family", k])
 
     @property
-    def none(self) -> tuple[JudgedSolution, ...]:
-        """Answers that are no solutions, which is proven as all solutions are known."""
+    def spurious(self) -> tuple[JudgedSolution, ...]:
+        """Answers that are not solutions, which is proven because all solutions are known."""
         return tuple(answer for answer in self.answers if not answer.found)
 
     @property
     def repeated(self) -> int:
-        """How many answers are isolated solutions that an answer before them is, too."""
+        """Number of answers that repeat an isolated solution of an earlier answer."""
         return sum(count - 1 for name, count in self._found.items() if name is not None and name[0] == "root")
 
     @property
     def ok(self) -> bool:
         """Every solution was found, and every answer is one."""
-        return not (self.missed_roots or self.missed_families or self.none)
+        return not (self.missed_roots or self.missed_families or self.spurious)
 
     def lines(self) -> list[str]:
-        """What was missed, and which answers are none, a line each."""
+        """What was missed, and which answers are spurious, one line each."""
         missed = [f"missed root {k} ({self._about(k)})" for k in self.missed_roots]
         missed += [f"missed family {k}, a continuum" for k in self.missed_families]
         lines = []
-        for part in (missed, list(map(str, self.none))):
+        for part in (missed, list(map(str, self.spurious))):
             more = len(part) - _PRINTED
             lines += [*part[:_PRINTED], *([f"... {more} more"] if more > 0 else [])]
         return [f"{self.entry.name}: {line}" for line in lines]
@@ -150,7 +150,7 @@ class ProblemReport:
         return f"{summary(self.certified.statuses[k])}; largest lambda_n {largest:.3g}"
 
 
-_HEADS = ("problem", "solutions", "answers", "found", "missed", "none", "repeated")
+_HEADS = ("problem", "solutions", "answers", "found", "missed", "spurious", "repeated")
 
 
 @dataclass(frozen=True)
@@ -172,12 +172,12 @@ class CollectionReport:
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     numpy.savez(f"{folder}/triangle-3.npz", lambda_n=[[0], [0.5]], lambda_t=[[0], [-1]])
     ...     enumsol.collection.check(f"{folder}/triangle-3.npz")
-    problem     solutions  answers  found  missed  none  repeated
-    triangle-3          3        2      1       2     1         0
+    problem     solutions  answers  found  missed  spurious  repeated
+    triangle-3          3        2      1       2         1         0
     triangle-3: missed root 1 (slip-; largest lambda_n 0.333)
     triangle-3: missed root 2 (stick; largest lambda_n 1.5)
-    triangle-3: answer 1 of triangle-3.npz is none: the nearest is root 1, at a distance of 1.7e-01; its largest \
-residual is 3.1e-01 (dissipation)
+    triangle-3: answer 1 of triangle-3.npz is not a solution: the nearest is root 1, at a distance of 1.7e-01; its \
+largest residual is 3.1e-01 (dissipation)
     1 problem tried, 0 of them with all solutions and no other answer; tolerance 0.0001
     """
 
@@ -187,7 +187,7 @@ residual is 3.1e-01 (dissipation)
 
     @property
     def ok(self) -> bool:
-        """Of every problem that was tried all solutions were found, and every answer is one."""
+        """All solutions of every problem that was tried were found, and every answer is one of them."""
         return all(report.ok for report in self.problems)
 
     def to_frame(self) -> pd.DataFrame:
@@ -214,7 +214,7 @@ residual is 3.1e-01 (dissipation)
                     "missed_roots": report.missed_roots,
                     "found_families": report.found_families,
                     "missed_families": report.missed_families,
-                    "none": len(report.none),
+                    "spurious": len(report.spurious),
                     "repeated": report.repeated,
                     "answers": [
                         {
@@ -260,7 +260,7 @@ def _row(report: ProblemReport) -> tuple[str, ...]:
         len(report.answers),
         len(report.found_roots) + len(report.found_families),
         len(report.missed_roots) + len(report.missed_families),
-        len(report.none),
+        len(report.spurious),
         report.repeated,
     )
     return (entry.name, *map(str, counts))

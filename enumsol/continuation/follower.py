@@ -100,7 +100,7 @@ class Follower(Generic[_Path]):
             while stop is None:
                 stop = self._advance()
         except KeyboardInterrupt as interruption:
-            message = f"interrupted at alpha = {self._alpha():g}; path.resume() goes on"
+            message = f"interrupted at alpha = {self._alpha():g}; path.resume() continues"
             partial = self._path(_Stop(PathStatus.INTERRUPTED, message))
             raise Interrupted(f"follow was {message}", partial) from interruption
         return self._path(stop)
@@ -127,7 +127,7 @@ class Follower(Generic[_Path]):
             return _Stop(
                 PathStatus.STEP_LIMIT,
                 f"the limit of {counted(self.options.max_steps, 'step')} was reached at alpha = {self._alpha():g}; "
-                "path.resume() goes on",
+                "path.resume() continues",
             )
         step = self._step()
         if step is None:
@@ -309,7 +309,7 @@ class Follower(Generic[_Path]):
         return _Stop(
             PathStatus.INTERVAL_LEFT,
             f"alpha left the interval ({low:g}, {high:g}) at {self.equation.alpha_scale * value:g}; "
-            "path.resume(interval=...) goes on",
+            "path.resume(interval=...) continues",
         )
 
     def _return(self, start: CurvePoint, end: CurvePoint) -> _Stop | None:

@@ -125,7 +125,7 @@ class NodalBasis:
         Raises
         ------
         InvalidArgumentError
-            A facet is no facet on the boundary of the body, has another number of nodes, or comes twice.
+            A facet is not a facet on the boundary of the body, has another number of nodes, or comes twice.
         """
         from skfem import LinearForm  # as below
 
@@ -161,7 +161,7 @@ class NodalBasis:
         if np.any(numbers < 0):
             k = int(np.argmin(numbers[:, 0]))
             raise InvalidArgumentError(
-                f"{name} row {k}, nodes {facets[k].tolist()}, is no facet on the boundary of the body; "
+                f"{name} row {k}, nodes {facets[k].tolist()}, is not a facet on the boundary of the body; "
                 "expected facets of one cell each"
             )
         if len(set(keys)) != len(keys):

@@ -121,7 +121,7 @@ def mesh_problem(
         ny)}`` by a point and the direction from it to the body, ``{"circle": (x, y, r)}``, or ``{"hole": (x, y, r)}``,
         a circle that the body is inside of; in 3D ``plane`` with six numbers, ``sphere`` and ``hole`` with four.
     max_rigid_displacement : float, "auto" or None
-        In 2D, lets bodies move as a whole that supports and springs leave free: their rigid modes are found, and
+        Lets bodies move as a whole that supports and springs leave free: their rigid modes are found, and
         solutions are sought within this bound of the rigid displacement, ten times the size of the mesh for "auto"
         (theory, section 14) [length]. By default such a body is refused.
     groups : str, optional
@@ -264,10 +264,10 @@ def _toml(place: Path) -> dict[str, Any]:
     except (ValueError, RecursionError) as error:  # UnicodeDecodeError and TOMLDecodeError, too
         reason = shortened(str(error))
         raise InvalidArgumentError(
-            f"it is no TOML file ({reason}); expected lines such as contact = 'floor'"
+            f"it is not a TOML file ({reason}); expected lines such as contact = 'floor'"
         ) from error
     if {_PAIRS, "pairs"} <= options.keys():
-        raise InvalidArgumentError(f"{_PAIRS} and pairs are given; expected one of both")
+        raise InvalidArgumentError(f"{_PAIRS} and pairs are given; expected only one of them")
     return {"pairs" if name == _PAIRS else name: value for name, value in options.items()}
 
 

@@ -74,7 +74,7 @@ class Pair:
         Raises
         ------
         InvalidArgumentError
-            It is no list of pairs, or has one twice.
+            It is not a list of pairs, or has one twice.
         """
         if not isinstance(value, (list, tuple)) or (value and all(isinstance(entry, str) for entry in value)):
             raise InvalidArgumentError(

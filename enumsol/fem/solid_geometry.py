@@ -91,7 +91,7 @@ def outward(facets: Integers, cells: Integers) -> Integers:
     Raises
     ------
     InvalidArgumentError
-        One is no facet on the boundary of the body, or comes twice; they have another number of corners.
+        One is not a facet on the boundary of the body, or comes twice; they have another number of corners.
     """
     boundary = boundary_facets(3, cells)
     if facets.shape[1] != boundary.shape[1]:
@@ -103,7 +103,7 @@ def outward(facets: Integers, cells: Integers) -> Integers:
     if -1 in rows:
         k = rows.index(-1)
         raise InvalidArgumentError(
-            f"contact row {k}, nodes {facets[k].tolist()}, is no facet on the boundary of the body; "
+            f"contact row {k}, nodes {facets[k].tolist()}, is not a facet on the boundary of the body; "
             "expected facets of one cell each"
         )
     if len(set(rows)) != len(rows):

@@ -160,7 +160,7 @@ def _rows(surface: ContactSurface, held: Mask, kind: str, ratio: int, patches: A
             raise InvalidArgumentError('ratio and patches are for multipliers="elements"; expected neither for "nodes"')
         return on_nodes(surface, held)
     if patches is not None and width != 1:
-        raise InvalidArgumentError(f"ratio is {width} and patches are given; expected one of both")
+        raise InvalidArgumentError(f"ratio is {width} and patches are given; expected only one of them")
     labels = blocks(surface.points, surface.facets, width) if patches is None else patches
     return on_patches(surface, labels, held)
 

@@ -156,14 +156,14 @@ def _read(place: Path) -> ContactProblem | ContactProblem3D:
     if not place.exists():
         raise InvalidProblemError(f"there is no such file or directory; expected {_READABLE}")
     if not place.is_file():
-        raise InvalidProblemError(f"it is no regular file; expected {_READABLE}")
+        raise InvalidProblemError(f"it is not a regular file; expected {_READABLE}")
     if place.suffix == ".npz":
         return npz.read(place)
     if place.suffix in fclib.SUFFIXES:
         return fclib.read(place)
     if place.suffix == ".mtx":
         raise InvalidProblemError(
-            "one MatrixMarket file is no problem; expected a directory with A.mtx, Bn.mtx and so on"
+            "one MatrixMarket file is not a problem; expected a directory with A.mtx, Bn.mtx and so on"
         )
     found = f"its name ends in {place.suffix!r}" if place.suffix else "its name has no suffix"
     raise InvalidProblemError(f"{found}; expected {_READABLE}")

@@ -166,7 +166,7 @@ def _matrix(group: Any, name: str, *, symmetric: bool = False) -> sp.csc_array:
     parts = _child(group, name)
     m, n, nz = (_integer(parts, key) for key in ("m", "n", "nz"))
     p, i, x = (np.asarray(_child(parts, key)[()]).ravel() for key in ("p", "i", "x"))
-    with refusing((ValueError, TypeError), f"{name} is no sparse matrix", "consistent m, n, nz, p, i, x"):
+    with refusing((ValueError, TypeError), f"{name} is not a sparse matrix", "consistent m, n, nz, p, i, x"):
         if nz >= 0:
             row, column = _triplets(name, p[:nz], i[:nz], (m, n), symmetric=symmetric)
             return sp.csc_array(sp.coo_array((x[:nz], (row, column)), shape=(m, n)))

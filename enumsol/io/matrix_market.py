@@ -85,7 +85,7 @@ def _values(name: str, file: Path, layout: Layout) -> sp.coo_array | NDArray[Any
     from scipy.io import mminfo, mmread  # slow to import
 
     with refusing(
-        (ValueError, OverflowError, OSError), f"{file.name} is no readable MatrixMarket file", "a complete one"
+        (ValueError, OverflowError, OSError), f"{file.name} is not a readable MatrixMarket file", "a complete one"
     ):
         content = file.read_bytes()
         rows, columns, entries = mminfo(BytesIO(content))[:3]
@@ -107,13 +107,13 @@ def _check(content: bytes, rows: int, columns: int, entries: int, *, dense: bool
     while content[start : start + 1] in (b"%", b"\n", b"\r"):
         start = content.find(b"\n", start) + 1 or len(content)
     if _NUMBERS.match(content, start) is None:
-        raise ValueError("a word in it is no number")
+        raise ValueError("a word in it is not a number")
     if entries > len(content) or (dense and rows * columns > _LARGEST_VECTOR):
         raise ValueError(f"it cannot hold {rows} x {columns} entries")
 
 
 def _labels(file: Path) -> list[Any]:
-    with refusing((ValueError,), f"{file.name} is no JSON", "a list of labels"):
+    with refusing((ValueError,), f"{file.name} is not JSON", "a list of labels"):
         labels = json.loads(file.read_text(encoding="utf-8"))
     if not isinstance(labels, list) or not all(isinstance(label, (int, float, str)) for label in labels):
         raise InvalidProblemError(f"{file.name} holds something else; expected a list of integers, floats or strings")

@@ -49,7 +49,7 @@ def read(path: Path) -> ContactProblem | ContactProblem3D:
     for name in layout.matrices:
         parts = {part: named.pop(f"{name}_{part}") for part in _PARTS if f"{name}_{part}" in named}
         if parts and name in named:
-            raise InvalidProblemError(f"{name} is given as a matrix and in sparse parts; expected one of both")
+            raise InvalidProblemError(f"{name} is given as a matrix and in sparse parts; expected only one of them")
         if parts:
             named[name] = _matrix(name, parts)
     check_names(named, layout)
@@ -98,7 +98,7 @@ def _member(archive: Any, name: str) -> NDArray[Any]:
             f"matrix its parts {', '.join(f'{name}_{part}' for part in _PARTS)}"
         ) from error
     if not isinstance(array, np.ndarray):
-        raise InvalidProblemError(f"its member {name} is no NumPy array; expected arrays only")
+        raise InvalidProblemError(f"its member {name} is not a NumPy array; expected arrays only")
     return array
 
 
@@ -116,9 +116,9 @@ def _matrix(name: str, parts: dict[str, NDArray[Any]]) -> sp.csc_array | sp.csr_
         raise InvalidProblemError(f"{name}_shape is {shape.tolist()}; expected two whole numbers")
     for part in ("indices", "indptr"):
         if parts[part].ndim != 1 or parts[part].dtype.kind not in "iu":
-            raise InvalidProblemError(f"{name}_{part} is no list of whole numbers; expected those of scipy.sparse")
+            raise InvalidProblemError(f"{name}_{part} is not a list of whole numbers; expected those of scipy.sparse")
     if parts["data"].ndim != 1 or parts["data"].dtype.kind not in "iufb":
-        raise InvalidProblemError(f"{name}_data is no list of real numbers; expected those of scipy.sparse")
+        raise InvalidProblemError(f"{name}_data is not a list of real numbers; expected those of scipy.sparse")
     build = sp.csc_array if kind == "csc" else sp.csr_array
     with refusing((ValueError,), f"the sparse parts of {name} do not fit together", f"those of one {kind} matrix"):
         matrix = build((parts["data"], parts["indices"], parts["indptr"]), shape=(int(shape[0]), int(shape[1])))

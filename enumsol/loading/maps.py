@@ -122,7 +122,7 @@ def multiplicity_map(
     optional_executor(executor)
     optional_callable(progress, "progress")
     if "interval" in options or "progress" in options:
-        raise InvalidArgumentError("interval and progress are no options here; expected those of branch_graph")
+        raise InvalidArgumentError("interval and progress are not options here; expected those of branch_graph")
     most = nonnegative_integer(max_boxes, "max_boxes")
     if not isinstance(make, _Replaced) or options.get("arithmetic") == "fast":
         most = 0

@@ -170,7 +170,9 @@ def read_steps(file: str | Path) -> pd.DataFrame:
     except OSError as error:
         raise InvalidArgumentError(f"steps {file} cannot be read ({error.strerror}); expected a CSV file") from error
     except ValueError as error:
-        raise InvalidArgumentError(f"steps {file} is no table ({error}); expected a CSV file with a header") from error
+        raise InvalidArgumentError(
+            f"steps {file} is not a table ({error}); expected a CSV file with a header"
+        ) from error
 
 
 def _step(item: Any, number: int, expected: str) -> LoadStep:

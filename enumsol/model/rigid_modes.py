@@ -61,7 +61,7 @@ class RigidModes(Sealed):
         if np.any(image > MODE_TOLERANCE * size):
             mode = int(np.argmax(image > MODE_TOLERANCE * size))
             raise InvalidProblemError(
-                f"rigid_modes: column {mode} is no rigid mode, for max|A N| = {image[mode]:.3g} where max|A| |N| = "
+                f"rigid_modes: column {mode} is not a rigid mode, for max|A N| = {image[mode]:.3g} where max|A| |N| = "
                 f"{size[mode]:.3g}; expected A N = 0 within {MODE_TOLERANCE:g} |A| |N|"
             )
         diagonal = A.diagonal()

@@ -47,7 +47,7 @@ class BegunProof:
             raise _refusal(place, f"cannot be read ({error.strerror or error})") from error
         if not MAGIC.startswith(start):
             other = start.startswith(b"enumsol-proof ")
-            raise _refusal(place, f"is of another version ({start!r})" if other else "is no proof")
+            raise _refusal(place, f"is of another version ({start!r})" if other else "is not a proof")
 
     def header(self) -> Any:
         """The first record; None if the file does not go so far."""
@@ -104,7 +104,7 @@ def begun_proof(place: Path, header: dict[str, Any]) -> BegunProof | None:
     if found is None:
         return None
     if not isinstance(found, dict) or found.get("format") != header["format"]:
-        raise _refusal(place, "is no proof")
+        raise _refusal(place, "is not a proof")
     if not same(found.get("kind", ()), header.get("kind", ())):
         raise _refusal(place, f"is a proof of another kind, {quoted(found.get('kind', 'point'))}")
     for name, words in _NAMES.items():

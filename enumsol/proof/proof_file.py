@@ -162,7 +162,7 @@ class Proof:
     def _open(self) -> BinaryIO:
         if not isinstance(self._source, Path):
             return io.BytesIO(self._source)
-        reason = "it is no regular file"
+        reason = "it is not a regular file"
         try:
             # a pipe or a device has no size that its content could be measured by
             if stat.S_ISREG(self._source.stat().st_mode):
@@ -183,7 +183,7 @@ class Proof:
                         f"proof {self._name} has another version ({start[:20]!r}); expected {MAGIC.decode().strip()!r}"
                     )
                 raise ProofFormatError(
-                    f"proof {self._name} is no proof file; expected it to begin with 'enumsol-proof'"
+                    f"proof {self._name} is not a proof file; expected it to begin with 'enumsol-proof'"
                 )
             digest = hashlib.sha256(start)
             left = size - len(MAGIC) - _DIGEST
@@ -295,7 +295,7 @@ def _finite(text: str) -> float:
 
 
 def _no_number(name: str) -> Any:
-    raise ValueError(f"{name} is no number of a proof")
+    raise ValueError(f"{name} is not a number of a proof")
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

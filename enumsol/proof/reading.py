@@ -55,7 +55,7 @@ def data_of(header: Any, problem: ContactProblem, kind: str | None) -> Data:
         It does not.
     """
     if not isinstance(header, dict) or header.get("format") != "enumsol-proof" or not same(header.get("version"), 1):
-        raise RefusedError("the first record is no header of an enumsol-proof of version 1")
+        raise RefusedError("the first record is not the header of an enumsol-proof of version 1")
     if header.get("problem") != problem.fingerprint:
         raise RefusedError("the proof belongs to another problem (its fingerprint is different)")
     if not same(header.get("p"), problem.p) or header.get("data") not in ("problem", "condensed"):
@@ -105,7 +105,7 @@ def rational_from(text: Any) -> Fraction:
     digits each, there is no exponent, and the value is within the range of float64.
     """
     if not isinstance(text, str) or _RATIONAL.fullmatch(text) is None:
-        raise ValueError(f"{quoted(text)} is no fraction of at most {MOST_DIGITS} digits")
+        raise ValueError(f"{quoted(text)} is not a fraction of at most {MOST_DIGITS} digits")
     numerator, _, denominator = text.partition("/")
     if denominator and not int(denominator):
         raise ValueError("a fraction's denominator is zero")
@@ -121,7 +121,7 @@ def units_from(header: dict[str, Any], p: int) -> tuple[Array, Array]:
     """Units of forces and displacements, (2p,) powers of two, whose binary exponents a record gives."""
     force, length = (exponents_from(header.get(key), 2 * p) for key in ("force", "length"))
     if len({a + b for a, b in zip(force, length, strict=True)}) != 1 or force[:p] != force[p:]:
-        raise ValueError("the units are no common scaling of energy and of the two directions of a node")
+        raise ValueError("the units are not a common scaling of energy and of the two directions of a node")
     return np.ldexp(1.0, np.array(force)), np.ldexp(1.0, np.array(length))
 
 
@@ -132,7 +132,7 @@ def exponents_from(value: Any, size: int) -> list[int]:
         and len(value) == size
         and all(type(x) is int and LEAST_EXPONENT <= x <= LARGEST_EXPONENT for x in value)
     ):
-        raise ValueError(f"the units are no {size} binary exponents")
+        raise ValueError(f"the units are not {size} binary exponents")
     return value
 
 
@@ -147,7 +147,7 @@ def bytes_from(text: str) -> bytes:
 def multipliers_from(texts: list[Any], most: int) -> Terms:
     """Rows, whole numbers below ``most``, and their multipliers, as many and at most ``most`` of them, from base64."""
     if len(texts) != 2 or not all(isinstance(text, str) for text in texts):
-        raise ValueError("its multipliers are no two texts")
+        raise ValueError("its multipliers are not two texts")
     rows, values = texts
     row = np.frombuffer(bytes_from(rows), dtype="<u4").astype(np.intp)
     value = np.frombuffer(bytes_from(values), dtype="<f8").astype(np.float64)
@@ -178,7 +178,7 @@ def codes_from(texts: Any, p: int) -> NDArray[np.uint8]:
         raise ValueError(f"expected status codes as texts of {p} digits")
     joined = "".join(texts)
     if not joined.isascii():
-        raise ValueError("a status code is no digit")
+        raise ValueError("a status code is not a digit")
     codes = np.frombuffer(joined.encode("ascii"), dtype=np.uint8) - np.uint8(ord("0"))
     if np.any(codes > UNDECIDED):
         raise ValueError(f"a status code is not among 0 to {UNDECIDED}")

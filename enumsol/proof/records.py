@@ -348,7 +348,7 @@ class RootSetRecord(Solved):
         if not isinstance(points, list) or not all(isinstance(point, list) and len(point) == size for point in points):
             raise ValueError(f"expected points of {size} fractions")
         if not all(isinstance(x, str) for point in points for x in point):
-            raise ValueError("a coordinate is no text")
+            raise ValueError("a coordinate is not a text")
         return cls(*entries)
 
 
@@ -408,7 +408,7 @@ class ClosedInRationals(ClosingRecord):
         """Codes and numbers, if they fit each other and the assignment."""
         codes, selection, free = limits.codes, _selection(entries[0], limits.friction), cls.free(limits.codes)
         if any(not refines(selection[i], code) for i, code in enumerate(codes) if i not in free):
-            raise RecordError("its selection is none below its assignment")
+            raise RecordError("its selection does not lie below its assignment")
         return cls(selection, _weights(entries[1], free, codes, limits.friction), entries[2])
 
     @staticmethod
@@ -466,7 +466,7 @@ FLOATING_LEAVES = table_of(
 def _selection(value: Any, friction: Sequence[bool], sliding: Iterable[int] = ()) -> Codes:
     """Final codes; FORWARD and BACKWARD are allowed as well at the given nodes."""
     if not isinstance(value, list) or len(value) != len(friction) or not all(type(code) is int for code in value):
-        raise ValueError(f"its selection is no list of {len(friction)} codes")
+        raise ValueError(f"its selection is not a list of {len(friction)} codes")
     for i, (code, positive) in enumerate(zip(value, friction, strict=True)):
         if code in final_codes(positive) or (positive and code in _SLIDING and i in sliding):
             continue
@@ -476,7 +476,7 @@ def _selection(value: Any, friction: Sequence[bool], sliding: Iterable[int] = ()
 
 def _nodes(value: Any, p: int) -> Codes:
     if not isinstance(value, list) or not all(type(i) is int and 0 <= i < p for i in value):
-        raise ValueError("its free nodes are no list of nodes")
+        raise ValueError("its free nodes are not a list of nodes")
     if sorted(set(value)) != value:
         raise ValueError("its free nodes are not ascending")
     return tuple(value)

@@ -54,7 +54,7 @@ class ExcludedInSpace(Exclusion):
         """Rows and as many multipliers."""
         rows, text = entries
         if not all((isinstance(rows, list), isinstance(text, str))):
-            raise ValueError("its multipliers are no list of rows and a text")
+            raise ValueError("its multipliers are not a list of rows and a text")
         values = np.frombuffer(bytes_from(text), dtype="<f8").astype(np.float64)
         if len(rows) != len(values):
             raise ValueError(f"{len(rows)} rows and {len(values)} multipliers")
@@ -116,7 +116,7 @@ class OnlyRoot(ClosingRecord):
         values, leaf, mid, *_ = entries
         numbers, force = numbers_from(values, limits.p + 2 * limits.components), numbers_from(mid, limits.components)
         if not isinstance(leaf, list) or not all(type(code) is int for code in leaf):
-            raise RecordError("its leaf is no list of codes")
+            raise RecordError("its leaf is not a list of codes")
         return cls(numbers, tuple(leaf), force, EnclosureRecord(*entries[2:]))
 
     def entries(self) -> Iterable[Any]:
@@ -165,7 +165,7 @@ FLOATING_LEAVES = table_of(ExcludedInSpace, Unbalanced, NoRoot, RegularRoot, Und
 
 def _row(row: Any, p: int) -> Row:
     if not isinstance(row, list) or len(row) != 3 or not all(type(x) is int for x in row):
-        raise ValueError(f"{quoted(row)} is no row")
+        raise ValueError(f"{quoted(row)} is not a row")
     kind, node, number = row
     known = 0 <= kind <= RIGHT and 0 <= node < p and -1 <= number < _NUMBERS
     if not known or (kind in (GAP, FORCE) and number):

@@ -45,7 +45,7 @@ def given_section(scene: Scene | None, units: tuple[str, str] | None) -> str:
         if value is not None and not (np.ndim(value) == 1 and len(value) == 0)
     ]
     about = fact_list((title, "; ".join(lines)) for title, lines in scene.sections.items() if lines)
-    words = "" if units is not None else "<p>Numbers are in the consistent units of the one who gave them.</p>"
+    words = "" if units is not None else "<p>Numbers are in the user's own consistent units.</p>"
     table = table_text("The options of the problem", ("option", "as given", "unit"), rows)
     return (
         f'<section id="given"><h2>The problem as it was given</h2>{words}{table}'

@@ -119,7 +119,7 @@ def _certified(history: History, commands: Sequence[str]) -> str:
             "roots, from wherever it starts. What happens between the ends of the steps is not part of it.</p>"
         )
     elif history.arithmetic == "fast":
-        lines.append("<p>Nothing is proven: floating-point numbers were believed.</p>")
+        lines.append("<p>Nothing is proven: the result rests on floating-point arithmetic.</p>")
     else:
         lines.append(f"<p>The history is proven to be unique until step {history.unique_until}.</p>")
     widest = max((stage.largest_radius for stage in history.data.stages), default=0.0)

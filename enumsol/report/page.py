@@ -243,7 +243,7 @@ def _certified(graph: BranchGraph, commands: Sequence[str]) -> str:
     elif graph.reasons:
         lines.append("<p>Nothing is claimed about solutions that are not shown here.</p>")
     else:
-        lines.append("<p>Nothing is proven: floating-point numbers were believed.</p>")
+        lines.append("<p>Nothing is proven: the result rests on floating-point arithmetic.</p>")
     lines.append(
         "<p>This page is a picture of the result and no proof. Curves are drawn between points on the arcs; critical "
         "alphas are given to the last digit.</p>"

@@ -114,9 +114,9 @@ def _bare_nodes(roots: Sequence[Root]) -> tuple[dict[str, Any], list[dict[str, A
     """In 3D the contact nodes at their coordinates, where there is no mesh."""
     places = roots[0].problem.coordinates
     if roots[0].lambda_t.ndim == 1:
-        return _nothing("The problem has no mesh, so that no body is drawn"), []
+        return _nothing("The problem has no mesh, so no body is drawn"), []
     if places is None:
-        return _nothing("The problem has no mesh and no coordinates, so that no body is drawn"), []
+        return _nothing("The problem has no mesh and no coordinates, so no body is drawn"), []
     size = float(np.max(np.ptp(places, axis=0)))
     if not size > 0:
         return _nothing("The problem has no mesh, and all its contact nodes are at one place: nothing is drawn"), []

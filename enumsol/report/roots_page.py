@@ -74,7 +74,7 @@ def _answers(found: RootSet) -> list[str]:
     if found.complete:
         lines = [f"The problem has {number} at this alpha, and no other."]
     elif found.whole:
-        lines = [f"{number} found; floating-point numbers were believed, and nothing is proven."]
+        lines = [f"{number} found in floating-point arithmetic; nothing is proven."]
     else:
         lines = [f"{number} found, at least {found.at_least} in all."]
     total = found.index_sum
@@ -182,7 +182,7 @@ def _what_is_certified(found: RootSet, commands: Sequence[str]) -> str:
             f"{about}.</p>"
         )
     elif found.arithmetic == "fast":
-        lines.append("<p>Nothing is proven: floating-point numbers were believed.</p>")
+        lines.append("<p>Nothing is proven: the result rests on floating-point arithmetic.</p>")
     else:
         known = "The listed roots are proven. " if len(found) else ""
         lines.append(f"<p>{known}Nothing is claimed about solutions that are not listed.</p>")

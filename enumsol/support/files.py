@@ -52,7 +52,7 @@ def unreadable(place: Path) -> str | None:
         if place.is_dir():
             return "it is a directory"
         if place.exists() and not place.is_file():
-            return "it is no regular file"
+            return "it is not a regular file"
         with place.open("rb"):
             return None
     except FileNotFoundError:

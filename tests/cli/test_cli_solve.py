@@ -149,13 +149,13 @@ def test_options_of_supports_and_obstacles(here, capsys):
         (("solve", "bdoy.msh", *OPTIONS), "bdoy.msh: there is no such file; did you mean body.msh"),
         (("solve", "", *OPTIONS), "MESH is an empty text; expected the name of a mesh file"),
         (("solve", "folder.msh", *OPTIONS), "folder.msh: it is a directory; expected a mesh with named parts"),
-        (("solve", "pipe.msh", *OPTIONS), "pipe.msh: it is no regular file; expected a mesh with named parts"),
+        (("solve", "pipe.msh", *OPTIONS), "pipe.msh: it is not a regular file; expected a mesh with named parts"),
         (("solve", "dangling.msh", *OPTIONS), "dangling.msh: there is no such file; expected a mesh with named parts"),
         (("solve", "p.npz", *OPTIONS), "p.npz is a problem; expected a mesh (enumsol roots p.npz solves a problem)"),
         (("solve", "gallery:wedge-8-5"), "gallery:wedge-8-5 is a problem; expected a mesh"),
-        (("solve", "pipe.toml"), "pipe.toml: it is no regular file; expected a TOML file of options"),
-        (("roots", "pipe.npz", "--alpha", 1), "pipe.npz: it is no regular file; expected a .npz file"),
-        (("roots", "pipe.toml", "--alpha", 1), "pipe.toml: it is no regular file; expected a TOML file of options"),
+        (("solve", "pipe.toml"), "pipe.toml: it is not a regular file; expected a TOML file of options"),
+        (("roots", "pipe.npz", "--alpha", 1), "pipe.npz: it is not a regular file; expected a .npz file"),
+        (("roots", "pipe.toml", "--alpha", 1), "pipe.toml: it is not a regular file; expected a TOML file of options"),
         (("roots", "pipe.msh", "--alpha", 1), "pipe.msh is a mesh; expected a problem"),
         (
             ("roots", "folder.toml", "--alpha", 1),
@@ -301,7 +301,7 @@ def test_bad_pairs_on_the_command_line(two_bodies, capsys, text, part):
 
 def test_a_pair_is_called_by_one_name_in_a_file(two_bodies):
     (two_bodies / "two.toml").write_text("mesh = 'two.msh'\ncontact_pair = []\npairs = []\n")
-    with pytest.raises(InvalidProblemError, match="contact_pair and pairs are given; expected one of both"):
+    with pytest.raises(InvalidProblemError, match="contact_pair and pairs are given; expected only one of them"):
         fem.read_mesh_problem("two.toml")
 
 

@@ -31,7 +31,7 @@ def test_all_solutions_in_any_order_are_all_found(tmp_path):
     assert report.ok
     assert report.found_roots == (0, 1, 2, 3, 4)
     assert [answer.nearest for answer in report.answers] == [("root", k) for k in (3, 0, 4, 1, 2)]
-    assert (report.missed_roots, report.none, report.repeated) == ((), (), 0)
+    assert (report.missed_roots, report.spurious, report.repeated) == ((), (), 0)
 
 
 def test_inaccurate_answers_are_found_up_to_the_tolerance(tmp_path):
@@ -40,7 +40,7 @@ def test_inaccurate_answers_are_found_up_to_the_tolerance(tmp_path):
     off[:, 2, 1] += size * np.array([0.0, 0.9e-4, -0.9e-4, 1.1e-4, -1.1e-4])
     report = checked(written(tmp_path, roots=off))
     assert report.found_roots == (0, 1, 2)
-    assert [answer.row for answer in report.none] == [3, 4]
+    assert [answer.row for answer in report.spurious] == [3, 4]
     assert [answer.distance for answer in report.answers] == pytest.approx(
         [0, 0.9e-4, 0.9e-4, 1.1e-4, 1.1e-4], abs=1e-9
     )
@@ -51,7 +51,7 @@ def test_inaccurate_answers_are_found_up_to_the_tolerance(tmp_path):
 def test_missing_and_repeated_answers_are_counted(tmp_path):
     report = checked(written(tmp_path, roots=ROOTS[[1, 1, 4, 1]]))
     assert (report.found_roots, report.missed_roots, report.repeated, report.ok) == ((1, 4), (0, 2, 3), 2, False)
-    assert report.none == ()
+    assert report.spurious == ()
     nothing = checked(written(tmp_path, roots=ROOTS[:0]))
     assert (nothing.missed_roots, nothing.answers) == ((0, 1, 2, 3, 4), ())
 
@@ -63,7 +63,7 @@ def test_wrong_answers_are_none_and_it_is_said_why(tmp_path):
     wrong[2] = (ROOTS[3] + ROOTS[4]) / 2  # between two solutions
     wrong[3, :, 1] = 9 * wrong[3, :, 0]  # beyond the cone of friction
     report = checked(written(tmp_path, roots=wrong))
-    assert len(report.none) == 4
+    assert len(report.spurious) == 4
     assert not report.ok
     reasons = [answer.reason for answer in report.answers]
     assert reasons[1] == "not all of its values are finite"
@@ -184,8 +184,8 @@ def test_every_format_says_the_same(tmp_path, write, entry):
     report = checked(tmp_path)
     assert report.missed_roots == (0,)
     assert report.found_roots == tuple(range(1, entry.roots))
-    assert len(report.none) == 1
-    assert 1e-3 < report.none[0].distance < 1
+    assert len(report.spurious) == 1
+    assert 1e-3 < report.spurious[0].distance < 1
 
 
 def test_one_solution_needs_no_further_dimension(tmp_path):
@@ -214,7 +214,7 @@ def test_what_this_package_writes_is_read(tmp_path, capsys, entry):
         assert run(capsys, *command, "--csv", tmp_path / f"{entry.name}.csv")[0] == 0
         assert checked(tmp_path / f"{entry.name}.csv").ok
     assert run(capsys, "fixed-point", *command[1:], "--json", tmp_path / f"{entry.name}.json")[0] == 0
-    assert checked(tmp_path / f"{entry.name}.json").none == ()
+    assert checked(tmp_path / f"{entry.name}.json").spurious == ()
 
 
 def test_several_files_of_a_problem_are_taken_together(tmp_path):
@@ -245,7 +245,7 @@ def test_the_command_reports_and_ends_with_a_status(tmp_path, capsys):
     status, out, err = run(capsys, "collection", "check", tmp_path, "--csv", tmp_path / "table.txt")
     assert (status, err) == (3, "")
     assert "wedge-8-5: missed root 3 (" in out
-    assert "wedge-8-5: answer 1 of wedge-8-5.npz is none: the nearest is root " in out
+    assert "wedge-8-5: answer 1 of wedge-8-5.npz is not a solution: the nearest is root " in out
     assert out.splitlines()[1].split() == ["wedge-8-5", "5", "2", "1", "4", "1", "0"]
     assert len((tmp_path / "table.txt").read_text().splitlines()) == 3
     status, out, _ = run(capsys, "collection", "check", tmp_path, "--json", "-")

@@ -255,7 +255,7 @@ def test_a_toml_file_is_a_call(toml, tmp_path):
         ("2.5", "'2.5'", r"young is '2\.5'; expected a finite number"),
         ("2.5", "true", "young is True; expected"),
         ("2.5", "1979-05-27", "young is datetime"),
-        ("young", "young young", "it is no TOML file"),
+        ("young", "young young", "it is not a TOML file"),
         ("floor = [0.0", "floor = [nan", "load of floor is .*; expected two finite numbers"),
     ],
 )

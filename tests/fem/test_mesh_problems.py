@@ -425,7 +425,7 @@ def test_a_part_that_hangs_together_with_no_other():
 def test_facets_inside_the_body_are_refused():
     mesh = grid(2, 2, 3)
     inside = fem.PartedMesh(mesh.points, mesh.cells, {**mesh.facets, "cut": np.array([[3, 4]])})
-    with pytest.raises(InvalidArgumentError, match=r"cut row 0, nodes \[3, 4\], is no facet on the boundary"):
+    with pytest.raises(InvalidArgumentError, match=r"cut row 0, nodes \[3, 4\], is not a facet on the boundary"):
         fem.mesh_problem(inside, **STEEL, contact="cut", clamp="top")
 
 

@@ -220,7 +220,7 @@ def test_broken_structures(tmp_path):
     change(lambda group: group["W"].pop("i"))
     refused(path, "/fclib_local/W/i is missing")
     change(lambda group: group["W"]["i"].write_direct(np.full(4, 9, dtype=np.int32)))
-    refused(path, "W is no sparse matrix")
+    refused(path, "W is not a sparse matrix")
     change(lambda group: group["W"]["nz"].write_direct(np.array([-7], dtype=np.int32)))
     refused(path, "W/nz is -7; expected -1")
     change(lambda group: group["vectors"].pop("mu"))

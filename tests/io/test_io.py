@@ -186,7 +186,7 @@ BAD_ARRAYS = {
     ),
     "version text": (DENSE | {"enumsol_format": "one"}, "enumsol_format is one"),
     "labels": (DENSE | {"node_ids": np.eye(2)}, r"node_ids has shape \(2, 2\) and type float64"),
-    "both forms": (DENSE | {"A_data": A}, "A is given as a matrix and in sparse parts; expected one of both"),
+    "both forms": (DENSE | {"A_data": A}, "A is given as a matrix and in sparse parts; expected only one of them"),
     "parts missing": (without("A") | {"A_data": A, "A_shape": (4, 4)}, "A_indices, A_indptr, A_format is missing"),
 }
 
@@ -215,11 +215,11 @@ def assert_one_sentence(error, place):
         ("format", "coo", r'A_format is \'coo\'; expected "csc" or "csr"'),
         ("shape", (4, 4, 4), r"A_shape is \[4, 4, 4\]; expected two whole numbers"),
         ("shape", (4, 9), r"the sparse parts of A do not fit together \(.*\); expected those of one csc matrix"),
-        ("indices", np.array([0.5] * 10), "A_indices is no list of whole numbers"),
+        ("indices", np.array([0.5] * 10), "A_indices is not a list of whole numbers"),
         ("indices", np.full(10, 77), "the sparse parts of A do not fit together"),
         ("indices", np.arange(3), "the sparse parts of A do not fit together"),
         ("indptr", np.array([0, 2, 1, 8, 10]), "the sparse parts of A do not fit together"),
-        ("data", np.array(["x"] * 10), "A_data is no list of real numbers"),
+        ("data", np.array(["x"] * 10), "A_data is not a list of real numbers"),
     ],
 )
 def test_bad_sparse_parts(tmp_path, part, value, pattern):
@@ -281,7 +281,7 @@ def test_truncated_and_damaged_archives(tmp_path):
         ("p.toml", r"expected a \.npz file, .* \(enumsol\.fem makes problems of meshes and \.toml files\)"),
         ("p.txt", r"its name ends in '\.txt'; expected a .npz file"),
         ("suffixless", "its name has no suffix; expected a .npz file"),
-        ("f.mtx", r"one MatrixMarket file is no problem; expected a directory with A\.mtx"),
+        ("f.mtx", r"one MatrixMarket file is not a problem; expected a directory with A\.mtx"),
         ("empty", r"the directory has no MatrixMarket files; expected A\.mtx, Bn\.mtx, Bt\.mtx and f\.mtx"),
     ],
 )
@@ -298,10 +298,10 @@ def test_wrong_places(tmp_path, name, pattern):
     ("file", "text", "pattern"),
     [
         ("A.mtx", None, r"A\.mtx is missing \(found Bn\.mtx, .*\); expected A\.mtx, Bn\.mtx, Bt\.mtx and f\.mtx"),
-        ("A.mtx", "", r"A\.mtx is no readable MatrixMarket file"),
-        ("A.mtx", "hello", r"A\.mtx is no readable MatrixMarket file"),
-        ("A.mtx", "%%MatrixMarket matrix coordinate real general\n4 4 3\n1 1 2\n", r"A\.mtx is no readable"),
-        ("A.mtx", "%%MatrixMarket matrix coordinate real general\n4 4 1\n9 9 2\n", r"A\.mtx is no readable"),
+        ("A.mtx", "", r"A\.mtx is not a readable MatrixMarket file"),
+        ("A.mtx", "hello", r"A\.mtx is not a readable MatrixMarket file"),
+        ("A.mtx", "%%MatrixMarket matrix coordinate real general\n4 4 3\n1 1 2\n", r"A\.mtx is not a readable"),
+        ("A.mtx", "%%MatrixMarket matrix coordinate real general\n4 4 1\n9 9 2\n", r"A\.mtx is not a readable"),
         ("A.mtx", "%%MatrixMarket matrix coordinate complex general\n4 4 1\n1 1 2 3\n", "A has complex entries"),
         (
             "f.mtx",
@@ -312,10 +312,14 @@ def test_wrong_places(tmp_path, name, pattern):
         (
             "gap.mtx",
             "%%MatrixMarket matrix array real general\n%\n2 1\n0.0=000000000000000e+",
-            r"gap\.mtx is no readable",
+            r"gap\.mtx is not a readable",
         ),
-        ("gap.mtx", "%%MatrixMarket matrix array real general\n%\n2 1\n0.0\n0.x0\n", "a word in it is no number"),
-        ("A.mtx", "%%MatrixMarket matrix coordinate real general\n4 4 2\n1 1 2.0\n2 2 1.0e", r"A\.mtx is no readable"),
+        ("gap.mtx", "%%MatrixMarket matrix array real general\n%\n2 1\n0.0\n0.x0\n", "a word in it is not a number"),
+        (
+            "A.mtx",
+            "%%MatrixMarket matrix coordinate real general\n4 4 2\n1 1 2.0\n2 2 1.0e",
+            r"A\.mtx is not a readable",
+        ),
         (
             "A.mtx",
             "%%MatrixMarket matrix coordinate real general\n4 4 99999999999\n1 1 2\n",
@@ -330,7 +334,7 @@ def test_wrong_places(tmp_path, name, pattern):
         ("f.mtx", "%%MatrixMarket matrix array real general\n4 1\n1\nnan\n3\n4\n", "f has the value nan"),
         ("gaps.mtx", "x", r"gaps\.mtx is not known \(is gap\.mtx meant\?\)"),
         ("friction.mtx", "%%MatrixMarket matrix array real general\n2 1\n1\n2\n", "friction is an array of shape"),
-        ("node_ids.json", "[1,", r"node_ids\.json is no JSON"),
+        ("node_ids.json", "[1,", r"node_ids\.json is not JSON"),
         ("node_ids.json", '{"a": 1}', r"node_ids\.json holds something else; expected a list"),
         ("node_ids.json", "[1, 2, 3]", "node_ids has 3 entries"),
     ],

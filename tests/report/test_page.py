@@ -327,7 +327,7 @@ def test_the_problem_is_told_as_it_was_given(scene, tmp_path):
     assert "gap 0.0001 mm" in text
     roots = enumerate_roots(scene.problem(), 0)
     plain = page_of(roots, tmp_path, scene=scene)
-    assert "Numbers are in the consistent units" in Reader(plain).text
+    assert "Numbers are in the user's own consistent units" in Reader(plain).text
     assert 'id="given"' not in page_of(roots, tmp_path)
     with pytest.raises(InvalidArgumentError, match="scene is a str; expected a Scene"):
         write_report(graph, tmp_path / "page.html", scene="scene.toml")

@@ -131,7 +131,8 @@ def test_what_is_undecided_has_a_table(tmp_path):
     fast = enumerate_roots(gallery.two_node_square(), 3.5, arithmetic="fast")
     write_report(fast, tmp_path / "fast.html")
     assert (
-        "Nothing is proven: floating-point numbers were believed" in Reader((tmp_path / "fast.html").read_text()).text
+        "Nothing is proven: the result rests on floating-point arithmetic"
+        in Reader((tmp_path / "fast.html").read_text()).text
     )
 
 
@@ -146,8 +147,8 @@ def test_a_continuum_is_in_a_table(tmp_path):
     ("name", "words"),
     [
         ("scattered", "The problem has no mesh: its contact nodes are drawn at their coordinates"),
-        ("bare", "The problem has no mesh and no coordinates, so that no body is drawn"),
-        ("bars", "The problem has no mesh, so that no body is drawn"),
+        ("bare", "The problem has no mesh and no coordinates, so no body is drawn"),
+        ("bars", "The problem has no mesh, so no body is drawn"),
     ],
 )
 def test_problems_without_a_mesh(pages, name, words):

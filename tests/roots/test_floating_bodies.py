@@ -226,7 +226,7 @@ N = block_on_table().rigid_modes
     ("change", "words"),
     [
         ({"rigid_modes": N[:3]}, r"rigid_modes has shape \(3, 3\); expected \(n, r\) = \(12, r\), r >= 1"),
-        ({"rigid_modes": N + np.eye(12)[:, :3]}, "column 0 is no rigid mode"),
+        ({"rigid_modes": N + np.eye(12)[:, :3]}, "column 0 is not a rigid mode"),
         ({"rigid_modes": N[:, [0, 1, 1]]}, "linearly dependent columns"),
         ({"rigid_modes": N * [1, 0, 1]}, "column 1 is zero"),
         ({"rigid_modes": N[:, :2]}, "A is singular or indefinite on more than the 2 rigid_modes"),

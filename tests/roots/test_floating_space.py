@@ -169,7 +169,7 @@ def test_what_is_refused():
         enumsol.enumerate_roots(problem, 0, arithmetic="fast")
     with pytest.raises(enumsol.NotHeldError, match="a fixed point cannot take a body that nothing holds"):
         enumsol.successive_approximations(problem, 0)
-    with pytest.raises(enumsol.InvalidProblemError, match="rigid_modes: column 0 is no rigid mode"):
+    with pytest.raises(enumsol.InvalidProblemError, match="rigid_modes: column 0 is not a rigid mode"):
         problem.replace(rigid_modes=np.eye(problem.n)[:, :2])
     with pytest.raises(enumsol.InvalidProblemError, match="singular or indefinite on more than the 2 rigid_modes"):
         problem.replace(rigid_modes=problem.rigid_modes[:, :2])

@@ -42,7 +42,7 @@ class VerifiedIntervalCertifier(IntervalCertifier):
     """Accepts a leaf when the dual bounds of its multipliers are proven positive at both ends of the piece.
 
     A leaf that the balls cannot exclude is branched on. Only where there are no balls at all (S positive definite
-    within rounding) do rationals decide, if S and g were condensed without rounding; there is no proof file then.
+    within rounding) do rationals decide, if S and g were condensed without rounding; there is not a proof file then.
 
     Parameters
     ----------
