@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
@@ -278,7 +278,10 @@ class CondensedProblem(Condensation):
 
 @dataclass(frozen=True)
 class FloatingCondensation(Condensation):
-    """What roots ask of a body that nothing holds: displacements, and the problem itself."""
+    """A body that nothing holds, condensed: S and g of the body on springs, and its equilibrium as a whole.
+
+    With q the coordinates of the rigid displacement, w = g - S lambda + G'q and G lambda = h (theory, (14.2)).
+    """
 
     problem: FloatingData = field(repr=False)
 
@@ -288,6 +291,23 @@ class FloatingCondensation(Condensation):
         held = problem.on_springs.condensed
         return cls(held.S, held.g0, held.g1, problem)
 
+    @cached_property
+    def G(self) -> NDArray[np.float64]:  # noqa: N802 (the field's letter)
+        """(B N)', shape (r, m)."""
+        return sealed(np.asarray((self.problem.contact_rows @ self.problem.rigid_modes).T))
+
+    @cached_property
+    def h(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """N'f at alpha = 0 and its derivative, shapes (r,)."""
+        N, slope = self.problem.rigid_modes, self.problem.load_slope
+        change = np.zeros(N.shape[1]) if slope is None else N.T @ slope
+        return sealed(np.asarray(N.T @ self.problem.f)), sealed(np.asarray(change))
+
     def displacement(self, alpha: AlphaLike, forces: NDArray[np.float64]) -> NDArray[np.float64]:
         """u less the rigid displacement: A_k^-1 (f(alpha) - B' lambda), shape (n,)."""
         return np.asarray(self.problem.on_springs.condensed.displacement(alpha, forces))
+
+
+def condensation_of(problem: Any) -> Any:
+    """``problem.condensed``, or that of a body that nothing holds."""
+    return problem.condensed if problem.modes is None else FloatingCondensation.of(problem)

@@ -88,5 +88,9 @@ class FloatingData(CondensableData, Protocol):
     """A problem of a body that nothing holds, in 2D or 3D."""
 
     @property
+    def rigid_modes(self) -> Vector:
+        """Rigid modes, (n, r)."""
+
+    @property
     def on_springs(self) -> Any:
         """The problem of the body on springs."""

@@ -55,7 +55,7 @@ class CondensedEquation(ScaledEquation):
 
     def _test_functions(self, x: Vector, r: Vector) -> Vector:
         p = self.p
-        trial = x[:-1] + r * self.w(x)
+        trial = x[: self.m] + r * self.w(x)
         bound = self.at(x).F * x[:p]
         return np.column_stack([trial[:p], trial[p:] - bound, trial[p:] + bound])
 
@@ -64,7 +64,7 @@ class CondensedEquation(ScaledEquation):
         return np.asarray(self.test_functions(x) > 0)
 
     def residual(self, x: Vector) -> Vector:
-        """H(x) for each node's own r, shape (2p,)."""
+        """H(x) for each node's own r, shape (2p + r,)."""
         return self._projected(x, np.ones(2 * self.p))
 
     def merit(self, x: Vector) -> float:
@@ -76,22 +76,22 @@ class CondensedEquation(ScaledEquation):
         p, w = self.p, self.w(x)
         closed, slips, count = pieces(self._test_functions(x, r) > 0)
         bound = self.at(x).F * x[:p]
-        tangential = (1 - count) * x[p:-1] - slips * bound - count * r[p:] * w[p:]
-        return np.concatenate([np.where(closed, -r[:p] * w[:p], x[:p]), tangential])
+        tangential = (1 - count) * x[p : 2 * p] - slips * bound - count * r[p:] * w[p:]
+        return np.concatenate([np.where(closed, -r[:p] * w[:p], x[:p]), tangential, -self.left(x)])
 
     def selection(self, codes: Codes) -> NDArray[np.bool_]:
         """Sign rows of the selection in which the nodes have these statuses, shape (p, 3)."""
         return np.array([SIGNS[code] for code in codes]).reshape(-1, 3) > 0
 
     def selection_residual(self, rows: NDArray[np.bool_], x: Vector) -> Vector:
-        """The named selection function of H, shape (2p,), its rows scaled by positive factors to size one."""
+        """The named selection function of H, shape (2p + r,), its rows scaled by positive factors to size one."""
         p = self.p
         closed, slips, count = pieces(rows)
         lengths, forces = self._shares(count)
         w = self.w(x)
         normal = np.where(closed, -w[:p], x[:p])
         bound = self.at(x).F * x[:p]
-        return np.concatenate([normal, forces * x[p:-1] - slips * bound - lengths * w[p:]])
+        return np.concatenate([normal, forces * x[p : 2 * p] - slips * bound - lengths * w[p:], -self.left(x)])
 
     def _shares(self, count: Vector) -> tuple[Vector, Vector]:
         """Factors of w_t and lambda_t in the tangential rows; only the fourth piece, 2 lambda_t + r w_t, needs r."""
@@ -101,19 +101,19 @@ class CondensedEquation(ScaledEquation):
         return np.where(fourth, -r * scale, count), (1 - count) * scale
 
     def jacobian(self, rows: NDArray[np.bool_], x: Vector) -> Vector:
-        """Gradient of the named selection function (see selection_residual), shape (2p, 2p + 1)."""
+        """Gradient of the named selection function (see selection_residual), shape (2p + r, 2p + r + 1)."""
         p, values = self.p, self.at(x)
         closed, slips, count = pieces(rows)
         lengths, forces = self._shares(count)
-        share = np.concatenate([closed.astype(float), lengths])
-        J = np.empty((2 * p, 2 * p + 1))
-        J[:, :-1] = share[:, None] * self.S
+        share = np.concatenate([closed.astype(float), lengths, np.ones(self.modes)])
+        J = np.empty((len(share), len(share) + 1))
+        J[:, :-1] = share[:, None] * self.bordered
         node = np.arange(p)
         J[node, node] += ~closed
         J[p + node, p + node] += forces
         J[p + node, node] -= slips * values.F
         J[:, -1] = -share * values.dg
-        J[p:, -1] -= slips * values.dF * x[:p]
+        J[p : 2 * p, -1] -= slips * values.dF * x[:p]
         return J
 
     # -- statuses and their conditions -------------------------------------------------------------------------------
@@ -121,7 +121,7 @@ class CondensedEquation(ScaledEquation):
     def _row_values(self, x: Vector) -> Vector:
         """Values of all rows in the order of RowKind, those of the cone over 1 + F, shape (7, p)."""
         F = self.at(x).F
-        rows: Vector = row_values(x[:-1], self.w(x), F)
+        rows: Vector = row_values(x[: self.m], self.w(x), F)
         rows[[RowKind.CONE_PLUS, RowKind.CONE_MINUS]] /= 1.0 + F
         return rows
 
@@ -134,9 +134,9 @@ class CondensedEquation(ScaledEquation):
         return self._of_inequalities(codes, self._row_values(x), np.inf)
 
     def slack_gradient(self, codes: Codes, x: Vector, which: tuple[int, int]) -> Vector:
-        """Gradient of one slack with respect to x, shape (2p + 1,)."""
+        """Gradient of one slack with respect to x, shape (2p + r + 1,)."""
         (i, k), p, values = which, self.p, self.at(x)
-        row, kind = np.zeros(2 * p + 1), CONDITIONS[codes[i]].inequalities[k]
+        row, kind = np.zeros(len(x)), CONDITIONS[codes[i]].inequalities[k]
         if kind == RowKind.NORMAL_FORCE:
             row[i] = 1.0
         elif kind in (RowKind.CONE_PLUS, RowKind.CONE_MINUS):
@@ -148,18 +148,18 @@ class CondensedEquation(ScaledEquation):
         else:
             at, sign = (i, -1.0) if kind == RowKind.PENETRATION else (p + i, 1.0)
             sign = -1.0 if kind == RowKind.SLIP_BACKWARD else sign
-            row[:-1], row[-1] = -sign * self.S[at], sign * values.dg[at]
+            row[:-1], row[-1] = -sign * self.bordered[at], sign * values.dg[at]
         return row
 
     def slack_rates(self, codes: Codes, x: Vector, tangent: Vector) -> Vector:
         """Derivatives of the slacks along a tangent, shape (p, 2); zero where there is one condition."""
         p, values, da = self.p, self.at(x), tangent[-1]
         F, dF, cone = values.F, values.dF * da, 1.0 + values.F
-        bound, t, dt = F * x[:p], x[p:-1], tangent[p:-1]
+        bound, t, dt = F * x[:p], x[p : 2 * p], tangent[p : 2 * p]
         moved, turn = F * tangent[:p] + dF * x[:p], dF / cone
-        dw = values.dg * da - self.S @ tangent[:-1]
+        dw = (values.dg * da - self.bordered @ tangent[:-1])[: 2 * p]
         plus, minus = (moved - dt - turn * (bound - t)) / cone, (moved + dt - turn * (bound + t)) / cone
-        rows = np.concatenate([tangent[:-1], plus, minus, -dw[:p], dw[p:], -dw[p:]]).reshape(-1, p)
+        rows = np.concatenate([tangent[: 2 * p], plus, minus, -dw[:p], dw[p:], -dw[p:]]).reshape(-1, p)
         return self._of_inequalities(codes, rows, 0.0)
 
     def across(self, code: int, k: int) -> Sequence[int]:
@@ -206,4 +206,4 @@ class CondensedEquation(ScaledEquation):
     def local_test(self, x: Vector) -> LocalBranchTest:
         """The local branch test at a point of a path; see ScaledEquation."""
         F, slip = self.at(x).F, self.w(x)[self.p :]
-        return coherent_orientation(self.S, F, self.active(x), slip, self.alpha(x))
+        return coherent_orientation(self.bordered, F, self.active(x), slip, self.alpha(x))

@@ -44,7 +44,7 @@ class Correction:
 
 def moore_penrose(equation: ScaledEquation, x: Vector, tangent: Vector, options: ContinuationOptions) -> Correction:
     """Steps 3-6 of the paper's Algorithm 5.1 from x: Newton's method across selections with a rotating tangent."""
-    size = len(equation.S)
+    size = len(x) - 1
     T: Vector = tangent
     residual = np.inf
     for count in range(1, options.k_max + 2):

@@ -54,7 +54,7 @@ class PiecewiseSmoothEquation:
     r: float = 1.0
 
     def __post_init__(self) -> None:
-        instance_of(self.problem, ContactProblem, "problem").check_held("the equation of continuation")
+        instance_of(self.problem, ContactProblem, "problem")
         object.__setattr__(self, "r", positive_number(self.r, "r"))
 
     @property

@@ -16,17 +16,16 @@ if TYPE_CHECKING:
     from enumsol.continuation.scaled_equation import ScaledEquation
 
 
-def check_problem(problem: Any, smooth_path: SmoothPath | None, what: str) -> None:
+def check_problem(problem: Any, smooth_path: SmoothPath | None) -> None:
     """Refuse what continuation does not take.
 
     Raises
     ------
     InvalidArgumentError
-        The problem is none or is not held, or the smooth path is none.
+        The problem is none, or the smooth path is none.
     """
     if not isinstance(problem, ContactBody):
         instance_of(problem, ContactProblem, "problem")
-    problem.check_held(what)
     if smooth_path is not None:
         instance_of(smooth_path, SmoothPath, "smooth_path")
 

@@ -50,7 +50,8 @@ def follow(
     ----------
     problem : ContactProblem or ContactProblem3D
     start : Root, PathPoint, or tuple (alpha, lambda_n, lambda_t)
-        A root, for example of enumerate_roots, newton or ``graph.starting_points()``.
+        A root, for example of enumerate_roots, newton or ``graph.starting_points()``. Of a body that nothing holds the
+        tuple is (alpha, lambda_n, lambda_t, rigid_coordinates); its path ends where ``max_rigid_displacement`` does.
     direction : {+1, -1}
         +1 is the positively oriented tangent (theory, (8.2)); alpha then increases where the root's index is +1.
     interval : pair of alphas or None
@@ -74,6 +75,8 @@ def follow(
         Several tangents, or none, have the asked orientation at a degenerate start; the error lists them.
     InvalidArgumentError
         The start is not a root or an argument is out of range.
+    NotHeldError
+        Some rigid displacement of a body that nothing holds moves no contact node.
     Interrupted
         On Ctrl-C; ``partial`` holds the path so far.
 

@@ -12,7 +12,7 @@ from enumsol.continuation.corrector import Correction, moore_penrose, smooth_new
 from enumsol.continuation.path_data import PathData, PathStatus, PointKind
 from enumsol.continuation.recorder import PathRecorder
 from enumsol.continuation.scaled_equation import STATUS_TOLERANCE
-from enumsol.continuation.tangents import curve_tangent, orientation
+from enumsol.continuation.tangents import RATE_TOLERANCE, curve_tangent, orientation
 from enumsol.continuation.transitions import (
     FORWARD_TOLERANCE,
     CurvePoint,
@@ -129,11 +129,36 @@ class Follower(Generic[_Path]):
                 f"the limit of {counted(self.options.max_steps, 'step')} was reached at alpha = {self._alpha():g}; "
                 "path.resume() continues",
             )
+        if self.equation.moves_rigidly(self.current.tangent):
+            return self._slide()
         step = self._step()
         if step is None:
             return self._change_selection()
         self._in_place = 0
         return self._take(step)
+
+    def _slide(self) -> _Stop | None:
+        """Where the body moves as a whole at fixed forces: straight to the next transition point, or to the bound.
+
+        All conditions are affine along this line (theory, section 14.7).
+        """
+        equation, start = self.equation, self.current
+        q, rates = equation.rigid(start.x), equation.rigid(start.tangent)
+        room = np.divide(
+            np.copysign(equation.reach, rates) - q, rates, out=np.full(len(q), np.inf), where=np.abs(rates) > 0
+        )
+        slacks, falls = equation.slacks(start.codes, start.x), equation.slack_rates(start.codes, start.x, start.tangent)
+        falling = falls < -RATE_TOLERANCE
+        ahead = float(np.min(np.maximum(slacks[falling], 0.0) / -falls[falling], initial=np.inf))
+        length = min(ahead, float(np.min(room)))
+        end = CurvePoint(start.x + length * start.tangent, start.codes, start.tangent)
+        if ahead == length:
+            return self._leave(end)
+        stop = self._return(start, end)
+        if stop is not None:
+            return stop
+        self._end(end)
+        return self._at_bound(int(np.argmin(room)))
 
     def _step(self) -> _Step | None:
         """Steps 2-7 and 9: an accepted step, or None when even the shortest one fails."""
@@ -223,6 +248,11 @@ class Follower(Generic[_Path]):
             arrival = passed_kink(equation, self.current, self.sign, options.transition_tolerance, reach)
         if arrival is None:
             return self._stalled("no transition point was found ahead")
+        return self._leave(arrival)
+
+    def _leave(self, arrival: CurvePoint) -> _Stop | None:
+        """Leave a transition point of the current curve."""
+        equation, options = self.equation, self.options
         moved = equation.norm(arrival.x - self.current.x) > SAME_POINT
         self._in_place = 0 if moved else self._in_place + 1
         if self._in_place > MAX_CHANGES_IN_PLACE:
@@ -280,7 +310,7 @@ class Follower(Generic[_Path]):
         """Stop conditions met between two points of one curve; the path is ended there. A fold is recorded."""
         fold = turning_point(self.equation, start, end, self.options.transition_tolerance)
         if fold is not None:
-            stop = self._border(start, fold) or self._return(start, fold)
+            stop = self._border(start, fold) or self._beyond(start, fold) or self._return(start, fold)
             if stop is not None:
                 return stop
             arrived = self._known(Kink(fold, fold))
@@ -289,7 +319,29 @@ class Follower(Generic[_Path]):
             self._landmarks.append((fold.x, fold.codes, False))
             if arrived is not None:
                 return arrived
-        return self._border(start, end) or self._return(start, end)
+        return self._border(start, end) or self._beyond(start, end) or self._return(start, end)
+
+    def _beyond(self, start: CurvePoint, end: CurvePoint) -> _Stop | None:
+        """Where a body that nothing holds comes to the bound of its rigid displacement."""
+        equation = self.equation
+        here, there = equation.rigid(start.x), equation.rigid(end.x)
+        sides = np.where(there < 0, -equation.reach, equation.reach)
+        for mode in np.argsort(-np.abs(there - here) / np.maximum(np.abs(sides - here), 1e-300)):
+            if abs(there[mode]) <= equation.reach[mode]:
+                continue
+            row, side = equation.rigid_rows[mode] / equation.reach[mode], math.copysign(1.0, there[mode])
+            x = smooth_newton(equation, end.codes, end.x, row, side, self.options.transition_tolerance)
+            if x is not None:
+                self._end(CurvePoint(x, end.codes, end.tangent))
+            return self._at_bound(int(mode))
+        return None
+
+    def _at_bound(self, mode: int) -> _Stop:
+        return _Stop(
+            PathStatus.RIGID_BOUND,
+            f"the body moves as a whole along rigid mode {mode}, by which max_rigid_displacement was reached at "
+            f"alpha = {self._alpha():g}: contact does not hold it there",
+        )
 
     def _inside(self, x: Vector) -> bool:
         return bool(self._low <= x[-1] <= self._high)
@@ -397,9 +449,9 @@ def _landmarks(equation: ScaledEquation, visited: Sequence[PathData]) -> Iterato
         for k, kind in enumerate(path.kinds):
             if kind is PointKind.STEP:
                 continue
-            x = equation.point(
-                float(path.alpha[k]), np.concatenate([path.lambda_n[k], path.lambda_t[k].ravel(order="F")])
-            )
+            forces = np.concatenate([path.lambda_n[k], path.lambda_t[k].ravel(order="F")])
+            rigid = None if path.rigid_coordinates is None else path.rigid_coordinates[k]
+            x = equation.point(float(path.alpha[k]), forces, rigid)
             if not math.isfinite(float(np.sum(x))):
                 continue
             codes = {tuple(int(c) for c in path.codes[k]), tuple(int(c) for c in path.codes[max(k - 1, 0)])}

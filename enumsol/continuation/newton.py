@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.condensation.condensed import condensation_of
 from enumsol.continuation.condensed_equation import CondensedEquation
 from enumsol.continuation.equations import check_problem, equation_on
 from enumsol.continuation.not_converged import NewtonIteration, NotConverged
 from enumsol.continuation.space_equation import SLIP, SpaceEquation
 from enumsol.errors import InvalidArgumentError
-from enumsol.model.statuses import FRICTIONLESS, STATUSES, STICK
+from enumsol.model.statuses import OPEN, STICK
 from enumsol.roots.local_branch import SINGULAR_TOLERANCE
 from enumsol.roots.root import Root
 from enumsol.support.arguments import alpha_value, positive_integer, positive_number
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from enumsol.continuation.parameter_path import SmoothPath
-    from enumsol.continuation.scaled_equation import ScaledEquation, Vector
+    from enumsol.continuation.scaled_equation import Codes, ScaledEquation, Vector
     from enumsol.model.problem import ContactProblem
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.support.arguments import Alpha, AlphaLike
@@ -56,7 +57,8 @@ def newton(
     alpha : float, Fraction or whatever enumerate_roots accepts as alpha
     start : Root, (2p,) or (p, 2) array_like, in 3D (3p,) or (p, 3), or None
         Contact forces: those of a root, lambda_n followed by lambda_t (in 3D all along the first axis, then all along
-        the second), or a row (lambda_n, lambda_t) per node [force]. None: zero.
+        the second), or a row (lambda_n, lambda_t) per node [force]. None: zero. Of a body that nothing holds, all
+        forces may be followed by the coordinates of its rigid displacement, which are zero otherwise.
     r : float or None
         Parameter of H [force / length]; None for each node's own stiffness.
     smooth_path : SmoothPath or None
@@ -71,7 +73,9 @@ def newton(
     Raises
     ------
     NotConverged
-        With the history of the iterations, and advice.
+        With the history of the iterations, and advice. A body that nothing holds may have no root.
+    NotHeldError
+        Some rigid displacement of a body that nothing holds moves no contact node.
     InvalidArgumentError
         An argument cannot be used as given.
 
@@ -82,7 +86,7 @@ def newton(
     >>> [enumsol.newton(problem, 5, start=start).statuses for start in (None, (1.0, -1.5))]
     [(ContactStatus.OPEN,), (ContactStatus.STICK,)]
     """
-    check_problem(problem, smooth_path, "newton")
+    check_problem(problem, smooth_path)
     exact = alpha_value(alpha)
     value = float(exact)
     r = None if r is None else positive_number(r, "r")
@@ -92,30 +96,39 @@ def newton(
         frozen = smooth_path.problem_at(frozen, value)
     frozen.friction_at(exact)
     equation = equation_on(problem, smooth_path, value, r=r)
-    x = equation.point(value, _start_forces(start, problem.p, len(equation.S) // problem.p))
+    forces, rigid = _start_values(start, problem.p, equation.m // problem.p, equation.modes)
+    x = equation.point(value, forces, rigid)
     x = _iterate(equation, x, value, max_iterations)
-    if isinstance(equation, SpaceEquation):
-        return _root_in_space(frozen, exact, equation, x)
+    if equation.modes or isinstance(equation, SpaceEquation):
+        return _root_of_floats(frozen, exact, equation, x)
     assert isinstance(equation, CondensedEquation)
     return build_root(frozen, exact if smooth_path is None else value, equation, x)
 
 
-def _start_forces(start: Root | ArrayLike | None, p: int, d: int) -> NDArray[np.float64]:
-    """Forces in d components at every node, (d p,)."""
+def _start_values(
+    start: Root | ArrayLike | None, p: int, d: int, modes: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Forces in d components at every node, (d p,), and the coordinates of the rigid displacement, (modes,)."""
+    none = np.zeros(modes)
     if start is None:
-        return np.zeros(d * p)
+        return np.zeros(d * p), none
     if isinstance(start, Root):
-        forces = np.concatenate([start.lambda_n, start.lambda_t.ravel(order="F")])
+        values = np.concatenate([start.lambda_n, start.lambda_t.ravel(order="F")])
+        if modes and start.rigid_coordinates is not None:
+            values = np.append(values, start.rigid_coordinates)
     else:
-        forces = real_array(start, "start", error=InvalidArgumentError)
-        if forces.shape == (p, d):
-            forces = forces.T.ravel()
-    if forces.shape != (d * p,):
+        values = real_array(start, "start", error=InvalidArgumentError)
+        if values.shape == (p, d):
+            values = values.T.ravel()
+    if values.shape == (d * p,):
+        return values, none
+    if values.shape != (d * p + modes,):
+        rigid = f", or with {counted(modes, 'rigid coordinate')} ({d * p + modes},)" if modes else ""
         raise InvalidArgumentError(
-            f"start has shape {forces.shape}; expected a Root or finite contact forces of shape ({d * p},) or ({p}, "
-            f"{d})"
+            f"start has shape {values.shape}; expected a Root or finite contact forces of shape ({d * p},) or ({p}, "
+            f"{d}){rigid}"
         )
-    return forces
+    return values[: d * p], values[d * p :]
 
 
 def _iterate(equation: ScaledEquation, x: Vector, alpha: float, max_iterations: int) -> Vector:
@@ -180,61 +193,47 @@ def build_root(problem: ContactProblem, alpha: Alpha, equation: CondensedEquatio
         component = connected_components([solution], floats)[0]
         if component.dimension == 0:
             return RootBuilder(problem, alpha, floats, floats, {}).root(component)
-    return _family_point(problem, alpha, equation, x)
+    return _root_of_floats(problem, alpha, equation, x, isolated=False)
 
 
-def _family_point(problem: ContactProblem, alpha: Alpha, equation: CondensedEquation, x: Vector) -> Root:
-    """A point of a continuum of solutions, as a root that is not regular."""
-    p = equation.p
-    forces, w = equation.forces(x), equation.displacements(x)
-    codes = equation.codes(x)
-    active = equation.active(x)
-    return Root(
-        alpha=alpha,
-        statuses=equation.statuses(codes, w[p:]),
-        active=tuple(
-            frozenset(STATUSES[STICK if code == FRICTIONLESS else code] for code in holds) for holds in active
-        ),
-        lambda_n=forces[:p],
-        lambda_t=forces[p:],
-        u_n=w[:p],
-        u_t=w[p:],
-        index=None,
-        regular=False,
-        margin=0.0,
-        enclosure=None,
-        _condensed=problem.condensed,
-        _tangent=None,
-    )
+def _root_of_floats(problem: Any, alpha: Alpha, equation: ScaledEquation, x: Vector, *, isolated: bool = True) -> Root:
+    """The Root at a point x of the condensed equation; not regular where a condition holds with equality.
 
-
-def _root_in_space(problem: ContactProblem3D, alpha: Alpha, equation: SpaceEquation, x: Vector) -> Root:
-    """The Root in 3D at a point x of the condensed equation; not regular where a condition holds with equality."""
+    ``isolated``: it is not known to belong to a continuum.
+    """
     codes, active = equation.codes(x), equation.active(x)
-    index = equation.index(codes, x, SINGULAR_TOLERANCE)
+    index = equation.index(codes, x, SINGULAR_TOLERANCE) if isolated else 0
     regular = bool(index) and all(len(held) == 1 for held in active)
     (lambda_n, lambda_t), (u_n, u_t) = equation.split(equation.forces(x)), equation.split(equation.displacements(x))
-    closed, held = (np.array([code in chosen for code in codes]) for chosen in ((STICK, SLIP, FRICTIONLESS), (STICK,)))
-    lambda_n, lambda_t = np.where(closed, lambda_n, 0.0), np.where(closed[:, None] & ~equation.without, lambda_t, 0.0)
-    u_n, u_t = np.where(closed, 0.0, u_n), np.where(held[:, None] & ~equation.without, 0.0, u_t)
-    slips = np.array([code == SLIP for code in codes])[:, None]
-    driven = problem.friction_at(alpha) * u_t
-    angle = np.arctan2(driven[:, 1], driven[:, 0])[:, None]
-    slip = u_t.ravel(order="F")
+    closed = np.array([code != OPEN for code in codes])
+    at_rest = np.array([code == STICK for code in codes])
+    tangential = (len(codes), *(1,) * (lambda_t.ndim - 1))
+    rubs, rests = closed.reshape(tangential) & ~equation.without, at_rest.reshape(tangential) & ~equation.without
+    lambda_n, lambda_t = np.where(closed, lambda_n, 0.0), np.where(rubs, lambda_t, 0.0)
+    u_n, u_t = np.where(closed, 0.0, u_n), np.where(rests, 0.0, u_t)
     return Root(
         alpha=alpha,
-        statuses=equation.statuses(codes, slip),
+        statuses=equation.statuses(codes, u_t.ravel(order="F")),
         active=tuple(
-            frozenset(equation.statuses((code,), u_t[i])[0] for code in codes_of) for i, codes_of in enumerate(active)
+            frozenset(equation.statuses((code,), np.atleast_1d(u_t[i]))[0] for code in codes_of)
+            for i, codes_of in enumerate(active)
         ),
         lambda_n=lambda_n,
         lambda_t=lambda_t,
         u_n=u_n,
         u_t=u_t,
-        slip_angle=np.where(slips & np.any(driven != 0, axis=1)[:, None], np.tile(angle, 2), np.nan),
+        slip_angle=None if lambda_t.ndim == 1 else _slip_angles(codes, problem.friction_at(alpha) * u_t),
         index=index if regular else None,
         regular=regular,
         margin=float(np.min(equation.slacks(codes, x))) if regular else 0.0,
         enclosure=None,
-        _condensed=problem.condensed,
+        _condensed=condensation_of(problem),
+        _rigid=equation.rigid(x) if equation.modes else None,
     )
+
+
+def _slip_angles(codes: Codes, driven: Vector) -> Vector:
+    """Angles of F u_t (p, 2) of the nodes that slip in 3D, each as two equal bounds; nan of the others."""
+    slips = np.array([code == SLIP for code in codes]) & np.any(driven != 0, axis=1)
+    angle = np.arctan2(driven[:, 1], driven[:, 0])[:, None]
+    return np.where(slips[:, None], np.tile(angle, 2), np.nan)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from enumsol.condensation.condensed import RHS_BLOCK
+from enumsol.condensation.condensed import RHS_BLOCK, FloatingCondensation, condensation_of
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.contact_body import ContactBody
 from enumsol.model.problem import ContactProblem
@@ -78,7 +78,6 @@ class SmoothPath:
         """The problem, in 2D or 3D, with friction and load frozen at alpha, to enumerate roots on the path."""
         if not isinstance(problem, ContactBody):
             instance_of(problem, ContactProblem, "problem")
-        problem.check_held("a SmoothPath")
         exact = alpha_value(alpha)
         value, shape = float(exact), affine_friction(problem)[0].shape
         F = problem.friction_at(exact) if self.F is None else _coefficients(self.F, value, "F", shape)
@@ -92,7 +91,8 @@ class SmoothPath:
 class PathValues:
     """Condensed load g, friction F and their derivatives at one alpha: arrays (2p,), (p,), (2p,), (p,).
 
-    In 3D the shapes are (3p,), (p, 2), (3p,), (p, 2).
+    In 3D the shapes are (3p,), (p, 2), (3p,), (p, 2). Of a body that nothing holds, g ends with the r loads h of its
+    equilibrium as a whole, and dg with their derivatives.
     """
 
     g: NDArray[np.float64]
@@ -106,13 +106,15 @@ class AffinePath:
 
     def __init__(self, problem: ContactProblem | ContactProblem3D) -> None:
         self.problem: Any = problem
-        self._condensed = problem.condensed
+        self.condensed = condensed = condensation_of(problem)
         self.friction = affine_friction(problem)
+        h = condensed.h if isinstance(condensed, FloatingCondensation) else (np.zeros(0), np.zeros(0))
+        self._load = np.append(condensed.g0, h[0]), np.append(condensed.g1, h[1])
 
     def at(self, alpha: float) -> PathValues:
         """Values at alpha."""
-        c, (F0, F1) = self._condensed, self.friction
-        return PathValues(c.g0 + alpha * c.g1, F0 + alpha * F1, c.g1, F1)
+        (g0, g1), (F0, F1) = self._load, self.friction
+        return PathValues(g0 + alpha * g1, F0 + alpha * F1, g1, F1)
 
     @property
     def frictionless(self) -> NDArray[np.bool_]:
@@ -144,6 +146,7 @@ class CallablePath:
         self._smooth = smooth
         self._affine = AffinePath(problem)
         self._start = alpha
+        self.condensed = self._affine.condensed
         self._check_start(alpha)
         self._check_derivatives(alpha)
 
@@ -162,14 +165,14 @@ class CallablePath:
 
     @cached_property
     def _influence(self) -> NDArray[np.float64]:
-        """B A^{-1}, shape (2p, n): dense, but only its few rows."""
+        """B A^{-1}, shape (2p, n), and N' of a body that nothing holds: dense, but only few rows."""
         problem = self.problem
         B = problem.contact_rows
         rows = np.empty(B.shape)
         for start in range(0, B.shape[0], RHS_BLOCK):
             block = B[start : start + RHS_BLOCK].T.toarray()
-            rows[start : start + RHS_BLOCK] = problem.factorization.solve(block).T
-        return rows
+            rows[start : start + RHS_BLOCK] = problem.on_springs.factorization.solve(block).T
+        return rows if problem.modes is None else np.vstack([rows, problem.modes.N.T])
 
     def at(self, alpha: float) -> PathValues:
         """Values at alpha."""
@@ -181,7 +184,8 @@ class CallablePath:
             dF = _coefficients(smooth.dF, alpha, "dF", F.shape)
         if smooth.f is not None and smooth.df is not None:
             offset = np.concatenate([problem.gap, problem.slip_offset.ravel(order="F")])
-            g = self._influence @ _evaluate(smooth.f, alpha, "f", (problem.n,)) - offset
+            g = self._influence @ _evaluate(smooth.f, alpha, "f", (problem.n,))
+            g[: len(offset)] -= offset
             dg = self._influence @ _evaluate(smooth.df, alpha, "df", (problem.n,))
         return PathValues(g, F, dg, dF)
 

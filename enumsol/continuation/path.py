@@ -42,8 +42,8 @@ class Path(PathData):
         Without units, see ContinuationOptions.
     transitions : tuple of Transition
     status : PathStatus
-        Why the path ended: "interval left", "closed", "visited", "step limit", "friction", "dead end", "stalled" or
-        "interrupted".
+        Why the path ended: "interval left", "closed", "visited", "step limit", "friction", "rigid bound", "dead end",
+        "stalled" or "interrupted".
     message : str
         The same as a sentence, with advice.
     orientation : int
@@ -55,6 +55,8 @@ class Path(PathData):
         Step length with which to go on.
     stats : PathStats
     node_ids : tuple
+    rigid_coordinates : (m, r) array or None
+        Of a body that nothing holds: q of the rigid displacement N q.
 
     Examples
     --------

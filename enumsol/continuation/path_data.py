@@ -31,6 +31,8 @@ VERTICAL_TOLERANCE = 1e-9
 _PRINTED_TRANSITIONS = 12
 #: The arrays of a path, one row per point.
 ARRAYS = ("alpha", "lambda_n", "lambda_t", "u_n", "u_t", "codes", "steps", "corrections", "arclength")
+#: Another one of a body that nothing holds.
+RIGID = "rigid_coordinates"
 
 
 class PointKind(TextEnum):
@@ -53,6 +55,8 @@ class PathStatus(TextEnum):
     STEP_LIMIT = "step limit"
     #: A friction coefficient becomes negative.
     FRICTION = "friction"
+    #: A body that nothing holds moves as a whole beyond max_rigid_displacement.
+    RIGID_BOUND = "rigid bound"
     #: No direction keeps the orientation.
     DEAD_END = "dead end"
     #: No step was accepted, however short.
@@ -73,6 +77,8 @@ class PathPoint(Sealed):
         The selection on which the path leaves the point.
     kind : PointKind
         "start", "step" (an accepted step of the paper's Algorithm 5.1), "transition" or "end".
+    rigid_coordinates : (r,) array or None
+        Of a body that nothing holds: q of the rigid displacement N q.
     """
 
     alpha: float
@@ -82,6 +88,7 @@ class PathPoint(Sealed):
     u_t: NDArray[np.float64]
     statuses: tuple[ContactStatus, ...]
     kind: PointKind
+    rigid_coordinates: NDArray[np.float64] | None = None
 
 
 @dataclass(frozen=True)
@@ -175,6 +182,7 @@ class PathData(Sequence[PathPoint], Sealed):
     stats: PathStats
     node_ids: tuple[Any, ...]
     _names: tuple[tuple[ContactStatus, ...], ...] = field(repr=False)
+    rigid_coordinates: NDArray[np.float64] | None = None
     _problem: ContactProblem | ContactProblem3D | None = field(default=None, repr=False, compare=False)
     _smooth_path: SmoothPath | None = field(default=None, repr=False, compare=False)
 
@@ -195,6 +203,7 @@ class PathData(Sequence[PathPoint], Sealed):
             u_t=self.u_t[k],
             statuses=self._names[k],
             kind=self.kinds[k],
+            rigid_coordinates=None if self.rigid_coordinates is None else self.rigid_coordinates[k],
         )
 
     @property
@@ -237,6 +246,8 @@ class PathData(Sequence[PathPoint], Sealed):
     def to_frame(self) -> pd.DataFrame:
         """One row per point: alpha, kind, step, corrections, arclength; of every node X lambda_n_X, .., status_X.
 
+        Of a body that nothing holds rigid_0, rigid_1, .. are the coordinates of its rigid displacement.
+
         In 3D lambda_t1_X and lambda_t2_X take the place of lambda_t_X, and so for u_t.
         X is the node's label, or its row number where two labels are the same text.
         """
@@ -256,6 +267,8 @@ class PathData(Sequence[PathPoint], Sealed):
             axes = [("", values)] if values.ndim == 2 else [("1", values[..., 0]), ("2", values[..., 1])]
             for axis, part in axes:
                 columns |= {f"{quantity}{axis}_{node}": column for node, column in zip(nodes, part.T, strict=True)}
+        if self.rigid_coordinates is not None:
+            columns |= {f"rigid_{mode}": column for mode, column in enumerate(self.rigid_coordinates.T)}
         columns |= {f"status_{node}": [names[i].value for names in self._names] for i, node in enumerate(nodes)}
         return pd.DataFrame(columns)
 
@@ -264,7 +277,7 @@ class PathData(Sequence[PathPoint], Sealed):
         shift = len(self) - 1
         arrays: dict[str, Any] = {
             name: np.concatenate([getattr(self, name), getattr(more, name)[1:]])
-            for name in ARRAYS
+            for name in (*ARRAYS, *([] if self.rigid_coordinates is None else [RIGID]))
             if name != "arclength"
         }
         arclength = np.concatenate([self.arclength, self.arclength[-1] + more.arclength[1:]])

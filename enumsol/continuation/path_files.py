@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import numpy as np
+
 from enumsol.continuation.continuation_options import ContinuationOptions
-from enumsol.continuation.path_data import ARRAYS, PathData, PathStats, PathStatus, PointKind, Transition
+from enumsol.continuation.path_data import ARRAYS, RIGID, PathData, PathStats, PathStatus, PointKind, Transition
 from enumsol.model.statuses import ContactStatus
 from enumsol.roots.local_branch import LocalBranchTest
 from enumsol.support.arguments import file_path
@@ -33,6 +35,8 @@ def save_path(followed: PathData, path: str | os.PathLike[str]) -> None:
         "node_ids": followed.node_ids,
         "names": [[status.value for status in point.statuses] for point in followed],
     }
+    if followed.rigid_coordinates is not None:
+        report[RIGID] = followed.rigid_coordinates.tolist()
     write_arrays(file_path(path, "path"), _FORMAT, report, {name: getattr(followed, name) for name in ARRAYS})
 
 
@@ -58,6 +62,7 @@ def _unpacked(kind: type[_Path], report: dict[str, Any], arrays: dict[str, Any])
         stats=PathStats(**report["stats"]),
         node_ids=tuple(report["node_ids"]),
         _names=tuple(tuple(ContactStatus(value) for value in names) for names in report["names"]),
+        rigid_coordinates=np.array(report[RIGID]) if RIGID in report else None,
     )
 
 

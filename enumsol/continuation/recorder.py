@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.continuation.path_data import PathStats, PointKind, Transition
+from enumsol.continuation.path_data import RIGID, PathStats, PointKind, Transition
 from enumsol.errors import TooLargeError
 
 if TYPE_CHECKING:
@@ -85,6 +85,7 @@ class PathRecorder:
             "node_ids": equation.problem.node_ids,
             "_names": tuple(equation.statuses(one.codes, w[k, p:]) for k, one in enumerate(self.points)),
             "_problem": equation.problem,
+            RIGID: np.array([equation.rigid(point.x) for point in self.points]) if equation.modes else None,
         }
 
     def _slip(self, point: CurvePoint, step: float) -> Vector:

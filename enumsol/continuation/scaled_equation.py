@@ -13,6 +13,9 @@ Lengths are those of the metric W = diag(S, 1) in these variables: the arclength
 
 On a friction path its first part is the elastic energy of the change of displacement. Signs of determinants of the full
 Jacobian of H bordered by a tangent are those of the condensed one, because A is positive definite.
+
+Of a body that nothing holds, x = (lambda, q, alpha) has its rigid displacement as well, and H the equilibrium of the
+body as a whole (theory, section 14.7); m counts the forces, and there are m + r equations. r is 0 for other bodies.
 """
 
 from __future__ import annotations
@@ -23,6 +26,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
+
+from enumsol.condensation.condensed import FloatingCondensation
+from enumsol.errors import NotHeldError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -41,13 +47,17 @@ if TYPE_CHECKING:
 STATUS_TOLERANCE = 1e-9
 #: Interval points at which the size of a load that varies is measured.
 _LOAD_SAMPLES = 9
+#: Rigid displacements whose contact nodes move less, squared and relative to the largest, move none.
+_MODE_RANK = 1e-14
+#: Parts of a unit tangent that are rounding, where the body moves as a whole.
+_RIGID_TOLERANCE = 1e-9
 
 
 class ScaledEquation(ABC):
     """H, its selections, their conditions and the metric of the path.
 
-    Points x have shape (m + 1,): scaled lambda (all normals first) and alpha. Selections are named by rows of booleans,
-    one for every node, or, at solutions, by status codes.
+    Points x have shape (m + r + 1,): scaled lambda (all normals first), q and alpha. Selections are named by rows of
+    booleans, one for every node, or, at solutions, by status codes.
 
     Parameters
     ----------
@@ -77,11 +87,21 @@ class ScaledEquation(ABC):
         self.problem = path.problem
         self.p = self.problem.p
         self.alpha_scale = alpha_scale
-        condensed = self.problem.condensed
+        condensed = path.condensed
         sigma, self.S = condensed.node_scale, condensed.balanced
+        self.m = len(sigma)
+        modes = np.zeros((0, self.m))
+        if isinstance(condensed, FloatingCondensation):
+            modes = condensed.G / sigma
+        #: L of theory, section 14.7.
+        self._mixing = _mixing(self.S, modes)
+        G, none = np.linalg.solve(self._mixing, modes), np.zeros((len(modes),) * 2)
+        #: Of theory, (14.9); without rigid modes S.
+        self.bordered = np.block([[self.S, -G.T], [G, none]]) if len(modes) else self.S
+        self._energy = np.block([[self.S, 0 * G.T], [0 * G, none + np.eye(len(modes))]]) if len(modes) else self.S
         self.without = path.frictionless
         self.frictionless = self.without if self.without.ndim == 1 else np.all(self.without, axis=1)
-        load = self._load_energy(interval, start, sigma)
+        self._load = load = self._load_energy(interval, start, sigma)
         self.force, self.length = load / sigma, load * sigma
         # the r of each row in scaled variables
         self.r = np.ones(len(sigma)) if r is None else r * sigma**2
@@ -92,41 +112,43 @@ class ScaledEquation(ABC):
         samples = [start]
         if math.isfinite(low) and math.isfinite(high):
             samples += list(np.linspace(low, high, _LOAD_SAMPLES))
-        loads = np.array([self.path.at(alpha).g for alpha in samples]) / sigma
+        loads = np.array([self._per_unit(self.path.at(alpha).g, sigma, 1.0) for alpha in samples])
         loads = loads[np.all(np.isfinite(loads), axis=1)]
         size = float(np.max(np.abs(loads), initial=0.0))
         if size == 0:
             return 1.0
         # loads of size one: their squares neither overflow nor underflow
         loads = loads / size
-        try:
-            forces = np.linalg.solve(self.S, loads.T)
-        except np.linalg.LinAlgError:  # S is singular within rounding
-            forces = np.linalg.lstsq(self.S, loads.T, rcond=None)[0]
+        forces = _solved(self._energy, loads.T)
         energy = float(np.max(np.einsum("ij,ji->i", loads, forces)))
         return size * math.sqrt(energy) if energy > 0 else size
+
+    def _per_unit(self, values: Vector, length: Vector | float, load: float) -> Vector:
+        """Displacements (m,) by their units, followed by loads of the body as a whole (r,) by theirs."""
+        return np.append(values[: self.m] / length, np.linalg.solve(self._mixing, values[self.m :]) / load)
 
     # -- values ----------------------------------------------------------------------------------------------------
 
     @cached_property
     def metric(self) -> Vector:
-        """W, shape (m + 1, m + 1)."""
-        W = np.zeros((len(self.S) + 1, len(self.S) + 1))
-        W[:-1, :-1] = self.S
+        """W, shape (m + r + 1, m + r + 1)."""
+        W = np.zeros((len(self._energy) + 1,) * 2)
+        W[:-1, :-1] = self._energy
         W[-1, -1] = 1.0
         return W
 
     def dot(self, a: Vector, b: Vector) -> float:
         """Inner product of two vectors in the metric W."""
-        return float(a[:-1] @ (self.S @ b[:-1]) + a[-1] * b[-1])
+        return float(a[:-1] @ (self._energy @ b[:-1]) + a[-1] * b[-1])
 
     def norm(self, a: Vector) -> float:
         """Length of a vector."""
         return math.sqrt(max(self.dot(a, a), 0.0))
 
-    def point(self, alpha: float, forces: Vector) -> Vector:
-        """The scaled point x of unscaled alpha and lambda (m,)."""
-        return np.concatenate([forces / self.force, [alpha / self.alpha_scale]])
+    def point(self, alpha: float, forces: Vector, rigid: Vector | None = None) -> Vector:
+        """The scaled point x of unscaled alpha, lambda (m,) and q (r,), by default zero."""
+        q = np.zeros(self.modes) if rigid is None else self._mixing.T @ rigid / self._load
+        return np.concatenate([forces / self.force, q, [alpha / self.alpha_scale]])
 
     def alpha(self, x: Vector) -> float:
         """Unscaled alpha."""
@@ -134,7 +156,33 @@ class ScaledEquation(ABC):
 
     def forces(self, x: Vector) -> Vector:
         """Unscaled lambda, shape (m,)."""
-        return np.asarray(x[:-1] * self.force)
+        return np.asarray(x[: self.m] * self.force)
+
+    @property
+    def modes(self) -> int:
+        """r, the number of rigid modes."""
+        return len(self._mixing)
+
+    def rigid(self, x: Vector) -> Vector:
+        """Unscaled q, shape (r,): coordinates of the rigid displacement."""
+        return np.asarray(self.rigid_rows @ x)
+
+    @cached_property
+    def rigid_rows(self) -> Vector:
+        """q by x, shape (r, m + r + 1)."""
+        rows = np.zeros((self.modes, self.m + self.modes + 1))
+        rows[:, self.m : -1] = self._load * np.linalg.inv(self._mixing).T
+        return rows
+
+    @cached_property
+    def reach(self) -> Vector:
+        """How large the components of q may be, (r,)."""
+        return self.problem.modes.reach(self.problem.rigid_reach) if self.modes else np.zeros(0)
+
+    def moves_rigidly(self, tangent: Vector) -> bool:
+        """Whether a curve with this unit tangent changes the rigid displacement alone."""
+        others = np.delete(tangent, slice(self.m, self.m + self.modes))
+        return self.modes > 0 and bool(np.max(np.abs(others)) <= _RIGID_TOLERANCE)
 
     def at(self, x: Vector) -> PathValues:
         """Scaled values of the paths; derivatives are with respect to the scaled alpha."""
@@ -142,22 +190,27 @@ class ScaledEquation(ABC):
         if self._last is None or self._last[0] != alpha:
             raw = self.path.at(alpha)
             a = self.alpha_scale
-            scaled = type(raw)(raw.g / self.length, raw.F, raw.dg * a / self.length, raw.dF * a)
+            g, dg = (self._per_unit(one, self.length, self._load) for one in (raw.g, raw.dg * a))
+            scaled = type(raw)(g, raw.F, dg, raw.dF * a)
             self._last = (alpha, scaled)
         return self._last[1]
 
     def w(self, x: Vector) -> Vector:
         """Scaled (u_n, u_t), shape (m,)."""
-        return np.asarray(self.at(x).g - self.S @ x[:-1])
+        return np.asarray(self.at(x).g[: self.m] - self.bordered[: self.m] @ x[:-1])
+
+    def left(self, x: Vector) -> Vector:
+        """Scaled h - G lambda, what contact does not carry of the load on the body as a whole, shape (r,)."""
+        return np.asarray(self.at(x).g[self.m :] - self.bordered[self.m :] @ x[:-1])
 
     def displacements(self, x: Vector) -> Vector:
         """Unscaled (u_n, u_t), shape (m,)."""
         return np.asarray(self.w(x) * self.length)
 
     def split(self, values: Vector) -> tuple[Vector, Vector]:
-        """Normal and tangential parts of arrays (..., m): (..., p) both, in 3D (..., p, 2) the latter."""
+        """Normal and tangential parts of arrays (..., m or more): (..., p) both, in 3D (..., p, 2) the latter."""
         p = self.p
-        normal, tangential = values[..., :p], values[..., p:]
+        normal, tangential = values[..., :p], values[..., p : self.m]
         if tangential.shape[-1] == p:
             return normal, tangential
         return normal, np.stack([tangential[..., :p], tangential[..., p:]], axis=-1)
@@ -166,7 +219,7 @@ class ScaledEquation(ABC):
 
     @abstractmethod
     def residual(self, x: Vector) -> Vector:
-        """H(x) for each node's own r, shape (m,).
+        """H(x) for each node's own r, shape (m + r,).
 
         Solutions do not depend on r, and neither may the decision whether x is one: a tiny r would make any
         displacement small, and a huge one any rounding error large.
@@ -186,11 +239,11 @@ class ScaledEquation(ABC):
 
     @abstractmethod
     def selection_residual(self, rows: NDArray[np.bool_], x: Vector) -> Vector:
-        """The named selection function of H, shape (m,), its rows scaled by positive factors to size one."""
+        """The named selection function of H, shape (m + r,), its rows scaled by positive factors to size one."""
 
     @abstractmethod
     def jacobian(self, rows: NDArray[np.bool_], x: Vector) -> Vector:
-        """Gradient of the named selection function (see selection_residual), shape (m, m + 1)."""
+        """Gradient of the named selection function (see selection_residual), shape (m + r, m + r + 1)."""
 
     # -- statuses and their conditions -------------------------------------------------------------------------------
 
@@ -200,7 +253,7 @@ class ScaledEquation(ABC):
 
     @abstractmethod
     def slack_gradient(self, codes: Codes, x: Vector, which: tuple[int, int]) -> Vector:
-        """Gradient of one slack with respect to x, shape (m + 1,)."""
+        """Gradient of one slack with respect to x, shape (m + r + 1,)."""
 
     @abstractmethod
     def slack_rates(self, codes: Codes, x: Vector, tangent: Vector) -> Vector:
@@ -226,6 +279,17 @@ class ScaledEquation(ABC):
     def statuses(self, codes: Sequence[int], slip: Vector) -> tuple[ContactStatus, ...]:
         """Names of the statuses; that of a frictionless node in contact is told by its u_t, ``slip`` (m - p,)."""
 
+    # -- signs of determinants ---------------------------------------------------------------------------------------
+
+    def index(self, codes: Codes, x: Vector, singular: float) -> int:
+        """Sign of the selection's determinant at fixed alpha, 0 where it is singular; rows scaled to length one."""
+        J = self.jacobian(self.selection(codes), x)[:, :-1]
+        size = np.linalg.norm(J, axis=1, keepdims=True)
+        J = J / np.where(size > 0, size, 1.0)
+        if not np.all(np.isfinite(J)) or np.linalg.svd(J, compute_uv=False)[-1] <= singular:
+            return 0
+        return int(np.linalg.slogdet(J)[0])
+
     @abstractmethod
     def local_test(self, x: Vector) -> LocalBranchTest:
         """The local branch test at a point of a path (theory, section 3.2).
@@ -235,3 +299,31 @@ class ScaledEquation(ABC):
         TooLargeError
             Too many selections hold there.
         """
+
+
+def _mixing(S: Vector, modes: Vector) -> Vector:
+    """L with L L' = G S^-1 G', shape (r, r).
+
+    Raises
+    ------
+    NotHeldError
+        Some rigid displacement moves no contact node.
+    """
+    if not len(modes):
+        return np.zeros((0, 0))
+    size = np.linalg.norm(modes, axis=1)
+    values, vectors = np.linalg.eigh(modes @ modes.T / np.outer(*(np.where(size > 0, size, 1.0),) * 2))
+    if values[0] <= _MODE_RANK * values[-1]:
+        raise NotHeldError(
+            f"rigid mode {int(np.argmax(np.abs(vectors[:, 0])))}, perhaps with others, moves no contact node: contact "
+            "cannot hold the body; expected a body that every rigid mode moves at its contact nodes"
+        )
+    return np.asarray(np.linalg.cholesky(modes @ _solved(S, modes.T)))
+
+
+def _solved(S: Vector, right: Vector) -> Vector:
+    """S^-1 times columns; of least length where S is singular within rounding."""
+    try:
+        return np.asarray(np.linalg.solve(S, right))
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.lstsq(S, right, rcond=None)[0])

@@ -97,7 +97,7 @@ class SpaceEquation(ScaledEquation):
     # -- H and its selections ----------------------------------------------------------------------------------------
 
     def residual(self, x: Vector) -> Vector:
-        """H(x) for each node's own r, shape (3p,)."""
+        """H(x) for each node's own r, shape (3p + r,)."""
         return self._projected(x, np.ones(3 * self.p))
 
     def merit(self, x: Vector) -> float:
@@ -113,12 +113,13 @@ class SpaceEquation(ScaledEquation):
         radius = cone.c * most
         inside = trial.length <= radius
         left = np.where(inside[:, None], -r_t * cone.q * w_t, trial.force - radius[:, None] * trial.direction)
-        return _flat(np.where(most > 0, -r_n * w_n, normal), np.where(rubs, cone.q * left, tangential))
+        found = _flat(np.where(most > 0, -r_n * w_n, normal), np.where(rubs, cone.q * left, tangential))
+        return np.append(found, -self.left(x))
 
     def selection_at(self, x: Vector) -> NDArray[np.bool_]:
         """Rows of the selection that is active at x, shape (p, 2)."""
         cone = self._cone(x)
-        normal = self.split(x[:-1] + self.r * self.w(x))[0]
+        normal = self.split(x[: self.m] + self.r * self.w(x))[0]
         slips = self._trial(x, self.r, cone).length > cone.c * np.maximum(normal, 0.0)
         return np.column_stack([normal > 0, slips & ~self.frictionless])
 
@@ -128,20 +129,20 @@ class SpaceEquation(ScaledEquation):
         return np.column_stack([named != OPEN, named == SLIP])
 
     def selection_residual(self, rows: NDArray[np.bool_], x: Vector) -> Vector:
-        """The named selection function of H, shape (3p,)."""
+        """The named selection function of H, shape (3p + r,)."""
         (normal, tangential), (w_n, w_t) = self.split(x[:-1]), self.split(self.w(x))
         closed, slips = rows[:, 0], (rows[:, 0] & rows[:, 1])[:, None]
         direction = self._trial(x, self.r, self._cone(x)).direction
         held = np.where(slips, tangential - normal[:, None] * self.at(x).F * direction, -w_t)
         free = ~closed[:, None] | self.without
-        return _flat(np.where(closed, -w_n, normal), np.where(free, tangential, held))
+        return np.append(_flat(np.where(closed, -w_n, normal), np.where(free, tangential, held)), -self.left(x))
 
     def jacobian(self, rows: NDArray[np.bool_], x: Vector) -> Vector:
-        """Gradient of the named selection function (see selection_residual), shape (3p, 3p + 1)."""
+        """Gradient of the named selection function (see selection_residual), shape (3p + r, 3p + r + 1)."""
         p, values, cone = self.p, self.at(x), self._cone(x)
         closed, slips = rows[:, 0], (rows[:, 0] & rows[:, 1])[:, None, None]
         dw_n, dw_t = self._slopes(x)
-        force, node = np.eye(3 * p, 3 * p + 1), np.arange(p)
+        force, node = np.eye(3 * p, len(x)), np.arange(p)
         dn, dt = force[:p], np.stack([force[p : 2 * p], force[2 * p :]], axis=1)
         direction, turned = self._turning(x, cone, dw_t, dt)
         slip = dt - (x[:p, None] * values.F)[:, :, None] * turned
@@ -150,16 +151,17 @@ class SpaceEquation(ScaledEquation):
         held = np.where(slips, slip, -dw_t)
         free = ~closed[:, None] | self.without
         tangential = np.where(free[:, :, None], dt, held)
-        return np.concatenate([np.where(closed[:, None], -dw_n, dn), tangential[:, 0], tangential[:, 1]])
+        rest = np.column_stack([self.bordered[self.m :], -values.dg[self.m :]])
+        return np.concatenate([np.where(closed[:, None], -dw_n, dn), tangential[:, 0], tangential[:, 1], rest])
 
     def _slopes(self, x: Vector) -> tuple[Vector, Vector]:
-        """Gradients of w_n and w_t with respect to x, (p, 3p + 1) and (p, 2, 3p + 1)."""
+        """Gradients of w_n and w_t with respect to x, (p, 3p + r + 1) and (p, 2, 3p + r + 1)."""
         p = self.p
-        slope = np.column_stack([-self.S, self.at(x).dg])
+        slope = np.column_stack([-self.bordered, self.at(x).dg])[: self.m]
         return slope[:p], np.stack([slope[p : 2 * p], slope[2 * p :]], axis=1)
 
     def _turning(self, x: Vector, cone: _Cone, dw_t: Vector, dt: Vector) -> tuple[Vector, Vector]:
-        """Directions of slip, (p, 2), and their gradients, (p, 2, 3p + 1)."""
+        """Directions of slip, (p, 2), and their gradients, (p, 2, 3p + r + 1)."""
         trial, r, inverse = self._trial(x, self.r, cone), self.split(self.r)[1], self._inverse(cone)
         slip = self.split(self.w(x))[1]
         moved = inverse[:, :, None] * dt + np.where(self.without, 0.0, r * cone.q)[:, :, None] * dw_t
@@ -185,12 +187,12 @@ class SpaceEquation(ScaledEquation):
         return np.column_stack([first, np.where(named == SLIP, along, np.inf)])
 
     def _slack_gradients(self, codes: Codes, x: Vector) -> Vector:
-        """Gradients of all slacks, shape (p, 2, 3p + 1), 0 where there is one condition."""
+        """Gradients of all slacks, shape (p, 2, 3p + r + 1), 0 where there is one condition."""
         p, named, cone = self.p, np.array(codes), self._cone(x)
         dw_n, dw_t = self._slopes(x)
-        force, node = np.eye(3 * p, 3 * p + 1), np.arange(p)
+        force, node = np.eye(3 * p, len(x)), np.arange(p)
         dt = np.stack([force[p : 2 * p], force[2 * p :]], axis=1)
-        found = np.zeros((p, 2, 3 * p + 1))
+        found = np.zeros((p, 2, len(x)))
         found[:, 0] = np.where((named == OPEN)[:, None], -dw_n, force[:p])
         room, towards = self._room(x, cone)
         inverse, tangential = self._inverse(cone), self.split(x[:-1])[1]
@@ -206,7 +208,7 @@ class SpaceEquation(ScaledEquation):
         return found
 
     def slack_gradient(self, codes: Codes, x: Vector, which: tuple[int, int]) -> Vector:
-        """Gradient of one slack with respect to x, shape (3p + 1,)."""
+        """Gradient of one slack with respect to x, shape (3p + r + 1,)."""
         return np.asarray(self._slack_gradients(codes, x)[which])
 
     def slack_rates(self, codes: Codes, x: Vector, tangent: Vector) -> Vector:
@@ -230,7 +232,7 @@ class SpaceEquation(ScaledEquation):
         found: list[set[int]] = [set() for _ in range(self.p)]
         for code in (OPEN, STICK, SLIP, FRICTIONLESS):
             codes = (code,) * self.p
-            broken = np.abs(self.selection_residual(self.selection(codes), x)).reshape(3, -1)
+            broken = np.abs(self.selection_residual(self.selection(codes), x)[: self.m]).reshape(3, -1)
             broken[1:] /= 1.0 + np.max(np.abs(self.at(x).F), axis=1)
             least = np.min(self.slacks(codes, x), axis=1)
             least = least if code == OPEN else np.minimum(least, x[: self.p])
@@ -243,7 +245,7 @@ class SpaceEquation(ScaledEquation):
     def codes(self, x: Vector, prefer: Codes | None = None, tolerance: float = STATUS_TOLERANCE) -> Codes:
         """Statuses at a solution; ``prefer`` is kept where it holds too."""
         ones, cone = np.ones(3 * self.p), self._cone(x)
-        normal = (x[:-1] + self.w(x))[: self.p]
+        normal = x[: self.p] + self.w(x)[: self.p]
         slips = self._trial(x, ones, cone).length >= cone.c * np.maximum(normal, 0.0)
         touching = np.where(self.frictionless, FRICTIONLESS, np.where(slips, SLIP, STICK))
         found = np.where(normal > 0, touching, OPEN).tolist()
@@ -257,17 +259,6 @@ class SpaceEquation(ScaledEquation):
         moves = np.any(np.reshape(slip, (2, -1)) != 0, axis=0)
         without = (ContactStatus.STICK, ContactStatus.SLIP)
         return tuple(_NAMES.get(code, without[bool(move)]) for code, move in zip(codes, moves, strict=True))
-
-    # -- signs of determinants ---------------------------------------------------------------------------------------
-
-    def index(self, codes: Codes, x: Vector, singular: float) -> int:
-        """Sign of the selection's determinant at fixed alpha, 0 where it is singular; rows scaled to length one."""
-        J = self.jacobian(self.selection(codes), x)[:, :-1]
-        size = np.linalg.norm(J, axis=1, keepdims=True)
-        J = J / np.where(size > 0, size, 1.0)
-        if not np.all(np.isfinite(J)) or np.linalg.svd(J, compute_uv=False)[-1] <= singular:
-            return 0
-        return int(np.linalg.slogdet(J)[0])
 
     def local_test(self, x: Vector) -> LocalBranchTest:
         """The local branch test at a point of a path; see ScaledEquation."""

@@ -12,13 +12,13 @@ from enumsol.continuation.equations import check_problem, equation_on
 from enumsol.continuation.parameter_path import affine_friction
 from enumsol.continuation.path_data import PathData
 from enumsol.errors import InvalidArgumentError
+from enumsol.model.problem import ContactProblem
 from enumsol.support.arguments import alpha_value, instance_of, unbounded_interval
 from enumsol.support.array_arguments import real_array
 
 if TYPE_CHECKING:
     from enumsol.continuation.parameter_path import SmoothPath
     from enumsol.continuation.scaled_equation import Vector
-    from enumsol.model.problem import ContactProblem
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.support.arguments import AlphaLike
 
@@ -29,6 +29,8 @@ ALPHA_FRACTION = 0.05
 RESOLUTION = 1e-6
 #: Norm of H above which a start is not a root.
 START_TOLERANCE = 1e-6
+#: What a start is made of, and of a body that nothing holds this as well.
+_NAMES, _RIGID = ("alpha", "lambda_n", "lambda_t"), "rigid_coordinates"
 
 
 class Start:
@@ -42,12 +44,13 @@ class Start:
         options: ContinuationOptions | None,
         smooth_path: SmoothPath | None,
     ) -> None:
-        check_problem(problem, smooth_path, "follow")
+        check_problem(problem, smooth_path)
         chosen = ContinuationOptions() if options is None else options
         self.options = instance_of(chosen, ContinuationOptions, "options")
         self.smooth_path = smooth_path
-        space = problem.condensed.S.shape[0] == 3 * problem.p
-        alpha, forces = _start_values(start, (problem.p, 2) if space else (problem.p,))
+        plane = isinstance(problem, ContactProblem)
+        modes = 0 if problem.modes is None else problem.modes.r
+        alpha, forces, rigid = _start_values(start, (problem.p,) if plane else (problem.p, 2), modes)
         self.interval = _interval(problem, interval, alpha, smooth_path)
         low, high = self.interval
         scale = self.options.alpha_scale
@@ -56,12 +59,12 @@ class Start:
         self.equation = equation_on(problem, smooth_path, alpha, self.interval, self.options.r, scale)
         if smooth_path is None and math.isfinite(high - low):
             self._check_resolution(alpha, (high - low) / scale)
-        self.x = self._on_solution(alpha, forces)
+        self.x = self._on_solution(alpha, forces, rigid)
 
     def _check_resolution(self, alpha: float, width: float) -> None:
         """Refuse an interval over which the problem hardly changes."""
         equation = self.equation
-        values = equation.at(equation.point(alpha, np.zeros(len(equation.S))))
+        values = equation.at(equation.point(alpha, np.zeros(equation.m)))
         change = max(np.max(np.abs(values.dg)), np.max(np.abs(values.dF) / (1.0 + values.F))) * width
         if 0 < change < RESOLUTION:
             raise InvalidArgumentError(
@@ -69,9 +72,15 @@ class Start:
                 f"by {change:.1e} of their size; expected at least {RESOLUTION:g} (branch_graph works without rounding)"
             )
 
-    def _on_solution(self, alpha: float, forces: Vector) -> Vector:
+    def _on_solution(self, alpha: float, forces: Vector, rigid: Vector) -> Vector:
         equation = self.equation
-        x = equation.point(alpha, forces)
+        x = equation.point(alpha, forces, rigid)
+        if np.any(np.abs(rigid) > equation.reach):
+            mode = int(np.argmax(np.abs(rigid) / equation.reach))
+            raise InvalidArgumentError(
+                f"start has {rigid[mode]:g} as coordinate of rigid mode {mode}; expected at most "
+                f"{equation.reach[mode]:g} (see max_rigid_displacement)"
+            )
         with np.errstate(over="ignore", invalid="ignore"):
             residual = float(np.linalg.norm(equation.residual(x)))
         if not residual <= START_TOLERANCE:
@@ -82,22 +91,23 @@ class Start:
         return x
 
 
-def _start_values(start: Any, tangential: tuple[int, ...]) -> tuple[float, Vector]:
-    """alpha and the forces (m,) of a start whose lambda_t has that shape."""
-    if isinstance(start, tuple) and len(start) == 3:
-        alpha, lambda_n, lambda_t = start
-    elif all(hasattr(start, name) for name in ("alpha", "lambda_n", "lambda_t")) and not isinstance(start, PathData):
-        alpha, lambda_n, lambda_t = start.alpha, start.lambda_n, start.lambda_t
+def _start_values(start: Any, tangential: tuple[int, ...], modes: int) -> tuple[float, Vector, Vector]:
+    """alpha, the forces (m,) and rigid coordinates (modes,) of a start whose lambda_t has that shape."""
+    values = (*_NAMES, *((_RIGID,) if modes else ()))
+    if isinstance(start, tuple) and len(start) == len(values):
+        alpha, *given = start
+    elif all(getattr(start, name, None) is not None for name in values) and not isinstance(start, PathData):
+        alpha, *given = (getattr(start, name) for name in values)
     else:
-        raise InvalidArgumentError(
-            f"start is a {type(start).__name__}; expected a Root, a PathPoint or (alpha, lambda_n, lambda_t)"
-        )
+        found = f"a tuple of {len(start)}" if isinstance(start, tuple) else f"a {type(start).__name__}"
+        raise InvalidArgumentError(f"start is {found}; expected a Root, a PathPoint or ({', '.join(values)})")
     parts = []
-    for name, part, shape in (("lambda_n", lambda_n, tangential[:1]), ("lambda_t", lambda_t, tangential)):
+    for name, part, shape in zip(values[1:], given, (tangential[:1], tangential, (modes,)), strict=False):
         parts.append(np.atleast_1d(real_array(part, f"{name} of start", error=InvalidArgumentError)))
         if parts[-1].shape != shape:
             raise InvalidArgumentError(f"{name} of start has shape {parts[-1].shape}; expected {shape}")
-    return float(alpha_value(alpha, "alpha of start")), np.concatenate([part.ravel(order="F") for part in parts])
+    forces = np.concatenate([part.ravel(order="F") for part in parts[:2]])
+    return float(alpha_value(alpha, "alpha of start")), forces, parts[2] if modes else np.zeros(0)
 
 
 def _interval(

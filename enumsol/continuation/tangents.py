@@ -127,7 +127,7 @@ def describe(equation: ScaledEquation, codes: Codes, x: Vector, vector: Vector) 
     if _kernel(J).shape[1] > 1:
         # a bifurcation point of the selection itself: read the orientation a little ahead
         sign = orientation(equation, codes, x + ORIENTATION_STEP * vector, vector)
-    change = vector[:-1] * equation.force
+    change = equation.forces(vector)
     slip = equation.w(x + ORIENTATION_STEP * vector)[p:]
     return Tangent(
         equation.statuses(codes, slip),

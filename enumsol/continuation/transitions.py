@@ -255,7 +255,7 @@ def selection_distance(equation: ScaledEquation, codes: Codes, x: Vector) -> flo
     chapter 23).
     """
     rows = equation.selection(codes)
-    to_metric = np.linalg.inv(np.linalg.cholesky(equation.S).T)
+    to_metric = np.linalg.inv(np.linalg.cholesky(equation.metric[:-1, :-1]).T)
     left, sizes, right = np.linalg.svd(equation.jacobian(rows, x)[:, :-1] @ to_metric)
     rank = int(np.sum(sizes > _RANK * sizes[0]))
     residual = left.T @ equation.selection_residual(rows, x)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.condensation.condensed import FloatingCondensation
+from enumsol.condensation.condensed import condensation_of
 from enumsol.model.statuses import (
     CONTACT,
     FRICTIONLESS,
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from enumsol.condensation.condensed import CondensedProblem
     from enumsol.model.problem import ContactProblem
     from enumsol.roots.components import RootComponent
     from enumsol.search.certifiers.protocol import UndecidedPart
@@ -83,16 +82,12 @@ class RootBuilder:
             regular=regular,
             margin=max(float(np.min(slack)), 0.0) if regular else 0.0,
             enclosure=self._enclosure(solution),
-            _condensed=self._condensed(),
+            _condensed=condensation_of(self.problem),
             _tangent=self._tangent(canonical, force, w) if regular else None,
             _rigid=self._rigid(solution),
             _slips=slips,
             _exact_slips=self.points.exact_slips(solution.vertices[0]),
         )
-
-    def _condensed(self) -> CondensedProblem | FloatingCondensation:
-        """What the root computes its displacements with."""
-        return self.problem.condensed if self.problem.modes is None else FloatingCondensation.of(self.problem)
 
     def _tangent(self, codes: Codes, force: NDArray[np.float64], w: NDArray[np.float64]) -> SelectionTangent | None:
         if self.problem.modes is not None:

@@ -153,7 +153,7 @@ def coherent_orientation(
 
     Parameters
     ----------
-    S : (2p, 2p) balanced compliance
+    S : (2p, 2p) balanced compliance, or (2p + r, 2p + r) the matrix of theory, (14.9), of a body that nothing holds
     F : (p,) friction coefficients at alpha
     active : per node the codes that hold
     slip : (p,) u_t, whose sign names the slip of nodes without friction
@@ -180,7 +180,8 @@ def normal_map_sign(
 ) -> int:
     """Sign of det DG in the cell of these statuses, 0 when it is singular; columns scaled to length one."""
     p = len(codes)
-    DG = np.eye(2 * p)
+    DG = np.eye(len(S))
+    DG[:, 2 * p :] = S[:, 2 * p :]
     for i, code in enumerate(codes):
         if code == OPEN:
             continue

@@ -11,7 +11,7 @@ import numpy as np
 
 from enumsol.arithmetic.ball_arrays import Ball
 from enumsol.arithmetic.balls import SAFE, UNIT
-from enumsol.condensation.condensed import FloatingCondensation
+from enumsol.condensation.condensed import condensation_of
 from enumsol.condensation.floating import RigidRows
 from enumsol.condensation.floating_space import FloatingSpace
 from enumsol.errors import InvalidArgumentError
@@ -163,9 +163,8 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
     @cached_property
     def _condensed(self) -> Condensation:
         """What roots compute their displacements with."""
-        if self.problem.modes is None:
-            return self.problem.condensed
-        return FloatingCondensation.of(self.problem)
+        found: Condensation = condensation_of(self.problem)
+        return found
 
     def _in_units(self, rigid: Ball) -> Ball:
         """Coordinates of a rigid displacement, without the units of their rows, which are powers of two."""

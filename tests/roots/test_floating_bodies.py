@@ -14,9 +14,9 @@ import enumsol
 from enumsol.errors import NotHeldError
 
 
-def difference_from_oracle(problem, alpha, arithmetic):
+def difference_from_oracle(problem, alpha, arithmetic, oracle=None):
     """What enumerate_roots says other than the oracle, or None."""
-    oracle = Oracle(problem, alpha)
+    oracle = Oracle(problem, alpha) if oracle is None else oracle
     roots = enumsol.enumerate_roots(problem, alpha, arithmetic=arithmetic)
     if not roots.complete:
         return f"not complete: {roots.completeness()}"
@@ -246,8 +246,6 @@ def test_modes_that_cannot_be_used(change, words):
     [
         lambda problem: enumsol.branch_graph(problem, (0, 1)),
         lambda problem: enumsol.link_samples(problem, [0, 1]),
-        lambda problem: enumsol.newton(problem, 0),
-        lambda problem: enumsol.follow(problem, None, 1),
         lambda problem: enumsol.follow_all(problem, (0, 1)),
         lambda problem: enumsol.histories(problem, []),
         lambda problem: enumsol.multiplicity_map(problem, (0, 1), {"friction": [1, 2]}),
