@@ -7,19 +7,21 @@ import hashlib
 import json
 import re
 import zlib
+from functools import lru_cache
 from itertools import pairwise, product
 from math import isfinite
 
 from flint import fmpq, fmpq_mat
 from rational_arcs import Arcs
 from rational_closings import Closings
+from rational_floating import FloatingData
 from rational_forms import (
+    Data,
     Forms,
     Refused,
     _value,
     as_point,
     column_of,
-    data_of,
     decimal_fraction,
     dimension_of,
     exact,
@@ -52,6 +54,12 @@ ALLOWED = {
 }
 
 
+@lru_cache(maxsize=16)
+def data_of(problem):
+    """Of a problem; made once where many proofs of it are checked."""
+    return Data(problem) if problem.rigid_modes is None else FloatingData(problem)
+
+
 def check(problem, file):
     """Check the bytes of a proof file.
 
@@ -64,7 +72,8 @@ def check_records(problem, records):
     need(len(records) > 1 and isinstance(records[0], dict), "no header")
     try:
         header = records[0]
-        return (Graph if header.get("kind") == "graph" else Point)(problem, header).run(records[1:])
+        kind = Graph if header.get("kind") == "graph" else Point if problem.rigid_modes is None else FloatingPoint
+        return kind(problem, header).run(records[1:])
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError) as error:
         raise Refused(f"a record cannot be read: {error!r}") from error
 
@@ -166,7 +175,7 @@ class Point(Proof):
         F = self.data.friction(alpha)
         need(min(F) >= 0, "friction is negative")
         self.friction = [value > 0 for value in F]
-        self.forms = Forms(self.data.S, self.data.load(alpha), F)
+        self.forms = self.data.forms(alpha)
         self.scale = self.units(header)
         self.regular = self.undecided = self.leaves = 0
         self.polytopes, self.roots, self.closings = [], [], Closings(self.forms, self.friction, self.scale)
@@ -264,9 +273,11 @@ class Point(Proof):
         point = N.solve(column_of([-form[-1] for form in equations])).entries()
         need(all(_value(form, point) > 0 for form in self.forms.conditions(codes)), "a condition is not strict")
         need(len(mid) == len(rad) == 2 * self.p, "an enclosure has another size")
-        for x, m, r in zip(point, map(exact, mid), map(exact, rad), strict=True):
+        for x, m, r in zip(point[: 2 * self.p], map(exact, mid), map(exact, rad), strict=True):
             need(abs(x - m) <= r, "an enclosure misses the root")
-        need(integer(index) == (1 if N.det() > 0 else -1), "an index is wrong")
+        # the columns of -q in place of those of q
+        sign = (1 if N.det() > 0 else -1) * (-1) ** (len(point) - 2 * self.p)
+        need(integer(index) == sign, "an index is wrong")
         self.regular += 1
         self.roots.append(tuple(codes))
 
@@ -288,11 +299,32 @@ class Point(Proof):
         return len(groups) - families, families
 
 
+class FloatingPoint(Point):
+    """[5.6]"""
+
+    def __init__(self, problem, header):
+        super().__init__(problem, header)
+        bound = header["max_rigid_displacement"]
+        need(type(bound) is float and bound == self.data.bound, "another bound of the rigid displacement")
+
+    def leaf(self, codes, kind, *rest):
+        need(kind in ("x", "n", "r", "N", "D", "u", "i"), "an unknown leaf")
+        if kind != "i":
+            super().leaf(codes, kind, *rest)
+            return
+        (z,) = rest
+        need(self.forms.unbalanced(codes, z, self.scale[0]), "forces of a leaf may be in balance with the load")
+
+    def declare(self, *record):
+        raise Refused("a form of a body that nothing holds")
+
+
 class Graph(Proof):
     """[6]"""
 
     def __init__(self, problem, header):
         super().__init__(problem, header)
+        need(problem.rigid_modes is None, "a graph of a body that nothing holds")
         self.a, self.b = (decimal_fraction(end) for end in header["interval"])
         need(self.a < self.b, "the interval is empty")
         need(min(self.data.friction(self.a) + self.data.friction(self.b)) >= 0, "friction is negative")

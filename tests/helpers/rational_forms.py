@@ -76,8 +76,9 @@ def multipliers(rows, values):
 
 @lru_cache(maxsize=16)
 def fingerprint(problem):
-    """[3.3]"""
-    digest = hashlib.sha256(b"enumsol problem 1")
+    """[3.3], [5.6]"""
+    free = problem.rigid_modes is not None
+    digest = hashlib.sha256(b"enumsol problem 1" + (b", held by nothing" if free else b""))
 
     def add(values, kind):
         digest.update(np.asarray(values).astype(kind).tobytes() + b"|")
@@ -92,6 +93,9 @@ def fingerprint(problem):
     slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
     for vector in (problem.f, problem.gap, *problem.friction, slope, problem.slip_offset):
         add(vector, "<f8")
+    if free:
+        add(problem.rigid_modes.ravel(), "<f8")
+        add([problem.rigid_reach], "<f8")
     return digest.hexdigest()
 
 
@@ -108,7 +112,7 @@ class Data:
 
     def __init__(self, problem):
         self.p = p = problem.p
-        A = matrix_of(problem.A.toarray())
+        A = self.stiffness(problem)
         B = matrix_of(np.vstack([problem.Bn.toarray(), problem.Bt.toarray()]))
         self.S = B * A.solve(B.transpose())
         for size in range(1, 2 * p + 1):
@@ -120,6 +124,14 @@ class Data:
         self.g0 = [value - exact(shift) for value, shift in zip(free, offset, strict=True)]
         self.g1 = (B * A.solve(matrix_of(slope[:, None]))).entries()
         self.F0, self.F1 = ([exact(value) for value in part.tolist()] for part in problem.friction)
+
+    def stiffness(self, problem):
+        """A."""
+        return matrix_of(problem.A.toarray())
+
+    def forms(self, alpha):
+        """Rows of the problem at one alpha."""
+        return Forms(self.S, self.load(alpha), self.friction(alpha))
 
     def load(self, alpha):
         return [a + alpha * b for a, b in zip(self.g0, self.g1, strict=True)]
@@ -136,10 +148,6 @@ class Data:
         return alpha if all(value == 0 for value in self.load(alpha)) else None
 
 
-#: Of a problem; made once where many proofs of it are checked.
-data_of = lru_cache(maxsize=16)(Data)
-
-
 # -- [4] statuses and rows ---------------------------------------------------------------------------------------------
 
 
@@ -151,7 +159,7 @@ class Forms:
         self.rows, self.p = S.tolist(), len(F)
 
     def force(self, normal, tangential, i):
-        form = [fmpq(0)] * (2 * self.p + 1)
+        form = [fmpq(0)] * (len(self.rows) + 1)
         form[i], form[self.p + i] = fmpq(normal), fmpq(tangential)
         return form
 

@@ -1,0 +1,116 @@
+"""docs/proof_format.md, section 5.6, suffices: a checker made from it accepts proofs of bodies that nothing holds."""
+
+import functools
+
+import pytest
+from floating_oracle import block_on_table, random_body
+from proof_tools import bytes_of, copied, leaves_of, multipliers, proof_of, records_of, with_multipliers
+from rational_checker import Refused, check, check_records, fingerprint
+
+import enumsol
+
+#: Among their proofs are all kinds of leaves.
+SEEDS = (5, 18, 21, 8, 16)
+
+
+@functools.cache
+def of(seed):
+    """A problem, its solutions and the records of the proof."""
+    problem = random_body(seed)
+    roots = enumsol.enumerate_roots(problem, 0.25)
+    return problem, roots, records_of(roots.proof)
+
+
+def accept(seed):
+    problem, roots, _ = of(seed)
+    counts = check(problem, bytes_of(roots.proof))
+    assert (counts["roots"], counts["families"], counts["undecided"]) == (len(roots), len(roots.families), 0)
+
+
+@pytest.mark.few(2)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_proofs_are_accepted(seed):
+    accept(seed)
+    problem = of(seed)[0]
+    assert fingerprint(problem) == problem.fingerprint
+
+
+@pytest.mark.slow
+def test_more_proofs_are_accepted():
+    for seed in range(100, 130):
+        accept(seed)
+
+
+def test_all_kinds_of_leaves_are_among_them():
+    assert {record[0] for seed in SEEDS for record in of(seed)[2][1:-1]} == {"b", "x", "i", "n", "N", "D", "r"}
+
+
+def verdicts(problem, records):
+    """Whether enumsol's checker accepts, and whether the one in rationals does."""
+    try:
+        return enumsol.verify(problem, proof_of(records)).ok, check_records(problem, records) is not None
+    except Refused:
+        return enumsol.verify(problem, proof_of(records)).ok, False
+
+
+def refused(problem, records):
+    """Whether both refuse."""
+    return not any(verdicts(problem, records))
+
+
+def forged(record):
+    """Leaves that show nothing in place of one."""
+    kind, *rest = record
+    if kind == "x":
+        rows, values = multipliers(record)
+        yield with_multipliers(record, rows, [-value for value in values])
+        yield with_multipliers(record, [], [])
+    elif kind == "i":
+        yield ["i", [-x for x in rest[0]]]
+        yield ["i", [0.0 for _ in rest[0]]]
+    elif kind == "r":
+        yield ["r", rest[0], rest[1], -rest[2]]
+        yield ["r", [x + 1.0 for x in rest[0]], rest[1], rest[2]]
+        yield ["n"]
+    elif kind == "D":
+        yield ["D", rest[0], rest[1] + 1]
+        yield ["D", rest[0][1:], rest[1]]
+        yield ["N"]
+
+
+@pytest.mark.few(1)
+@pytest.mark.parametrize("seed", SEEDS[:3])
+def test_forgeries_are_refused_by_both(seed):
+    problem, _, records = of(seed)
+    tried = 0
+    for place, _ in leaves_of(records):
+        for leaf in forged(records[place]):
+            changed = copied(records)
+            changed[place] = leaf
+            mine, exact = verdicts(problem, changed)
+            # where balance alone excludes an assignment, rationals need no multipliers
+            assert not mine
+            assert leaf[0] == "x" or not exact
+            tried += 1
+    assert tried > 5
+
+
+def test_another_bound_and_leaves_of_held_bodies_are_refused():
+    problem, _, records = of(SEEDS[0])
+    for bound in (2.0, None, "8"):
+        changed = copied(records)
+        changed[0]["max_rigid_displacement"] = bound
+        assert refused(problem, changed)
+    place = leaves_of(records)[0][0]
+    for leaf in (["z"], ["X", "", ""], ["m", [0], [0], [], [], []], ["i", []]):
+        changed = copied(records)
+        changed[place] = leaf
+        assert refused(problem, changed)
+
+
+@pytest.mark.parametrize(("push", "bound"), [(0.5, 4.0), (1.0, 4.0), (1.25, 1e6)])
+def test_a_block_on_a_table(push, bound):
+    problem = block_on_table(cells=1, push=push, max_rigid_displacement=bound)
+    roots = enumsol.enumerate_roots(problem, 0)
+    counts = check(problem, bytes_of(roots.proof))
+    assert (counts["roots"], counts["families"]) == (len(roots), len(roots.families))
