@@ -15,15 +15,14 @@ import numpy as np
 from enumsol.condensation.condensed import ScaledSystem
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.floating import FloatingSystem, RigidRows
-from enumsol.errors import InvalidArgumentError
 from enumsol.proof import records
-from enumsol.search.certifiers.protocol import Certified, UndecidedPart
+from enumsol.search.certifiers.protocol import UndecidedPart
 from enumsol.search.certifiers.rational_certifier import ExactCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier, proven
 from enumsol.search.resume import PlaneReader, RecordedBound
+from enumsol.search.setup import HeldByNothing
 from enumsol.search.solvers import Solvers
 from enumsol.search.splitting import PlaneSplitting
-from enumsol.search.tree import TreeSearch, make_engine
 from enumsol.trusted.at_alpha import holds_no_root, solve_selection
 from enumsol.trusted.confinement import motion_against, without_bound
 from enumsol.trusted.exclusion import Terms, exclusion_margin
@@ -36,38 +35,18 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.proof.compressed_parts import Recorder
-    from enumsol.relaxation.engine import Engine
     from enumsol.search.certifiers.margins import Margin
     from enumsol.search.certifiers.protocol import Bound, Certifier
-    from enumsol.search.outcome import SearchLimits, SearchProgress
     from enumsol.search.resume import Reader
     from enumsol.selections.rational_selections import ExactSelections
     from enumsol.selections.solution import Codes, SelectionSolution
-    from enumsol.support.arguments import Alpha
 
 #: Stiffness of the springs of the relaxations, relative to that of the body (theory, section 14.5).
 WEAK = 2.0**-20
 
 
-class FloatingSolvers(Solvers):
-    """Solvers and certifier for a body that nothing holds, at one alpha; parameters as of Solvers.
-
-    Raises
-    ------
-    InvalidArgumentError
-        Arithmetic is "fast", which has no solver for such a body, or as Solvers.
-    """
-
-    has_solution = False
-
-    def __init__(
-        self, problem: Any, alpha: Alpha, arithmetic: Any, tolerance: float, engine: str | None = None
-    ) -> None:
-        if arithmetic == "fast":
-            raise InvalidArgumentError(
-                'arithmetic is "fast" for a body that nothing holds; expected "verified" or "exact"'
-            )
-        super().__init__(problem, alpha, arithmetic, tolerance, engine)
+class FloatingSolvers(HeldByNothing, Solvers):
+    """Solvers and certifier for a body that nothing holds, at one alpha; parameters as of Solvers."""
 
     @cached_property
     def rows(self) -> RigidRows:
@@ -127,43 +106,18 @@ class FloatingSolvers(Solvers):
         ids = self.problem.node_ids
         return FloatingCertifier(self.scaled, self.exclusions, lambda: self.exact_certifier, recorder, ids)
 
-    def search(
-        self,
-        certifier: Certifier,
-        limits: SearchLimits | None = None,
-        progress: Callable[[SearchProgress], object] | None = None,
-    ) -> TreeSearch:
-        """A search of the tree with a certifier made here."""
-        return TreeSearch(
-            self.on_weak_springs,
-            certifier,
-            engine=self._relaxations,
-            splitting=PlaneSplitting(self.scaled.F),
-            limits=limits,
-            progress=progress,
-        )
-
     @cached_property
-    def on_weak_springs(self) -> ScaledSystem:
-        """What the relaxations are about."""
+    def relaxed(self) -> ScaledSystem:
+        """The body on weak springs (theory, section 14.5)."""
         return on_weak_springs(self.scaled, self.rows)
 
-    @cached_property
-    def _relaxations(self) -> Engine:
-        return make_engine(self.on_weak_springs, self.engine)
+    def _splitting(self, certifier: Certifier) -> PlaneSplitting:
+        return PlaneSplitting(self.scaled.F)
 
     def reader(self) -> FloatingReader:
         """Understands the records of an earlier proof."""
         held = PlaneReader((self.scaled.F > 0).tolist(), self.enclosed)
         return FloatingReader(held, records.FLOATING_LEAVES, len(self.rows.unit))
-
-    def unloaded(self) -> bool:
-        """Without load the body may be moved: there is no one solution."""
-        return False
-
-    def proof_header(self) -> dict[str, Any]:
-        """First record of a proof: with the bound of the rigid displacement."""
-        return super().proof_header() | {"max_rigid_displacement": self.problem.rigid_reach}
 
 
 class FloatingReader:
@@ -279,13 +233,6 @@ class FloatingCertifier(VerifiedCertifier):
     ) -> None:
         super().__init__(scaled, None, exact, recorder, node_ids)
         self._exclusions, self._exactly = exclusions, exact
-        #: Some conclusion rests on the bound of the rigid displacement.
-        self.bounded = False
-
-    @property
-    def certified(self) -> Certified:
-        """What was proven so far."""
-        return Certified(self._verified, self._escalations, self._leaves, self.sliding, self.bounded)
 
     def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """Whether the relaxation's multipliers are proven to exclude the partial assignment."""
@@ -327,16 +274,6 @@ class FloatingCertifier(VerifiedCertifier):
         self.bounded |= certifier.bounded
         return self._in_rationals(codes, solution)
 
-    def add(self, part: Certified) -> None:
-        """Take over what the certifier of a subtree has proven."""
-        super().add(part)
-        self.bounded |= part.bounded
-
-    def forget(self) -> None:
-        """Forget what was proven."""
-        super().forget()
-        self.bounded = False
-
 
 def _holds_none(system: FloatingSystem, codes: Codes) -> bool:
     return holds_no_root(system, codes, solve_selection(system, codes))
@@ -348,13 +285,6 @@ class FloatingExactCertifier(ExactCertifier):
     def __init__(self, selections: ExactSelections, scaled: ScaledSystem, exclusions: Exclusions | None = None) -> None:
         super().__init__(selections, scaled)
         self._exclusions = exclusions
-        #: As of FloatingCertifier.
-        self.bounded = False
-
-    @property
-    def certified(self) -> Certified:
-        """Whether something rests on the bound of the rigid displacement."""
-        return Certified(bounded=self.bounded)
 
     def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """Whether the multipliers prove that the partial assignment holds no solution."""
@@ -368,8 +298,3 @@ class FloatingExactCertifier(ExactCertifier):
         if not isinstance(found, UndecidedPart):
             self.bounded |= self._selections.rests_on_reach(codes, found)
         return found
-
-    def add(self, part: Certified) -> None:
-        """Take over what the certifier of a subtree has met."""
-        super().add(part)
-        self.bounded |= part.bounded

@@ -18,8 +18,9 @@ from enumsol.search.certifiers.verified import VerifiedCertifier
 from enumsol.search.fathoming import Closer
 from enumsol.search.form_policy import Forms
 from enumsol.search.resume import PlaneReader
+from enumsol.search.setup import SearchSetup
 from enumsol.search.splitting import PlaneSplitting
-from enumsol.search.tree import TreeSearch, make_engine
+from enumsol.search.tree import make_engine
 from enumsol.selections.float_selections import FloatSelections
 
 if TYPE_CHECKING:
@@ -27,13 +28,13 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from enumsol.condensation.condensed import ScaledSystem
     from enumsol.model.problem import ContactProblem
     from enumsol.proof.compressed_parts import Recorder
     from enumsol.relaxation.engine import Engine
     from enumsol.search.certifiers.protocol import Certifier
     from enumsol.search.certifiers.rational_certifier import ExactCertifier
     from enumsol.search.fathoming import Closing
-    from enumsol.search.outcome import SearchLimits, SearchProgress
     from enumsol.search.resume import Reader
     from enumsol.selections.rational_selections import ExactSelections
     from enumsol.support.arguments import Alpha
@@ -41,7 +42,7 @@ if TYPE_CHECKING:
 Arithmetic = Literal["fast", "verified", "exact"]
 
 
-class Solvers:
+class Solvers(SearchSetup):
     """Solvers and certifier for one problem at one alpha (of a body that is held; ``search.floating`` has others).
 
     Parameters
@@ -62,8 +63,6 @@ class Solvers:
         S is not positive definite: exactly where rationals decide what balls leave open, otherwise beyond rounding.
     """
 
-    #: There is a solution for certain (theory, section 6.7).
-    has_solution = True
     #: Units of the rigid displacement of a body that nothing holds.
     rigid_unit: NDArray[np.float64] | None = None
 
@@ -170,31 +169,26 @@ class Solvers:
             self.scaled, self.enclosed, lambda: self.exact_certifier, _present(recorder), self.problem.node_ids
         )
 
-    def search(
-        self,
-        certifier: Certifier,
-        limits: SearchLimits | None = None,
-        progress: Callable[[SearchProgress], object] | None = None,
-    ) -> TreeSearch:
-        """A search of the tree with a certifier made here."""
-        closing = cast("Closing", certifier)
-        return TreeSearch(
-            self.scaled,
-            certifier,
-            engine=self._relaxations,
-            splitting=PlaneSplitting(self.scaled.F, sliding=closing.sliding),
-            limits=limits,
-            progress=progress,
-            closer=Closer(self.scaled, closing),
-            forms=self._forms,
-        )
+    @property
+    def relaxed(self) -> ScaledSystem:
+        """What the relaxations are about."""
+        return self.scaled
 
     @cached_property
-    def _relaxations(self) -> Engine:
-        return make_engine(self.scaled, self.engine)
+    def _engine(self) -> Engine:
+        return make_engine(self.relaxed, self.engine)
 
-    @cached_property
+    def _splitting(self, certifier: Certifier) -> PlaneSplitting:
+        return PlaneSplitting(self.scaled.F, sliding=certifier.sliding)
+
+    def _closer(self, certifier: Certifier) -> Closer | None:
+        return Closer(self.scaled, cast("Closing", certifier))
+
     def _forms(self) -> Forms | None:
+        return self._own_forms
+
+    @cached_property
+    def _own_forms(self) -> Forms | None:
         """Forms for a long search; None where the energy is the only one, or there are no balls to prove them by."""
         scaled = self.scaled
         fast = self.arithmetic == "fast"

@@ -180,7 +180,7 @@ def _proposals(problem):
     rows = ImposedRows(PlaneSplitting(solvers.scaled.F), problem.p)
 
     def best(codes):
-        relaxation = solvers._relaxations.root(*rows.over(tuple(codes), range(problem.p)))
+        relaxation = solvers._engine.root(*rows.over(tuple(codes), range(problem.p)))
         if relaxation.stalled or relaxation.pruned:
             return
         found, values = relaxation.multipliers()

@@ -160,24 +160,37 @@ class Unrecorded:
         """Nothing to write."""
 
 
-class WithoutProof:
+class Met:
+    """Base of all certifiers: what they have met so far, beside what they have proven.
+
+    Attributes
+    ----------
+    sliding : as of Certifier
+    bounded : bool
+        Of a body that nothing holds: some conclusion rests on the bound of its rigid displacement.
+    """
+
+    def __init__(self) -> None:
+        self.sliding: dict[int, int] = {}
+        self.bounded = False
+
+    def add(self, part: Certified) -> None:
+        """Take over what the certifier of a subtree has met."""
+        self.sliding |= part.sliding
+        self.bounded |= part.bounded
+
+
+class WithoutProof(Met):
     """Base of certifiers that write no proof."""
 
     recorder: Recorder = Unrecorded()
     hard = False
     exactly, plain, lone = True, False, False
 
-    def __init__(self) -> None:
-        self.sliding: dict[int, int] = {}
-
     @property
     def certified(self) -> Certified:
         """Nothing is proven."""
-        return Certified(sliding=self.sliding)
-
-    def add(self, part: Certified) -> None:
-        """Take over what the certifier of a subtree has met."""
-        self.sliding |= part.sliding
+        return Certified(sliding=self.sliding, bounded=self.bounded)
 
     def _nothing(self, *_: object, **__: object) -> None:
         """There is nothing to write, and nothing to forget."""
@@ -185,7 +198,7 @@ class WithoutProof:
     branching = skipped = unloaded = forget = _nothing
 
 
-class RecordingCertifier:
+class RecordingCertifier(Met):
     """Base of these certifiers: it writes what needs no proof, and keeps count.
 
     Parameters
@@ -194,11 +207,18 @@ class RecordingCertifier:
         Where the records of the proof go.
     """
 
+    _escalations: Escalations | None = None
+
     def __init__(self, recorder: Recorder) -> None:
+        super().__init__()
         self.recorder = recorder
-        self.sliding: dict[int, int] = {}
         self._verified: dict[Codes, Any] = {}
         self._leaves = 0
+
+    @property
+    def certified(self) -> Certified:
+        """What was proven so far."""
+        return Certified(self._verified, self._escalations, self._leaves, self.sliding, self.bounded)
 
     def branching(self, node: int, children: Sequence[int]) -> None:
         """Write a branching of the tree."""
@@ -214,13 +234,13 @@ class RecordingCertifier:
 
     def add(self, part: Certified) -> None:
         """Take over what the certifier of a subtree has proven."""
+        super().add(part)
         self._verified |= part.verified
         self._leaves += part.leaves
-        self.sliding |= part.sliding
 
     def forget(self) -> None:
         """Forget what was proven."""
-        self._verified, self._leaves = {}, 0
+        self._verified, self._leaves, self.bounded = {}, 0, False
 
     def _leaf(self, leaf: Record) -> None:
         self._leaves += 1

@@ -72,6 +72,7 @@ class VerifiedCertifier(RecordingCertifier):
     """
 
     exactly, plain, lone = False, False, True
+    _escalations: Escalations
 
     def __init__(
         self,
@@ -95,11 +96,6 @@ class VerifiedCertifier(RecordingCertifier):
         self.hard = False
         #: Selections of the roots found in rationals.
         self._known: list[Codes] = []
-
-    @property
-    def certified(self) -> Certified:
-        """What was proven so far."""
-        return Certified(self._verified, self._escalations, self._leaves, self.sliding)
 
     def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """Whether the relaxation's multipliers are proven to exclude the partial assignment."""

@@ -7,18 +7,18 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enumsol.condensation.floating_space import FloatingSpace
-from enumsol.errors import InvalidArgumentError
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.proof.records import NoRoot, Unbalanced
 from enumsol.proof.space_records import FLOATING_LEAVES, ExcludedInSpace
 from enumsol.relaxation.engine import PRUNE_MARGIN
-from enumsol.search.certifiers.protocol import Certified, Refine, UndecidedPart, Unrecorded
+from enumsol.search.certifiers.protocol import Refine, UndecidedPart, Unrecorded
 from enumsol.search.floating import FloatingReader, weakly_held
+from enumsol.search.setup import HeldByNothing
 from enumsol.search.space.space_search import SpaceCertifier
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.confinement import motion_beside
@@ -32,34 +32,21 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
-    from enumsol.model.problem3d import ContactProblem3D
     from enumsol.proof.compressed_parts import Recorder
     from enumsol.proof.records import Exclusion
     from enumsol.relaxation.space_relaxation import SpaceEngine
-    from enumsol.search.certifiers.protocol import Bound, Certifier
+    from enumsol.search.certifiers.protocol import Bound
     from enumsol.selections.solution import Codes
-    from enumsol.support.arguments import Alpha
     from enumsol.trusted.space.boxed_solution import BoxedSolution
     from enumsol.trusted.space.sector_rows import Row
 
     Array = NDArray[np.float64]
 
 
-class FloatingSpaceSolvers(SpaceSolvers):
-    """Solvers and certifier for a body in 3D that nothing holds, at one alpha; parameters as of SpaceSolvers.
+class FloatingSpaceSolvers(HeldByNothing, SpaceSolvers):
+    """Solvers and certifier for a body in 3D that nothing holds, at one alpha; parameters as of SpaceSolvers."""
 
-    Raises
-    ------
-    InvalidArgumentError
-        Arithmetic is "fast", which has no solver for such a body, or as SpaceSolvers.
-    """
-
-    has_solution = False
-
-    def __init__(self, problem: ContactProblem3D, alpha: Alpha, arithmetic: str) -> None:
-        if arithmetic == "fast":
-            raise InvalidArgumentError('arithmetic is "fast" for a body that nothing holds; expected "verified"')
-        super().__init__(problem, alpha, arithmetic)
+    offered = '"verified"'
 
     def _in_balls(self, alpha: Fraction, force: Array, length: Array) -> FloatingSpace:
         return FloatingSpace.of(self.problem, alpha, force, length)
@@ -81,24 +68,10 @@ class FloatingSpaceSolvers(SpaceSolvers):
         """The certifier of this arithmetic."""
         return FloatingSpaceCertifier(self._engine, self.enclosed, self.exclusions, recorder or Unrecorded())
 
-    def _closer(self, certifier: Certifier) -> None:
-        """There may be no solution: no certificate takes the place of a tree."""
-
-    def _forms(self) -> None:
-        """Bounds of these bodies are of the energy."""
-
     def reader(self) -> FloatingReader:
         """Understands the records of an earlier proof."""
         modes = len(self.problem.modes.held) if self.problem.modes else 0
         return FloatingReader(super().reader(), FLOATING_LEAVES, modes)
-
-    def unloaded(self) -> bool:
-        """Without load the body may be moved: there is no one solution."""
-        return False
-
-    def proof_header(self) -> dict[str, Any]:
-        """First record of a proof: with the bound of the rigid displacement."""
-        return super().proof_header() | {"max_rigid_displacement": self.problem.rigid_reach}
 
 
 class SpaceExclusions:
@@ -157,13 +130,6 @@ class FloatingSpaceCertifier(SpaceCertifier):
     ) -> None:
         super().__init__(engine, enclosed, recorder)
         self._exclusions = exclusions
-        #: Some conclusion rests on the bound of the rigid displacement.
-        self.bounded = False
-
-    @property
-    def certified(self) -> Certified:
-        """What was proven so far."""
-        return Certified(self._verified, None, self._leaves, bounded=self.bounded)
 
     def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """Whether the relaxation's multipliers, or balance alone, are proven to exclude the partial assignment."""
@@ -190,13 +156,3 @@ class FloatingSpaceCertifier(SpaceCertifier):
 
     def _boxed(self, leaf: Open) -> None:
         """Boxes rest on a stiffness that is positive definite."""
-
-    def add(self, part: Certified) -> None:
-        """Take over what the certifier of a subtree has proven."""
-        super().add(part)
-        self.bounded |= part.bounded
-
-    def forget(self) -> None:
-        """Forget what was proven."""
-        super().forget()
-        self.bounded = False

@@ -172,11 +172,6 @@ class SpaceCertifier(RecordingCertifier):
         #: The form that was written last.
         self._form: SlipForm | None = None
 
-    @property
-    def certified(self) -> Certified:
-        """What was proven so far."""
-        return Certified(self._verified, None, self._leaves)
-
     def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """Whether the relaxation's multipliers are proven to exclude the partial assignment."""
         if not relaxation.bound > PRUNE_MARGIN:

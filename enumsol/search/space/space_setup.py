@@ -14,10 +14,10 @@ from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.proof.writer import point_header, unit_exponents
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.certifiers.protocol import Unrecorded
+from enumsol.search.setup import SearchSetup
 from enumsol.search.space.space_fathoming import SpaceCloser
 from enumsol.search.space.space_forms import SpaceForms
 from enumsol.search.space.space_search import SpaceCertifier, SpaceReader, SpaceSplitting
-from enumsol.search.tree import TreeSearch
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.proof.compressed_parts import Recorder
     from enumsol.search.certifiers.protocol import Certifier
-    from enumsol.search.outcome import SearchLimits, SearchProgress
     from enumsol.search.resume import Reader
     from enumsol.search.space.space_fathoming import SpaceClosing
     from enumsol.support.arguments import Alpha
@@ -35,7 +34,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 
-class SpaceSolvers:
+class SpaceSolvers(SearchSetup):
     """System, balls, engine and certifier for one problem in 3D at one alpha.
 
     Parameters
@@ -49,9 +48,6 @@ class SpaceSolvers:
     InvalidArgumentError, InvalidProblemError
         Of ``problem.friction_at`` and of the condensation.
     """
-
-    #: There is a solution for certain (theory, section 12.6).
-    has_solution = True
 
     def __init__(self, problem: ContactProblem3D, alpha: Alpha, arithmetic: str) -> None:
         self.problem, self.alpha, self.arithmetic = problem, alpha, arithmetic
@@ -101,27 +97,10 @@ class SpaceSolvers:
             recorder = Unrecorded()
         return SpaceCertifier(self._engine, self.enclosed, recorder)
 
-    def search(
-        self,
-        certifier: Certifier,
-        limits: SearchLimits | None = None,
-        progress: Callable[[SearchProgress], object] | None = None,
-    ) -> TreeSearch:
-        """A search of the tree with a certifier made here."""
-        engine = self._engine
-        return TreeSearch(
-            self.system,
-            certifier,
-            engine=engine,
-            splitting=SpaceSplitting(engine),
-            limits=limits,
-            progress=progress,
-            closer=self._closer(certifier),
-            forms=self._forms(),
-        )
+    def _splitting(self, certifier: Certifier) -> SpaceSplitting:
+        return SpaceSplitting(self._engine)
 
     def _closer(self, certifier: Certifier) -> SpaceCloser | None:
-        """What decides the whole problem without a tree, where that serves."""
         return SpaceCloser(self.system, cast("SpaceClosing", certifier), regular=self.arithmetic == "fast")
 
     def _forms(self) -> SpaceForms | None:

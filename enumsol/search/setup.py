@@ -1,0 +1,93 @@
+"""What makes a search at one alpha, in 2D and in 3D, of a body that is held or not."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from enumsol.errors import InvalidArgumentError
+from enumsol.search.tree import TreeSearch
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from enumsol.search.certifiers.protocol import Certifier
+    from enumsol.search.outcome import SearchLimits, SearchProgress
+
+
+class SearchSetup:
+    """Base of the solvers of one problem at one alpha: a search is made of their parts.
+
+    Attributes
+    ----------
+    relaxed : ScaledSystem or SpaceSystem
+        What the relaxations are about.
+    """
+
+    #: There is a solution for certain (theory, sections 6.7 and 12.6).
+    has_solution = True
+    relaxed: Any
+    _engine: Any
+
+    def search(
+        self,
+        certifier: Certifier,
+        limits: SearchLimits | None = None,
+        progress: Callable[[SearchProgress], object] | None = None,
+    ) -> TreeSearch:
+        """A search of the tree with a certifier made here."""
+        return TreeSearch(
+            self.relaxed,
+            certifier,
+            engine=self._engine,
+            splitting=self._splitting(certifier),
+            limits=limits,
+            progress=progress,
+            closer=self._closer(certifier),
+            forms=self._forms(),
+        )
+
+    def _splitting(self, certifier: Certifier) -> Any:
+        """How a partial assignment is split, and which rows it imposes."""
+        raise NotImplementedError
+
+    def _closer(self, certifier: Certifier) -> Any:
+        """What decides the problem, or subtrees, by an only solution; None where nothing does."""
+        raise NotImplementedError
+
+    def _forms(self) -> Any:
+        """What a long search may bound with in place of the energy, or None."""
+        raise NotImplementedError
+
+
+class HeldByNothing:
+    """Of the solvers of a body that nothing holds, beside those of a body that is held: there may be no solution.
+
+    Raises
+    ------
+    InvalidArgumentError
+        Arithmetic is "fast", which has no solver for such a body, or as of a body that is held.
+    """
+
+    has_solution = False
+    offered = '"verified" or "exact"'
+    problem: Any
+
+    def __init__(self, problem: Any, alpha: Any, arithmetic: Any, *options: Any) -> None:
+        if arithmetic == "fast":
+            raise InvalidArgumentError(f'arithmetic is "fast" for a body that nothing holds; expected {self.offered}')
+        super().__init__(problem, alpha, arithmetic, *options)  # type: ignore[call-arg]
+
+    def _closer(self, certifier: Certifier) -> None:
+        """There may be no solution: no certificate takes the place of a tree."""
+
+    def _forms(self) -> None:
+        """Bounds of these bodies are of the energy."""
+
+    def unloaded(self) -> bool:
+        """Without load the body may be moved: there is no one solution."""
+        return False
+
+    def proof_header(self) -> dict[str, Any]:
+        """First record of a proof: with the bound of the rigid displacement."""
+        header: dict[str, Any] = super().proof_header()  # type: ignore[misc]
+        return header | {"max_rigid_displacement": self.problem.rigid_reach}
