@@ -39,10 +39,10 @@ class NotHeldError(EnumsolError, ValueError):
     >>> import enumsol
     >>> block = enumsol.gallery.block_on_table()
     >>> try:
-    ...     enumsol.branch_graph(block, (0, 1))
+    ...     block.condensed
     ... except enumsol.NotHeldError as error:
     ...     print(error)
-    branch_graph cannot take a body that nothing holds (rigid_modes is given); expected a body held by supports or \
+    condensation cannot take a body that nothing holds (rigid_modes is given); expected a body held by supports or \
 springs
     """
 

@@ -47,6 +47,7 @@ def make_vertex(
     *,
     border: bool,
     settled: bool,
+    bounded: bool = False,
     family: RootFamily | None = None,
 ) -> Vertex:
     """A vertex with the kind and the degrees that the arcs on its sides give it, if all of these are known.
@@ -56,11 +57,14 @@ def make_vertex(
     state : forces and displacements, (2p,) arrays
     active : codes that hold at every node
     slip_sign : the sign of u_t at a node, which names the slip where there is no friction
+    bounded : it reaches a bound of the rigid displacement, beyond which arcs are not known
     """
     p, (forces, w) = len(active), state
     statuses, names = named_statuses(active, slip_sign)
     dimension = 0 if family is None else family.dimension
-    kind = vertex_kind(*sides, border=border, dimension=dimension) if settled else VertexKind.UNSETTLED
+    kind = VertexKind.UNSETTLED
+    if settled:
+        kind = vertex_kind(*sides, border=border, dimension=dimension, bounded=bounded)
     left, right = map(degree_of, sides) if settled else (None, None)
     return Vertex(
         number=number,
@@ -78,6 +82,7 @@ def make_vertex(
         index_right=right,
         selections=tuple(selections),
         exact=alpha,
+        bounded=bounded,
     )
 
 
@@ -99,7 +104,9 @@ def degree_of(arcs: Sequence[Arc]) -> int | None:
     return index_sum(arc.index for arc in arcs)
 
 
-def vertex_kind(left: Sequence[Arc], right: Sequence[Arc], *, border: bool, dimension: int) -> VertexKind:
+def vertex_kind(
+    left: Sequence[Arc], right: Sequence[Arc], *, border: bool, dimension: int, bounded: bool = False
+) -> VertexKind:
     """What a settled vertex is, by the arcs that end there from the left and begin there to the right."""
     if any(arc.dimension for arc in (*left, *right)):
         return VertexKind.SHEET
@@ -107,6 +114,8 @@ def vertex_kind(left: Sequence[Arc], right: Sequence[Arc], *, border: bool, dime
         return VertexKind.FAMILY
     if border:
         return VertexKind.END
+    if bounded:
+        return VertexKind.BOUND
     degrees = degree_of(left), degree_of(right)
     if None not in degrees and degrees[0] != degrees[1]:
         return VertexKind.BROKEN

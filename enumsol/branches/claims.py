@@ -87,17 +87,21 @@ class Uniqueness:
     throughout : bool or None
         One solution at every alpha of the interval; None when that is not known.
     limit : float or None
-        The alpha up to which the solution is unique, from the interval's first alpha on; None when it is unique
+        The alpha up to which there is one solution, from the interval's first alpha on; None when there is one
         throughout, and when that is not known.
     several_by : float or None
         There are several solutions at this alpha or right above it, so that the limit is not larger. None when no
         second solution was found.
+    none_by : float or None
+        There is no solution at this alpha or right above it, which happens to a body that nothing holds only. None when
+        there is always one, and for a graph with gaps.
     """
 
     known: bool
     throughout: bool | None
     limit: float | None
     several_by: float | None
+    none_by: float | None = None
 
 
 class Claims:
@@ -109,13 +113,21 @@ class Claims:
     arcs : sequence of Arc
     interval : (Fraction, Fraction)
     standing : Standing
+    held : bool
+        The body is held, so that the indices of all solutions add up to +1.
     """
 
     def __init__(
-        self, vertices: Sequence[Vertex], arcs: Sequence[Arc], interval: tuple[Fraction, Fraction], standing: Standing
+        self,
+        vertices: Sequence[Vertex],
+        arcs: Sequence[Arc],
+        interval: tuple[Fraction, Fraction],
+        standing: Standing,
+        *,
+        held: bool = True,
     ) -> None:
         self._vertices, self._arcs, self._interval = vertices, arcs, interval
-        self.standing = standing
+        self.standing, self._held = standing, held
 
     def __repr__(self) -> str:
         low, high = map(float, self._interval)
@@ -135,14 +147,14 @@ class Claims:
         point = CriticalAlpha.rational(rational(alpha))
         at = [v.exact for v in self._vertices if v.exact.compare(point) == 0]
         if not self.whole or not all(place.is_rational for place in at):
-            return Multiplicity(least_at(alpha, self._vertices, self._arcs), exact=False)
+            return Multiplicity(least_at(alpha, self._vertices, self._arcs, held=self._held), exact=False)
         over = sum(arc.passes_over(point) for arc in self._arcs)
         return Multiplicity(over + len(at), exact=True)
 
     def steps(self) -> MultiplicitySteps:
         """The number of solutions over the whole interval, or its lower bound."""
         if not self.whole:
-            alphas, least, between = least_steps(self._interval, self._vertices, self._arcs)
+            alphas, least, between = least_steps(self._interval, self._vertices, self._arcs, held=self._held)
             return MultiplicitySteps(tuple(map(Fraction, alphas)), tuple(least), tuple(between), exact=False)
         groups: list[list[Vertex]] = []
         for v in self._vertices:
@@ -152,8 +164,15 @@ class Claims:
                 groups.append([v])
         place = {v.number: k for k, group in enumerate(groups) for v in group}
         over, between = _cover(((place[arc.tail], place[arc.head]) for arc in self._arcs), len(groups))
-        at = tuple(passing + len(group) for group, passing in zip(groups, over, strict=True))
-        return MultiplicitySteps(tuple(Fraction(group[0].alpha) for group in groups), at, tuple(between), exact=True)
+        at = [passing + len(group) for group, passing in zip(groups, over, strict=True)]
+        places = [Fraction(group[0].alpha) for group in groups]
+        # where nothing holds the body there may be no solution at an end, and no vertex
+        first, last = self._interval
+        if not groups or places[0] > first:
+            places, at, between = [first, *places], [0, *at], [0, *between] if groups else []
+        if places[-1] < last:
+            places, at, between = [*places, last], [*at, 0], [*between, 0]
+        return MultiplicitySteps(tuple(places), tuple(at), tuple(between), exact=True)
 
     def uniqueness(self) -> Uniqueness:
         """Up to which alpha the solution is unique, or what is known about it."""
@@ -167,7 +186,11 @@ class Claims:
         several = min(found, default=None)
         if not self.whole:
             return Uniqueness(known=False, throughout=None, limit=None, several_by=several)
-        return Uniqueness(known=True, throughout=several is None, limit=several, several_by=several)
+        none = min(
+            (float(x) for x, n, m in zip(steps.alphas, steps.at, behind, strict=False) if min(n, m) == 0), default=None
+        )
+        limit = min((end for end in (several, none) if end is not None), default=None)
+        return Uniqueness(known=True, throughout=limit is None, limit=limit, several_by=several, none_by=none)
 
     def sentences(self, bound: float | None) -> list[str]:
         """What a user asks first, as lines of text.
@@ -186,8 +209,17 @@ class Claims:
             line = "one solution throughout"
         elif found.limit > self._interval[0]:
             line = f"one solution below alpha = {found.limit:.8g}"
-        else:
+        elif found.limit == found.several_by:
             line = "several solutions from the first alpha on"
+        else:
+            line = "no solution at or right above the first alpha"
+        if found.none_by is not None and found.none_by > self._interval[0]:
+            line += f"; none at or right above alpha = {found.none_by:.8g}"
+        several = found.several_by
+        if found.none_by is not None and several is None:
+            line += "; nowhere several"
+        elif found.none_by is not None and several is not None and several > found.none_by:
+            line += f"; several at or right above alpha = {several:.8g}"
         if self.standing is Standing.NOT_PROVEN:
             line += ", not proven"
         lines = [line]

@@ -10,6 +10,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from flint import fmpq_mat
 
 from enumsol.arithmetic.rationals import rational
 from enumsol.branches.enclosed.following import follow_selections
@@ -26,10 +27,11 @@ from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.exact import FAST_EXACT_DOF, ExactCondensed, check_definite
 from enumsol.condensation.unloaded import never_loaded, vanishing_alpha
-from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.errors import Interrupted, InvalidArgumentError, TooLargeError
 from enumsol.model.problem import ContactProblem
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.search.certifiers.interval_certifiers import ExactIntervalCertifier, VerifiedIntervalCertifier
+from enumsol.search.interval.floating_interval import FloatingIntervalCertifier, on_weak_springs
 from enumsol.search.interval.interval_parallel import run_parallel
 from enumsol.search.interval.subintervals import FastIntervalCertifier, IntervalSearch
 from enumsol.search.outcome import Stop, StopReason
@@ -139,9 +141,10 @@ def branch_graph(
     complete: yes (proven)
     """
     instance_of(problem, ContactProblem, "problem")
-    problem.check_held("branch_graph")
     a, b = (Fraction(end) for end in alpha_interval(interval))
     one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
+    if problem.modes is not None:
+        _check_floating(problem, arithmetic)
     optional_callable(progress, "progress")
     optional_executor(executor)
     max_nodes, time_limit = optional_count(max_nodes, "max_nodes"), optional_seconds(time_limit)
@@ -201,12 +204,17 @@ def _prepared(
     TimeOverError
         The body is so large that the time was over before it was condensed.
     """
-    way = _way(problem, interval, arithmetic)
+    if problem.modes is None:
+        way, condensed = _way(problem, interval, arithmetic), problem.condensed
+        certifier = _certifier(problem, way, arithmetic)
+    else:
+        way, condensed = _ByAlgebra(problem, _floating(problem)), on_weak_springs(problem)
+        certifier = FloatingIntervalCertifier(problem, checkable=arithmetic == "verified")
     search = IntervalSearch(
-        problem.condensed,
+        condensed,
         interval,
         way.origin,
-        _certifier(problem, way, arithmetic),
+        certifier,
         max_nodes=max_nodes,
         deadline=limits.deadline,
         progress=_stage(progress, "search"),
@@ -324,6 +332,26 @@ def _way(problem: ContactProblem, interval: tuple[Fraction, Fraction], arithmeti
     return _ByAlgebra(problem, exact)
 
 
+def _floating(problem: ContactProblem) -> ExactCondensed:
+    """The body that nothing holds in rationals; refused if its stiffness on springs is not positive definite."""
+    exact, size = ExactCondensed.floating(problem), 2 * problem.p
+    if not problem.on_springs.condensed.definite:
+        check_definite(fmpq_mat([list(row[:size]) for row in exact.rows[:size]]))
+    return exact
+
+
+def _check_floating(problem: ContactProblem, arithmetic: Arithmetic) -> None:
+    """Refuse what is not there for a body that nothing holds."""
+    if arithmetic == "fast":
+        raise InvalidArgumentError('arithmetic is "fast" for a body that nothing holds; expected "verified" or "exact"')
+    if problem.n > EXACT_DOF_LIMIT:
+        raise TooLargeError(
+            f"branch_graph follows a body that nothing holds in rationals, up to n = {EXACT_DOF_LIMIT} degrees of "
+            f"freedom, and the problem has n = {problem.n}; condense the body to its contact nodes first, or use "
+            "multiplicity_table"
+        )
+
+
 def _exact_work(problem: ContactProblem, candidates: set[Codes]) -> int:
     """What exact algebra of selections costs, roughly, in units of 7e-5 s: (slips whose friction varies + 1) size^3.
 
@@ -387,7 +415,7 @@ def _proof_of_problem(
     followed: Followed | None,
 ) -> Proof | None:
     """The proof for the problem's own data, with the arcs where they can be followed in balls."""
-    if followed is None and (traced := _traced(problem, interval)) is not None:
+    if followed is None and problem.modes is None and (traced := _traced(problem, interval)) is not None:
         followed = follow_selections(traced, pieces)
     whole = followed is None or followed.stopped is None
     return write_graph_proof(problem, interval, "problem", pieces, followed if whole else None)

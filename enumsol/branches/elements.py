@@ -52,6 +52,8 @@ class VertexKind(TextEnum):
     TERMINAL = "terminal"
     #: The degrees of the arcs on both sides do not balance: something is missing, and the graph is not complete.
     BROKEN = "broken"
+    #: The body has moved by the largest rigid displacement that was asked for; beyond, nothing is known.
+    BOUND = "bound"
     #: On the interval's border.
     END = "end"
 
@@ -77,18 +79,20 @@ class Vertex(ContactState):
     alpha : float
         Rounded from ``exact``.
     kind : VertexKind
-        "transition", "fold", "bifurcation", "family", "sheet", "touch", "point", "terminal", "unsettled", "broken" or
-        "end".
+        "transition", "fold", "bifurcation", "family", "sheet", "touch", "point", "terminal", "unsettled", "broken",
+        "bound" or "end".
     border : bool
         It lies at the first or last alpha.
     statuses, active, lambda_n, lambda_t, u_n, u_t
         As in Root. For a family, ``active`` holds every status that occurs on it, and the arrays belong to one point.
     family : RootFamily or None
     index_left, index_right : int or None
-        Sums of the indices of the arcs that end and begin here; equal inside the interval (balance of degrees). None
-        where one is not known, or not all arcs.
+        Sums of the indices of the arcs that end and begin here; equal inside the interval (balance of degrees), but for
+        a vertex at a bound. None where one is not known, or not all arcs.
     selections : tuple of status codes that hold here
     exact : CriticalAlpha
+    bounded : bool
+        Of a body that nothing holds: a solution in it is at the bound of its rigid displacement.
     """
 
     number: int
@@ -100,6 +104,7 @@ class Vertex(ContactState):
     index_right: int | None
     selections: tuple[Codes, ...] = field(repr=False)
     exact: CriticalAlpha = field(repr=False)
+    bounded: bool = field(default=False, repr=False)
 
     @property
     def enclosure(self) -> tuple[Fraction, Fraction]:

@@ -116,13 +116,18 @@ class BranchGraph(GraphData):
 
     @property
     def jumps(self) -> tuple[Vertex, ...]:
-        """Settled vertices that no arc leaves to the right: with increasing alpha a branch must be left there."""
+        """Settled vertices that no arc leaves to the right: with increasing alpha a branch must be left there.
+
+        Those at a bound of the rigid displacement are left out.
+        """
         tails = {arc.tail for arc in self.arcs}
         heads = {arc.head for arc in self.arcs}
         return tuple(
             v
             for v in self.vertices
-            if not v.border and v.kind is not VertexKind.UNSETTLED and v.number in heads and v.number not in tails
+            if not (v.border or v.bounded or v.kind is VertexKind.UNSETTLED)
+            and v.number in heads
+            and v.number not in tails
         )
 
     # -- solutions at one alpha ------------------------------------------------------------------------------------
@@ -201,7 +206,7 @@ class BranchGraph(GraphData):
 
     @property
     def uniqueness_limit(self) -> float | None:
-        """The critical alpha: the solution is unique from the interval's first alpha up to it; None when throughout.
+        """The critical alpha: there is one solution from the interval's first alpha up to it; None when throughout.
 
         Raises
         ------
@@ -218,8 +223,11 @@ class BranchGraph(GraphData):
     def uniqueness_bound(self) -> float | None:
         """An alpha up to which uniqueness follows without any search (theory, section 5.6), if there is one.
 
-        F^2 lmax((S^-1)_nn) lmax(S_tt) < 1 at every contact node; evaluated in floats.
+        F^2 lmax((S^-1)_nn) lmax(S_tt) < 1 at every contact node; evaluated in floats. None for a body that nothing
+        holds.
         """
+        if self.problem.modes is not None:
+            return None
         return uniqueness_bound(self.problem.condensed, self.interval)
 
     def starting_point(self, branch: Branch) -> Root | None:

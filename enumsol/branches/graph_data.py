@@ -125,7 +125,8 @@ class GraphData(Immutable):
     def claims(self) -> Claims:
         """What is known about the number of solutions: exact counts, or lower bounds for a graph with gaps."""
         whole = Standing.PROVEN if self.complete else Standing.NOT_PROVEN
-        return Claims(self.vertices, self.arcs, self.exact_interval, Standing.INCOMPLETE if self.reasons else whole)
+        standing = Standing.INCOMPLETE if self.reasons else whole
+        return Claims(self.vertices, self.arcs, self.exact_interval, standing, held=self.problem.modes is None)
 
     def completeness(self) -> str:
         """The closing line of the printed summary: whether the graph is complete, and of what, or why not."""
@@ -135,6 +136,8 @@ class GraphData(Immutable):
         if not self.complete:
             return "complete: not proven (degrees balance at every vertex)"
         about = "" if self.certified_data == "problem" else " for S and g as computed"
+        if self.problem.modes is not None:
+            about = f", within rigid displacements of {self.problem.rigid_reach:g}"
         return f"complete: yes (proven{about})"
 
     # -- parts -----------------------------------------------------------------------------------------------------
@@ -180,7 +183,8 @@ class GraphData(Immutable):
     def gaps(self) -> tuple[str, ...]:
         """Violations of the balance of degrees, and vertices that are not settled (theory, (7.3)).
 
-        Each of them proves that something is missing.
+        Each of them proves that something is missing. Of a body that nothing holds, degrees balance only where its
+        rigid displacement is within its bounds, and there is no sum that they must have (theory, section 14.8).
         """
         found, first = [], float(self.exact_interval[0])
         unsettled = sum(v.kind is VertexKind.UNSETTLED for v in self.vertices)
@@ -189,7 +193,12 @@ class GraphData(Immutable):
         for v in self.vertices:
             if v.kind is VertexKind.UNSETTLED:
                 continue
+            if v.bounded:
+                continue  # beyond the bound nothing is known
             if v.index_left is None or v.index_right is None:
+                # where a body slides it may be that of a continuum that reaches the bound
+                if self.problem.modes is not None:
+                    continue
                 found.append(f"vertex {v.number} at alpha = {v.alpha:.17g}: the degree of an arc is not known")
             elif not v.border and v.index_left != v.index_right:
                 found.append(
@@ -198,6 +207,6 @@ class GraphData(Immutable):
                 )
         start = [v.index_right for v in self.vertices if v.border and v.alpha == first]
         total = sum(k for k in start if k is not None)
-        if not self.undecided and None not in start and total != 1:
+        if self.problem.modes is None and not self.undecided and None not in start and total != 1:
             found.append(f"the degrees of all arcs at alpha = {first:g} sum to {total:+d} and not to +1")
         return tuple(found)

@@ -20,7 +20,7 @@ from enumsol.branches.enclosed.make_traced import TracedArcValues
 from enumsol.branches.enclosed.traced import TracedProblem
 from enumsol.branches.exact.make_elements import ExactArcValues
 from enumsol.branches.graph_data import GraphData, GraphStats
-from enumsol.condensation.exact import ExactCondensed
+from enumsol.condensation.exact import ExactCondensed, exact_condensed
 from enumsol.condensation.unloaded import vanishing_alpha
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.mesh import BodyMesh
@@ -114,7 +114,7 @@ def _values(
         traced = TracedProblem(problem, interval, vanishing_alpha(problem, "problem"))
         return None, partial(TracedArcValues, traced)
     exactly = record["condensed_exactly"]
-    exact = ExactCondensed.from_problem(problem) if exactly else ExactCondensed.from_condensed(problem)
+    exact = exact_condensed(problem) if exactly else ExactCondensed.from_condensed(problem)
     return exact, partial(ExactArcValues, exact)
 
 
@@ -128,9 +128,16 @@ def _problem_record(problem: ContactProblem) -> dict[str, Any]:
         "friction": [part.tolist() for part in problem.friction],
         "load_slope": None if problem.load_slope is None else problem.load_slope.tolist(),
         "node_ids": list(problem.node_ids),
+        **_rigid_record(problem),
         "coordinates": None if problem.coordinates is None else problem.coordinates.tolist(),
         "mesh": _mesh_record(problem.mesh),
     }
+
+
+def _rigid_record(problem: ContactProblem) -> dict[str, Any]:
+    if problem.rigid_modes is None:
+        return {}
+    return {"rigid_modes": problem.rigid_modes.tolist(), "max_rigid_displacement": problem.max_rigid_displacement}
 
 
 def _mesh_record(mesh: BodyMesh | None) -> dict[str, Any] | None:
@@ -167,6 +174,8 @@ def _problem(record: dict[str, Any]) -> ContactProblem:
         mesh=None
         if (mesh := record.get("mesh")) is None
         else BodyMesh(mesh["points"], mesh["cells"], matrix(mesh["motion"]), mesh["offset"], lame=mesh.get("lame")),
+        rigid_modes=record.get("rigid_modes"),
+        max_rigid_displacement=record.get("max_rigid_displacement"),
     )
 
 
@@ -187,6 +196,7 @@ def _vertex_record(v: Vertex) -> dict[str, Any]:
     if v.family is not None:
         family = [
             {"statuses": _names(part.statuses), "vertices": part.vertices.tolist(), "dimension": part.dimension}
+            | ({} if part.rigid_coordinates is None else {"rigid_coordinates": part.rigid_coordinates.tolist()})
             for part in v.family.polytopes
         ]
     return {
@@ -204,6 +214,7 @@ def _vertex_record(v: Vertex) -> dict[str, Any]:
         "index_left": v.index_left,
         "index_right": v.index_right,
         "selections": [list(codes) for codes in v.selections],
+        **({"bounded": True} if v.bounded else {}),
     }
 
 
@@ -227,7 +238,12 @@ def _vertex(number: int, item: dict[str, Any], *, balls: bool) -> Vertex:
     family = None
     if item["family"] is not None:
         parts = [
-            Polytope(_statuses(part["statuses"]), np.array(part["vertices"]), part["dimension"])
+            Polytope(
+                _statuses(part["statuses"]),
+                np.array(part["vertices"]),
+                part["dimension"],
+                np.array(part["rigid_coordinates"]) if "rigid_coordinates" in part else None,
+            )
             for part in item["family"]
         ]
         family = RootFamily(item["alpha"], tuple(parts), item["family_index"], vertices_proven=True)
@@ -244,6 +260,7 @@ def _vertex(number: int, item: dict[str, Any], *, balls: bool) -> Vertex:
         index_right=item["index_right"],
         selections=tuple(tuple(codes) for codes in item["selections"]),
         exact=EnclosedAlpha(lo, hi) if balls else CriticalAlpha(poly, lo, hi),
+        bounded=item.get("bounded", False),
     )
 
 

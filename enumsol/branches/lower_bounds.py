@@ -108,7 +108,7 @@ class _Tally:
             self.add(sums.pop() if closed and len(sums) == 1 else None)
 
 
-def least_at(alpha: Fraction, vertices: Sequence[Vertex], arcs: Sequence[Arc]) -> int:
+def least_at(alpha: Fraction, vertices: Sequence[Vertex], arcs: Sequence[Arc], *, held: bool = True) -> int:
     """Lower bound of the number of isolated roots and families at one alpha.
 
     Parameters
@@ -116,10 +116,13 @@ def least_at(alpha: Fraction, vertices: Sequence[Vertex], arcs: Sequence[Arc]) -
     alpha : Fraction
     vertices : sequence of Vertex, each at the place of its number
     arcs : sequence of Arc
+    held : the indices of all solutions add up to +1
     """
     point = CriticalAlpha.rational(rational(alpha))
     settled = [v.kind is not VertexKind.UNSETTLED for v in vertices]
-    tally = _Tally(vertices=[v for v in vertices if settled[v.number] and v.exact.compare(point) == 0])
+    tally = _Tally(
+        index=0 if held else None, vertices=[v for v in vertices if settled[v.number] and v.exact.compare(point) == 0]
+    )
     for arc in arcs:
         begin, end = arc.begin.compare(point), arc.end.compare(point)
         if begin < 0 < end:
@@ -130,7 +133,7 @@ def least_at(alpha: Fraction, vertices: Sequence[Vertex], arcs: Sequence[Arc]) -
 
 
 def least_steps(
-    interval: tuple[Fraction, Fraction], vertices: Sequence[Vertex], arcs: Sequence[Arc]
+    interval: tuple[Fraction, Fraction], vertices: Sequence[Vertex], arcs: Sequence[Arc], *, held: bool = True
 ) -> tuple[list[float], list[int], list[int]]:
     """The lower bound as a step function: floats inside the interval, bounds at them and over all alphas between.
 
@@ -159,7 +162,7 @@ def least_steps(
     known = [v.kind is not VertexKind.UNSETTLED for v in vertices]
     found = []
     for k, (tally, *sums) in enumerate(zip(here, *map(accumulate, (over, graze, index, unknown)), strict=False)):
-        tally.apart, tally.another, tally.index = sums[0], sums[1] > 0, None if sums[3] else sums[2]
+        tally.apart, tally.another, tally.index = sums[0], sums[1] > 0, sums[2] if held and not sums[3] else None
         found.append(tally.least(known, exactly=k % 2 == 0))
     return positions.steps(found)
 

@@ -62,6 +62,7 @@ def write_graph_proof(
             "p": problem.p,
             "data": data,
         }
+        | ({} if problem.modes is None else {"max_rigid_displacement": problem.rigid_reach})
     )
     selections = set()
     leaves = 0

@@ -71,14 +71,14 @@ def _pattern(exact: ExactCondensed, codes: Codes, alpha: Any) -> Any:
 
 def _critical_polynomials(exact: ExactCondensed, codes: Codes) -> list[Any]:
     """Nonzero integer polynomials whose roots include every alpha at which the polytope changes its shape."""
-    p, size = exact.p, 2 * exact.p
+    size = len(exact.rows)
 
     def rows_at(alpha: Any) -> tuple[list[list[Any]], list[list[Any]]]:
         equations, inequalities = FiberSelections(exact, alpha).forms(codes)
         return [[*form, c] for form, c in equations], [[*form, c] for form, c in inequalities]
 
     # a rank that holds for all but finitely many alpha is found at one of more points than the degree of any minor
-    independent = max((_independent_rows(rows_at(fmpq(k))[0]) for k in range(2 * p + 2)), key=len)
+    independent = max((_independent_rows(rows_at(fmpq(k))[0]) for k in range(size + 2)), key=len)
     dimension = size - len(independent)
     count = len(rows_at(fmpq(0))[1])
     if comb(count, dimension) > MAX_SHEET_BASES:

@@ -15,9 +15,9 @@ What a verified proof says
 
 What checker and search share
     The checkers (``checker.verify``, ``checker.graph_checker``, ``checker.history_checker``, ``checker.space_checker``,
-    ``checker.floating``, ``checker.space_floating``) import nothing of the search, neither its trees and relaxations
-    nor its arcs and results, and a test guards that. They
-    are not independent of all that it uses. These serve both, and an error in one of them may write a false proof
+    ``checker.floating``, ``checker.floating_graphs``, ``checker.space_floating``) import nothing of the search, neither
+    its trees and relaxations nor its arcs and results, and a test guards that. They are not independent of all that it
+    uses. These serve both, and an error in one of them may write a false proof
     and accept it:
 
     - ``trusted.status_rows``: the codes, the rows and the branchings that cover, on which writer and reader have to

@@ -41,9 +41,7 @@ class WithinReach(TreeChecker):
         super()._read_header(header)
         if self.data != "problem":
             raise RefusedError("a proof about S and g as computed, of a body that nothing holds")
-        found, reach = header.get("max_rigid_displacement"), self.problem.rigid_reach
-        if not same(found, reach):
-            raise RefusedError(f"its bound of the rigid displacement is {quoted(found)}; the problem's is {reach:g}")
+        check_bound(header, self.problem)
 
     @property
     def _within(self) -> float | None:
@@ -56,6 +54,13 @@ class WithinReach(TreeChecker):
 
     def _declare(self, record: list[Any]) -> None:
         raise RefusedError(f"a record {quoted(record)} that no leaf of this proof can refer to")
+
+
+def check_bound(header: dict[str, Any], problem: Any) -> None:
+    """Refuse a proof about another bound of the rigid displacement."""
+    found, reach = header.get("max_rigid_displacement"), problem.rigid_reach
+    if not same(found, reach):
+        raise RefusedError(f"its bound of the rigid displacement is {quoted(found)}; the problem's is {reach:g}")
 
 
 @dataclass

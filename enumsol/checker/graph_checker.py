@@ -73,7 +73,7 @@ _END = object()
 
 
 @dataclass
-class _Piece:
+class Piece:
     """A piece whose leaves are being read."""
 
     a: Fraction
@@ -119,6 +119,9 @@ class GraphChecker:
         Called with the number of leaves checked after every piece.
     """
 
+    #: A proof may hold arcs, and forms.
+    follows_arcs = True
+
     def __init__(
         self, problem: ContactProblem, header: dict[str, Any], progress: Callable[[int], object] | None
     ) -> None:
@@ -155,11 +158,17 @@ class GraphChecker:
             None if self.arcs is None else self.arcs.arcs,
             0 if self.arcs is None else self.arcs.open,
             len(self._closed),
+            self.within,
         )
+
+    @property
+    def within(self) -> float | None:
+        """Bound of the rigid displacement of a body that nothing holds."""
+        return None
 
     def _check(self, interval: tuple[Fraction, Fraction], records: Iterator[Any]) -> None:
         a, b = interval
-        self._zero = vanishing_alpha(self.problem, self.data)
+        self._zero = self._vanishing()
         ends = [a, self._zero, b] if self._zero is not None and a < self._zero < b else [a, b]
         everything = np.full((1, self.problem.p), UNDECIDED, dtype=np.uint8)
         # pieces in the order in which they are searched, the next one last: halves come directly after what was cut
@@ -171,7 +180,8 @@ class GraphChecker:
             if len(cut):
                 waiting += [((x + y) / 2, y, cut), (x, (x + y) / 2, cut)]
         claim = {"pieces": self.pieces, "leaves": self.leaves, "selections": len(self.selections)}
-        if self.data == "problem" and isinstance(record, dict) and "force" in record and "piece" not in record:
+        follows = self.follows_arcs and self.data == "problem"
+        if follows and isinstance(record, dict) and "force" in record and "piece" not in record:
             origin = self._zero if self._zero is not None and a <= self._zero <= b else None
             checker = ArcChecker(self.problem, self.enclosure, (a, b), origin, self._handed, self._closed, self._fail)
             self.arcs, record = checker.run(record, records)
@@ -188,6 +198,10 @@ class GraphChecker:
     def enclosure(self) -> CondensedEnclosure:
         """Balls for what is certified; only exclusions need them."""
         return as_computed(self.problem) if self.data == "condensed" else CondensedEnclosure.from_problem(self.problem)
+
+    def _vanishing(self) -> Fraction | None:
+        """The alpha at which g vanishes, where the interval is cut first."""
+        return vanishing_alpha(self.problem, self.data)
 
     def _read_header(self) -> tuple[Fraction, Fraction]:
         self.data = data_of(self.header, self.problem, "graph")
@@ -248,15 +262,15 @@ class GraphChecker:
             self.progress(self.leaves)
         return piece.leaves("c"), record
 
-    def _begin(self, record: Any) -> _Piece:
+    def _begin(self, record: Any) -> Piece:
         if not isinstance(record, dict):
             raise ValueError("no piece begins here")  # noqa: TRY004 (as in reading)
         names_only(record, ("piece", "force", "length", "roots"))
         a, b = _interval_from(record["piece"])
         units = units_from(record, self.problem.p)
-        return _Piece(a, b, *units, codes_from(record["roots"], self.problem.p))
+        return Piece(a, b, *units, codes_from(record["roots"], self.problem.p))
 
-    def _read_leaves(self, piece: _Piece, batch: list[list[Any]]) -> None:
+    def _read_leaves(self, piece: Piece, batch: list[list[Any]]) -> None:
         """Record some leaves, the first perhaps a form or the piece's numbers, and check those claimed to be empty."""
         if batch[0][:1] == [_FORM]:
             piece.declare(batch[0])
@@ -296,7 +310,7 @@ class GraphChecker:
                 self._fail(f"leaf {self.leaves + number + 1}: its multipliers do not exclude it")
         self.leaves += len(terms)
 
-    def _with_form(self, piece: _Piece) -> EnclosedPiece:
+    def _with_form(self, piece: Piece) -> EnclosedPiece:
         """The data at both ends of the piece, with the form declared last."""
         enclosed = self._enclosed(piece)
         if piece.declared is None:
@@ -305,16 +319,17 @@ class GraphChecker:
             piece.with_form = enclosed.with_form(piece.declared)
         return piece.with_form
 
-    def _enclosed(self, piece: _Piece) -> EnclosedPiece:
+    def _enclosed(self, piece: Piece) -> EnclosedPiece:
         """The data at both ends of the piece, with S proven positive definite."""
         if piece.enclosed is None:
-            origin = self._zero if self._zero in (piece.a, piece.b) else None
-            piece.enclosed = EnclosedPiece.from_enclosure(
-                self.enclosure, piece.a, piece.b, piece.force, piece.length, origin
-            )
+            piece.enclosed = self._data_on(piece)
             if not all(end.smallest_eigenvalue > 0 for end in piece.enclosed.ends):
                 raise RefusedError("S is not proven positive definite")
         return piece.enclosed
+
+    def _data_on(self, piece: Piece) -> EnclosedPiece:
+        origin = self._zero if self._zero in (piece.a, piece.b) else None
+        return EnclosedPiece.from_enclosure(self.enclosure, piece.a, piece.b, piece.force, piece.length, origin)
 
 
 def _interval_from(ends: Any) -> tuple[Fraction, Fraction]:
@@ -326,7 +341,7 @@ def _interval_from(ends: Any) -> tuple[Fraction, Fraction]:
     return a, b
 
 
-def _check_repetitions(piece: _Piece) -> None:
+def _check_repetitions(piece: Piece) -> None:
     """Refuse a piece that gives a leaf twice: the leaves of a tree are different, and so bounded in number."""
     leaves = piece.leaves()
     if len(np.unique(leaves, axis=0)) < len(leaves):

@@ -105,6 +105,8 @@ class GraphVerificationReport:
         Short intervals of alpha in which the proof leaves open what some selection does.
     closed : int
         Pieces without a tree: their only branch is proven to hold all solutions.
+    within : float or None
+        Of a body that nothing holds: all this is about solutions whose rigid displacement is within this bound.
     """
 
     ok: bool
@@ -117,6 +119,7 @@ class GraphVerificationReport:
     arcs: int | None = None
     open: int = 0
     closed: int = 0
+    within: float | None = None
 
     @property
     def complete(self) -> bool:
@@ -138,6 +141,7 @@ class GraphVerificationReport:
             (
                 f"proof: verified{where}",
                 f"  {found}; every solution lies in one of {counted(len(self.selections), 'selection')}",
+                *([] if self.within is None else [f"  within rigid displacements of {self.within:g}"]),
                 *self._arcs(ends),
                 f"  certified data: {_DATA[self.data]}",
                 f"  complete: {'yes' if self.complete else 'no'}",

@@ -84,8 +84,12 @@ def verify(
         problem.check_held("a history")
         return HistoryChecker(problem, header, checker, progress).run(lines)
     if isinstance(header, dict) and header.get("kind") == "graph" and not in_space:
-        problem.check_held("a graph")
-        return GraphChecker(cast("ContactProblem", problem), header, progress).run(lines)
+        graphs = GraphChecker
+        if problem.modes is not None:
+            from enumsol.checker.floating_graphs import FloatingGraphChecker  # for bodies that nothing holds only
+
+            graphs = FloatingGraphChecker
+        return graphs(cast("ContactProblem", problem), header, progress).run(lines)
     return checker(problem, progress).run(proof)
 
 

@@ -213,16 +213,9 @@ class FloatingExactSystem(ExactSystem):
         TooLargeError
             The problem has more than EXACT_DOF_LIMIT degrees of freedom.
         """
-        held = ExactSystem.from_problem(problem.on_springs, alpha)
-        N = rational_matrix(problem.modes.N)
-        G = (rational_matrix(problem.contact_rows.toarray()) * N).transpose().tolist()
-        slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
-        loads = (N.transpose() * rational_matrix(np.column_stack([problem.f, slope]))).tolist()
-        h = [load + rational(alpha) * change for load, change in loads]
-        S = [[*row, *(mode[k] for mode in G)] for k, row in enumerate(held.S.tolist())]
-        S += [[*mode, *([fmpq(0)] * len(G))] for mode in G]
-        reach = tuple(rational(float(x)) for x in problem.modes.reach(problem.rigid_reach))
-        return cls(fmpq_mat(S), (*held.g, *h), held.F, reach)
+        problem.friction_at(alpha)
+        exact = ExactCondensed.floating(problem)
+        return cls(exact.S, *exact.at(rational(alpha)), exact.reach)
 
     @property
     def contact_compliance(self) -> Any:
@@ -233,7 +226,7 @@ class FloatingExactSystem(ExactSystem):
     def along(self, direction: tuple[Any, ...]) -> FloatingExactSystem:
         """What changes with g along a direction: neither h nor the bounds."""
         zeros = (fmpq(0),) * len(self.reach)
-        return FloatingExactSystem(self.S, (*direction, *zeros), self.F, zeros)
+        return FloatingExactSystem(self.S, (*direction[: 2 * self.p], *zeros), self.F, zeros)
 
 
 def exact_system(problem: Any, alpha: Alpha) -> ExactSystem:
@@ -245,6 +238,8 @@ def exact_system(problem: Any, alpha: Alpha) -> ExactSystem:
 class ExactCondensed:
     """The condensed problem in rationals: w = g0 + alpha g1 - S lambda, F = F0 + alpha F1.
 
+    Of a body that nothing holds S and g are bordered by G and h (theory, section 14.2), and have r rows more.
+
     Attributes
     ----------
     rows : tuple of 2p tuples of 2p fmpq
@@ -255,7 +250,9 @@ class ExactCondensed:
         S and g follow from A, Bn, Bt, f without rounding; otherwise they are the floats computed in CondensedProblem.
     zero : Fraction or None
         The alpha at which g(alpha) = 0, where lambda = 0 is the only solution and every selection holds; found where
-        the checker finds it.
+        the checker finds it. Nothing is special about it where nothing holds the body.
+    reach : tuple of r fmpq
+        Bounds of the coordinates of a rigid displacement; none of a body that is held.
     """
 
     rows: tuple[tuple[Any, ...], ...]
@@ -265,6 +262,26 @@ class ExactCondensed:
     F1: tuple[Any, ...]
     condensed_exactly: bool
     zero: Fraction | None
+    reach: tuple[Any, ...] = ()
+
+    @classmethod
+    def floating(cls, problem: Any) -> ExactCondensed:
+        """That of a body that nothing holds: condensed on springs, with G and h, without any rounding.
+
+        Raises
+        ------
+        TooLargeError
+            The problem has more than EXACT_DOF_LIMIT degrees of freedom.
+        """
+        rows, g0, g1, F0, F1 = _condensed(problem.on_springs)
+        N = rational_matrix(problem.modes.N)
+        G = (rational_matrix(problem.contact_rows.toarray()) * N).transpose().tolist()
+        h = (N.transpose() * fmpq_mat([list(pair) for pair in zip(*_loads(problem), strict=True)])).tolist()
+        bordered = [(*row, *(mode[k] for mode in G)) for k, row in enumerate(rows)]
+        bordered += [(*mode, *([fmpq(0)] * len(G))) for mode in G]
+        reach = tuple(rational(float(x)) for x in problem.modes.reach(problem.rigid_reach))
+        g0, g1 = (*g0, *(load for load, _ in h)), (*g1, *(change for _, change in h))
+        return cls(tuple(bordered), g0, g1, F0, F1, condensed_exactly=True, zero=None, reach=reach)
 
     @classmethod
     def from_problem(cls, problem: CondensedData) -> ExactCondensed:
@@ -304,8 +321,8 @@ class ExactCondensed:
 
     @cached_property
     def unloaded(self) -> bool:
-        """Whether g = 0 for every alpha."""
-        return not self.loaded and all(v == 0 for v in self.g0)
+        """Whether g = 0 for every alpha, so that lambda = 0 is the only solution."""
+        return not self.reach and not self.loaded and all(v == 0 for v in self.g0)
 
     @cached_property
     def frictionless(self) -> tuple[bool, ...]:
@@ -341,7 +358,14 @@ class ExactCondensed:
 
     def system(self, alpha: Any) -> ExactSystem:
         """The condensed problem at an alpha of any exact field."""
+        if self.reach:
+            return FloatingExactSystem(self.S, *self.at(alpha), self.reach)
         return ExactSystem(self.S, *self.at(alpha))
+
+
+def exact_condensed(problem: Any) -> ExactCondensed:
+    """The condensed problem in rationals for all alpha, of a body that is held or not."""
+    return ExactCondensed.from_problem(problem) if problem.modes is None else ExactCondensed.floating(problem)
 
 
 @dataclass(frozen=True)

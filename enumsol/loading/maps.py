@@ -221,7 +221,9 @@ def map_row(
 ) -> MapRow:
     """One row of a map (a module-level function, so that other processes can import it)."""
     started = time.perf_counter()
-    graph = branch_graph(instance_of(make(value), ContactProblem, "the problem that over makes"), interval, **options)
+    problem = instance_of(make(value), ContactProblem, "the problem that over makes")
+    problem.check_held("multiplicity_map")
+    graph = branch_graph(problem, interval, **options)
     steps, uniqueness = graph.claims.steps(), graph.claims.uniqueness()
     arcs = {vertex.number: [] for vertex in graph.folds}  # type: dict[int, list[tuple[str, ...]]]
     for arc in graph.arcs:

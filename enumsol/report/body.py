@@ -36,6 +36,8 @@ def body_record(problem: ContactProblem, scene: Scene | None = None) -> dict[str
     """
     if problem.mesh is None:
         return "The problem has no mesh"
+    if problem.modes is not None:
+        return "Nothing holds the body, and arcs do not say how far it moves as a whole; graph.roots_at(alpha) does"
     shape = body_shape(problem)
     columns = 2 * problem.p + 2
     cells = shape.cells[:, KINDS[2, shape.cells.shape[1]].outline]

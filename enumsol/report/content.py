@@ -10,6 +10,7 @@ import numpy as np
 from enumsol.branches.elements import VertexKind
 from enumsol.branches.figures.curves import QUANTITIES, Curve, curves, side_by_side, state_columns
 from enumsol.branches.figures.marks import colour_of
+from enumsol.branches.figures.panels import family_states
 from enumsol.model.statuses import STATUSES
 from enumsol.report.body import body_record
 
@@ -126,7 +127,6 @@ def _arc(arc: Arc, branch: int, curve: Curve | None) -> dict[str, Any]:
 
 
 def _vertex(v: Vertex, graph: BranchGraph) -> dict[str, Any]:
-    p = graph.problem.p
     record: dict[str, Any] = {
         "number": v.number,
         "alpha": v.alpha,
@@ -139,9 +139,7 @@ def _vertex(v: Vertex, graph: BranchGraph) -> dict[str, Any]:
         "family": None,
     }
     if v.family is not None:
-        condensed = graph.problem.condensed
-        forces = v.family.vertices.transpose(0, 2, 1).reshape(len(v.family.vertices), 2 * p)
-        moves = condensed.g0 + v.alpha * condensed.g1 - forces @ condensed.S
+        forces, moves = family_states(graph.problem, v.alpha, v.family)
         record["family"] = {"f": rounded_list(forces), "w": rounded_list(moves), "dimension": v.family.dimension}
     return record
 

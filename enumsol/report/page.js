@@ -4,6 +4,7 @@ const SYMBOLS = {
   transition: ["circle-open", "transition"], fold: ["square-open", "fold"], bifurcation: ["diamond-open", "bifurcation"],
   touch: ["triangle-down-open", "status met and left again"], point: ["x-thin-open", "single point"],
   family: ["line-ns-open", "continuum"], terminal: ["cross-open", "begins or ends alone"],
+  bound: ["line-ew-open", "at the bound of rigid displacements"],
   broken: ["x", "degrees differ, something is missing"], unsettled: ["y-right-open", "not followed further"],
 };
 const CARDS = 12;

@@ -355,7 +355,8 @@ def roots_of_selections(problem: ContactProblem, alpha: Alpha, selections: Seque
     selections : codes of complete selections
     whole : no others hold
     """
-    solvers = Solvers(problem, alpha, "verified", SIGN_TOLERANCE)
+    kind = Solvers if problem.modes is None else _floating_solvers()
+    solvers = kind(problem, alpha, "verified", SIGN_TOLERANCE)
     return _Selected(solvers, None, None, method="graph").select(selections, whole=whole)
 
 

@@ -148,7 +148,7 @@ class Enumeration(ABC, Generic[_Solvers]):
         """Of a body that nothing holds, within which rigid displacements the solutions are all of them."""
         if problem.modes is None:
             return None
-        return RigidBound(problem.rigid_reach, self.certifier.certified.bounded or self.method == "exhaustive")
+        return RigidBound(problem.rigid_reach, self.certifier.certified.bounded or self.method != "tree")
 
     def _stats(self) -> SearchStats:
         outcome = self.outcome

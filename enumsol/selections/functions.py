@@ -45,7 +45,7 @@ class SelectionFunctions:
     @property
     def _selection(self) -> Selection:
         """Made where it is needed: what a graph keeps holds no arrays that can be written to."""
-        return Selection(self.codes)
+        return Selection(self.codes, len(self.exact.reach))
 
     @cached_property
     def det(self) -> Any:
@@ -130,6 +130,15 @@ class SelectionFunctions:
         F = as_objects([fmpz_poly([a, b]) for a, b in zip(data.F0, data.F1, strict=True)])
         unknowns = as_objects(self.numerators)
         return list(self._selection.forces(unknowns, F, fmpz_poly([]), data.friction_unit))
+
+    def margins(self) -> list[Any]:
+        """What is left of the rigid displacement's bounds on both sides, (2r,), of a body that nothing holds."""
+        data, found = self.exact.integers, []
+        for moved, most in zip(self._forces[2 * self.exact.p :], self.exact.reach, strict=True):
+            # both times the denominators of the bound and of the unit of forces
+            whole, part = most.p * data.force.q * self.det, data.force.p * most.q * moved
+            found += [integer_polynomial(whole + side * part) for side in (-1, 1)]
+        return found
 
     def _displacement(self, row: int) -> Any:
         data = self.exact.integers

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 from flint import fmpq
 
 from enumsol.arithmetic.rationals import to_fraction
-from enumsol.condensation.exact import ExactSystem
 from enumsol.model.statuses import STICK, RowKind
 from enumsol.selections.polytopes import dot
 from enumsol.selections.rational_selections import ExactSelections
@@ -37,8 +36,8 @@ class FiberSelections(ExactSelections):
     """
 
     def __init__(self, exact: ExactCondensed, alpha: Any, push: tuple[Any, ...] | None = None) -> None:
-        g, F = exact.at(alpha)
-        super().__init__(ExactSystem(exact.S, g if push is None else push, F))
+        system = exact.system(alpha)
+        super().__init__(system if push is None else system.along(push))
         self.exact, self.alpha = exact, alpha
         self.F_positive = tuple(not without for without in exact.frictionless)
 

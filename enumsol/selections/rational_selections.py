@@ -187,7 +187,8 @@ class ExactSelections:
         if found is not None:
             # of a convex set that lies within the bounds, nothing lies beyond them
             reach, places = self.system.reach, range(2 * self.p, 2 * self.p + self.modes)
-            return any(abs(v[i]) == most for v in found.vertices for i, most in zip(places, reach, strict=True))
+            pairs = [(v[i], most) for v in found.vertices for i, most in zip(places, reach, strict=True)]
+            return any(x in (most, -most) for x, most in pairs)
         equations, inequalities = self.forms(codes)
         own, bounds = inequalities[: -2 * self.modes], inequalities[-2 * self.modes :]
         # (s x, s) with a solution x anywhere and some 0 < s <= 1 such that s x is within the bounds

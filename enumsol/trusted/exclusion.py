@@ -15,7 +15,7 @@ in alpha (see ``trusted.over_interval``). ``trusted.energy_bounds`` has the boun
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
@@ -161,14 +161,14 @@ def _margins(
         # where friction is constant a cone row may be an equation, and its coefficient must be the exact one
         c_rad[:, :p] += np.max([end.F_rad for end in ends], axis=0) * (low == high) * cone_size
         c_rad *= SAFE
-        bounds = [_bounds(end, y, c, c_rad, errors) for end in ends]
-        least = np.min(bounds, axis=0)
+        if isinstance(ends[0], FloatingSystem):
+            least = floating_bounds(cast("Sequence[FloatingSystem]", ends), y, c, c_rad, errors)
+        else:
+            least = np.min([_bounds(end, y, c, c_rad, errors) for end in ends], axis=0)
     return np.where(refused | ~np.isfinite(least), -np.inf, least)
 
 
 def _bounds(end: EnclosedSystem | EnclosedForm, y: Array, c: Array, c_rad: Array, errors: float) -> Array:
     if isinstance(end, EnclosedForm):
         return form_bounds(end, y, c, c_rad, errors)
-    if isinstance(end, FloatingSystem):
-        return floating_bounds(end, y, c, c_rad, errors)
     return energy_bounds(end, y, c, c_rad, errors)

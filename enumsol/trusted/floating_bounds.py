@@ -28,22 +28,65 @@ if TYPE_CHECKING:
     from enumsol.condensation.floating import FloatingSystem
 
 
-def floating_bounds(system: FloatingSystem, y: Array, c: Array, c_rad: Array, errors: float = 1.0) -> Array:
-    """Lower bounds on e - h'q for multipliers y (m, 2p) and c, a ball; as energy_bounds."""
+def floating_bounds(ends: Sequence[FloatingSystem], y: Array, c: Array, c_rad: Array, errors: float = 1.0) -> Array:
+    """Lower bounds on e - h'q for multipliers y (m, 2p) and c, a ball; as energy_bounds.
+
+    At one alpha, or for all between two, at which g and h are those of the ends (theory, section 14.8).
+    """
     none = np.zeros_like(y)
-    first = bounds_within(system, y, none, c, c_rad, errors)
-    y, change, sure = balanced(system.rows.G, system.rows.h, y, errors)
-    second = bounds_within(system, y, change, c, c_rad, errors, at_balance=True)
-    return np.asarray(np.fmax(first, np.where(sure, second, -np.inf)))
+    # between the ends the bound is concave for multipliers that are the same at both
+    z = np.mean([balancing(end, y, c) for end in ends], axis=0)
+    first = np.min([bounds_within(end, y, none, c, c_rad, errors, z) for end in ends], axis=0)
+    # others are affine between the ends
+    found = [(end, *balanced(end.rows.G, end.rows.h, y, errors)) for end in ends]
+    own = [balancing(end, there, c) for end, there, _, _ in found]
+    second = np.min(
+        [
+            bounds_within(end, there, change, c, c_rad, errors, z, at_balance=True)
+            for (end, there, change, _), z in zip(found, own, strict=True)
+        ],
+        axis=0,
+    )
+    if len(ends) > 1:
+        second = second - _bend(found, own)
+    sure = np.all([exists for *_, exists in found], axis=0)
+    return np.asarray(np.fmax(first, np.where(sure & np.isfinite(second), second, -np.inf)))
+
+
+def _bend(found: Sequence[tuple[FloatingSystem, Array, Array, NDArray[np.bool_]]], z: Sequence[Array]) -> Array:
+    """How far the bound may sag between two ends, (m,), for multipliers that are affine in alpha."""
+    (one, y0, change0, _), (other, y1, change1, _) = found
+    k = gamma(len(one.g) + len(one.reach) + 8)
+    turned = np.abs(y1 - y0) + change0 + change1
+    loaded = np.abs(other.g - one.g) + other.g_rad + one.g_rad
+    h0, h1 = one.rows.h, other.rows.h
+    work = turned @ loaded + np.abs(z[1] - z[0]) @ (np.abs(h1.mid - h0.mid) + h1.rad + h0.rad)
+    return np.asarray(0.25 * work * (1 + k) * SAFE * SAFE + TINY)
+
+
+def balancing(system: FloatingSystem, y: Array, c: Array) -> Array:
+    """Multipliers z of G lambda - h, (m, r), that are good for these y and c; any z is a choice."""
+    G, h = system.rows.G.mid, system.rows.h.mid
+    z = (2 * h - (system.g + c) @ system.inverse.T @ G.T - y @ G.T) @ system.mode_inverse
+    return np.where(np.isfinite(z), z, 0.0)
 
 
 def bounds_within(
-    system: FloatingSystem, y: Array, y_rad: Array, c: Array, c_rad: Array, errors: float, *, at_balance: bool = False
+    system: FloatingSystem,
+    y: Array,
+    y_rad: Array,
+    c: Array,
+    c_rad: Array,
+    errors: float,
+    z: Array | None = None,
+    *,
+    at_balance: bool = False,
 ) -> Array:
     """Lower bounds on e - h'q for a y and a c, both balls, within the bounds of the rigid displacement.
 
     ``at_balance``: for the y of the ball with G y = h, which are known to exist, at any displacement.
     """
+    z = balancing(system, y, c) if z is None else z
     h, h_rad, k = system.rows.h.mid, system.rows.h.rad, gamma(2 * len(system.g) + 8)
     G, G_rad = system.rows.G.mid, system.rows.G.rad
     y_abs, bounds = np.abs(y), np.zeros(len(y))
@@ -53,9 +96,6 @@ def bounds_within(
         price = (moved + errors * slack * (1 + k) * SAFE) * SAFE
         # a mode without load that moves no contact node costs nothing, whatever its bound
         bounds -= np.where(price > 0, price * system.reach, 0.0).sum(axis=1) * (1 + k) * SAFE
-    # any z is a choice
-    z = (2 * h - (system.g + c) @ system.inverse.T @ G.T - y @ G.T) @ system.mode_inverse
-    z = np.where(np.isfinite(z), z, 0.0)
     z_abs = np.abs(z)
     size = np.abs(c) + z_abs @ np.abs(G)
     all_c, all_c_rad = c + z @ G, (c_rad + z_abs @ G_rad + k * size) * (1 + k) * SAFE

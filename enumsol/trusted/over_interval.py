@@ -18,6 +18,7 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE
 from enumsol.condensation.enclosure import CondensedEnclosure
+from enumsol.condensation.floating import FloatingSystem, RigidRows
 from enumsol.trusted.quadratic_forms import EnclosedForm
 from enumsol.trusted.status_rows import BACKWARD, FORWARD, ROW_KINDS, STILL, UNDECIDED, row_table
 
@@ -84,6 +85,22 @@ class EnclosedPiece:
         elif enclosure.problem.load_slope is None:
             systems = systems[:1]
         return cls(tuple(systems), low, high)
+
+    @classmethod
+    def floating(cls, problem: ContactProblem, a: Fraction, b: Fraction, force: Array, length: Array) -> EnclosedPiece:
+        """A piece [a, b] of a body that nothing holds (theory, section 14.8).
+
+        Raises
+        ------
+        NotEnclosedError
+            Something over- or underflows.
+        """
+        held = cls.from_enclosure(problem.on_springs.enclosure, a, b, force, length, None)
+        ends = tuple(
+            FloatingSystem.on(end, RigidRows.of(problem, alpha, force, length))
+            for end, alpha in zip(held.ends, (a, b), strict=False)
+        )
+        return replace(held, ends=ends)
 
     def with_form(self, multipliers: Array) -> EnclosedPiece:
         """The same with a form for all alpha of the piece: with F_lo in place of F (theory, section 7.9).

@@ -130,7 +130,8 @@ def _truss(rng):
 
 
 def rational(value):
-    return fmpq(*Fraction(float(value)).as_integer_ratio())
+    exact = value if isinstance(value, Fraction) else Fraction(float(value))
+    return fmpq(*exact.as_integer_ratio())
 
 
 class Oracle:

@@ -43,6 +43,7 @@ class GluedVertex:
     solutions : polytopes of the singular selections (empty at an isolated point)
     solver : FiberSelections of those polytopes, or None
     settled : every selection that holds there is known, and with it every arc that ends there
+    bounded : it reaches a bound of the rigid displacement
     """
 
     alpha: CriticalAlpha
@@ -51,6 +52,7 @@ class GluedVertex:
     solutions: list[SelectionSolution] = field(default_factory=list)
     solver: FiberSelections | None = None
     settled: bool = True
+    bounded: bool = False
 
     @property
     def dimension(self) -> int:
@@ -272,6 +274,7 @@ def _vertices(groups: Sequence[list[SelectionEvent]]) -> list[GluedVertex]:
             active = tuple(frozenset().union(*sets) for sets in zip(*(event.active for event in events), strict=True))
             settled = all(event.settled for event in events)
             vertex = GluedVertex(equal[0], sorted(event.codes for event in events), active, settled=settled)
+            vertex.bounded = any(event.bounded for event in events)
             for event in events:
                 event.vertex = len(vertices)
                 if event.polytope is not None:
@@ -326,6 +329,6 @@ def _component(known: KnownSelections, codes: Codes, sample: Any) -> RootCompone
         known.complain(f"selection {codes} should hold at alpha = {sample} and does not")
         return None
     component = connected_components([solution], solver)[0]
-    if component.index is None:
+    if component.index is None and not known.exact.reach:
         known.complain(f"the degree of a degenerate arc near alpha = {sample} could not be found")
     return component

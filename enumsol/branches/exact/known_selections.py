@@ -99,6 +99,7 @@ class KnownSelections:
             return True
         if solution is not None:
             event.polytope = (solver, solution)
+            event.bounded = solver.rests_on_reach(event.codes, solution)
         return solution is not None
 
     def _fiber(self, alpha: CriticalAlpha) -> FiberSelections:

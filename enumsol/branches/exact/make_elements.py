@@ -57,9 +57,14 @@ class ExactArcValues:
         point: Any = self._functions.forces_at(rational(alpha))
         if point is None:  # bounded arcs have no poles, but a rounded end may lie beyond the exact one
             point = self._functions.forces_at(rational(self.sample)) or ()
-        g = self.exact.at(rational(alpha))[0]
-        moves = [as_float(a - dot(row, point)) for a, row in zip(g, self.exact.rows, strict=True)]
-        return np.array([as_float(v) for v in point]), np.array(moves)
+        return _as_floats(self.exact, rational(alpha), point)
+
+
+def _as_floats(exact: ExactCondensed, alpha: Any, point: Any) -> Pair:
+    """Contact forces and displacements at a point."""
+    size = 2 * exact.p
+    moves = [as_float(g - dot(row, point)) for g, row in zip(exact.at(alpha)[0][:size], exact.rows, strict=False)]
+    return np.array([as_float(v) for v in point[:size]]), np.array(moves)
 
 
 def make_arcs(gluing: Gluing) -> list[Arc]:
@@ -118,6 +123,7 @@ def _vertex(gluing: Gluing, number: int, glued: GluedVertex, sides: Sides) -> Ve
         glued.members,
         border=border,
         settled=glued.settled,
+        bounded=glued.bounded,
         family=_family(glued, degree, proven=gluing.exact.condensed_exactly),
     )
 
@@ -137,7 +143,7 @@ def _slip_sign(gluing: Gluing, glued: GluedVertex, node: int) -> int:
 
 def _values(gluing: Gluing, glued: GluedVertex) -> Pair:
     """Forces and displacements at a vertex as floats, with exact zeros where the statuses say so."""
-    exact, p = gluing.exact, gluing.exact.p
+    exact = gluing.exact
     if glued.solutions and glued.solver is not None:
         point = glued.solutions[0].vertices[0]
         return glued.solver.forces(point) + 0.0, glued.solver.displacements(point) + 0.0
@@ -151,10 +157,9 @@ def _values(gluing: Gluing, glued: GluedVertex) -> Pair:
             if not gluing.arcs[c].functions.singular
             and (found := gluing.arcs[c].functions.forces_at(alpha)) is not None
         ),
-        (fmpq(0),) * (2 * p),
+        (fmpq(0),) * len(exact.rows),
     )
-    w = np.array([as_float(a - dot(row, point)) for a, row in zip(exact.at(alpha)[0], exact.rows, strict=True)])
-    return with_exact_zeros((np.array([as_float(v) for v in point]), w), glued.active)
+    return with_exact_zeros(_as_floats(exact, alpha, point), glued.active)
 
 
 def _family(glued: GluedVertex, index: int | None, *, proven: bool) -> RootFamily | None:

@@ -44,6 +44,8 @@ class SelectionEvent:
     active : per node all codes that hold on its solutions, once asked for
     settled : bool
         Every selection that holds there is known.
+    bounded : bool
+        A solution there lies at a bound of the rigid displacement of a body that nothing holds.
     vertex : int
         The vertex of the graph it belongs to, once glued; -1 before.
     """
@@ -55,6 +57,7 @@ class SelectionEvent:
     polytope: tuple[FiberSelections, SelectionSolution] | None = None
     active: ActiveSets = ()
     settled: bool = True
+    bounded: bool = False
     vertex: int = -1
 
 
@@ -88,6 +91,8 @@ class SelectionArcs:
     events, cells : lists in the order of alpha
     grazing : bool
         A condition vanishes identically: on its cells other selections hold too.
+    bounded : bool
+        So does what is left of a bound of the rigid displacement.
     """
 
     codes: Codes
@@ -95,6 +100,7 @@ class SelectionArcs:
     events: list[SelectionEvent] = field(default_factory=list)
     cells: list[Cell] = field(default_factory=list)
     grazing: bool = False
+    bounded: bool = False
 
     @property
     def empty(self) -> bool:
@@ -115,7 +121,8 @@ class SelectionArcs:
             if order == 0:
                 return self.events[middle], False
             after, high = (middle + 1, high) if order < 0 else (after, middle)
-        cell, event = self.cells[after - 1], SelectionEvent(self.codes, alpha, self.cells[after - 1].holds)
+        cell = self.cells[after - 1]
+        event = SelectionEvent(self.codes, alpha, cell.holds, bounded=self.bounded)
         self.events.insert(after, event)
         left = rational_between(self.events[after - 1].alpha, alpha)
         right = rational_between(alpha, self.events[after + 1].alpha)
@@ -136,8 +143,14 @@ def selection_arcs(exact: ExactCondensed, codes: Codes, a: Any, b: Any) -> Selec
     if functions.singular:
         return None
     rows = [functions.row(kind, i) for i, code in enumerate(codes) for kind in _required(code)]
+    margins = functions.margins()
     arcs = SelectionArcs(codes, functions, grazing=any(row.is_zero() for row in rows))
+    arcs.bounded = any(margin.is_zero() for margin in margins)
     rows = [row for row in rows if not row.is_zero()]
+    contact = len(rows)
+    rows += [margin for margin in margins if not margin.is_zero()]
+    # as on weak springs (theory, section 14.2)
+    side = -1 if len(exact.reach) % 2 else 1
     points = _critical_points(functions.det, rows, a, b)
     if points is None:
         return arcs
@@ -151,7 +164,7 @@ def selection_arcs(exact: ExactCondensed, codes: Codes, a: Any, b: Any) -> Selec
         at = rational_between(left.alpha, right.alpha)
         det = sign(functions.det(at))
         signs.append([det * sign(row(at)) for row in rows])
-        arcs.cells.append(Cell(at, min(signs[-1], default=1) > 0, det))
+        arcs.cells.append(Cell(at, min(signs[-1], default=1) > 0, side * det))
     for k, (event, zero) in enumerate(zip(arcs.events, vanishing, strict=True)):
         if any(cell.holds for cell in arcs.cells[max(k - 1, 0) : k + 1]):
             event.holds = True
@@ -164,6 +177,7 @@ def selection_arcs(exact: ExactCondensed, codes: Codes, a: Any, b: Any) -> Selec
         else:
             det = event.alpha.sign_of(functions.det)
             event.holds = all(det * event.alpha.sign_of(row) >= 0 for row in rows)
+        event.bounded = arcs.bounded or any(k >= contact for k in zero)
     return arcs
 
 

@@ -29,6 +29,7 @@ MARKERS = {
     VertexKind.TOUCH: ("v", "white", "status met and left again"),
     VertexKind.POINT: ("x", GREY, "single point"),
     VertexKind.TERMINAL: ("P", "white", "begins or ends alone"),
+    VertexKind.BOUND: ("|", GREY, "at the bound of rigid displacements"),
     VertexKind.BROKEN: ("X", GREY, "degrees differ, something is missing"),
     VertexKind.UNSETTLED: ("4", GREY, "not followed further"),
 }

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from enumsol.branches.elements import Arc, Vertex
     from enumsol.branches.figures.curves import Curve, CurvePlace, Quantity
     from enumsol.model.problem import ContactProblem
+    from enumsol.roots.root import RootFamily
     from enumsol.roots.root_set import RootSet
 
     Floats = NDArray[np.float64]
@@ -36,16 +37,27 @@ def drawn_range(vertices: Iterable[Vertex], quantity: Quantity) -> Floats:
     return np.asarray(np.ptp(values, axis=0))
 
 
+def family_states(problem: ContactProblem, alpha: float, family: RootFamily) -> tuple[Floats, Floats]:
+    """Forces and displacements at the vertices of a family, (k, 2p) each."""
+    points, modes = family.vertices, problem.modes
+    if modes is not None:
+        points = np.concatenate([part.vertices for part in family.polytopes])
+    condensed = problem.on_springs.condensed
+    forces = points.transpose(0, 2, 1).reshape(len(points), 2 * problem.p)
+    moves = condensed.g0 + alpha * condensed.g1 - forces @ condensed.S
+    if modes is not None:
+        rigid = [part.rigid_coordinates for part in family.polytopes if part.rigid_coordinates is not None]
+        moves = moves + np.concatenate(rigid) @ (problem.contact_rows @ modes.N).T
+    return forces, moves
+
+
 def family_range(problem: ContactProblem, v: Vertex, quantity: Quantity, column: int) -> tuple[float, float]:
     """Smallest and largest value of the quantity at the vertices of a family, or at a single solution."""
     family = v.family
     if family is None:
         value = float(state_columns(quantity, v)[column])
         return value, value
-    condensed, p = problem.condensed, problem.p
-    forces = family.vertices.transpose(0, 2, 1).reshape(len(family.vertices), 2 * p)
-    moves = condensed.g0 + v.alpha * condensed.g1 - forces @ condensed.S
-    values = columns(quantity, forces, moves)[:, column]
+    values = columns(quantity, *family_states(problem, v.alpha, family))[:, column]
     return float(np.min(values)), float(np.max(values))
 
 

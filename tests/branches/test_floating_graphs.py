@@ -1,0 +1,203 @@
+"""Graphs of bodies that nothing holds, against an oracle in rationals that condenses nothing."""
+
+from concurrent.futures import ThreadPoolExecutor
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from helpers.floating_oracle import Oracle, block_on_table, random_body
+from helpers.proof_tools import copied, multipliers, proof_of, records_of, with_multipliers
+
+import enumsol
+
+
+def varying(seed):
+    """A random body of which load or friction depend on alpha."""
+    problem = random_body(seed)
+    if problem.load_slope is None and not np.any(problem.friction[1]):
+        slope = np.random.default_rng(seed + 10**6).integers(-1, 2, problem.n)
+        problem = problem.replace(load_slope=slope.astype(float))
+    return problem
+
+
+def pushed(cells=2, press=1.0, **options):
+    """A block on a table that is pushed: it slides at alpha = 1 and at -1."""
+    data = block_on_table(cells=cells, press=press, **options)
+    return data.replace(load_slope=block_on_table(cells=cells, press=press, push=1.0).f - data.f)
+
+
+def places(graph):
+    """Alphas all over the interval, and those of vertices that are rational numbers of few digits."""
+    low, high = graph.exact_interval
+    between = {low + (high - low) * Fraction(k, 3) for k in range(4)} | {low + (high - low) / 97}
+    exact = {v.enclosure[0] for v in graph.vertices if v.enclosure[0] == v.enclosure[1]}
+    return sorted(between | {alpha for alpha in exact if alpha.denominator < 10**9})
+
+
+def difference_from_oracle(problem, interval, arithmetic):
+    """What a graph says other than the oracle, or None."""
+    graph = enumsol.branch_graph(problem, interval, arithmetic)
+    if not graph.complete:
+        return graph.reasons
+    for alpha in places(graph):
+        oracle = Oracle(problem, alpha)
+        wanted = len(oracle.points), oracle.families
+        roots = graph.roots_at(alpha)
+        if graph.multiplicity_at(alpha) != sum(wanted) or (len(roots), len(roots.families)) != wanted:
+            return alpha, graph.multiplicity_at(alpha), len(roots), len(roots.families), wanted
+        found = [np.concatenate([root.lambda_n, root.lambda_t, root.u]) for root in roots]
+        for row in np.hstack(oracle.forces):
+            if min(np.max(np.abs(one - row)) for one in found) > 1e-7 * (1 + np.max(np.abs(row))):
+                return alpha, "a root is not where it should be"
+    if arithmetic == "exact":
+        return None if graph.proof is None else "a proof of what rationals decided"
+    report = enumsol.verify(problem, graph.proof)
+    return None if report.ok and report.within == problem.rigid_reach else report
+
+
+@pytest.mark.few(2, 6)
+@pytest.mark.parametrize("seed", [3, 8, 14, 17, 28, 31, 35, 38])
+def test_all_solutions_of_random_bodies(seed):
+    assert difference_from_oracle(varying(seed), (0, 2), "exact" if seed == 31 else "verified") is None
+
+
+@pytest.mark.long
+def test_all_solutions_of_many_random_bodies():
+    """Without those with so many free modes that a sheet takes minutes."""
+    problems = {seed: varying(seed) for seed in range(40, 100)}
+    few = {seed: problem for seed, problem in problems.items() if problem.modes.r < 5}
+    found = {seed: difference_from_oracle(problem, (0, 2), "verified") for seed, problem in few.items()}
+    assert not {seed: said for seed, said in found.items() if said is not None}
+
+
+def test_a_block_that_is_pushed_until_it_slides(tmp_path):
+    problem = pushed(max_rigid_displacement=4.0)
+    graph = enumsol.branch_graph(problem, (-2, Fraction(3, 2)))
+    assert graph.complete
+    assert "complete: yes (proven, within rigid displacements of 4)" in repr(graph)
+    alphas, at, between = graph.steps
+    assert (alphas[0], alphas[-1]) == (-2, Fraction(3, 2))
+    assert (at[0], at[-1], between[0], between[-1]) == (0, 0, 0, 0)
+    assert {*at[1:-1], *between[1:-1]} == {1}
+    ends = [v for v in graph.vertices if v.family is not None]
+    assert [v.exact.enclosure() for v in ends] == [(-1, -1), (1, 1)]
+    assert all(v.bounded and v.family.free_modes == (0,) for v in ends)
+    assert graph.uniqueness_limit == -2
+    assert not graph.jumps
+    (said,) = graph.claims.sentences(None)
+    assert said == "no solution at or right above the first alpha; several at or right above alpha = -1"
+    assert (len(graph.roots_at(1.25)), len(graph.roots_at(0.5))) == (0, 1)
+    assert graph.roots_at(0.5).rigid_bound.needed
+    graph.save(tmp_path / "graph.json")
+    again = enumsol.BranchGraph.load(tmp_path / "graph.json")
+    assert again.problem.fingerprint == problem.fingerprint
+    assert again.steps == graph.steps
+    assert repr(again) == repr(graph)
+    assert [v.bounded for v in again.vertices] == [v.bounded for v in graph.vertices]
+    one, other = (g.families[0].polytopes[0].rigid_coordinates for g in (graph, again))
+    assert np.array_equal(one, other)
+    assert np.array_equal(again.roots_at(0.5)[0].u, graph.roots_at(0.5)[0].u)
+
+
+def test_arcs_end_where_the_body_has_moved_as_far_as_was_asked():
+    """Pushed more and more, the block gives way where it touches the table, before it slides."""
+    problem = pushed(max_rigid_displacement=1 / 64)
+    graph = enumsol.branch_graph(problem, (-1.5, 0))
+    assert graph.complete
+    (end,) = (v for v in graph.vertices if v.kind == "bound")
+    assert end.bounded
+    assert (end.index_left, end.index_right) == (0, 1)
+    assert -1.0 < end.alpha < -0.6
+    (root,) = graph.roots_at(end.alpha + 1e-9)
+    assert np.max(np.abs(root.rigid_coordinates) / problem.modes.reach(1 / 64)) == pytest.approx(1, abs=1e-6)
+    assert graph.multiplicity_at(end.alpha - 1e-9) == 0
+    assert graph.claims.uniqueness().none_by == -1.5
+    wider = enumsol.branch_graph(problem.replace(max_rigid_displacement=1 / 8), (-0.99, 0))
+    assert wider.claims.uniqueness().throughout
+    assert not [v for v in wider.vertices if v.kind == "bound"]
+
+
+def test_a_body_that_slides_without_friction_is_a_sheet():
+    problem = block_on_table(cells=1, friction=0.0, max_rigid_displacement=2.0)
+    problem = problem.replace(load_slope=block_on_table(cells=1, press=2.0, friction=0.0).f - problem.f)
+    graph = enumsol.branch_graph(problem, (0, 1))
+    assert graph.complete
+    assert graph.sheets
+    (family,) = graph.roots_at(0.5).families
+    assert family.free_modes == (0,)
+    assert not graph.claims.uniqueness().throughout
+
+
+def test_lower_bounds_of_a_graph_with_gaps_do_not_count_what_only_the_sum_of_indices_implies():
+    problem = pushed()
+    graph = enumsol.branch_graph(problem, (-2, 2), max_nodes=1)
+    assert not graph.complete
+    assert [graph.at_least(alpha) for alpha in (-1.75, 0.5, 1.75)] == [0, 0, 0]
+    assert min(graph.claims.steps().at) == 0
+
+
+@pytest.mark.slow
+def test_pictures_and_a_report(tmp_path):
+    graph = enumsol.branch_graph(pushed(cells=1, max_rigid_displacement=4.0), (0, 1.5))
+    graph.plot(file=tmp_path / "graph.png")
+    enumsol.write_report(graph, tmp_path / "graph.html")
+    assert "within rigid displacements of 4" in (tmp_path / "graph.html").read_text(encoding="utf-8")
+    body = enumsol.gallery.block_on_table(2, 1)
+    enumsol.write_report(enumsol.branch_graph(body, (0, 1)), tmp_path / "meshed.html")
+    assert "Nothing holds the body" in (tmp_path / "meshed.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_with_workers_it_is_the_same():
+    problem = pushed()
+    alone = enumsol.branch_graph(problem, (0, 1.5))
+    with ThreadPoolExecutor(2) as executor:
+        spread = enumsol.branch_graph(problem, (0, 1.5), executor=executor)
+    assert spread.steps == alone.steps
+    assert records_of(spread.proof) == records_of(alone.proof)
+
+
+PROBLEM = pushed(cells=1, max_rigid_displacement=4.0)
+RECORDS = records_of(enumsol.branch_graph(PROBLEM, (-0.5, 0.5)).proof)
+
+
+def refusal(records, problem=PROBLEM):
+    report = enumsol.verify(problem, proof_of(records))
+    assert not report.ok
+    return " ".join(report.failures)
+
+
+def test_a_proof_says_within_which_bound():
+    report = enumsol.verify(PROBLEM, proof_of(RECORDS))
+    assert report.ok
+    assert report.within == 4.0
+    assert "within rigid displacements of 4" in repr(report)
+    records = copied(RECORDS)
+    for bound in (2.0, 8.0, 4, None):
+        records[0]["max_rigid_displacement"] = bound
+        assert "bound of the rigid displacement" in refusal(records)
+    assert "another problem" in refusal(RECORDS, PROBLEM.on_springs)
+    records[0] |= {"max_rigid_displacement": 4.0, "data": "condensed"}
+    assert "S and g as computed" in refusal(records)
+
+
+def _kind(record):
+    return record[0] if isinstance(record, list) else None
+
+
+def test_forged_leaves_are_refused():
+    excluded, survivors = ([place for place, record in enumerate(RECORDS) if _kind(record) == kind] for kind in "xs")
+    assert excluded
+    for place in excluded:
+        rows, values = multipliers(["x", *RECORDS[place][2:]])
+        for forged in ([0.0] * len(values), [-v for v in values]):
+            records = copied(RECORDS)
+            records[place] = ["x", RECORDS[place][1], *with_multipliers(["x", "", ""], rows, forged)[1:]]
+            assert "do not exclude" in refusal(records)
+    for record in (["q", [1.0] * 2, [0.0] * 2, [0.0] * 2, [0.0] * 2], ["m", [1.0] * 2, [1.0] * 2, [0.0] * 2]):
+        records = copied(RECORDS)
+        records.insert(excluded[0], record)
+        assert "unknown kind of record" in refusal(records)
+    records = copied(RECORDS)
+    del records[survivors[0]]
+    assert "do not cover" in refusal(records)
