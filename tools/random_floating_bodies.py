@@ -23,6 +23,17 @@ FIRST = 20_000
 ALPHAS = (0, 0.25, 0.5)
 
 
+COLUMNS = ["bodies", "different", "roots", "with several roots", "with a continuum", "without a solution"]
+
+
+def text_of(found: dict[tuple[int, int], Counter[str]]) -> str:
+    """The table of what was compared so far."""
+    rows = [{"p": p, "modes": r, **{name: row[name] for name in COLUMNS}} for (p, r), row in sorted(found.items())]
+    table = pd.DataFrame(rows)
+    sums = ", ".join(f"{int(table[name].sum())} {name}" for name in COLUMNS)
+    return f"{table.to_string(index=False)}\n{sums}\n"
+
+
 def main() -> int:
     """Run the comparison."""
     sys.path[:0] = [str(TESTS), str(TESTS / "roots")]
@@ -49,17 +60,13 @@ def main() -> int:
             if said is not None:
                 row["different"] += 1
                 sys.stderr.write(f"seed {seed}, {arithmetic}: {said}\n")
-    columns = ["bodies", "different", "roots", "with several roots", "with a continuum", "without a solution"]
-    table = pd.DataFrame(
-        [{"p": p, "modes": r, **{name: row[name] for name in columns}} for (p, r), row in sorted(found.items())]
-    )
-    sums = ", ".join(f"{int(table[name].sum())} {name}" for name in columns)
-    text = f"{table.to_string(index=False)}\n{sums}\n"
+        if given.table is not None and seed % 100 == 99:
+            given.table.write_text(text_of(found), encoding="utf-8")
+    text = text_of(found)
     sys.stdout.write(text)
     if given.table is not None:
-        given.table.parent.mkdir(parents=True, exist_ok=True)
         given.table.write_text(text, encoding="utf-8")
-    return int(table["different"].sum() > 0)
+    return int(any(row["different"] for row in found.values()))
 
 
 if __name__ == "__main__":

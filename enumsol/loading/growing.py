@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.condensation.enclosure import NotEnclosedError
-from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.errors import Interrupted, InvalidArgumentError, NotHeldError
 from enumsol.loading.history import History
 from enumsol.loading.history_data import HistoryData
 from enumsol.loading.refinement import refined
@@ -111,7 +111,8 @@ def histories(
         replace the problem's).
     arithmetic : {"verified", "fast", "exact"}
         Of `enumerate_roots`. "verified": starts are known as balls, and a step is complete only if it is so for every
-        start in its ball. "exact": starts are rationals (2D only). "fast" proves nothing.
+        start in its ball. "exact": starts are rationals (2D only). "fast" proves nothing. A body that nothing holds
+        needs "exact".
     follow : {"all", "nearest"} or callable
         Which roots start the next step. "nearest": the one whose contact nodes are nearest to where the step began. A
         callable gets the root before (None in the first step) and the RootSet, and returns roots or their numbers.
@@ -147,6 +148,8 @@ def histories(
     ------
     InvalidArgumentError
         An argument cannot be used; of a step its number is named.
+    NotHeldError
+        Nothing holds the body, and arithmetic is not "exact" or the problem is one in 3D.
     Interrupted
         On Ctrl-C; ``partial`` is the history as far as it was found.
 
@@ -173,8 +176,12 @@ def histories(
     given: Any = problem
     if not isinstance(given, ContactBody):
         instance_of(given, ContactProblem, "problem")
-    problem.check_held("histories")
     one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
+    if problem.modes is not None and (arithmetic != "exact" or not isinstance(given, ContactProblem)):
+        raise NotHeldError(
+            "histories cannot take a body that nothing holds (rigid_modes is given) but in 2D and in exact arithmetic; "
+            'expected arithmetic="exact", or a body held by supports or springs'
+        )
     if not callable(follow):
         one_of(follow, "follow", ("all", "nearest"))
     tolerance = None if merge is None else nonnegative_number(merge, "merge")
@@ -259,7 +266,7 @@ class _Growing:
         self.ends: dict[Any, SlipStart] = {}
         if search["arithmetic"] != "fast":
             with suppress(NotEnclosedError):
-                _ = problem.enclosure  # made once, for all steps
+                _ = problem.on_springs.enclosure  # made once, for all steps
 
     def run(self) -> HistoryData:
         """Step by step, all starts of one before the next."""

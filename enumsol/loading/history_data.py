@@ -158,8 +158,17 @@ class HistoryData:
         first = self.stages_of(1)
         if self.unique_until:
             until = f"unique until step {self.unique_until}"
-        elif first and first[0].roots.unique is False:
+        elif first and first[0].roots.unique is False and len(first[0].roots):
             until = "not unique in step 1"
         else:
             until = "nothing is known to be unique"
-        return f"complete: {'no' if self.reasons else 'yes (proven)'}, {until}"
+        if not self.reasons and (last := self.stages[-1].step) and not self.nodes_of(last):
+            until += f"; nothing solves step {last}"
+        return f"complete: {'no' if self.reasons else 'yes (proven)'}, {until}{self._within()}"
+
+    def _within(self) -> str:
+        """Of a body that nothing holds, within which rigid displacements."""
+        bounds = [stage.roots.rigid_bound for stage in self.stages if stage.roots.rigid_bound is not None]
+        if not bounds:
+            return ""
+        return f", {next((bound for bound in bounds if bound.needed), bounds[0]).words()}"

@@ -154,15 +154,18 @@ class ContactBody(Immutable):
         without = {"A", *self._rows, "coordinates", "areas", "mesh", "rigid_modes", "max_rigid_displacement"}
         data = {name: getattr(self, name) for name in self.__dataclass_fields__ if name not in without}
         if self._origin is not None:
-            return self._origin.on_springs.replace(**data)  # type: ignore[return-value]
-        rows = (matrix.matrix() for matrix in self._rows.values())
-        try:
-            return type(self)(sp.csc_array(self.A + self.modes.springs()), *rows, **data)
-        except InvalidProblemError as error:
-            raise InvalidProblemError(
-                f"A is singular or indefinite on more than the {self.modes.r} rigid_modes, for springs that hold these "
-                f"leave it so ({error})"
-            ) from None
+            held: Any = self._origin.on_springs.replace(**data)
+        else:
+            rows = (matrix.matrix() for matrix in self._rows.values())
+            try:
+                held = type(self)(sp.csc_array(self.A + self.modes.springs()), *rows, **data)
+            except InvalidProblemError as error:
+                raise InvalidProblemError(
+                    f"A is singular or indefinite on more than the {self.modes.r} rigid_modes, for springs that hold "
+                    f"these leave it so ({error})"
+                ) from None
+        held.__dict__.update(offset_radius=self.offset_radius, exact_offset=self.exact_offset)
+        return held  # type: ignore[no-any-return]
 
     @cached_property
     def rigid_reach(self) -> float:

@@ -143,7 +143,8 @@ class Oracle:
     families : number of connected continua
     """
 
-    def __init__(self, problem, alpha=0):
+    def __init__(self, problem, alpha=0, offset=None):
+        offset = [rational(x) for x in problem.slip_offset] if offset is None else offset
         alpha = rational(alpha)
         self.problem, self.n, self.p = problem, problem.n, problem.p
         A, Bn, Bt = (M.toarray() for M in (problem.A, problem.Bn, problem.Bt))
@@ -161,9 +162,7 @@ class Oracle:
             ln[self.n + i] = lt[self.n + self.p + i] = fmpq(1)
             un = [rational(x) for x in Bn[i]] + [fmpq(0)] * (2 * self.p)
             ut = [rational(x) for x in Bt[i]] + [fmpq(0)] * (2 * self.p)
-            rows.append(
-                ((ln, fmpq(0)), (lt, fmpq(0)), (un, -rational(problem.gap[i])), (ut, -rational(problem.slip_offset[i])))
-            )
+            rows.append(((ln, fmpq(0)), (lt, fmpq(0)), (un, -rational(problem.gap[i])), (ut, -offset[i])))
         self.rows = rows
         self.box = self._box(problem)
         held = [self.polytope([codes]) for codes in product(range(4), repeat=self.p)]

@@ -246,7 +246,6 @@ def test_modes_that_cannot_be_used(change, words):
     [
         lambda problem: enumsol.link_samples(problem, [0, 1]),
         lambda problem: enumsol.follow_all(problem, (0, 1)),
-        lambda problem: enumsol.histories(problem, []),
         lambda problem: enumsol.multiplicity_map(problem, (0, 1), {"friction": [1, 2]}),
         lambda problem: enumsol.solve_tresca(problem, 0, 1),
         lambda problem: enumsol.successive_approximations(problem, 0),
