@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,8 +39,8 @@ class Group:
     pair : Pair or None
     normals : (k, d) array
         Of the boundary, out of the body, also where an obstacle gives the normals of the rows.
-    count, missed : int
-        How many there are, and how many nodes of a pair face nothing.
+    count, missed, shared : int
+        How many there are, how many nodes of a pair face nothing, and how many belong to another contact before.
     """
 
     parts: list[str]
@@ -48,6 +48,7 @@ class Group:
     normals: Floats
     count: int
     missed: int = 0
+    shared: int = 0
 
     def __str__(self) -> str:
         return ", ".join(self.parts) if self.pair is None else f"the pair {self.pair}"
@@ -154,6 +155,7 @@ def _group(
     """Contact nodes with their normals on some facets, and the distances to what they face."""
     dimension = mesh.points.shape[1]
     touching = along(facets) if dimension == 2 else np.unique(contact_nodes(dimension, facets))
+    shared = int(np.sum(np.isin(touching, taken)))
     touching = touching[~np.isin(touching, taken)]
     if pair is None and np.all(held.supports.fixed[touching]):
         raise InvalidArgumentError("contact has no node that clamp or displacement leave free; expected some")
@@ -180,7 +182,8 @@ def _group(
     if pair is None:
         nodes = movable(touching, normals, held.supports)
         return nodes, gaps[nodes.kept], Group(parts, None, own[nodes.kept], len(nodes.nodes))
-    return _paired(body, mesh, touching, normals, held, pair)
+    rows, gaps, group = _paired(body, mesh, touching, normals, held, pair)
+    return rows, gaps, replace(group, shared=shared)
 
 
 def _paired(

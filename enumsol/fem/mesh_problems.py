@@ -131,7 +131,8 @@ def mesh_problem(
     -------
     ContactProblem or ContactProblem3D
         With ``coordinates``, ``mesh`` and, as ``node_ids``, the numbers of the nodes in the mesh; in 3D also with
-        ``areas``.
+        ``areas``. What may be meant otherwise is in its ``notes``, a tuple of sentences: nodes of a pair that face
+        nothing, for example, have no contact.
 
     Raises
     ------

@@ -10,12 +10,15 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.fem.basis_problems import outward_normal
 from enumsol.fem.pairs import faced
 from enumsol.model.cells import boundary_facets
+from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
 #: Share of the contact nodes of a part that may touch another body before that is refused as a wall between both.
 _WALL = 0.5
+#: Nodes nearer to each other than this share of the extent of the mesh are at the same place.
+_SAME = 1e-9
 #: Press fits and given displacements above this part of the extent of the largest body are not small.
 _SMALL = 0.25
 #: Strains by loads above this come from wrong units: ten times the length of the body.
@@ -38,9 +41,12 @@ def refuse_walls(scene: Any) -> None:
     """
     mesh, dimension = scene.mesh, scene.dimension
     group = scene.contacts.groups[0]
-    if len(scene.pieces) < 2 or group.pair is not None or scene.options["obstacle"] is not None:
+    if group.pair is not None or scene.options["obstacle"] is not None:
         return
     nodes = scene.contacts.rows.nodes[: group.count]
+    _refuse_cracks(scene, nodes, group.parts)
+    if len(scene.pieces) < 2:
+        return
     boundary = boundary_facets(dimension, mesh.cells)
     for piece in scene.pieces:
         own = piece.nodes[nodes]
@@ -63,9 +69,36 @@ def refuse_walls(scene: Any) -> None:
                 )
 
 
+def _refuse_cracks(scene: Any, nodes: Any, parts: list[str]) -> None:
+    """Refuse parts that are a face of a crack: nodes of the same body are where theirs are."""
+    from scipy.spatial import cKDTree  # not needed for paths that read no mesh
+
+    mesh, boundary = scene.mesh, np.unique(boundary_facets(scene.dimension, scene.mesh.cells))
+    near = _SAME * float(np.max(np.ptp(mesh.points, axis=0)))
+    pairs = cKDTree(mesh.points[nodes]).query_ball_tree(cKDTree(mesh.points[boundary]), near)
+    body = np.zeros(len(mesh.points), dtype=np.int64)
+    for number, piece in enumerate(scene.pieces):
+        body[piece.nodes] = number
+    twins = [
+        [k for k in boundary[found] if k != node and body[k] == body[node]]
+        for node, found in zip(nodes, pairs, strict=True)
+    ]
+    doubled = np.array([bool(found) for found in twins])
+    for part in parts:
+        own = np.isin(nodes, mesh.nodes(part))
+        if np.any(doubled & own) and np.sum(doubled & own) >= _WALL * np.sum(own):
+            beside = np.unique([k for found, mine in zip(twins, own, strict=True) if mine for k in found])
+            names = [name for name, rows in mesh.facets.items() if np.all(np.isin(beside, rows))]
+            other = min(names, key=lambda name: len(mesh.facets[name]), default="OTHER")
+            raise InvalidArgumentError(
+                f"contact names {part}, a face of a crack whose other face {'is ' + other if names else 'coincides'}, "
+                f"and would put a rigid wall into the crack; expected the pair {part}:{other}"
+            )
+
+
 def scene_notes(scene: Any) -> list[str]:
     """What may be meant otherwise."""
-    checks = (_unfaced, _alone, _rest, _loaded_contact, _reach, _units, _friction)
+    checks = (_unfaced, _shared, _alone, _rest, _loaded_contact, _reach, _units, _friction)
     return [note for check in checks for note in check(scene)]
 
 
@@ -76,6 +109,16 @@ def _unfaced(scene: Any) -> list[str]:
         f"{group.pair.master} and have no contact"
         for group in scene.contacts.groups
         if group.missed
+    ]
+
+
+def _shared(scene: Any) -> list[str]:
+    """Nodes of pairs that have the contact of another one."""
+    return [
+        f"{counted(group.shared, 'node')} of {group.pair.slave} {'belong' if group.shared > 1 else 'belongs'} to "
+        f"another contact before, and not to the pair {group.pair}"
+        for group in scene.contacts.groups
+        if group.shared
     ]
 
 

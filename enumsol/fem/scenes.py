@@ -164,12 +164,14 @@ class Scene:
         axes = _axes(nodes, options["axis"], self.dimension)
         more |= _moved(nodes, axes, offset, more["gap"])
         slopes = self.slope.ravel() if np.any(self.slope) else None
-        return problem_of(
+        problem = problem_of(
             *(A, self.forces.ravel(), slopes, plain_dofs(mesh.points.shape), nodes, axes, supports),
             modes=modes,
             mesh=lambda left: BodyMesh.of_dofs(mesh.points, mesh.cells, left, offset, surface, lame=self.lame),
             **more,
         )
+        problem.__dict__["notes"] = tuple(self.notes)
+        return problem
 
     def _modes(self, more: dict[str, Any]) -> Floats | None:
         """Rigid motions that nothing holds, if that is asked for; their bound is put to the other arguments."""

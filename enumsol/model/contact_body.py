@@ -68,6 +68,8 @@ class ContactBody(Immutable):
     rigid_modes: Floats | None = None
     max_rigid_displacement: float | None = None
     mesh: BodyMesh | None = None
+    #: What of a scene (``fem.mesh_problem``) may be meant otherwise; copies with other data have none.
+    notes: tuple[str, ...] = ()
     __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
 
     def __init_subclass__(cls) -> None:
@@ -342,9 +344,9 @@ class ContactBody(Immutable):
             f"  load                {load},  max |f| = {np.max(np.abs(self.f)):.4g}\n"
             f"  gap                 {span(self.gap)}"
         )
-        if self.modes is None:
-            return text
-        return f"{text}\n  rigid modes         {self.modes.r}, of displacements up to {self.rigid_reach:g}"
+        if self.modes is not None:
+            text += f"\n  rigid modes         {self.modes.r}, of displacements up to {self.rigid_reach:g}"
+        return "\n".join([text, *(f"  note                {note}" for note in self.notes)])
 
     def __getstate__(self) -> dict[str, Any]:
         # the factorization (SuperLU) cannot be pickled; workers that need it compute it again

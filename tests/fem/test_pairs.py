@@ -316,6 +316,9 @@ def test_a_node_of_two_contacts_belongs_to_the_first():
     mesh = together(("block", shifted(grid(2, 2, 4), (0, 1))), ("floor", floor), ("wall", shifted(wall, (-1, 1))))
     data = {**STEEL, "clamp": ["block.right", "floor.bottom", "wall.left"], "friction": 0.3}
     problem = fem.mesh_problem(mesh, **data, pairs=[("block.bottom", "floor.top"), ("block.left", "wall.right")])
+    shared = "1 node of block.left belongs to another contact before, and not to the pair block.left:wall.right"
+    assert shared in problem.notes
+    assert f"note                {shared}" in repr(problem)
     assert len(set(problem.node_ids)) == problem.p == 3 + 2
     assert np.allclose(sorted(problem.coordinates.tolist()), [[0, 1], [0, 1.5], [0, 2], [0.5, 1], [1, 1]])
 
@@ -335,6 +338,10 @@ def test_a_node_at_which_both_parts_end_has_no_contact():
     mesh = fem.PartedMesh(points, cells, facets)
     problem = fem.mesh_problem(mesh, **STEEL, pairs=[("above", "below")], clamp="right", friction=0.3)
     assert problem.node_ids == (9,)
+    # the tip is where both faces end; a foundation would be a wall in the crack
+    for part, other in (("above", "below"), ("below", "above")):
+        with pytest.raises(enumsol.InvalidArgumentError, match=rf"{part}, a face of a crack .*the pair {part}:{other}"):
+            fem.mesh_problem(mesh, **STEEL, contact=part, clamp="right", friction=0.3)
 
 
 def test_displacements_that_are_given_on_the_other_body_are_gaps():
@@ -402,7 +409,7 @@ def test_bodies_that_share_their_nodes_are_one_body():
     flat = grid(2, 2, 4)
     facets = {**flat.facets, "one": np.array([[3, 4]]), "two": np.array([[4, 3]])}
     mesh = fem.PartedMesh(flat.points, flat.cells, facets)
-    with pytest.raises(InvalidArgumentError, match="no facet on the boundary"):
+    with pytest.raises(InvalidArgumentError, match="not a facet on the boundary"):
         fem.mesh_problem(mesh, **STEEL, pairs=[("one", "two")], clamp="top")
 
 
