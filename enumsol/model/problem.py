@@ -64,7 +64,8 @@ class ContactProblem(ContactBody):
     rigid_modes : (n, r) array_like or None
         Of a body that nothing holds: all displacements, one in a column, that A offers no resistance to. A is then
         positive semidefinite and A N = 0 within ``1e-9 |A| |N|`` (theory, section 14). `enumerate_roots`, `is_unique`,
-        `multiplicity_table`, `verify`, `newton`, `follow` and exact `histories` take such a body, all else refuses it.
+        `multiplicity_table`, `verify`, `newton`, `follow`, in 2D also `branch_graph` and exact `histories` take such a
+        body, all else refuses it.
     max_rigid_displacement : float or None
         Solutions are sought whose rigid displacement N q, at the degrees of freedom where it equals u, has no component
         above this [length]. Default: ten times the size of the mesh, or of the contact nodes' ``coordinates``; without
