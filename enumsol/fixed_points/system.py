@@ -37,10 +37,11 @@ def checked_problem(value: Any) -> Problem:
     InvalidArgumentError
         It is neither.
     NotHeldError
-        Nothing holds the body.
+        Nothing holds the body: its Tresca problems need not have solutions.
     """
     if isinstance(value, (ContactProblem, ContactProblem3D)):
-        value.check_held("a fixed point")
+        # theory, section 14.9
+        value.check_held("a fixed point", "for given bounds of friction may be too small to balance its load")
         return value
     raise InvalidArgumentError(f"problem is a {type(value).__name__}; expected a ContactProblem or a ContactProblem3D")
 
