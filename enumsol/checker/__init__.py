@@ -31,6 +31,7 @@ What checker and search share
       for G and h; ``trusted.floating_bounds``, what multipliers prove, and ``trusted.confinement``, beyond which bounds
       there are no solutions;
     - ``trusted.at_alpha``: the verified solve of a selection and the contradiction of its equations;
+      ``trusted.precise_at_alpha``, the same solve with many digits, loaded where double arithmetic does not decide;
     - ``trusted.uniqueness``, the test by which a subtree is closed by its only possible solution, and which of these
       solutions are the same; ``trusted.uniqueness_in_contact``, the test that a root is alone below an assignment;
       ``trusted.uniqueness_weights``, the form of both, and ``arithmetic.ball_arrays``, their linear systems of balls;

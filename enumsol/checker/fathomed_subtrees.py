@@ -5,12 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from flint import fmpq_mat
 
 from enumsol.arithmetic.balls import SAFE
 from enumsol.arithmetic.rationals import to_fraction
 from enumsol.proof.reading import same
-from enumsol.trusted.status_rows import BACKWARD, CONTACT, FORWARD, OPEN, STICK
+from enumsol.trusted.status_rows import BACKWARD, CONTACT, FORWARD, OPEN
 from enumsol.trusted.uniqueness import closed_solution, only_solution, same_solution
 
 if TYPE_CHECKING:
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from enumsol.checker.rational import RationalSystem
+    from enumsol.checker.rational import RationalBody
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.proof.records import Closed, ClosedInRationals
     from enumsol.trusted.uniqueness import ClosedSolution
@@ -57,17 +56,17 @@ def _solution(system: EnclosedSystem, said: Closed, force: Array) -> ClosedSolut
 
 
 def closed_in_rationals(
-    system: EnclosedSystem, rational: RationalSystem, codes: Codes, said: ClosedInRationals
+    system: EnclosedSystem, rational: RationalBody, codes: Codes, said: ClosedInRationals
 ) -> tuple[str | None, list[Any]]:
     """Why a record proves nothing, or None; and its root, if it holds one."""
     selection, free = said.selection, said.free(codes)
     slides = {i: code for i, code in enumerate(codes) if code in (FORWARD, BACKWARD)}
     named = tuple(slides.get(i, code) for i, code in enumerate(selection))
-    point = _point(rational, selection)
+    point = rational.point(selection)
     if point is None:
         return "its selection is singular", []
-    w = _displacements(rational, point)
-    least = {i: min(rational.node_conditions(selection[i], i, point)) for i in range(rational.p)}
+    w = rational.moved(point)
+    least = {i: rational.least(selection[i], i, point) for i in range(rational.p)}
     if any(least[i] < 0 for i in free) or any(w[i] > 0 if selection[i] == OPEN else point[i] < 0 for i in slides):
         return "the point of its selection does not solve the reduced problem", []
     if not only_solution(system, named, free, said.weights, point, w):
@@ -91,31 +90,3 @@ def count_apart(closed: dict[Codes, ClosedSolution], others: list[Codes]) -> tup
         kept += 1
         known.append((core, ball.possible))
     return kept, doubtful
-
-
-def _point(rational: RationalSystem, selection: Codes) -> list[Any] | None:
-    """The only solution of a selection's equations; None where they are singular."""
-    p, S = rational.p, rational.S
-    closed = [i for i, code in enumerate(selection) if code != OPEN]
-    held = [p + i for i, code in enumerate(selection) if code == STICK]
-    rows, point = closed + held, [rational.zero] * (2 * p)
-    if not rows:
-        return point
-    turn = [{2: rational.F[i], 3: -rational.F[i]}.get(selection[i], rational.zero) for i in closed]
-    table = [
-        [S[r, i] + f * S[r, p + i] for i, f in zip(closed, turn, strict=True)] + [S[r, k] for k in held] for r in rows
-    ]
-    try:
-        y = fmpq_mat(table).solve(fmpq_mat([[rational.g[r]] for r in rows])).entries()
-    except ZeroDivisionError:
-        return None
-    for i, f, force in zip(closed, turn, y, strict=False):
-        point[i], point[p + i] = force, f * force
-    for k, force in zip(held, y[len(closed) :], strict=True):
-        point[k] = force
-    return point
-
-
-def _displacements(rational: RationalSystem, point: list[Any]) -> list[Any]:
-    moved = (rational.S * fmpq_mat([[x] for x in point])).entries()
-    return [g - x for g, x in zip(rational.g, moved, strict=True)]

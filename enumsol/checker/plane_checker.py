@@ -31,11 +31,13 @@ from enumsol.trusted.uniqueness_in_contact import lone_root
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from enumsol.checker.rational import RationalSystem
+    from enumsol.checker.hull import Hull
+    from enumsol.checker.rational import RationalBody, RationalSystem
     from enumsol.checker.walk import Codes, Test
     from enumsol.proof.records import EnclosureRecord, Record
     from enumsol.trusted.at_alpha import VerifiedSelection
     from enumsol.trusted.exclusion import Terms
+    from enumsol.trusted.precise_at_alpha import PreciseAtAlpha
     from enumsol.trusted.uniqueness import ClosedSolution
 
     #: codes of a selection, the vertices of its root set, and its dimension
@@ -126,17 +128,32 @@ class Checker(TreeChecker):
     @cached_property
     def rational(self) -> RationalSystem:
         """The condensed problem in rationals; computed only if a leaf needs it."""
+        self._allow_rationals()
+        from enumsol.checker.rational import RationalSystem  # python-flint, not always needed
+
+        return RationalSystem(self.problem, self.alpha, definite=self._definite)
+
+    @cached_property
+    def _body(self) -> RationalBody:
+        """The problem in rationals, not condensed: all that single points need."""
+        self._allow_rationals()
+        from enumsol.checker.rational import RationalBody  # python-flint, not always needed
+
+        return RationalBody(self.problem, self.alpha)
+
+    def _allow_rationals(self) -> None:
         if self.data == "condensed":
             raise RefusedError("a rational leaf in a proof about S and g as computed")
         if not self.problem.known_exactly:
             raise RefusedError("a rational leaf in a proof about a problem whose slip offset is a ball")
-        from enumsol.checker.rational import RationalSystem  # python-flint, not always needed
 
+    @cached_property
+    def _definite(self) -> bool:
+        """S is proven positive definite by balls."""
         try:
-            definite = self.system.smallest_eigenvalue > 0
+            return self.system.smallest_eigenvalue > 0
         except (NotEnclosedError, RefusedError):
-            definite = False
-        return RationalSystem(self.problem, self.alpha, definite=definite)
+            return False
 
     def _flush(self, *, last: bool) -> None:
         """Check the dual inequalities of the waiting leaves together."""
@@ -164,7 +181,7 @@ class Checker(TreeChecker):
         # as the kernel has it
         friction = (self.system.F > 0).tolist()
         if kind is records.ClosedInRationals:
-            _ = self.rational  # refused before the record is read
+            _ = self._body  # refused before the record is read
         return records.Limits(codes, friction)
 
     def _declare(self, record: list[Any]) -> None:
@@ -208,13 +225,32 @@ class Checker(TreeChecker):
         self._by_forms.add(self.leaves, codes, said)
         return None
 
+    def _solved(self, codes: Codes) -> VerifiedSelection | None:
+        """The verified solution of a complete selection, in many digits where double arithmetic leaves it open."""
+        ball = solve_selection(self.system, codes)
+        if ball is not None and (ball.is_root or ball.is_excluded):
+            return ball
+        return (None if self._precise is None else self._precise.solve(codes)) or ball
+
+    @cached_property
+    def _precise(self) -> PreciseAtAlpha | None:
+        """The problem in many digits; None where that is not to be had, or the proof is about S and g as computed."""
+        if self.data == "condensed" or self.problem.modes is not None:
+            return None
+        from enumsol.trusted.precise_at_alpha import PreciseAtAlpha  # python-flint, not always needed
+
+        return PreciseAtAlpha.of(self.problem, self.alpha, self.force, self.length)
+
     def _no_root(self, codes: Codes, said: records.NoRoot) -> str | None:
         if holds_no_root(self.system, codes, solve_selection(self.system, codes)):
+            return None
+        ball = self._solved(codes)
+        if ball is not None and ball.is_excluded:
             return None
         return "its candidate does not break a condition strictly, nor do its equations contradict each other"
 
     def _regular_root(self, codes: Codes, said: records.RegularRoot) -> str | None:
-        ball = solve_selection(self.system, codes)
+        ball = self._solved(codes)
         if ball is None:
             return "its selection is not proven regular"
         if not ball.is_root:
@@ -270,12 +306,7 @@ class Checker(TreeChecker):
         """w_t at a point, exactly."""
         from enumsol.arithmetic.rationals import rational  # python-flint, as above
 
-        column = [rational(x) for x in point]
-        rows = self.rational.S.tolist()
-        pairs = zip(rows, self.rational.g, strict=True)
-        return [g - sum((a * x for a, x in zip(row, column, strict=True)), g * 0) for row, g in pairs][
-            len(point) // 2 :
-        ]
+        return self._body.moved([rational(x) for x in point])[len(point) // 2 :]
 
     def _alone(self, codes: Codes, said: records.Alone) -> str | None:
         root = lone_root(self.system, codes, *said.arguments)
@@ -288,7 +319,7 @@ class Checker(TreeChecker):
     def _closed_in_rationals(self, codes: Codes, said: records.ClosedInRationals) -> str | None:
         from enumsol.checker.fathomed_subtrees import closed_in_rationals
 
-        reason, points = closed_in_rationals(self.system, self.rational, codes, said)
+        reason, points = closed_in_rationals(self.system, self._body, codes, said)
         self.polytopes += [(said.selection, points, 0)] if points else []
         return reason
 
@@ -301,14 +332,22 @@ class Checker(TreeChecker):
         return None if positive else "its multipliers do not exclude it in rational arithmetic"
 
     def _no_rational_root(self, codes: Codes, said: records.NoRootInRationals) -> str | None:
-        from enumsol.checker.hull import hull_of_selections
+        return "it holds a root" if self._hull(codes).points else None
 
-        return "it holds a root" if hull_of_selections(self.rational, codes).points else None
+    def _hull(self, codes: Codes) -> Hull:
+        """All that a selection holds; S is computed only where its equations are singular."""
+        from enumsol.arithmetic.rationals import to_fraction
+        from enumsol.checker.hull import Hull, hull_of_selections
+
+        regular = self.problem.modes is None and self._definite
+        point = self._body.point(codes) if regular else None
+        if point is None:
+            return hull_of_selections(self.rational, codes)
+        holds = all(self._body.least(code, i, point) >= 0 for i, code in enumerate(codes))
+        return Hull([tuple(map(to_fraction, point))] if holds else [], 0)
 
     def _root_set(self, codes: Codes, said: records.RootSetRecord) -> str | None:
-        from enumsol.checker.hull import hull_of_selections
-
-        hull = hull_of_selections(self.rational, codes)
+        hull = self._hull(codes)
         # in lowest terms a number has one text: the texts in a file need no conversion
         found = [[fraction_text(x.numerator, x.denominator) for x in point] for point in hull.points]
         if not found or sorted(said.points) != sorted(found) or not same(said.dimension, hull.dimension):

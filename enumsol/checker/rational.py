@@ -1,4 +1,4 @@
-"""The condensed problem in rationals, as the checker computes it; the search has its own code for this."""
+"""A problem in rationals, condensed or not, as the checker computes it; the search has its own code for this."""
 
 from __future__ import annotations
 
@@ -80,11 +80,6 @@ class RationalSystem:
         moved = (fmpq_mat([form for form, _ in rows]) * fmpq_mat([[x] for x in point])).entries()
         return [x + constant for x, (_, constant) in zip(moved, rows, strict=True)]
 
-    def node_conditions(self, code: int, node: int, point: Vector) -> Vector:
-        """The inequalities of a final code at a node, at a point."""
-        rows = [self.row(kind, node) for kind in CONDITIONS[code][1]]
-        return [sum((a * x for a, x in zip(form, point, strict=True) if x != 0), constant) for form, constant in rows]
-
     def energy_bound_positive(
         self, signs: NDArray[np.int8], rows: Sequence[int], values: Sequence[float], units: Sequence[Fraction]
     ) -> bool:
@@ -106,3 +101,90 @@ class RationalSystem:
             self._inverse = self.S.inv()
         column = fmpq_mat([[x] for x in v])
         return bool(4 * total > (column.transpose() * (self._inverse * column))[0, 0])
+
+
+class RationalBody:
+    """The matrices of a problem at alpha in rationals, not condensed: for single points.
+
+    S has as many digits as det A, and 2p columns; the displacements of one point take one solve with A.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+        A body that is held, with the slip offset that it has in floats.
+    alpha : Fraction
+
+    Raises
+    ------
+    NotEnclosedError
+        The problem has more than EXACT_DOF_LIMIT degrees of freedom.
+    """
+
+    def __init__(self, problem: ContactProblem, alpha: Fraction) -> None:
+        self.p, a = problem.p, rational(alpha)
+        self._A, B = exact_matrices(problem)
+        self._B: list[Vector] = B.tolist()
+        self.F: Vector = [rational(F) for F in exactly_at(alpha, *problem.friction)]
+        slope = [0.0] * problem.n if problem.load_slope is None else problem.load_slope.tolist()
+        self._f = [rational(x) + a * rational(y) for x, y in zip(problem.f.tolist(), slope, strict=True)]
+        self._offset = [rational(x) for x in problem.gap.tolist() + problem.slip_offset.tolist()]
+        self._moved: dict[tuple[Any, ...], Vector] = {}
+
+    def point(self, codes: Sequence[int]) -> Vector | None:
+        """The only lambda that solves a selection's equations; None where they are singular.
+
+        Of A u + B'lambda = f and of w = B u - offset = 0 in the rows of the selection, with u and those forces as
+        unknowns that the statuses leave free.
+        """
+        p = self.p
+        closed = [i for i, code in enumerate(codes) if code]
+        held = [p + i for i, code in enumerate(codes) if code == 1]
+        turn = [{2: self.F[i], 3: -self.F[i]}.get(codes[i], fmpq(0)) for i in closed]
+        columns = [
+            [x + f * y for x, y in zip(self._B[i], self._B[p + i], strict=True)]
+            for i, f in zip(closed, turn, strict=True)
+        ]
+        columns += [self._B[k] for k in held]
+        rows = closed + held
+        table = [[*row, *(c[k] for c in columns)] for k, row in enumerate(self._A.tolist())]
+        table += [[*self._B[r], *([fmpq(0)] * len(rows))] for r in rows]
+        right = [*self._f, *(self._offset[r] for r in rows)]
+        try:
+            solved = fmpq_mat(table).solve(fmpq_mat([[x] for x in right])).entries()
+        except ZeroDivisionError:
+            return None
+        u, y = solved[: len(self._f)], solved[len(self._f) :]
+        point = [fmpq(0)] * (2 * p)
+        for i, f, force in zip(closed, turn, y, strict=False):
+            point[i], point[p + i] = force, f * force
+        for k, force in zip(held, y[len(closed) :], strict=True):
+            point[k] = force
+        self._moved[tuple(point)] = self._displaced(u)
+        return point
+
+    def moved(self, point: Sequence[Any]) -> Vector:
+        """w at a point: where the forces on the contact nodes are these.
+
+        Raises
+        ------
+        NotEnclosedError
+            A is singular.
+        """
+        if tuple(point) not in self._moved:
+            load = list(self._f)
+            for force, row in zip(point, self._B, strict=True):
+                if force != 0:
+                    load = [x - force * b for x, b in zip(load, row, strict=True)]
+            self._moved[tuple(point)] = self._displaced(solved(self._A, fmpq_mat([[x] for x in load])).entries())
+        return self._moved[tuple(point)]
+
+    def _displaced(self, u: Vector) -> Vector:
+        pairs = zip(self._B, self._offset, strict=True)
+        return [sum((b * x for b, x in zip(row, u, strict=True) if b != 0), -o) for row, o in pairs]
+
+    def least(self, code: int, node: int, point: Sequence[Any]) -> Any:
+        """The smallest of the numbers that a final code wants not to be negative at a node, at a point."""
+        p, w = self.p, self.moved(point)
+        bound, t = self.F[node] * point[node], point[p + node]
+        rows = (point[node], t, bound - t, bound + t, -w[node], w[p + node], -w[p + node])
+        return min(rows[kind] for kind in CONDITIONS[code][1])

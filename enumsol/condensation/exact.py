@@ -16,6 +16,7 @@ from enumsol.condensation.unloaded import vanishing_alpha
 from enumsol.errors import InvalidProblemError, TooLargeError
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from fractions import Fraction
 
     from enumsol.condensation.data import ProblemData
@@ -100,6 +101,8 @@ class UncondensedSystem:
     problem : ContactProblem
         A body that is held.
     alpha : float or Fraction
+    index : callable
+        The sign of det M of a selection where it is known, else 0.
 
     Attributes
     ----------
@@ -115,10 +118,12 @@ class UncondensedSystem:
 
     reach: tuple[Any, ...] = ()
 
-    def __init__(self, problem: ProblemData, alpha: Alpha) -> None:
+    def __init__(
+        self, problem: ProblemData, alpha: Alpha, index: Callable[[tuple[int, ...]], int] = lambda _: 0
+    ) -> None:
         problem.friction_at(alpha)
         _check_size(problem)
-        self._problem, self._alpha, self.p = problem, alpha, problem.p
+        self._problem, self._alpha, self.p, self.index = problem, alpha, problem.p, index
         a = rational(alpha)
         self.F = tuple(rational(x) + a * rational(y) for x, y in zip(*problem.friction, strict=True))
         self._moved: dict[tuple[Any, ...], list[Any]] = {}
@@ -149,7 +154,7 @@ class UncondensedSystem:
         A, B = (rational_matrix(M.toarray()).tolist() for M in (self._problem.A, self._problem.contact_rows))
         return A, B, [x + alpha * y for x, y in zip(f, slope, strict=True)], _offset(self._problem)
 
-    def solved(self, turned: Any, unknown: Any) -> tuple[list[Any], list[Any], int] | None:
+    def solved(self, turned: Any, unknown: Any, sign: int) -> tuple[list[Any], list[Any], int] | None:
         """The unknowns y of a selection, u, and the sign of det M; None where M is singular.
 
         With u the displacements, M y = g_R is what is left when u is eliminated from
@@ -162,6 +167,7 @@ class UncondensedSystem:
         ----------
         turned : function that gives K E for the rows of K, an object array of shape (n, 2p)
         unknown : int array, the k rows R
+        sign : that of det M if it is known, else 0: det takes longer than the solution
         """
         A, B, f, offset = self._matrices
         columns = turned(np.array(B, dtype=object).T).tolist()
@@ -169,12 +175,14 @@ class UncondensedSystem:
         K = [[*row, *more] for row, more in zip(A, columns, strict=True)]
         K += [[*B[r], *([fmpq(0)] * size)] for r in unknown]
         matrix = fmpq_mat(K)
-        det = matrix.det()
-        if det == 0:
-            return None
+        if not sign:
+            det = matrix.det()
+            if det == 0:
+                return None
+            sign = (1 if det > 0 else -1) * (-1) ** size
         right = fmpq_mat([[x] for x in (*f, *(offset[r] for r in unknown))])
         found = matrix.solve(right).entries()
-        return found[len(A) :], found[: len(A)], (1 if det > 0 else -1) * (-1) ** size
+        return found[len(A) :], found[: len(A)], sign
 
     def keep(self, point: tuple[Any, ...], u: list[Any]) -> None:
         """Keep w = B u - o at a point, for `moved`."""

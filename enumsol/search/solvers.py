@@ -37,7 +37,10 @@ if TYPE_CHECKING:
     from enumsol.search.fathoming import Closing
     from enumsol.search.resume import Reader
     from enumsol.selections.rational_selections import ExactSelections
+    from enumsol.selections.solution import Codes
     from enumsol.support.arguments import Alpha
+    from enumsol.trusted.at_alpha import VerifiedSelection
+    from enumsol.trusted.precise_at_alpha import PreciseAtAlpha
 
 Arithmetic = Literal["fast", "verified", "exact"]
 
@@ -109,7 +112,9 @@ class Solvers(SearchSetup):
         # verified arithmetic asks about few selections, exact arithmetic about all
         apart = self.arithmetic == "verified" and self.problem.n > FAST_EXACT_DOF
         system = (
-            UncondensedSystem(self.problem, self.alpha) if apart else ExactSystem.from_problem(self.problem, self.alpha)
+            UncondensedSystem(self.problem, self.alpha, self._index)
+            if apart
+            else ExactSystem.from_problem(self.problem, self.alpha)
         )
         enclosed, data = self._enclosed
         proven = enclosed is not None and data == "problem"
@@ -124,7 +129,7 @@ class Solvers(SearchSetup):
             return None
         from enumsol.search.certifiers.rational_certifier import ExactCertifier  # python-flint
 
-        return ExactCertifier(self.exact, self.scaled, self.enclosed)
+        return ExactCertifier(self.exact, self.scaled, self.enclosed, self._solved_precisely)
 
     @cached_property
     def _enclosed(self) -> tuple[EnclosedSystem | None, str]:
@@ -165,9 +170,28 @@ class Solvers(SearchSetup):
             from enumsol.search.certifiers.rational_certifier import ExactCertifier  # python-flint
 
             return ExactCertifier(_present(self.exact), self.scaled, self.enclosed)
-        return VerifiedCertifier(
-            self.scaled, self.enclosed, lambda: self.exact_certifier, _present(recorder), self.problem.node_ids
-        )
+        ids = self.problem.node_ids
+        exact = lambda: self.exact_certifier  # noqa: E731
+        return VerifiedCertifier(self.scaled, self.enclosed, exact, _present(recorder), ids, self._solved_precisely)
+
+    def _solved_precisely(self, codes: Codes) -> VerifiedSelection | None:
+        """The verified solution of a complete selection in many digits; None where that is not to be had."""
+        return None if self._precise is None else self._precise.solve(codes)
+
+    def _index(self, codes: Codes) -> int:
+        """The sign of det M of a selection where many digits show it, else 0."""
+        found = self._solved_precisely(codes)
+        return 0 if found is None else found.det_sign
+
+    @cached_property
+    def _precise(self) -> PreciseAtAlpha | None:
+        """The problem at this alpha in many digits; None for small ones, which rationals decide as fast."""
+        from enumsol.condensation.exact import FAST_EXACT_DOF
+        from enumsol.trusted.precise_at_alpha import PreciseAtAlpha  # python-flint
+
+        if self.problem.n <= FAST_EXACT_DOF or self.data == "condensed":
+            return None
+        return PreciseAtAlpha.of(self.problem, Fraction(self.alpha), self.scaled.force, self.scaled.length)
 
     @property
     def relaxed(self) -> ScaledSystem:

@@ -132,7 +132,8 @@ class ExactSelections:
 
     def _solved_apart(self, system: UncondensedSystem, selection: Selection) -> tuple[Point, int] | None:
         """The same from the matrices of the problem, for its own load."""
-        solved = system.solved(lambda K: selection.columns(K, self._F), selection.unknown)
+        index = system.index(selection.codes)
+        solved = system.solved(lambda K: selection.columns(K, self._F), selection.unknown, index)
         if solved is None:
             return None
         y, u, sign = solved

@@ -77,6 +77,7 @@ SHARED = {
     "trusted.uniqueness_in_contact": {"lone_root", "numbers_of"},
     "trusted.uniqueness": {"ClosedSolution", "closed_solution", "only_solution", "same_solution"},
     "trusted.at_alpha": {"VerifiedSelection", "holds_no_root", "solve_selection"},
+    "trusted.precise_at_alpha": {"PreciseAtAlpha"},
     "trusted.quadratic_forms": {"EnclosedForm", "Equations"},
     "trusted.status_rows": None,
     "trusted.space.sector_rows": None,

@@ -171,6 +171,8 @@ def test_a_report_prints_its_counts(wedge):
 
 def test_rational_leaves_may_be_long(monkeypatch):
     monkeypatch.setattr("enumsol.search.fathoming.Closer.closed", lambda *_: None)
+    # many digits would decide it
+    monkeypatch.setattr("enumsol.search.solvers.Solvers._solved_precisely", lambda *_: None)
     # a gap that is closed to within rounding, in a body whose entries are full floats: fractions of many digits
     rng = np.random.default_rng(3)
     n = 60

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from flint import fmpq, fmpq_mat
 
 from enumsol.arithmetic.rationals import rational
-from enumsol.model.statuses import OPEN, SLIDING, RowKind
+from enumsol.model.statuses import CONDITIONS, OPEN, SLIDING, RowKind
 from enumsol.relaxation.imposed_rows import INEQUALITY, imposed_rows
 from enumsol.search.certifiers.float_certifier import solve_or_open
 from enumsol.search.certifiers.protocol import WithoutProof
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from enumsol.selections.polytopes import Form
     from enumsol.selections.rational_selections import ExactSelections
     from enumsol.selections.solution import Codes
+    from enumsol.trusted.at_alpha import VerifiedSelection
 
     Array = NDArray[np.float64]
 
@@ -67,12 +68,27 @@ def energy_bound_positive(g: tuple[Any, ...], inverse: Any, terms: Iterable[tupl
 
 
 class ExactCertifier(WithoutProof):
-    """Rationals: a pruning needs multipliers whose dual bound is positive, exactly (theory, (6.1))."""
+    """Rationals: a pruning needs multipliers whose dual bound is positive, exactly (theory, (6.1)).
+
+    Parameters
+    ----------
+    selections : ExactSelections
+    scaled : ScaledSystem
+    enclosed : EnclosedSystem or None
+        Balls for it; without them no subtree is closed.
+    precisely : callable giving the verified solution of a complete selection in many digits, or None
+        Asked first whether a selection is worth being solved in rationals.
+    """
 
     def __init__(
-        self, selections: ExactSelections, scaled: ScaledSystem, enclosed: EnclosedSystem | None = None
+        self,
+        selections: ExactSelections,
+        scaled: ScaledSystem,
+        enclosed: EnclosedSystem | None = None,
+        precisely: Callable[[Codes], VerifiedSelection | None] = lambda _: None,
     ) -> None:
         self._selections = selections
+        self._precisely = precisely
         self._scaled = scaled
         self._enclosed = enclosed
         super().__init__()
@@ -95,7 +111,7 @@ class ExactCertifier(WithoutProof):
         if self._enclosed is None or proposal is None or proposal.weights is None:
             return None
         solver, selection = self._selections, proposal.selection
-        solved = solver.solve_equations(selection)
+        solved = None if self._fails(proposal) else solver.solve_equations(selection)
         if solved is None:
             return None
         point, determinant = solved
@@ -115,6 +131,16 @@ class ExactCertifier(WithoutProof):
         strict = all(len(held) == 1 for held in active)
         solution = SelectionSolution(proposal.selection, (point,), 0, determinant, strict, exact=True, index=index)
         return proposal, [solution]
+
+    def _fails(self, proposal: Proposal) -> bool:
+        """Whether many digits show that the solution of what is proposed breaks a condition at a node that is free."""
+        found = self._precisely(proposal.selection)
+        if found is None:
+            return False
+        kinds = [(i, kind) for i, code in enumerate(proposal.selection) for kind in CONDITIONS[code].inequalities]
+        broken = (found.slack.mid < -found.slack.rad).tolist()
+        free = {*proposal.free}
+        return any(is_broken and i in free for (i, _), is_broken in zip(kinds, broken, strict=True))
 
     def solution_near(self, proposal: Proposal) -> SelectionSolution | None:
         """The root of what is proposed with the statuses that hold exactly, by Newton's method; None if not found."""

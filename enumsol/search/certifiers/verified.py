@@ -69,6 +69,8 @@ class VerifiedCertifier(RecordingCertifier):
     recorder : Recorder
         Where the records of the proof go.
     node_ids : labels of the contact nodes, for messages
+    precisely : callable giving the verified solution of a complete selection in many digits, or None
+        Asked where balls in double arithmetic do not decide.
     """
 
     exactly, plain, lone = False, False, True
@@ -81,8 +83,10 @@ class VerifiedCertifier(RecordingCertifier):
         exact: Callable[[], ExactCertifier | None],
         recorder: Recorder,
         node_ids: Sequence[Any],
+        precisely: Callable[[Codes], VerifiedSelection | None] = lambda _: None,
     ) -> None:
         super().__init__(recorder)
+        self._precisely = precisely
         self._scaled = scaled
         self._enclosed = enclosed
         self._margin = None if enclosed is None else energy_margin(enclosed)
@@ -142,10 +146,16 @@ class VerifiedCertifier(RecordingCertifier):
     def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
         """All roots in a complete selection."""
         ball = None if self._enclosed is None else solve_selection(self._enclosed, codes)
+        if self._enclosed is not None and not (ball is not None and ball.is_root):
+            if holds_no_root(self._enclosed, codes, ball):
+                self._escalations.balls += 1
+                self._leaf(records.NoRoot())
+                return None
+            ball = self._precisely(codes) or ball
         if ball is not None and ball.is_root:
             self._escalations.balls += 1
             return self._regular(codes, ball)
-        if self._enclosed is not None and holds_no_root(self._enclosed, codes, ball):
+        if ball is not None and ball.is_excluded:
             self._escalations.balls += 1
             self._leaf(records.NoRoot())
             return None
