@@ -54,15 +54,17 @@ What checker and search share
     - for histories: ``trusted.positions``, where a root leaves the contact nodes; ``model.restart``, the problem of a
       step;
     - ``condensation.unloaded`` and ``condensation.free_displacements``: the alpha at which g vanishes, and for the
-      search whether it does at all (then there is no proof); ``condensation.affine``: F(alpha) and f(alpha) without
-      rounding; of ``arithmetic.rationals`` the pivots of a definite matrix, and floats as rationals;
+      search whether it does at all (then there is no proof), and the solution of A X = K in rationals;
+      ``condensation.affine``: F(alpha) and f(alpha) without rounding; of ``arithmetic.rationals`` the pivots of a
+      definite matrix, and floats as rationals;
     - ``proof.proof_file`` and of ``proof.reading`` what a fraction in a proof may be: the file;
     - ``proof.records`` and, for problems in 3D, ``proof.space_records``: what a record of each kind may say. The search
       writes records by these classes, the checkers read them by the same ones, strictly, and so does a search that
       resumes from an earlier proof. It takes what ``proof.begun`` finds, and proves it again before ``proof.writer``
       and ``proof.compressed_parts`` have it. What a record makes of a leaf is not in these classes: a checker tests it;
     - ``model.problem``, ``model.mesh``, ``model.cells``, ``model.contact_body``, ``condensation.data``,
-      ``condensation.condensed``, ``condensation.factorization``, ``support.deadlines``, ``support.immutable``,
+      ``condensation.condensed``, ``condensation.factorization``, ``support.deadlines``, ``support.telling``,
+      ``support.immutable``,
       ``support.arguments``, ``support.array_arguments``, ``support.array_types``, ``support.files``,
       ``support.messages`` and ``errors``: the data, their checks and their fingerprint, the factorization of A (no
       bound assumes that it is accurate), S and g as computed;

@@ -22,6 +22,7 @@ import numpy as np
 from enumsol.checker.arc_boxes import Boxes, BoxSelection, alpha_number, check_entries, inside
 from enumsol.checker.only_branches import ClaimedArc, ClaimedEvent
 from enumsol.proof.reading import RefusedError, codes_from, names_only, quoted, same, units_from
+from enumsol.support.telling import tell
 from enumsol.trusted.arcs.selection_balls import ArcSelection, ArcSystem
 from enumsol.trusted.selection import (
     CONE_MINUS,
@@ -123,8 +124,9 @@ class ArcChecker:
             raise RefusedError(f"the arcs cannot be read: {error}") from None
         sides = (0,) if self._origin is None else (-1, 1)
         self._systems = {side: ArcSystem.of(self._enclosure, *units, float(side)) for side in sides}
-        record = next(records, _END)
+        record, due = next(records, _END), len(self._due)
         while isinstance(record, list):
+            tell("selections followed", min(self.traces, due), due)
             self.traces += 1
             try:
                 record = self._trace(record, records)

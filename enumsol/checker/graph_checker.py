@@ -43,6 +43,7 @@ from enumsol.proof.reading import (
     same,
     units_from,
 )
+from enumsol.support.telling import tell
 from enumsol.trusted.exclusion import Leaves, exclusion_margin, exclusion_margins
 from enumsol.trusted.over_interval import KINDS, EnclosedPiece, as_computed
 from enumsol.trusted.status_rows import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, STICK, UNDECIDED, children_of
@@ -176,6 +177,7 @@ class GraphChecker:
         record = next(records, _END)
         while waiting:
             x, y, roots = waiting.pop()
+            tell("per cent of the interval", int(100 * (x - a) / (b - a)), 100)
             cut, record = self._piece(record, records, (x, y, roots))
             if len(cut):
                 waiting += [((x + y) / 2, y, cut), (x, (x + y) / 2, cut)]

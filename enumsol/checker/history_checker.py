@@ -12,6 +12,7 @@ from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.model.restart import SlipStart, afresh, restarted
 from enumsol.proof.reading import RefusedError, numbers_from, quoted, rational_from, same
+from enumsol.support.telling import heard_by, tell, tell_part
 from enumsol.trusted.positions import tangential_positions
 
 if TYPE_CHECKING:
@@ -148,7 +149,9 @@ class HistoryChecker:
         enclosure = self.enclosure.restarted(problem, problem.products)
         checker = self.checker(problem, self.progress)
         checker.enclosure, checker.located = enclosure, []
-        report = checker.run(_Part(_search(records)))
+        tell("searches", number, count)
+        with heard_by(tell_part(f"of search {number + 1}")):
+            report = checker.run(_Part(_search(records)))
         where = f"search {number} (step {stage.step})"
         self.failures += [f"{where}: {failure}" for failure in report.failures]
         if len(self.failures) >= MAX_FAILURES:

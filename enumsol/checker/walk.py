@@ -11,6 +11,7 @@ from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.proof.reading import RefusedError, quoted, same
 from enumsol.proof.records import Branching, DeclaredForm, Limits, RecordError, UndecidedRecord, Unloaded, kind_of
+from enumsol.support.telling import tell
 from enumsol.trusted.status_rows import UNDECIDED
 
 if TYPE_CHECKING:
@@ -49,6 +50,7 @@ class TreeChecker:
     #: undecided parts besides undecided leaves
     doubtful: int = 0
     leaves: int = 0
+    _all: int = 0
     data: Data = "problem"
     #: What was found of the roots, if someone wants to know where they leave the contact nodes: forces in the
     #: problem's units, and tangential components with u_t = 0 for certain.
@@ -164,7 +166,7 @@ class TreeChecker:
 
     def _survey(self, records: Iterator[Any]) -> Any:
         """Walk the tree without a look at its leaves; gives the counts at the end."""
-        leaves = sum(1 for _ in self._leaves(records, survey=True))
+        leaves = self._all = sum(1 for _ in self._leaves(records, survey=True))
         footer = next(records, _END)
         if not isinstance(footer, dict) or footer.get("leaves") != leaves:
             found = "missing" if footer is _END else quoted(footer)
@@ -180,8 +182,10 @@ class TreeChecker:
             if problem is not None:
                 self.fail(f"leaf {self.leaves}: {problem}")
             self._flush(last=False)
-            if self.progress is not None and self.leaves % _REPORT_EVERY == 0:
-                self.progress(self.leaves)
+            if self.leaves % _REPORT_EVERY == 0:
+                tell("leaves", self.leaves, self._all)
+                if self.progress is not None:
+                    self.progress(self.leaves)
         self._flush(last=True)
 
     # -- leaves ----------------------------------------------------------------------------------------------------

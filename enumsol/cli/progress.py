@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import sys
 import time
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING, Any, Self
 
 from enumsol.cli.quiet import is_quiet
+from enumsol.support.telling import heard_by
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from rich.progress import Progress, TaskID
 
@@ -24,14 +25,19 @@ _LEAST_SHARE = 0.02
 class Display:
     """A progress bar on stderr, shown on a terminal when the work lasts.
 
+    Inside, it hears what long calls tell of themselves (``support.telling``), and says it behind the bar.
+
     Parameters
     ----------
     title : str
         What is going on.
+    steps : mapping, optional
+        Work that fills the bar when it is told, and from which to which share.
     """
 
-    def __init__(self, title: str) -> None:
-        self._title = title
+    def __init__(self, title: str, steps: Mapping[str, tuple[float, float]] | None = None) -> None:
+        self._title, self._steps = title, {} if steps is None else steps
+        self._work, self._hearing = "", heard_by(self.hear)
         self._started = self._begun = self._told = time.perf_counter()
         self._step, self._share, self._note, self._completed = "", 0.0, "", 0.0
         self._progress: Progress | None = None
@@ -40,6 +46,7 @@ class Display:
 
     def __enter__(self) -> Self:
         """Nothing is shown yet."""
+        self._hearing.__enter__()
         return self
 
     def show(self, share: float, note: str, step: tuple[str, float, float] = ("", 0.0, 1.0)) -> None:
@@ -53,28 +60,43 @@ class Display:
         if name != self._step:
             self._begun = self._told if self._step else self._started
             self._step = name
-        self._share, self._note = share, note
-        if not self._shown or (self._progress is None and self._told - self._started < _PROGRESS_DELAY):
+        self._share, self._note, self._work = share, note, ""
+        self._completed = max(self._completed, first + share * (last - first))
+        self._draw()
+
+    def hear(self, work: str, done: int, of: int) -> None:
+        """Show what a long call is at: behind the bar, or as a step that fills it."""
+        told = f"{done:,} of {of:,} {work}" if of else work
+        if of and work in self._steps:
+            self.show(done / of, told, (work, *self._steps[work]))
+        else:
+            self._work = told
+            self._draw()
+
+    def _draw(self) -> None:
+        now = time.perf_counter()
+        if not self._shown or (self._progress is None and now - self._started < _PROGRESS_DELAY):
             return
         if self._progress is None or self._task is None:
             self._progress, self._task = _progress_bar(self._title, self.counts)
-        self._completed = max(self._completed, first + share * (last - first))
         self._progress.update(self._task, completed=self._completed)
         self._progress.start()
 
     def counts(self) -> str:
         """What stands behind the bar, as of now: also while nothing new is told, the time goes on."""
         now = time.perf_counter()
+        said = ", ".join(part for part in (self._note, self._work) if part)
         left = remaining(self._told - self._begun, self._share, now - self._told)
         of = " of this step" if self._step and left else ""
-        return f"{self._note}  {now - self._started:.0f} s{left}{of}"
+        return f"{said}  {now - self._started:.0f} s{left}{of}"
 
     def count(self, unit: str) -> Callable[[int, int], None]:
         """A callback that takes how many are done, and of how many."""
         return lambda done, of: self.show(done / max(of, 1), f"{done:,} of {of:,} {unit}")
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, *error: Any) -> None:
         """Take the bar away."""
+        self._hearing.__exit__(*error)
         if self._progress is not None:
             self._progress.stop()
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -11,10 +10,19 @@ import typer
 from enumsol.cli.common import ExitStatus, load_any_problem
 from enumsol.cli.options import JsonFile, ProblemArgument, Quiet
 from enumsol.cli.output import check_outputs, deliver
-from enumsol.cli.quiet import is_quiet
+from enumsol.cli.progress import Display
 
 if TYPE_CHECKING:
     from enumsol.checker.reports import GraphVerificationReport, HistoryVerificationReport, VerificationReport
+
+#: What the checker tells of itself, and which part of the bar is its: a root set has leaves, a graph an interval and
+#: selections that were followed, a history a search for every start.
+_STEPS = {
+    "leaves": (0.0, 1.0),
+    "per cent of the interval": (0.0, 0.5),
+    "selections followed": (0.5, 1.0),
+    "searches": (0.0, 1.0),
+}
 
 
 def verify(
@@ -42,10 +50,9 @@ def verify(
     from enumsol.proof.proof_file import Proof
 
     check_outputs(json=json_file)
-    body, shown = load_any_problem(problem), sys.stderr.isatty() and not is_quiet()
-    report = check(body, Proof.load(proof), _show_progress if shown else None)
-    if shown:
-        typer.echo("\r\033[K", nl=False, err=True)
+    body = load_any_problem(problem)
+    with Display("checking", _STEPS):
+        report = check(body, Proof.load(proof))
     about = {"problem": problem, "proof": proof, "fingerprint": body.fingerprint}
     deliver(
         json_file=json_file,
@@ -63,7 +70,3 @@ def _content(report: VerificationReport | GraphVerificationReport | HistoryVerif
     if "selections" in content and not isinstance(content["selections"], int):
         content["selections"] = len(content["selections"])
     return content
-
-
-def _show_progress(leaves: int) -> None:
-    typer.echo(f"\r{leaves:,} leaves checked", nl=False, err=True)

@@ -123,7 +123,9 @@ class CondensedEnclosure(Sealed):
         scale, size = products.scale, len(products.mid)
         A, _ = scaled(sp.csr_array(problem.A), scale, scale)
         estimate = _smallest_eigenvalue(problem, scale)
-        bound = attended(lambda: sparse_eigenvalue_bound(sp.csc_array(A), estimate), A.nnz)
+        bound = attended(
+            lambda: sparse_eigenvalue_bound(sp.csc_array(A), estimate), A.nnz, "bound of the smallest eigenvalue of A"
+        )
         if not bound > 0:
             raise NotEnclosedError(
                 "A is positive definite only within rounding: its smallest eigenvalue, after scaling to a unit "

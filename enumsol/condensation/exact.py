@@ -12,8 +12,10 @@ from flint import fmpq, fmpq_mat
 
 from enumsol.arithmetic.rationals import is_positive_definite, rational, rational_matrix
 from enumsol.condensation.data import EXACT_DOF_LIMIT
+from enumsol.condensation.free_displacements import solved
 from enumsol.condensation.unloaded import vanishing_alpha
 from enumsol.errors import InvalidProblemError, TooLargeError
+from enumsol.support.telling import tell
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -170,6 +172,7 @@ class UncondensedSystem:
         sign : that of det M if it is known, else 0: det takes longer than the solution
         """
         A, B, f, offset = self._matrices
+        tell("a selection in rationals")
         columns = turned(np.array(B, dtype=object).T).tolist()
         size = len(unknown)
         K = [[*row, *more] for row, more in zip(A, columns, strict=True)]
@@ -409,7 +412,7 @@ def _condensed(problem: ProblemData) -> _Parts:
     p = problem.p
     B = rational_matrix(problem.contact_rows.toarray())
     rhs = [[*row, *load] for row, *load in zip(B.transpose().tolist(), *_loads(problem), strict=True)]
-    table = (B * rational_matrix(problem.A.toarray()).solve(fmpq_mat(rhs))).tolist()
+    table = (B * solved(rational_matrix(problem.A.toarray()), fmpq_mat(rhs))).tolist()
     g0 = tuple(row[2 * p] - o for row, o in zip(table, _offset(problem), strict=True))
     g1 = tuple(row[2 * p + 1] for row in table)
     F0, F1 = (tuple(rational(v) for v in part) for part in problem.friction)

@@ -51,6 +51,7 @@ class Factorization(Immutable):
                     options=options,
                 ),
                 A.nnz,
+                "factors of A",
             )
         except RuntimeError as error:  # SuperLU: "Factor is exactly singular"
             raise InvalidProblemError(_RIGID.format(ratio=0.0)) from error

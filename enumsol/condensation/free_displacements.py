@@ -1,6 +1,6 @@
 """The problem's matrices in rationals, and g solved from them: for the checker, and for the alpha at which g vanishes.
 
-The search has its own code for this (``condensation.exact``).
+The search has its own code for this (``condensation.exact``), but for `solved`.
 """
 
 from __future__ import annotations
@@ -12,9 +12,14 @@ from flint import fmpq_mat
 from enumsol.arithmetic.rationals import rational, rational_matrix
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.support.deadlines import look
+from enumsol.support.telling import tell
 
 if TYPE_CHECKING:
     from enumsol.condensation.data import ProblemData
+
+#: Right-hand sides that are solved for together: with 170 degrees of freedom half a second, beside 0.14 s for one.
+_COLUMNS = 4
 
 
 def free_displacements(problem: ProblemData) -> tuple[list[Any], list[Any]]:
@@ -50,14 +55,21 @@ def exact_matrices(problem: ProblemData) -> tuple[Any, Any]:
 
 
 def solved(A: Any, rhs: Any) -> Any:
-    """A^-1 rhs.
+    """A^-1 rhs, a few columns after another: no slower than at once, and it can be told and stopped.
 
     Raises
     ------
     NotEnclosedError
         A is singular.
+    TimeOverError
+        The deadline that holds here has passed.
     """
-    try:
-        return A.solve(rhs)
-    except ZeroDivisionError:
-        raise NotEnclosedError("A is singular in rational arithmetic") from None
+    rows, parts = rhs.tolist(), []
+    for start in range(0, rhs.ncols(), _COLUMNS):
+        look()
+        tell("columns of A^-1 B' in rationals", start, rhs.ncols())
+        try:
+            parts.append(A.solve(fmpq_mat([row[start : start + _COLUMNS] for row in rows])).tolist())
+        except ZeroDivisionError:
+            raise NotEnclosedError("A is singular in rational arithmetic") from None
+    return fmpq_mat([[x for part in line for x in part] for line in zip(*parts, strict=True)])

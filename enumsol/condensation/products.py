@@ -12,6 +12,7 @@ from enumsol.arithmetic.balls import SAFE, TINY, UNIT, gamma, residual, upper_no
 from enumsol.condensation.data import CondensableData
 from enumsol.support.deadlines import look
 from enumsol.support.immutable import Sealed
+from enumsol.support.telling import tell
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -109,6 +110,7 @@ class Products(Sealed):
             lengths, left = np.empty(K.shape[1]), np.empty(K.shape[1])
             for start in range(0, K.shape[1], _COLUMNS):
                 look()
+                tell("columns of A^-1 B'", start, K.shape[1])
                 part = slice(start, min(start + _COLUMNS, K.shape[1]))
                 given = K[:, part].toarray()
                 X = solve(given)

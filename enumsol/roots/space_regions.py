@@ -12,6 +12,7 @@ from enumsol.arithmetic.balls import SAFE, TINY, UNIT, upper_norm
 from enumsol.model.sectors import SECTORS
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.support.deadlines import over
+from enumsol.support.telling import tell
 from enumsol.trusted.space.leaves import settle, unsettled
 
 if TYPE_CHECKING:
@@ -78,6 +79,7 @@ def regions_of(system: EnclosedSpace, leaves: Sequence[Codes]) -> list[Region]:
         members, waiting = [], [int(left[0])]
         left = left[1:]
         while waiting:
+            tell("undecided leaves joined", len(leaves) - len(left) - len(waiting), len(leaves))
             one = waiting.pop()
             members.append(one)
             touching = boxes.touching(one, left)
@@ -141,6 +143,7 @@ def _boxes(system: EnclosedSpace, leaves: Sequence[Codes]) -> _Boxes:
     everywhere = _energy_bounds(system)
     modes, (S, g, _) = len(system.reach), system.balls
     for k, codes in enumerate(leaves):
+        tell("undecided leaves bounded", k, count)
         leaf = unsettled(system, codes) if over() else settle(system, codes)
         angle[k], radius[k] = slip_angles(system, codes, leaf)
         y = everywhere if leaf is None or leaf.y is None else smaller(leaf.y, everywhere)

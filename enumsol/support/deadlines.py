@@ -14,6 +14,8 @@ from contextvars import ContextVar, copy_context
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
+from enumsol.support.telling import tell
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
@@ -97,7 +99,7 @@ def look() -> None:
         raise TimeOverError
 
 
-def attended(work: Callable[[], _Result], size: int) -> _Result:
+def attended(work: Callable[[], _Result], size: int, name: str) -> _Result:
     """What one long call into compiled code returns; Ctrl-C and the end of the time end the wait for it at once.
 
     Nothing can interrupt such a call, so it runs in a thread of its own (it must release the interpreter's lock, as
@@ -107,6 +109,7 @@ def attended(work: Callable[[], _Result], size: int) -> _Result:
     ----------
     work : callable
     size : number of entries that it works on; a short call needs no thread
+    name : what is told of it
 
     Raises
     ------
@@ -115,6 +118,7 @@ def attended(work: Callable[[], _Result], size: int) -> _Result:
     """
     if size < _SHORT:
         return work()
+    tell(name)
     done: Future[_Result] = Future()
     context = copy_context()
 

@@ -57,6 +57,7 @@ SHARED = {
     "arithmetic.rationals": {"as_objects", "is_positive_definite", "rational", "rational_matrix", "to_fraction"},
     "condensation.affine": {"exactly_at"},
     "condensation.enclosure": {"CondensedEnclosure", "EnclosedSystem", "NotEnclosedError"},
+    "condensation.free_displacements": {"solved"},
     "condensation.floating": {"FloatingSystem", "RigidRows"},
     "condensation.floating_space": {"FloatingSpace"},
     "condensation.space_condensed": {"EnclosedSpace", "SpaceSystem"},

@@ -17,6 +17,7 @@ from enumsol.cli.common import ExitStatus
 from enumsol.cli.graph import build
 from enumsol.cli.options import problem_names
 from enumsol.cli.progress import Display, remaining
+from enumsol.support.telling import tell
 
 SQUARE = "gallery:two-node-6.4"
 
@@ -183,6 +184,34 @@ def test_a_bar_goes_on_between_two_reports(monkeypatch):
         "arcs  20 s, about 8 s left of this step",
         "arcs  25 s, about 3 s left of this step",
         "arcs  29 s",
+    ]
+
+
+def test_what_a_long_call_tells_stands_behind_the_bar_until_the_next_report(monkeypatch):
+    clock = [0.0]
+    monkeypatch.setattr("enumsol.cli.progress.time.perf_counter", lambda: clock[0])
+    said = []
+    with Display("checking", {"leaves": (0.0, 0.5)}) as display:
+        tell("factors of A")
+        said.append(display.counts())
+        tell("columns of S in rationals", 12, 34)
+        said.append(display.counts())
+        clock[0] = 10.0
+        tell("leaves", 2_500, 10_000)
+        said.append(display.counts())
+        tell("columns of S in rationals", 0, 34)
+        said.append(display.counts())
+        assert display._completed == 0.125
+        display.show(0.5, "nodes 7")
+        said.append(display.counts())
+    tell("leaves", 1, 1)
+    assert display._completed == 0.5
+    assert said == [
+        "factors of A  0 s",
+        "12 of 34 columns of S in rationals  0 s",
+        "2,500 of 10,000 leaves  10 s, about 30 s left of this step",
+        "2,500 of 10,000 leaves, 0 of 34 columns of S in rationals  10 s, about 30 s left of this step",
+        "nodes 7  10 s",
     ]
 
 

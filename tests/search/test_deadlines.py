@@ -115,11 +115,11 @@ def endless():
 
 
 def test_what_a_long_call_returns_or_raises():
-    assert attended(current, LONG) is None
+    assert attended(current, LONG, "work") is None
     with within(Deadline(5.0)):
-        assert attended(current, LONG) == 5.0
+        assert attended(current, LONG, "work") == 5.0
     with pytest.raises(ZeroDivisionError):
-        attended(lambda: 1 // 0, LONG)
+        attended(lambda: 1 // 0, LONG, "work")
 
 
 def test_a_long_call_is_not_waited_for_beyond_the_limit(clock, endless):
@@ -128,7 +128,7 @@ def test_a_long_call_is_not_waited_for_beyond_the_limit(clock, endless):
         endless()
 
     with within(Deadline(5.0)), pytest.raises(TimeOverError):
-        attended(work, LONG)
+        attended(work, LONG, "work")
 
 
 def test_a_long_call_ends_at_once_on_ctrl_c(endless):
@@ -137,7 +137,7 @@ def test_a_long_call_ends_at_once_on_ctrl_c(endless):
         endless()
 
     with pytest.raises(KeyboardInterrupt):
-        attended(work, LONG)
+        attended(work, LONG, "work")
 
 
 @pytest.mark.parametrize("build", [lambda: gallery.clamped_block(8, 4), lambda: gallery.block3d(2, 2, 2)])

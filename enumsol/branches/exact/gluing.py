@@ -20,6 +20,7 @@ from enumsol.roots.components import connected_components
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.selections.ordered_field import FiberSelections
 from enumsol.support.deadlines import Deadline, TimeOverError, look, within
+from enumsol.support.telling import tell
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -202,6 +203,7 @@ def _joined(known: KnownSelections) -> list[list[SelectionEvent]]:
         event.active = tuple(frozenset((code,)) for code in event.codes)
         try:
             look()
+            tell("ends of arcs joined", len(seen), len(seen) + len(waiting))
             for active in known.active_at(event):
                 _join_members(known, event, active, union)
         except TimeOverError:
@@ -287,7 +289,8 @@ def _vertices(groups: Sequence[list[SelectionEvent]]) -> list[GluedVertex]:
 def _edges(known: KnownSelections, vertices: list[GluedVertex]) -> list[GluedArc]:
     """One arc per cell in which a selection holds; of selections that coincide there, one for all."""
     found: dict[tuple[int, int, tuple[Codes, ...]], GluedArc] = {}
-    for codes, arcs in known.arcs.items():
+    for number, (codes, arcs) in enumerate(known.arcs.items()):
+        tell("selections whose arcs are made", number, len(known.arcs))
         for k, cell in enumerate(arcs.cells):
             if not cell.holds:
                 continue

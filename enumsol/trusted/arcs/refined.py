@@ -16,6 +16,7 @@ from flint import arb, fmpz_mat
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.products import scaled
 from enumsol.support.deadlines import look
+from enumsol.support.telling import tell
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -142,6 +143,7 @@ def _refined(
         if largest <= -_RESIDUAL_BITS or largest > before - _LEAST_GAIN:
             break
         before = largest
+        tell("bits of A^-1 B'", max(-largest, 0), _RESIDUAL_BITS)
         drop = np.maximum(sizes - _FLOAT_BITS, 0)
         floats = (E >> drop.astype(object)).astype(float)
         step = np.asarray(problem.factorization.solve(floats / scale[:, None], refined=False) / scale[:, None])
