@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 #: The table over contact nodes is printed when it has at most so many rows.
 _ROWS = 24
-_STATS = ("nodes", "pruned", "selections", "qps", "fallback_qps", "closed", "seconds", "resumed")
+_STATS = ("nodes", "pruned", "selections", "qps", "fallback_qps", "closed", "seconds", "resumed", "held", "held_open")
 
 
 def roots_as_text(found: RootSet) -> str:

@@ -8,12 +8,12 @@ from __future__ import annotations
 import contextlib
 import itertools
 import zlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.proof.proof_file import EXPANSION, MAGIC, SMALL, ProofFormatError, decoded, lines_of
 from enumsol.proof.reading import quoted, same
-from enumsol.proof.records import UndecidedRecord
+from enumsol.proof.records import DeclaredForm, UndecidedRecord
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -23,6 +23,26 @@ if TYPE_CHECKING:
 _CHUNK = 512
 #: How an undecided leaf and the footer begin: what needs no proof, and is found out anew.
 _OPEN = (f'["{UndecidedRecord.kind}"'.encode(), b"{")
+#: How a form begins, which is no node of the tree.
+_FORM = f'["{DeclaredForm.kind}"'.encode()
+
+
+class Extent(NamedTuple):
+    """How far a proof goes that was begun.
+
+    Attributes
+    ----------
+    needed : int
+        How many records, after the header, a file that replaces it must hold: all up to the last that is proven.
+    nodes : int
+        Of all its records, those of nodes of the tree.
+    undecided : int
+        Nodes of these that are undecided.
+    """
+
+    needed: int
+    nodes: int
+    undecided: int
 
 
 class BegunProof:
@@ -57,10 +77,15 @@ class BegunProof:
         """What follows the header, up to the last record that is whole."""
         return itertools.islice(self._records(), 1, None)
 
-    def needed(self) -> int:
-        """How many of these records a file that replaces this one must hold: all up to the last that is proven."""
-        lines = enumerate(itertools.islice(self._lines(), 1, None), start=1)
-        return max((number for number, line in lines if not line.startswith(_OPEN)), default=0)
+    def extent(self) -> Extent:
+        """How far the file goes."""
+        needed = nodes = undecided = 0
+        for number, line in enumerate(itertools.islice(self._lines(), 1, None), start=1):
+            if not line.startswith(_OPEN):
+                needed = number
+            nodes += line.startswith(b"[") and not line.startswith(_FORM)
+            undecided += line.startswith(_OPEN[0])
+        return Extent(needed, nodes, undecided)
 
     def _records(self) -> Iterator[Any]:
         for line in self._lines():

@@ -163,6 +163,8 @@ class Enumeration(ABC, Generic[_Solvers]):
             presolved=outcome.presolved,
             closed=outcome.closed,
             resumed=outcome.resumed,
+            held=outcome.held,
+            held_open=outcome.held_open,
             redone=outcome.redone,
         )
 

@@ -102,6 +102,8 @@ class SearchStats:
     resumed : int
         Nodes of the tree taken from the proof of an earlier search, and proven again. They are not among ``nodes``, but
         what they came to is among ``pruned``, ``selections`` and ``closed``.
+    held, held_open : int
+        Nodes that the file of this proof held, and those of them that were undecided there.
     redone : int
         Tasks of an executor whose worker died, and which were done again.
 
@@ -123,6 +125,8 @@ class SearchStats:
     presolved: int = 0
     closed: int = 0
     resumed: int = 0
+    held: int = 0
+    held_open: int = 0
     redone: int = 0
 
 
@@ -437,13 +441,8 @@ class RootSet(Sequence[Root], Immutable):
         lines += [f"undecided region {k}: {_region(item)}" for k, item in enumerate(regions[:_PRINTED_REGIONS])]
         if len(regions) > _PRINTED_REGIONS:
             lines.append(f"   ... {len(regions) - _PRINTED_REGIONS} more")
-        if self.stats.resumed:
-            # the file may hold fewer than were searched, and undecided ones
-            missing = " (what the file left undecided, and what had not reached it)"
-            searched = (
-                f"{self.stats.nodes} more searched{missing}" if self.stats.nodes else "nothing was left to search"
-            )
-            lines.append(f"resumed: {counted(self.stats.resumed, 'node')} of the tree from the file, {searched}")
+        if self.stats.held:
+            lines.append(_resumed(self.stats))
         if self.stats.fallback_qps:
             of = counted(self.stats.qps, "relaxation")
             lines.append(f"stalled: {self.stats.fallback_qps} of {of}, solved by a slower solver or not at all")
@@ -490,3 +489,13 @@ def _columns(name: str, arrays: list[NDArray[np.float64]]) -> list[tuple[str, ND
     """A quantity of all roots as columns of a frame: one, or in 3D one an axis."""
     values = np.concatenate(arrays) if arrays else np.zeros(0)
     return [(name, values)] if values.ndim == 1 else [(f"{name}{k + 1}", values[:, k]) for k in range(values.shape[1])]
+
+
+def _resumed(stats: SearchStats) -> str:
+    """What a search has taken of the nodes in its file, and why not all of them."""
+    left = stats.held - stats.held_open - stats.resumed
+    why = [f"{stats.held_open:,} undecided there"] if stats.held_open else []
+    why += [f"{left:,} not proven again"] if left > 0 else []
+    missing = f" ({', '.join(why)})" if why else ""
+    searched = f"{stats.nodes:,} more searched" if stats.nodes else "nothing was left to search"
+    return f"resumed: {stats.resumed:,} of {counted(stats.held, 'node')} in the file{missing}, {searched}"

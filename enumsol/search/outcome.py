@@ -83,6 +83,9 @@ class SearchOutcome:
     closed: int = 0
     #: Nodes taken from the proof of an earlier search.
     resumed: int = 0
+    #: Nodes that its file held, and those of them that were undecided there.
+    held: int = 0
+    held_open: int = 0
     #: Tasks whose worker died, which were done again.
     redone: int = 0
 

@@ -162,7 +162,8 @@ class Replay:
 
         ``passed`` is called once all that is proven in the file, and can be followed, has been gone through.
         """
-        outcome, needed = self._search.outcome, begun.needed()
+        outcome, extent = self._search.outcome, begun.extent()
+        needed, outcome.held, outcome.held_open = extent
         stack = [self._search.first()]
         for number, record in enumerate(begun.records() if needed else (), start=1):
             if not stack or not isinstance(record, list) or not record or not self._take(stack, record):

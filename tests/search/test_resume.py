@@ -159,7 +159,7 @@ def test_a_whole_proof_leaves_nothing_to_search(name, tmp_path):
     assert found.stats.resumed == len(tree)
     assert records_of(found.proof) == records_of(whole.proof)
     if tree and not undecided:
-        assert "from the file, nothing was left to search" in repr(found)
+        assert "in the file, nothing was left to search" in repr(found)
 
 
 @pytest.mark.long
