@@ -116,7 +116,10 @@ def parts_between(
         elif part.high < low or part.low > high:
             continue
         elif part.kind is ArcPartKind.EVENT:
-            yield from _event_inside(trace, part, (low, high), sharpen(trace, part) or part.zero)
+            found = list(_event_inside(trace, part, (low, high), part.zero))
+            if any(item.kind is ArcPartKind.OPEN for item in found) and (zero := sharpen(trace, part)) is not None:
+                found = list(_event_inside(trace, part, (low, high), zero))
+            yield from found
         else:
             yield part
 

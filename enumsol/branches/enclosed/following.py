@@ -115,7 +115,9 @@ def follow_selections(
             break
     followed.traces.sort(key=lambda trace: trace.selection.rows.codes)
     missing = cut_short or followed.stopped is not None
-    followed.joined = join(followed.traces, traced.interval, traced.origin, traced.sharpen, cut_short=missing)
+    followed.joined = join(
+        followed.traces, traced.interval, traced.origin, traced.sharpen, cut_short=missing, sparing=traced.sparing
+    )
     return followed
 
 

@@ -158,6 +158,7 @@ def join(
     sharpen: Callable[[Trace, ArcPart], Bounds | None],
     *,
     cut_short: bool = False,
+    sparing: bool = False,
 ) -> Joined:
     """Arcs and the places at which they end.
 
@@ -169,8 +170,13 @@ def join(
         The alpha at which g vanishes, if it lies in the interval; no trace crosses it.
     sharpen : gives narrower bounds of an event's zero, or None
     cut_short : selections that hold somewhere may be missing, as all do at the origin
+    sparing : bounds are made narrower only where the order of the places is not known otherwise
     """
-    return _Joining(traces, interval, origin, sharpen, whole=not cut_short).run()
+    whole = not cut_short
+    joined = _Joining(traces, interval, origin, sharpen, whole=whole, sparing=sparing).run()
+    if sparing and not joined.ordered:
+        joined = _Joining(traces, interval, origin, sharpen, whole=whole, sparing=False).run()
+    return joined
 
 
 class _Joining:
@@ -184,8 +190,9 @@ class _Joining:
         sharpen: Callable[[Trace, ArcPart], Bounds | None],
         *,
         whole: bool,
+        sparing: bool,
     ) -> None:
-        self._traces, self._interval, self._sharpen = traces, interval, sharpen
+        self._traces, self._interval, self._sharpen, self._sparing = traces, interval, sharpen, sparing
         self._joined = Joined()
         self._origin = None if origin is None else EventPlace(EventPlaceKind.ORIGIN, origin, origin, [], whole=whole)
         self._parts = []
@@ -255,7 +262,7 @@ class _Joining:
     def _bounds(self, one: _Found, other: _Found) -> Bounds:
         """Bounds of the zero that two events have in common."""
         low, high = max(one.low, other.low), min(one.high, other.high)
-        for event in sorted((one, other), key=lambda event: event.codes):
+        for event in () if self._sparing else sorted((one, other), key=lambda event: event.codes):
             sharper = self._sharpen(event.trace, event.part)
             if sharper is not None:
                 return max(low, sharper[0]), min(high, sharper[1])

@@ -86,7 +86,8 @@ class ClosedPieces:
         traces: list[Trace] = []
         traced.trace(where, traces)
         ends = stretch[0].piece.a, stretch[-1].piece.b
-        joined = join(traces, ends, traced.origin if traced.origin in ends else None, traced.sharpen)
+        origin = traced.origin if traced.origin in ends else None
+        joined = join(traces, ends, origin, traced.sharpen, sparing=traced.sparing)
         if _is_chain(joined) and all(_was_tested(joined, proposed) for proposed in stretch):
             self.pieces |= {p.piece: (p.numbers, [codes for codes, _, _ in p.spans]) for p in stretch}
             self.traces += traces

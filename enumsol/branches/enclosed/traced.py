@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.branches.enclosed.tracing import trace
+from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.support.deadlines import TimeOverError, over
 from enumsol.trusted.arcs.precise import PreciseSelection, PreciseSystem
 from enumsol.trusted.arcs.refined import affordable
@@ -29,6 +30,9 @@ if TYPE_CHECKING:
 
 #: Events are not sharpened when their bounds are this narrow, relative to alpha.
 _NARROW = 2.0**-60
+#: Error of the values at a vertex, relative to the largest, up to which balls in double arithmetic will do where many
+#: digits cost much.
+_CLOSE = 2.0**-20
 
 
 class TracedProblem:
@@ -63,6 +67,11 @@ class TracedProblem:
         }
         self._selections: dict[tuple[Codes, float], ArcSelection] = {}
         self._precise: dict[tuple[Codes, float], PreciseSelection] = {}
+
+    @property
+    def sparing(self) -> bool:
+        """Many digits cost much here, and are asked for only where balls in double arithmetic do not decide."""
+        return self.problem.n > EXACT_DOF_LIMIT
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Made again: balls of many digits cannot be pickled."""
@@ -120,7 +129,7 @@ class TracedProblem:
                 for low, high, side in self.spans(pieces)
             ],
             found,
-            sharpened=affordable(self.problem),
+            sharpened=not self.sparing,
         )
 
     def sharpen(self, found: Trace, part: ArcPart) -> Bounds | None:
@@ -137,19 +146,21 @@ class TracedProblem:
     def values(self, codes: Codes, alpha: Fraction, *, precisely: bool) -> tuple[Array, Array] | None:
         """lambda [force] and w [length] of a selection's solution, 2p each; None where it is not proven regular.
 
-        ``precisely`` asks for many digits where they are affordable, to be rounded last.
+        ``precisely`` asks for many digits, to be rounded last, where they are affordable and make a difference.
         """
         factor, side = Fraction(1), 0.0
         if self.origin is not None:
             if alpha == self.origin:
                 return np.zeros(2 * self.problem.p), np.zeros(2 * self.problem.p)
             factor, side = abs(alpha - self.origin), 1.0 if alpha > self.origin else -1.0
-        precise = self.precise(codes, side) if precisely else None
+        enclosed = self.selection(codes, side).at(float(alpha)) if self.sparing or not precisely else None
+        close = enclosed is not None and all(_is_close(part.mid, part.rad) for part in enclosed[:2])
+        precise = self.precise(codes, side) if precisely and not close else None
         if precise is not None:
             found = precise.forces(alpha)
             if found is not None:
                 return tuple(np.array([float(v.mid()) for v in part]) * float(factor) for part in found)  # type: ignore[return-value]
-        enclosed = self.selection(codes, side).at(float(alpha))
+        enclosed = enclosed or self.selection(codes, side).at(float(alpha))
         if enclosed is None:
             return None
         forces, w, _ = enclosed
@@ -163,6 +174,10 @@ class TracedProblem:
             return dict.fromkeys(nodes, 0)
         w, p = enclosed[1], self.problem.p
         return {i: int(w.mid[p + i] > 2 * w.rad[p + i]) - int(w.mid[p + i] < -2 * w.rad[p + i]) for i in nodes}
+
+
+def _is_close(middle: Array, radius: Array) -> bool:
+    return bool(np.max(radius) <= _CLOSE * np.max(np.abs(middle)))
 
 
 def _down(value: Fraction) -> float:
