@@ -2,6 +2,7 @@
 
 from . import (
     arithmetic as arithmetic,
+    auditing as auditing,
     branches as branches,
     checker as checker,
     collection as collection,
@@ -21,6 +22,7 @@ from . import (
     trusted as trusted,
 )
 from ._version import __version__ as __version__
+from .auditing import audit as audit, follow_all as follow_all
 from .branches import (
     BranchGraph as BranchGraph,
     branch_graph as branch_graph,
@@ -34,9 +36,7 @@ from .continuation import (
     NotConverged as NotConverged,
     Path as Path,
     SmoothPath as SmoothPath,
-    audit as audit,
     follow as follow,
-    follow_all as follow_all,
     local_branch_test as local_branch_test,
     newton as newton,
 )

@@ -17,8 +17,8 @@ from enumsol.support.messages import counted
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from enumsol.auditing import AuditReport, PointRun
     from enumsol.branches import BranchGraph
-    from enumsol.continuation import AuditReport, PointRun
     from enumsol.model.problem import ContactProblem
     from enumsol.support.arguments import Alpha
 
@@ -82,8 +82,8 @@ def audit(
     that is known to be incomplete has no arc there; 2 on bad input; 130 on Ctrl-C; 74 if a result could not be written;
     141 if the program that read it has ended.
     """
-    from enumsol.continuation import audit as check  # numpy and scipy: not for --help
-    from enumsol.continuation.audit.graph_map import checked_tolerance
+    from enumsol.auditing import audit as check  # numpy and scipy: not for --help
+    from enumsol.auditing.graph_map import checked_tolerance
 
     checked_tolerance(tolerance)
     check_outputs(json=json_file, csv=csv_file)
@@ -105,7 +105,7 @@ def audit(
 
 
 def _read_runs(points: str, problem: ContactProblem, columns: Columns) -> Sequence[PointRun]:
-    from enumsol.continuation import read_points
+    from enumsol.auditing import read_points
 
     source, name = (sys.stdin, "stdin") if points == "-" else (points, points)
     runs = read_points(source, problem, columns=columns, name=name)

@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from enumsol import ContinuationOptions, follow, follow_all
-from enumsol.continuation import follow_arc, start_tangents
+from enumsol.auditing import follow_arc
+from enumsol.continuation import start_tangents
 from paper_examples.one_node import MINUS, OPEN, STICK
 
 

@@ -1,26 +1,12 @@
-import numpy as np
 import pytest
+from path_problems import stable_problem
 
 import enumsol
 
 
-def random_problem(seed, loading=False):
-    """A stable body with p <= 6 contact nodes; friction grows with alpha, or the load does at fixed friction."""
-    rng = np.random.default_rng(seed)
-    p = int(rng.integers(1, 7))
-    n = 2 * p + int(rng.integers(0, 3))
-    M = rng.normal(size=(n, n))
-    B = np.linalg.qr(rng.normal(size=(n, n)))[0][: 2 * p]
-    f = rng.normal(size=n) * 3
-    data = {"friction": (0.0, rng.uniform(0.3, 1.5, p))}
-    if loading:
-        data = {"friction": (rng.uniform(0.3, 6, p), 0.0), "load_slope": rng.normal(size=n)}
-    return enumsol.ContactProblem(M @ M.T + 0.3 * np.eye(n), B[:p], B[p:], f, **data)
-
-
 @pytest.fixture
 def random_problems():
-    return random_problem
+    return stable_problem
 
 
 @pytest.fixture

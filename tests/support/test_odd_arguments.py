@@ -9,7 +9,8 @@ from skfem.models.elasticity import linear_elasticity
 
 import enumsol
 from enumsol import EnumsolError, collection, fem, fixed_points, gallery
-from enumsol.continuation import follow_arc, start_tangents
+from enumsol.auditing import follow_arc
+from enumsol.continuation import start_tangents
 
 POINTS, TRIANGLES = [[0, 0], [1, 0], [0, 1]], [[0, 1, 2]]
 PROBLEM = gallery.one_node_triangle()

@@ -4,11 +4,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from path_problems import stable_problem
 
 import enumsol
 from enumsol import gallery
-from enumsol.continuation import ContinuationOptions, audit, follow, follow_all, follow_arc, newton
-from enumsol.continuation.audit.graph_map import GraphMap
+from enumsol.auditing import audit, follow_all, follow_arc
+from enumsol.auditing.graph_map import GraphMap
+from enumsol.continuation import ContinuationOptions, follow, newton
 
 enumerate_roots = partial(enumsol.enumerate_roots, arithmetic="fast")
 
@@ -175,8 +177,8 @@ class TestBranchGraph:
     @pytest.mark.few(0, 1)
     @pytest.mark.parametrize("loading", [False, True])
     @pytest.mark.parametrize("seed", range(5))
-    def test_follow_all_visits_every_arc(self, branch_graph, seed, loading, random_problems):
-        problem = random_problems(seed, loading)
+    def test_follow_all_visits_every_arc(self, branch_graph, seed, loading):
+        problem = stable_problem(seed, loading)
         interval = (-5.0, 5.0) if loading else (0.0, 20.0)
         result = follow_all(problem, interval, graph=branch_graph(problem, interval))
         assert result.complete

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from enumsol.continuation.audit.audit_report import AuditReport
-from enumsol.continuation.audit.auditor import DETOUR, POINT_TOLERANCE, audit_on
-from enumsol.continuation.audit.graph_map import GraphMap, GraphPlaceKind, checked_graph
-from enumsol.continuation.audit.points import read_points
+from enumsol.auditing.audit_report import AuditReport
+from enumsol.auditing.auditor import DETOUR, POINT_TOLERANCE, audit_on
+from enumsol.auditing.graph_map import GraphMap, GraphPlaceKind, checked_graph
+from enumsol.auditing.points import read_points
 from enumsol.continuation.follow import follow, start_tangents
 from enumsol.continuation.not_converged import AmbiguousStart
 from enumsol.continuation.path import Path

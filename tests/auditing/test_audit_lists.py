@@ -9,8 +9,8 @@ from command_line import assert_refused, call, run
 
 import enumsol
 from enumsol import ContactProblem, audit, branch_graph, follow_all, gallery, write_problem
-from enumsol.continuation import read_points
-from enumsol.continuation.audit.graph_map import GraphMap
+from enumsol.auditing import read_points
+from enumsol.auditing.graph_map import GraphMap
 
 EXAMPLE = "one-node-6.1"
 

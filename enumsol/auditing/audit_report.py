@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.continuation.audit.graph_map import GraphPlaceKind
+from enumsol.auditing.graph_map import GraphPlaceKind
 from enumsol.roots.root import summary
 from enumsol.support.messages import TextEnum, counted
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-    from enumsol.continuation.audit.graph_map import GraphPlace
+    from enumsol.auditing.graph_map import GraphPlace
     from enumsol.model.statuses import ContactStatus
 
 #: How rows are counted, printed with a report.

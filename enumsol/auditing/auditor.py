@@ -7,9 +7,9 @@ import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from enumsol.continuation.audit.audit_report import AuditedPoint, AuditReport, Jump, MissedArc, Verdict
-from enumsol.continuation.audit.graph_map import GraphMap, GraphPlace, GraphPlaceKind
-from enumsol.continuation.audit.points import Columns, PointRun, read_points
+from enumsol.auditing.audit_report import AuditedPoint, AuditReport, Jump, MissedArc, Verdict
+from enumsol.auditing.graph_map import GraphMap, GraphPlace, GraphPlaceKind
+from enumsol.auditing.points import Columns, PointRun, read_points
 from enumsol.continuation.path import Path
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.arguments import real_or_nan, shown

@@ -1,0 +1,19 @@
+"""Continuation and the graph side by side: every branch followed, and audits of paths against the graph."""
+
+from enumsol.auditing.audit_report import AuditedPoint, AuditReport, Jump, MissedArc
+from enumsol.auditing.auditor import audit
+from enumsol.auditing.follow_all import FollowAllResult, follow_all, follow_arc
+from enumsol.auditing.points import PointRun, read_points
+
+__all__ = [
+    "AuditReport",
+    "AuditedPoint",
+    "FollowAllResult",
+    "Jump",
+    "MissedArc",
+    "PointRun",
+    "audit",
+    "follow_all",
+    "follow_arc",
+    "read_points",
+]
