@@ -286,6 +286,7 @@ class BranchGraph(GraphData):
             "unique_throughout": uniqueness.throughout,
             "uniqueness_limit": uniqueness.limit,
             "several_solutions_by": uniqueness.several_by,
+            "no_solution_by": uniqueness.none_by,
             "uniqueness_bound": self.uniqueness_bound,
             "multiplicity": {
                 "exact": steps.exact,

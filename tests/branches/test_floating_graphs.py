@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from helpers.floating_oracle import Oracle, block_on_table, random_body
 from helpers.proof_tools import copied, multipliers, proof_of, records_of, with_multipliers
+from rational_checker import Refused, check_records
 
 import enumsol
 
@@ -52,6 +53,7 @@ def difference_from_oracle(problem, interval, arithmetic):
     if arithmetic == "exact":
         return None if graph.proof is None else "a proof of what rationals decided"
     report = enumsol.verify(problem, graph.proof)
+    assert check_records(problem, records_of(graph.proof)) == report.selections
     return None if report.ok and report.within == problem.rigid_reach else report
 
 
@@ -162,8 +164,11 @@ RECORDS = records_of(enumsol.branch_graph(PROBLEM, (-0.5, 0.5)).proof)
 
 
 def refusal(records, problem=PROBLEM):
+    """Why the checker refuses records, as the one made from the proof format does."""
     report = enumsol.verify(problem, proof_of(records))
     assert not report.ok
+    with pytest.raises(Refused):
+        check_records(problem, records)
     return " ".join(report.failures)
 
 

@@ -14,7 +14,7 @@ from math import isfinite
 from flint import fmpq, fmpq_mat
 from rational_arcs import Arcs
 from rational_closings import Closings
-from rational_floating import FloatingData
+from rational_floating import FloatingData, FloatingForms
 from rational_forms import (
     Data,
     Forms,
@@ -72,7 +72,8 @@ def check_records(problem, records):
     need(len(records) > 1 and isinstance(records[0], dict), "no header")
     try:
         header = records[0]
-        kind = Graph if header.get("kind") == "graph" else Point if problem.rigid_modes is None else FloatingPoint
+        kinds = (Point, Graph) if problem.rigid_modes is None else (FloatingPoint, FloatingGraph)
+        kind = kinds[header.get("kind") == "graph"]
         return kind(problem, header).run(records[1:])
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError) as error:
         raise Refused(f"a record cannot be read: {error!r}") from error
@@ -129,6 +130,11 @@ class Proof:
         need(header["problem"] == fingerprint(problem) and integer(header["p"]) == problem.p, "another problem")
         need(header["data"] == "problem", "S and g as computed are not at hand")
         self.data, self.p = data_of(problem), problem.p
+
+    def same_bound(self, header):
+        """[5.6], [6.6]"""
+        bound = header["max_rigid_displacement"]
+        need(type(bound) is float and bound == self.data.bound, "another bound of the rigid displacement")
 
     def units(self, record):
         """[4.4] Factors of multipliers: on rows of forces, and of displacements."""
@@ -304,8 +310,7 @@ class FloatingPoint(Point):
 
     def __init__(self, problem, header):
         super().__init__(problem, header)
-        bound = header["max_rigid_displacement"]
-        need(type(bound) is float and bound == self.data.bound, "another bound of the rigid displacement")
+        self.same_bound(header)
 
     def leaf(self, codes, kind, *rest):
         need(kind in ("x", "n", "r", "N", "D", "u", "i"), "an unknown leaf")
@@ -324,11 +329,10 @@ class Graph(Proof):
 
     def __init__(self, problem, header):
         super().__init__(problem, header)
-        need(problem.rigid_modes is None, "a graph of a body that nothing holds")
         self.a, self.b = (decimal_fraction(end) for end in header["interval"])
         need(self.a < self.b, "the interval is empty")
         need(min(self.data.friction(self.a) + self.data.friction(self.b)) >= 0, "friction is negative")
-        self.origin = self.data.origin()
+        self.origin = self.starts()
         self.pieces = self.leaves = 0
         #: Codes of the surviving selections, with the pieces in which they survive.
         self.handed_on, self.closed = {}, []
@@ -373,7 +377,7 @@ class Graph(Proof):
         loads = [self.data.load(x), self.data.load(y)]
         if self.origin in (x, y):
             loads = [[value if x == self.origin else -value for value in self.data.g1]]
-        forms = [Forms(self.data.S, g, F_hi, F_lo) for g in loads]
+        forms = self.forms_of((x, y), loads, F_hi, F_lo)
         covered, cut, declared = set(), [], None
         kinds = [record[0] for record in leaves]
         closed = "m" in kinds
@@ -394,7 +398,7 @@ class Graph(Proof):
             if kind == "x":
                 self.leaves += 1
                 terms = self.terms(codes, rest, units, friction, varying)
-                need(all(form.excludes(terms) for form in forms), "multipliers do not exclude a leaf")
+                need(self.excluded(forms, terms), "multipliers do not exclude a leaf")
                 continue
             if kind == "f":
                 self.leaves += 1
@@ -415,6 +419,17 @@ class Graph(Proof):
         self.pieces += 1
         return cut
 
+    def starts(self):
+        """[6.2] alpha_0."""
+        return self.data.origin()
+
+    def forms_of(self, ends, loads, F_hi, F_lo):
+        return [Forms(self.data.S, g, F_hi, F_lo) for g in loads]
+
+    @staticmethod
+    def excluded(forms, terms):
+        return all(form.excludes(terms) for form in forms)
+
     @staticmethod
     def selections_below(codes, friction):
         return list(product(*(refinements(code, positive) for code, positive in zip(codes, friction, strict=True))))
@@ -422,3 +437,31 @@ class Graph(Proof):
     def codes(self, text):
         need(re.fullmatch(f"[0-6]{{{self.p}}}", text, re.ASCII), "no codes")
         return tuple(map(int, text))
+
+
+class FloatingGraph(Graph):
+    """[6.6]"""
+
+    def __init__(self, problem, header):
+        super().__init__(problem, header)
+        self.same_bound(header)
+
+    def starts(self):
+        return None
+
+    def run(self, records):
+        lists = [record[0] for record in records if isinstance(record, list)]
+        need(set(lists) <= {"x", "s", "c"}, "a record that such a graph cannot have")
+        need("pieces" in records[-1] and not any("traces" in record for record in records), "arcs")
+        return super().run(records)
+
+    def forms_of(self, ends, loads, F_hi, F_lo):
+        data = self.data
+        h = [[a + alpha * b for a, b in zip(data.h0, data.h1, strict=True)] for alpha in ends]
+        return [
+            FloatingForms(data.S, g, F_hi, data.G, load, data.reach, F_lo) for g, load in zip(loads, h, strict=True)
+        ]
+
+    @staticmethod
+    def excluded(forms, terms):
+        return forms[0].beside(forms[1], terms)

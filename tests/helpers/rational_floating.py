@@ -65,10 +65,10 @@ def _upward(value):
 class FloatingForms(Forms):
     """Forms a'(lambda, -q) + a0 as lists of 2p + r + 1 numbers."""
 
-    def __init__(self, S, g, F, G, h, reach):
+    def __init__(self, S, g, F, G, h, reach, F_lo=None):
         none = [fmpq(0)] * len(h)
         bordered = [[*row, *column] for row, column in zip(S.tolist(), zip(*G, strict=True), strict=True)]
-        super().__init__(fmpq_mat(bordered + [[*row, *none] for row in G]), [*g, *h], F)
+        super().__init__(fmpq_mat(bordered + [[*row, *none] for row in G]), [*g, *h], F, F_lo)
         self.own, self.G, self.h, self.reach = S, G, h, reach
 
     def equations(self, codes):
@@ -88,6 +88,11 @@ class FloatingForms(Forms):
         return self._excludes(terms) or self._excludes(self._balanced(terms))
 
     def _excludes(self, terms):
+        z = self.best(terms)
+        return z is None or self.margin(terms, z) > 0
+
+    def _gathered(self, terms):
+        """v without G'z, what the multipliers add, and G y - h."""
         size = 2 * self.p
         v, constant = self.g[:size], fmpq(0)
         turn = [-x for x in self.h]
@@ -97,25 +102,39 @@ class FloatingForms(Forms):
             # the coefficients of -q
             turn = [x + u * y for x, y in zip(turn, a[size:], strict=True)]
             constant += u * a0
-        G, right = fmpq_mat(self.G), column_of(v)
-        # the best z is where the concave function of it is stationary; where there is none it has no upper bound
-        flat = G * self.own.solve(G.transpose())
-        slope = (G * self.own.solve(right)).entries()
-        z = _solution(flat, [2 * x - y for x, y in zip(self.h, slope, strict=True)])
-        if z is None:
-            return True
-        right += G.transpose() * column_of(z)
-        value = -constant - (right.transpose() * self.own.solve(right))[0, 0] / 4
-        value += sum((x * y for x, y in zip(z, self.h, strict=True)), fmpq(0))
-        return value > sum((most * abs(x) for most, x in zip(self.reach, turn, strict=True)), fmpq(0))
+        return v, constant, turn
 
-    def _balanced(self, terms):
-        """Multipliers of the same signs with G y = h, or none."""
+    def best(self, terms, bend=0):
+        """Where the concave function of z is stationary; None where it is not, and has no upper bound.
+
+        Then some ``bend`` more makes it stationary at a z that is far along.
+        """
+        G, right = fmpq_mat(self.G), column_of(self._gathered(terms)[0])
+        flat = G * self.own.solve(G.transpose())
+        for j in range(len(self.h)):
+            flat[j, j] += bend
+        slope = (G * self.own.solve(right)).entries()
+        return _solution(flat, [2 * x - y for x, y in zip(self.h, slope, strict=True)])
+
+    def margin(self, terms, z):
+        """By how much (5.5) holds."""
+        v, constant, turn = self._gathered(terms)
+        right = column_of(v) + fmpq_mat(self.G).transpose() * column_of(z)
+        value = -constant - (right.transpose() * self.own.solve(right))[0, 0] / 4 + _dot(z, self.h)
+        return value - _dot(self.reach, list(map(abs, turn)))
+
+    def sums(self, terms):
+        """y."""
         y = [fmpq(0)] * (2 * self.p)
         for number, u in terms:
             kind, i = divmod(number, self.p)
-            if kind >= 4:
+            if 4 <= kind <= 6:
                 y[i if kind == 4 else self.p + i] += -u if kind == 5 else u
+        return y
+
+    def _balanced(self, terms):
+        """Multipliers of the same signs with G y = h, or none."""
+        y = self.sums(terms)
         G = fmpq_mat(self.G)
         scaled = fmpq_mat([[x * abs(w) for x, w in zip(row, y, strict=True)] for row in self.G])
         left = [a - b for a, b in zip(self.h, (G * column_of(y)).entries(), strict=True)]
@@ -129,8 +148,28 @@ class FloatingForms(Forms):
         for number, u in terms:
             kind, i = divmod(number, self.p)
             place = i if kind == 4 else self.p + i
-            found.append((number, u * (1 + share[place]) if kind >= 4 else u))
+            found.append((number, u * (1 + share[place]) if 4 <= kind <= 6 else u))
         return found
+
+    def beside(self, other, terms):
+        """[6.6] Whether the multipliers exclude a leaf for all alpha between this one and another."""
+        little = fmpq(1, 2**40)
+        z = [form.best(terms) or form.best(terms, little) for form in (self, other)]
+        middle = [(x + y) / 2 for x, y in zip(*z, strict=True)]
+        if any(min(form.margin(terms, one) for form in (self, other)) > 0 for one in (middle, *z)):
+            return True
+        turned = [form._balanced(terms) for form in (self, other)]
+        if [] in turned:
+            return False
+        z = [
+            form.best(changed) or form.best(changed, little)
+            for form, changed in zip((self, other), turned, strict=True)
+        ]
+        size = 2 * self.p
+        y = [self.sums(changed) for changed in turned]
+        bend = _dot(_less(*y), _less(self.g[:size], other.g[:size])) + _dot(_less(*z), _less(self.h, other.h))
+        margins = [form.margin(*given) for form, *given in zip((self, other), turned, z, strict=True)]
+        return min(margins) > abs(bend) / 4
 
     def units(self, lengths):
         """Units of the rows of G."""
@@ -155,6 +194,14 @@ class FloatingForms(Forms):
             if any(against[i] + side * against[self.p + i] > 0 for side in sides):
                 return False
         return True
+
+
+def _dot(a, b):
+    return sum((x * y for x, y in zip(a, b, strict=True)), fmpq(0))
+
+
+def _less(a, b):
+    return [x - y for x, y in zip(a, b, strict=True)]
 
 
 def _solution(matrix, right):
