@@ -176,3 +176,11 @@ def test_what_is_refused():
         problem.replace(rigid_modes=np.eye(problem.n)[:, :2])
     with pytest.raises(enumsol.InvalidProblemError, match="singular or indefinite on more than the 2 rigid_modes"):
         problem.replace(rigid_modes=problem.rigid_modes[:, :2])
+
+
+@pytest.mark.slow
+def test_a_table_of_roots_over_a_push_that_grows():
+    still, pushed = (block_on_table3d(1, push=(push, 0.0)) for push in (0.0, 1.0))
+    table = enumsol.multiplicity_table(still.replace(load_slope=pushed.f - still.f), [0.25, 0.75, 1.25])
+    assert table["roots"].tolist() == [1, 1, 0]
+    assert table["complete"].all()
