@@ -110,9 +110,9 @@ class SpaceChecker(TreeChecker):
         system = self.system
         try:
             limits = Limits((UNDECIDED,) * self.problem.p, components=len(system.g))
-            directions = DeclaredSlipForm.read(record, limits).directions
-            if self.form is None or not np.array_equal(self.form.directions, directions):
-                self.form = SlipForm.of(system, directions)
+            numbers = DeclaredSlipForm.read(record, limits).numbers
+            if self.form is None or not np.array_equal(self.form.numbers, numbers):
+                self.form = SlipForm.of(system, numbers)
         except ValueError as error:
             raise RefusedError(str(error)) from None
 

@@ -67,17 +67,17 @@ class ExcludedInSpace(Exclusion):
 
 @dataclass(frozen=True, eq=False)
 class DeclaredSlipForm(Record):
-    """A form to which later leaves refer: a number for each tau."""
+    """A form to which later leaves refer: mu and kappa of every node, and a number for each tau."""
 
     kind, sizes, unfit = DeclaredForm.kind, (2,), "a form has {} entries; expected {}"
 
-    directions: Array
+    numbers: Array
 
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> DeclaredSlipForm:
         """The numbers; ValueError where there are not as many as tau."""
         try:
-            return cls(numbers_from(entries[0], limits.components - limits.p))
+            return cls(numbers_from(entries[0], limits.components + limits.p))
         except ValueError as error:
             raise ValueError(f"a form cannot be read: {error}") from None
 

@@ -23,6 +23,8 @@ from enumsol.trusted.quadratic_forms import EnclosedForm, Equations
 from enumsol.trusted.status_rows import CONTACT, UNDECIDED
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from enumsol.condensation.condensed import ScaledSystem
@@ -214,16 +216,11 @@ class FormAscent:
         """Newton's step, in the logs of multipliers that have a sign, and what it promises; None where it fails."""
         scaled, live = self._scaled, space.live
         signed = live >= 2 * scaled.p
-        left, right = self._factors(found.relaxation.forces)
-        X = solve_triangular(found.factor, space.across.T, lower=True)
-        P = X.T @ X
-        PS = P @ scaled.S
-        mixed = self._right(self._left(PS).T).T
-        gradient = (scale * left * right + np.diagonal(mixed))[live]
-        grid = np.ix_(live, live)
-        mixed = mixed[grid]
-        lefts, rights = self._left(self._left(P).T)[grid], self._right(self._right(scaled.S @ PS).T)[grid]
-        hessian = 0.5 * (lefts * rights + mixed * mixed.T) + scale * self._bending(space, found, left, right)
+        numbers, _ = found.relaxation.multipliers()
+        normals = row_normals(scaled.p, scaled.F, scaled.S, numbers) @ space.across
+        terms = Products(scaled.S, scaled.g, lambda rows: self._left(rows)[live], lambda rows: self._right(rows)[live])
+        forces = found.relaxation.forces
+        gradient, hessian = terms.derivatives(found.form.H, found.factor, forces, scale, normals, space.across)
         slope = np.where(signed, found.multipliers[live], 1.0)
         gradient *= slope
         hessian *= slope[:, None] * slope
@@ -231,37 +228,11 @@ class FormAscent:
         # what the logs add to the curvature, where it is concave
         diagonal[signed] += np.maximum(-gradient[signed], _LOGS)
         gradient[signed] += _LOGS
-        hessian[np.diag_indices(len(live))] = diagonal * (1.0 + 1e-8)
-        if not (np.all(np.isfinite(hessian)) and np.all(np.isfinite(gradient))):
-            return None
-        try:
-            step = np.asarray(cho_solve(cho_factor(hessian, overwrite_a=True), gradient))
-        except np.linalg.LinAlgError:
-            return None
-        return step, float(gradient @ step)
-
-    def _bending(self, space: _Subspace, found: _Candidate, left: Array, right: Array) -> Array:
-        """Minus the second derivative of the bound: the minimiser moves on the face of the rows that are active."""
-        scaled, live = self._scaled, space.live
-        numbers, _ = found.relaxation.multipliers()
-        normals = row_normals(scaled.p, scaled.F, scaled.S, numbers) @ space.across
-        free = space.across
-        if len(normals):
-            free = free @ _complement(normals)
-        if not free.shape[1]:
-            return np.zeros((len(live), len(live)))
-        slopes = self._left(free) * right[:, None] + self._right(scaled.S @ free) * left[:, None]
-        factor = factor_above(free.T @ found.form.H @ free)
-        if factor is None:
-            return np.zeros((len(live), len(live)))
-        moved = solve_triangular(factor, slopes[live].T, lower=True)
-        return np.asarray(0.5 * (moved.T @ moved))
+        hessian[np.diag_indices(len(live))] = diagonal
+        step = newton_step(gradient, hessian)
+        return None if step is None else (step, float(gradient @ step))
 
     # -- the terms of all 4p multipliers: products of a factor in lambda and one in S lambda - g -----------------------
-
-    def _factors(self, forces: Array) -> tuple[Array, Array]:
-        w = self._scaled.g - self._scaled.S @ forces
-        return self._left(forces[:, None])[:, 0], -self._right(w[:, None])[:, 0]
 
     def _left(self, rows: Array) -> Array:
         """Factors lambda_n, lambda_t, lambda_t - F lambda_n, lambda_t + F lambda_n, given rows for lambda."""
@@ -273,6 +244,72 @@ class FormAscent:
         """Factors w_n, w_n, w_t, w_t, given rows for w."""
         normal, tangential = rows[: self._scaled.p], rows[self._scaled.p :]
         return np.concatenate([normal, normal, tangential, tangential])
+
+
+@dataclass(frozen=True)
+class Products:
+    """Products of a factor in y and one in S y - g, of which a form is the sum with multipliers.
+
+    Attributes
+    ----------
+    S, g : arrays
+    left, right : callables
+        Rows of the factors of all products, given rows for y and for S y - g.
+    """
+
+    S: Array
+    g: Array
+    left: Callable[[Array], Array]
+    right: Callable[[Array], Array]
+
+    def derivatives(
+        self, H: Array, factor: Array, forces: Array, scale: float, normals: Array, across: Array
+    ) -> tuple[Array, Array]:
+        """Gradient, and minus the second derivative, of scale times the bound plus the log of the determinant.
+
+        Parameters
+        ----------
+        H : of the form
+        factor : Cholesky factor of H on the subspace
+        forces : (m,) array
+            The minimiser.
+        scale : float
+        normals : (k, r) array
+            Of the rows that are active, on the subspace.
+        across : (m, r) array
+            Columns that span the subspace.
+        """
+        left = self.left(forces[:, None])[:, 0]
+        right = self.right((self.S @ forces - self.g)[:, None])[:, 0]
+        X = solve_triangular(factor, across.T, lower=True)
+        P = X.T @ X
+        PS = P @ self.S
+        mixed = self.right(self.left(PS).T).T
+        gradient = scale * left * right + np.diagonal(mixed)
+        lefts, rights = self.left(self.left(P).T), self.right(self.right(self.S @ PS).T)
+        bending = scale * self._bending(H, left, right, normals, across)
+        return gradient, 0.5 * (lefts * rights + mixed * mixed.T) + bending
+
+    def _bending(self, H: Array, left: Array, right: Array, normals: Array, across: Array) -> Array:
+        """Minus the second derivative of the bound: the minimiser moves on the face of the rows that are active."""
+        free = across @ _complement(normals) if len(normals) else across
+        factor = factor_above(free.T @ H @ free) if free.shape[1] else None
+        if factor is None:
+            return np.zeros((len(left), len(left)))
+        slopes = self.left(free) * right[:, None] + self.right(self.S @ free) * left[:, None]
+        moved = solve_triangular(factor, slopes.T, lower=True)
+        return np.asarray(0.5 * (moved.T @ moved))
+
+
+def newton_step(gradient: Array, hessian: Array) -> Array | None:
+    """The step of Newton's method, given minus the second derivative; None where that is not definite."""
+    hessian[np.diag_indices(len(hessian))] *= 1.0 + 1e-8
+    if not (np.all(np.isfinite(hessian)) and np.all(np.isfinite(gradient))):
+        return None
+    try:
+        return np.asarray(cho_solve(cho_factor(hessian, overwrite_a=True), gradient))
+    except np.linalg.LinAlgError:
+        return None
 
 
 def _is_convex(H: Array, mean: float) -> bool:

@@ -100,14 +100,19 @@ class Space:
             return "+" if a <= c and d <= b else "."
         return (table[code] if code < 8 else "E+....+")[kind]
 
-    def form(self, c):
-        """H and h of the form that c declares; None where c is longer than one or H is not positive definite."""
-        share, p, size = [Fraction(x) for x in c], len(self.F[0]), len(self.g)
+    def form(self, numbers):
+        """H and h of the form of these numbers; None where a c is too long or H is not positive definite."""
+        p, size = len(self.F[0]), len(self.g)
+        numbers = [Fraction(x) for x in numbers]
+        mu, kappa, share = numbers[:p], numbers[p : 2 * p], numbers[2 * p :]
         rows, h = copied(self.S), list(self.g)
         for i in range(p):
             own = [t for k in range(2) if (t := self.tau.get((i, k))) is not None]
-            if sum(share[t - p] ** 2 for t in own) > 1:
+            if kappa[i] <= 0 or sum(share[t - p] ** 2 for t in own) >= kappa[i] ** 2:
                 return None
+            for t, factor in ((i, mu[i]), *((t, kappa[i]) for t in own)):
+                rows[t] = [factor * x for x in self.S[t]]
+                h[t] = factor * self.g[t]
             for t in own:
                 rows[i] = [x - share[t - p] * y for x, y in zip(rows[i], self.S[t], strict=True)]
                 h[i] -= share[t - p] * self.g[t]
@@ -226,10 +231,10 @@ def test_exclusions_by_a_form_hold_in_rationals_and_no_others_are_accepted():
     checker._read_header(header)
     counts = [0, 0]
     for factor in (1.0, 0.8, 1.05, 0.0):
-        c = [factor * x for x in records[declared][1]]
-        form = space.form(c)
+        numbers = [x if k < 2 * problem.p else factor * x for k, x in enumerate(records[declared][1])]
+        form = space.form(numbers)
         try:
-            checker._declare(["q", c])
+            checker._declare(["q", numbers])
         except RefusedError:
             assert form is None
             continue

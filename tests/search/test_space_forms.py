@@ -67,6 +67,12 @@ def test_the_same_roots_as_by_the_energy_and_by_newton():
     assert used >= 4
 
 
+def numbers_of(c, enclosed, mu=1.0, kappa=1.0):
+    """The numbers of a form, given a vector for every node."""
+    both = np.concatenate([np.broadcast_to(mu, len(c)), np.broadcast_to(kappa, len(c))])
+    return np.concatenate([both, c[enclosed.tau >= 0]])
+
+
 def test_a_form_is_at_most_zero_at_solutions_and_what_the_theory_says():
     rng = np.random.default_rng(1)
     for seed in range(6):
@@ -76,13 +82,15 @@ def test_a_form_is_at_most_zero_at_solutions_and_what_the_theory_says():
         solvers, p = SpaceSolvers(problem, 0.0, "verified"), 2
         enclosed, system = solvers.enclosed, solvers.system
         angle = rng.uniform(0, 2 * np.pi, p)
-        c = 0.999 * np.column_stack([np.cos(angle), np.sin(angle)])
-        form = SlipForm.of(enclosed, c[enclosed.tau >= 0])
+        mu, kappa = rng.normal(size=p), rng.uniform(0.2, 2.0, p)
+        c = 0.999 * kappa[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
+        form = SlipForm.of(enclosed, numbers_of(c, enclosed, mu, kappa))
         for root in enumerate_roots(problem, 0):
             lam, v = forces(root), np.where(F > 0, F * root.u_t, 0.0)
             tau = lam[p:].reshape(2, p).T / np.where(F > 0, F, 1.0)
             y = np.concatenate([lam[:p] / system.force, (tau / system.force[:, None])[F > 0] / enclosed.unit[p:]])
-            wanted = np.sum(lam[:p] * (np.sum(np.where(F > 0, c, 0.0) * v, axis=1) - np.linalg.norm(v, axis=1)))
+            slip = np.sum(np.where(F > 0, c, 0.0) * v, axis=1) - kappa * np.linalg.norm(v, axis=1)
+            wanted = np.sum(lam[:p] * slip)
             q = (y @ form.H @ y - form.h @ y) * system.force[0] * system.length[0]
             assert q == pytest.approx(wanted, abs=1e-9 * max(1.0, np.max(np.abs(S)) * np.max(lam) ** 2))
             assert wanted <= 1e-12
@@ -91,11 +99,18 @@ def test_a_form_is_at_most_zero_at_solutions_and_what_the_theory_says():
 def test_balls_of_a_form_hold_the_exact_one():
     problem = problem_of(on_springs(3, 2))
     enclosed, p = SpaceSolvers(problem, 0.0, "verified").enclosed, 2
-    c = np.array([0.3, -0.6, 0.123, 0.9])
-    form = SlipForm.of(enclosed, c)
+    c, mu, kappa = np.array([0.3, -0.6, 0.123, 0.9]), [0.7, -0.1], [1.3, 0.95]
+    form = SlipForm.of(enclosed, np.array([*mu, *kappa, *c]))
     S, g = [[Fraction(x) for x in row] for row in enclosed.S.tolist()], [Fraction(x) for x in enclosed.g.tolist()]
     share = [Fraction(x) / Fraction(u) for x, u in zip(c.tolist(), enclosed.unit[p:].tolist(), strict=True)]
-    rows, load = copied(S), list(g)
+    weight = [Fraction(mu[i]) for i in range(p)] + [Fraction(0)] * (2 * p)
+    for i in range(p):
+        for t in enclosed.tau[i].tolist():
+            weight[t] = Fraction(kappa[i])
+    rows, load = (
+        [[x * y for y in row] for x, row in zip(weight, S, strict=True)],
+        [x * y for x, y in zip(weight, g, strict=True)],
+    )
     for i in range(p):
         for t in enclosed.tau[i].tolist():
             rows[i] = [x - share[t - p] * y for x, y in zip(rows[i], S[t], strict=True)]
@@ -109,11 +124,21 @@ def test_balls_of_a_form_hold_the_exact_one():
     assert np.max(form.H_rad) < 8 * np.max(enclosed.S_rad) + 1e-14 * np.max(np.abs(enclosed.S))
 
 
-@pytest.mark.parametrize("c", [[1.0, 1e-6, 0.0, 0.0], [0.0, 0.0, -1.0 * SAFE, 0.0], [0.0] * 3])
-def test_no_vector_is_longer_than_one(c):
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        [1.0, 1.0, 0.5, 1.0, 0.5, 1e-6, 0.0, 0.0],
+        [1.0, 1.0, 1.0, 2.0, 0.0, 0.0, -2.0 * SAFE, 0.0],
+        [1.0, 1.0, -1.0, 1.0, 0.0, 0.0, 0.0, 0.0],
+        [1.0, 1.0, 1e-200, 1.0, 1e-170, 0.0, 0.0, 0.0],
+        [1.0, 1.0, np.nan, 1.0, 0.0, 0.0, 0.0, 0.0],
+        [1.0] * 4 + [0.0] * 3,
+    ],
+)
+def test_no_vector_is_longer_than_its_kappa(numbers):
     enclosed = SpaceSolvers(problem_of(on_springs(3, 2)), 0.0, "verified").enclosed
-    with pytest.raises(ValueError, match=r"longer than one|3 numbers; expected 4"):
-        SlipForm.of(enclosed, np.array(c))
+    with pytest.raises(ValueError, match=r"longer than its kappa|7 numbers; expected 8"):
+        SlipForm.of(enclosed, np.array(numbers))
 
 
 def test_proofs_that_say_something_else_of_a_form_are_refused(with_form):
@@ -127,13 +152,18 @@ def test_proofs_that_say_something_else_of_a_form_are_refused(with_form):
         return verify(problem, proof_of(changed))
 
     def lengthen(changed):
-        changed[declared][1][:2] = [0.8, 0.8]
+        numbers = changed[declared][1]
+        numbers[2 * problem.p] = numbers[problem.p]
 
     def shorten(changed):
         changed[declared][1].pop()
 
     def turn(changed):
-        changed[declared][1] = [-x for x in changed[declared][1]]
+        numbers, p = changed[declared][1], problem.p
+        changed[declared][1] = numbers[: 2 * p] + [-x for x in numbers[2 * p :]]
+
+    def weigh(changed):
+        changed[declared][1][0] *= 3.0
 
     def take_away(changed):
         del changed[declared]
@@ -148,9 +178,9 @@ def test_proofs_that_say_something_else_of_a_form_are_refused(with_form):
     def weaken(changed):
         changed[first] = with_values(changed[first], [0.0 for _ in values_of(changed[first])])
 
-    for change in (lengthen, shorten, turn, take_away, late, by_energy, weaken):
+    for change in (lengthen, shorten, turn, weigh, take_away, late, by_energy, weaken):
         assert not report(change).ok, change.__name__
-    assert "longer than one" in str(report(lengthen))
+    assert "longer than its kappa" in str(report(lengthen))
     assert len(roots) >= 1
 
 

@@ -115,10 +115,10 @@ class SpaceReader:
         """Take note of a form; ValueError where the record makes no sense."""
         system = self._engine.system
         limits = Limits((UNDECIDED,) * system.p, components=len(system.g))
-        directions = DeclaredSlipForm.read(record, limits).directions
+        numbers = DeclaredSlipForm.read(record, limits).numbers
         # parts of one search declare the same form
-        if self._form is None or not np.array_equal(self._form.directions, directions):
-            self._form = SlipForm.of(self._enclosed, directions)
+        if self._form is None or not np.array_equal(self._form.numbers, numbers):
+            self._form = SlipForm.of(self._enclosed, numbers)
 
     def form_over(self, codes: Codes) -> SlipForm | None:
         """The form that was declared last, which holds over all partial assignments."""
@@ -183,7 +183,7 @@ class SpaceCertifier(RecordingCertifier):
             return False
         if form is not None and form is not self._form:
             self._form = form
-            self.recorder.write(DeclaredSlipForm(form.directions).write())
+            self.recorder.write(DeclaredSlipForm(form.numbers).write())
         self._leaf((ExcludedInSpace if form is None else ExcludedBySlipForm)(rows, values))
         return True
 

@@ -105,7 +105,7 @@ class SpaceSolvers(SearchSetup):
 
     def _forms(self) -> SpaceForms | None:
         """What a long search may bound with in place of the energy."""
-        return SpaceForms(self.system, self.enclosed)
+        return SpaceForms(self.enclosed)
 
     def remake(self) -> Callable[[], SpaceSolvers]:
         """Makes the same again, also in another process."""

@@ -1,6 +1,7 @@
 """The trusted forms in 3D that bound in place of the energy (theory, section 12.2).
 
-At every solution e = -(sum of lambda_n |v|), and |v| is at least c . v for every vector c that is no longer than one.
+At every solution lambda_n w_n = 0, and tau . v = lambda_n |v| is at least lambda_n c . v for every vector c that is no
+longer than one, node by node.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import TINY, UNIT, upper_norm
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT
 from enumsol.trusted.quadratic_forms import QuadraticForm
 
 if TYPE_CHECKING:
@@ -24,36 +25,43 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class SlipForm(QuadraticForm):
-    """q(y) = e(y) + sum of lambda_n c . v over all nodes, at most zero at every solution; theory, section 12.2.
+    """q(y) = - sum over all nodes of mu lambda_n w_n + kappa tau . v - lambda_n c . v; theory, section 12.2.
+
+    It is at most zero at every solution, since |c| is at most kappa.
 
     Attributes
     ----------
-    directions : (m - p,) array
-        The components of c, one for each tau, in their order in y.
+    numbers : (m + p,) array
+        mu and kappa of all nodes, and the components of c, one for each tau, in their order in y.
     """
 
-    directions: Array
+    numbers: Array
 
     @classmethod
-    def of(cls, system: EnclosedSpace, directions: Array) -> SlipForm:
-        """The form of given vectors c.
+    def of(cls, system: EnclosedSpace, numbers: Array) -> SlipForm:
+        """The form of given multipliers.
 
         Raises
         ------
         ValueError
-            There are not as many numbers as tau, or the c of a node is longer than one.
+            There are not as many numbers as a form has, or the c of a node is longer than its kappa.
         """
         tau, p = system.tau, len(system.tau)
-        if directions.shape != (len(system.g) - p,):
-            raise ValueError(f"a form has {len(directions)} numbers; expected {len(system.g) - p}")
-        place = np.where(tau >= 0, tau - p, len(directions))
-        if not np.all(upper_norm(np.append(directions, 0.0)[place], axis=1) <= 1.0):
-            raise ValueError("the vector of a node is longer than one")
-        S, g = Ball(system.S, system.S_rad), Ball(system.g, system.g_rad)
-        H, h = Ball(S.mid.copy(), S.rad.copy()), Ball(g.mid.copy(), g.rad.copy())
+        if numbers.shape != (len(system.g) + p,):
+            raise ValueError(f"a form has {len(numbers)} numbers; expected {len(system.g) + p}")
+        mu, kappa, c = np.split(numbers, [p, 2 * p])
+        place = np.where(tau >= 0, tau - p, len(c))
+        first, second = np.append(c, 0.0)[place].T
+        if not np.all(np.hypot(first, second) * SAFE + TINY <= kappa):
+            raise ValueError("the vector c of a node is longer than its kappa")
         # units are powers of two: what is rounded is less than TINY
         with np.errstate(over="ignore", invalid="ignore"):
-            share = Ball(directions / system.unit[p:], np.full(len(directions), TINY))
+            share = Ball(c / system.unit[p:], np.full(len(c), TINY))
+            node, axis = np.nonzero(tau >= 0)
+            weight = np.append(mu, np.zeros(len(c)))
+            weight[tau[node, axis]] = kappa[node]
+            S, g, factor = Ball(system.S, system.S_rad), Ball(system.g, system.g_rad), Ball.exact(weight)
+            H, h = S * factor[:, None], g * factor
             for k in range(2):
                 n = np.flatnonzero(tau[:, k] >= 0)
                 t = tau[n, k]
@@ -61,4 +69,4 @@ class SlipForm(QuadraticForm):
                 h[n] = h[n] - g[t] * share[t - p]
             mid = 0.5 * (H.mid + H.mid.T)
             rad = 0.5 * (H.rad + H.rad.T) * (1 + 4 * UNIT) + 4 * UNIT * np.abs(mid) + TINY
-        return cls(system, mid, rad, h.mid, h.rad, 0.0, 0.0, directions)
+        return cls(system, mid, rad, h.mid, h.rad, 0.0, 0.0, numbers)
