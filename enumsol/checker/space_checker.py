@@ -27,7 +27,7 @@ from enumsol.trusted.space.boxed_solution import apart_in_boxes, is_inside, solu
 from enumsol.trusted.space.leaves import Open, distinct_roots, settle
 from enumsol.trusted.space.sector_rows import STICK, UNDECIDED, is_sector_covering, sector_margin
 from enumsol.trusted.space.slip_forms import SlipForm
-from enumsol.trusted.space.space_uniqueness import OnlySolution, only_root, only_solution_in_space
+from enumsol.trusted.space.space_uniqueness import OnlySolution, lone_root, only_root, only_solution_in_space
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -85,8 +85,7 @@ class SpaceChecker(TreeChecker):
     # -- leaves ----------------------------------------------------------------------------------------------------
 
     def _limits(self, codes: Codes, kind: type[Record]) -> Limits:
-        whole = kind is OnlyRoot and all(code == UNDECIDED for code in codes)
-        return Limits(codes, components=len(self.system.g) if whole else 0)
+        return Limits(codes, components=len(self.system.g) if kind is OnlyRoot else 0)
 
     def _tests(self) -> dict[type[Record], Test]:
         return {
@@ -157,9 +156,15 @@ class SpaceChecker(TreeChecker):
         return self._placed(found, said.enclosure)
 
     def _only(self, codes: Codes, said: OnlyRoot) -> str | None:
-        """The only solution of all."""
-        del codes
+        """The only solution of all, or of an assignment."""
         found: LooseSolution | SpaceRoot | None
+        if any(code != UNDECIDED for code in codes):
+            found = lone_root(self.system, codes, said.numbers, said.leaf)
+            if found is None:
+                return "its root is not proven to be the only one in it"
+            self.roots.append((said.leaf, found))
+            self._locate(found.y, np.array(said.leaf) == STICK)
+            return self._placed(found, said.enclosure)
         if said.leaf:
             found = only_root(self.system, said.numbers, said.leaf)
         else:

@@ -91,7 +91,7 @@ class ExcludedBySlipForm(ExcludedInSpace):
 
 @dataclass(frozen=True, eq=False)
 class OnlyRoot(ClosingRecord):
-    """The whole tree: the problem has this solution only.
+    """Below the assignment there is this solution only, or none; if it is the whole tree, the problem has it only.
 
     Attributes
     ----------
@@ -110,10 +110,10 @@ class OnlyRoot(ClosingRecord):
 
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> OnlyRoot:
-        """Numbers and codes, at the root of the tree."""
-        if any(code != UNDECIDED for code in limits.codes):
-            raise RecordError("its only solution is claimed below the root of the tree")
+        """Numbers and codes; below the root of the tree those of a leaf."""
         values, leaf, mid, *_ = entries
+        if not leaf and any(code != UNDECIDED for code in limits.codes):
+            raise RecordError("its only solution is claimed below the root of the tree without a leaf")
         numbers, force = numbers_from(values, limits.p + 2 * limits.components), numbers_from(mid, limits.components)
         if not isinstance(leaf, list) or not all(type(code) is int for code in leaf):
             raise RecordError("its leaf is not a list of codes")

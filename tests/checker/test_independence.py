@@ -90,7 +90,15 @@ SHARED = {
         *("BoxedSolution", "apart_in_boxes", "box_around", "is_inside", "solution_in_box")
     },
     "trusted.space.space_uniqueness": {
-        *("LARGEST_UNIT", "LooseSolution", "OnlySolution", "only_root", "only_solution_in_space")
+        *(
+            "LARGEST_UNIT",
+            "LooseSolution",
+            "OnlySolution",
+            "equations",
+            "lone_root",
+            "only_root",
+            "only_solution_in_space",
+        )
     },
     "arithmetic.ball_arrays": None,
     "proof.begun": None,

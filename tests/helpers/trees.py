@@ -19,7 +19,16 @@ def by_the_tree():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Closer, "_due", lambda self, nodes: False)
         patch.setattr(SpaceCloser, "whole", lambda self: None)
+        patch.setattr(SpaceCloser, "closed", lambda self, codes, relaxation: None)
         patch.setattr(ClosedPieces, "find", lambda self, traced: None)
+        yield
+
+
+@contextmanager
+def closed_in_the_tree():
+    """In this context no problem in 3D is decided by one certificate before its tree."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(SpaceCloser, "whole", lambda self: None)
         yield
 
 

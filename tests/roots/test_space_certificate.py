@@ -354,13 +354,13 @@ def test_coefficients_beyond_what_is_tried_are_left_to_the_tree():
 # -- the interface -----------------------------------------------------------------------------------------------------
 
 
-def test_only_the_whole_tree_is_tried():
+def test_what_is_tried_again():
     problem = gallery.block3d(2, 1, 2)
     solvers = SpaceSolvers(problem, 0.5, "verified")
     certifier = solvers.certifier(None)
     closer = SpaceCloser(solvers.system, certifier)
     assert not closer.begins_again(7)
-    assert closer.closed((UNDECIDED,) * problem.p, None) is None
+    # the solution has no open nodes
     assert closer.again((0, *(UNDECIDED,) * (problem.p - 1)), None) is None
     assert closer.sliding == {}
     (one,), (other,) = closer.whole(), closer.again((UNDECIDED,) * problem.p, None)

@@ -1,4 +1,4 @@
-"""In 3D: one certificate before the tree, that the problem has one solution only (theory, section 12.6).
+"""In 3D: one certificate, before the tree or in it, that there is one solution only (theory, section 12.6).
 
 Nothing here is trusted: the certifier proves what is proposed, or the tree is searched.
 """
@@ -6,21 +6,22 @@ Nothing here is trusted: the certifier proves what is proposed, or the tree is s
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import scipy.linalg
 
 from enumsol.model.sectors import SECTORS, nearest, start_of
-from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.search.space.space_newton import Isotropic
 from enumsol.support.deadlines import look
-from enumsol.trusted.space.space_uniqueness import LARGEST_UNIT
+from enumsol.trusted.space.space_uniqueness import LARGEST_UNIT, equations
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from enumsol.condensation.space_condensed import SpaceSystem
+    from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
     from enumsol.relaxation.engine import Relaxation
     from enumsol.search.fathoming_in_contact import KnownRoot
     from enumsol.selections.solution import Codes
@@ -42,10 +43,14 @@ _MANY, _EVALUATIONS, _ROUND = 8, 60, 20
 _HARDNESS = 10.0, 20.0, 40.0
 #: Of the gap of an open node, what may serve for its slip.
 _SHARED = 0.5
+#: Weight of the equations of an assignment, by the largest entry of S.
+_WEIGHT = 1024.0
 
 
 class SpaceClosing(Protocol):
-    """A certifier that can close the whole tree."""
+    """A certifier that can close the whole tree, or parts of it."""
+
+    enclosed: EnclosedSpace
 
     def close(self, numbers: Array, codes: Codes | None, normal: Array) -> list[Any] | None:
         """The only solution, as a list; None if not proven.
@@ -57,9 +62,12 @@ class SpaceClosing(Protocol):
         normal : (p,) array, lambda_n near the solution
         """
 
+    def alone(self, codes: Codes, numbers: Array, leaf: Codes) -> list[Any] | None:
+        """The root of a leaf, as a list, if no other solution has the statuses of an assignment; None if not proven."""
+
 
 class SpaceCloser:
-    """Tries once, before the tree, and never below its root.
+    """Tries once before the tree, and then at every assignment that allows the statuses of a regular solution.
 
     Parameters
     ----------
@@ -71,6 +79,10 @@ class SpaceCloser:
 
     def __init__(self, system: SpaceSystem, certifier: SpaceClosing, *, regular: bool = False) -> None:
         self._system, self._certifier, self._regular = system, certifier, regular
+        #: Smallest eigenvalue of Q relative to S, and slack of a solution, that are asked for.
+        self._enough, self._least = (_CLEAR, _CLEAR) if regular else (_DEFINITE, NEAR)
+        #: Assignments of statuses that were tried in vain.
+        self._tried: set[Codes] = set()
         #: No node slides without load in a part of the tree, and no root is tried there.
         self.sliding: dict[int, int] = {}
         self.known: KnownRoot | None = None
@@ -79,18 +91,37 @@ class SpaceCloser:
     def whole(self) -> list[Any] | None:
         """The only solution, as a list; None where that is not proven."""
         with np.errstate(all="ignore"):
-            return self._tried()
+            return self._whole()
 
     def again(self, codes: Codes, relaxation: Relaxation | None) -> list[Any] | None:
         """The only solution, proven again where an earlier search has proven it."""
-        del relaxation
-        return self.whole() if all(code == UNDECIDED for code in codes) else None
+        if all(code == UNDECIDED for code in codes):
+            return self.whole()
+        return self.closed(codes, relaxation)
 
-    def closed(self, codes: Codes, relaxation: Relaxation | None) -> None:
-        """No partial assignment is closed."""
+    def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[Any] | None:
+        """The regular solution that is known, if it is proven to be the only one with the statuses of an assignment.
+
+        Sectors count as contact: each assignment of statuses is tried once.
+        """
+        del relaxation
+        statuses, found = tuple(CONTACT if code > SECTORS else code for code in codes), None
+        with np.errstate(all="ignore"):
+            point = self._point
+            if point is None or point.slack <= self._least or statuses in self._tried:
+                return None
+            if not all(map(_allows, statuses, point.codes)):
+                return None
+            held = equations(self._certifier.enclosed, statuses, _WEIGHT).mid
+            numbers = point.numbers(self._enough, better=False, held=held)
+            if numbers is not None:
+                found = self._certifier.alone(statuses, numbers, point.codes)
+        if found is None:
+            self._tried.add(statuses)
+        return found
 
     def alone(self, codes: Codes, proposal: object, bound: object) -> None:
-        """Nor by a root that is alone below it."""
+        """Nothing else is proposed below an assignment."""
 
     def met(self, answer: object) -> None:
         """Nothing follows from what a leaf holds."""
@@ -100,7 +131,9 @@ class SpaceCloser:
         del nodes
         return False
 
-    def _tried(self) -> list[Any] | None:
+    @cached_property
+    def _point(self) -> Point | None:
+        """A solution in floats."""
         system = self._system
         if np.max(np.maximum(system.unit, 1.0 / system.unit)) > LARGEST_UNIT:
             return None
@@ -108,12 +141,15 @@ class SpaceCloser:
         y = problem.solution()
         if y is None:
             return None
-        point = Point.of(system, problem, y)
-        if self._regular and point.slack < _CLEAR:
+        return Point.of(system, problem, y)
+
+    def _whole(self) -> list[Any] | None:
+        system, point = self._system, self._point
+        if point is None or (self._regular and point.slack < _CLEAR):
             return None
         # a tree would not end at a degenerate solution: numbers are sought there whatever they cost
         better = not self._regular and (system.p >= _MANY or point.slack <= NEAR)
-        numbers = point.numbers(_CLEAR if self._regular else _DEFINITE, better=better)
+        numbers = point.numbers(self._enough, better=better)
         if numbers is None:
             return None
         found = self._certifier.close(numbers, point.codes, point.n) if point.slack > 0 else None
@@ -183,17 +219,26 @@ class Point:
 
     # -- numbers ---------------------------------------------------------------------------------------------------
 
-    def numbers(self, enough: float, *, better: bool) -> Array | None:
+    def numbers(self, enough: float, *, better: bool, held: Array | None = None) -> Array | None:
         """Numbers for which Q is definite, as a proof has them; plain ones, or better ones if these are asked for.
 
-        ``enough``: the smallest eigenvalue relative to S from which Q counts as definite.
+        Parameters
+        ----------
+        enough : smallest eigenvalue relative to S from which Q counts as definite
+        better : whether better numbers than the plain ones are sought
+        held : rows whose squares are added to Q
         """
-        form = _Definite(self)
+        form = _Definite(self, held)
         logs, shares = form.plain
         least = form.least(logs, shares)
         if least <= enough and better and (least > _HOPELESS or self.slack <= NEAR):
             logs, shares, least = form.improved(logs, shares, least)
         return form.values(logs, shares) if least > enough else None
+
+
+def _allows(code: int, final: int) -> bool:
+    """Whether a node of a (partial) status, which is not a sector, may have a final one."""
+    return code in (UNDECIDED, final) or (code == CONTACT and final != OPEN)
 
 
 def _sector(direction: Array, level: int) -> int:
@@ -214,8 +259,9 @@ class _Definite:
     (1 + |z|^2)^(1/2) for a z in the plane.
     """
 
-    def __init__(self, point: Point) -> None:
+    def __init__(self, point: Point, held: Array | None = None) -> None:
         system = point.system
+        self._held = None if held is None else held.T @ held
         self._system, self._S, self._point = system, system.S, point
         tau, p = system.tau, system.p
         self._open = point.gap > 0
@@ -293,6 +339,8 @@ class _Definite:
             rows = self._rows[wide, k] * np.sqrt(kappa[wide] / reach)[:, None]
             form -= 0.5 * rows.T @ rows
         form[wide, wide] -= 0.5 * kappa[wide] * reach
+        if self._held is not None:
+            form += self._held
         return 0.5 * (form + form.T)
 
     def _value(self, x: Array, columns: Array, hardness: float) -> tuple[float, Array]:

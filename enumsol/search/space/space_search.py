@@ -26,7 +26,7 @@ from enumsol.search.space.known_boxes import KnownBoxes
 from enumsol.trusted.space.leaves import Cause, Open, SpaceRoot, settle
 from enumsol.trusted.space.sector_rows import is_sector_covering, sector_margin, sector_row_terms
 from enumsol.trusted.space.slip_forms import SlipForm
-from enumsol.trusted.space.space_uniqueness import OnlySolution, only_root, only_solution_in_space
+from enumsol.trusted.space.space_uniqueness import OnlySolution, lone_root, only_root, only_solution_in_space
 from enumsol.trusted.space.turning import turned_by
 
 if TYPE_CHECKING:
@@ -258,6 +258,23 @@ class SpaceCertifier(RecordingCertifier):
         self._verified[codes or (UNDECIDED,) * len(normal)] = found
         ball = self._ball(found)
         self._leaf(OnlyRoot(numbers, codes or (), ball.mid, ball))
+        return [found]
+
+    def alone(self, codes: Codes, numbers: Array, leaf: Codes) -> list[SpaceRoot] | None:
+        """The root of a leaf, if no other solution has the statuses of an assignment, and that record written; or None.
+
+        Parameters
+        ----------
+        codes : of the assignment
+        numbers : of the form, as for ``close``
+        leaf : codes of the leaf
+        """
+        found = lone_root(self.enclosed, codes, numbers, leaf, errors=2.0)
+        if found is None:
+            return None
+        ball = self._ball(found)
+        self._leaf(OnlyRoot(numbers, leaf, ball.mid, ball))
+        found = self._verified[leaf] = self._placed(leaf, found)
         return [found]
 
     def _ball(self, found: SpaceRoot | LooseSolution, wider: float = WIDEN) -> EnclosureRecord:

@@ -1,7 +1,8 @@
-"""The trusted test in 3D that a whole problem has one solution only, which is enclosed (theory, section 12.6).
+"""The trusted test in 3D that a problem, or an assignment, has one solution only, which is enclosed.
 
 A solution that is known well enough is the only one where a matrix is positive definite. That there is one follows from
-the degree. It is enclosed by a leaf, where it is regular, or by a point near it, whatever statuses hold there.
+the degree. It is enclosed by a leaf, where it is regular, or by a point near it, whatever statuses hold there. Below an
+assignment the matrix has to be definite on the subspace of its equations (theory, section 12.6).
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from enumsol.arithmetic.ball_arrays import Ball
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, dense_eigenvalue_bound, upper_norm
 from enumsol.model.sectors import DEEPEST, SECTORS, is_sector, level_of
 from enumsol.trusted.space.leaves import SpaceRoot, settle
-from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.trusted.space.sector_rows import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
 _UNIT_LENGTH = 2.0**-40
 #: Units of tau beyond this, or below its inverse, are left to the tree: nothing here underflows with others.
 LARGEST_UNIT = 2.0**128
+#: Weights of equations that are tried, by the largest entry of S.
+_WEIGHTS = 16.0, 1024.0
 
 
 @dataclass(frozen=True)
@@ -119,6 +122,62 @@ def only_root(system: EnclosedSpace, numbers: Array, codes: Sequence[int], error
         return root if form.serves(root.y, root.w, errors) else None
 
 
+def lone_root(
+    system: EnclosedSpace, codes: Sequence[int], numbers: Array, leaf: Sequence[int], errors: float = 1.0
+) -> SpaceRoot | None:
+    """The regular root of a leaf, if it is proven that no other solution has the statuses of an assignment.
+
+    Parameters
+    ----------
+    system : EnclosedSpace
+    codes : (partial) status codes of the assignment; a sector counts as contact
+    numbers, errors : as for ``only_solution_in_space``
+    leaf : codes of the leaf, whose statuses the assignment allows
+
+    Raises
+    ------
+    NotEnclosedError
+        S is not proven positive definite.
+    """
+    if not is_complete(system, leaf) or not all(map(_allows, codes, leaf)):
+        return None
+    with np.errstate(all="ignore"):
+        root = settle(system, leaf)
+        if not isinstance(root, SpaceRoot):
+            return None
+        forms = (_Form.of(system, numbers, equations(system, codes, weight)) for weight in _WEIGHTS)
+        served = any(form is not None and form.serves(root.y, root.w, errors) for form in forms)
+        return root if served else None
+
+
+def _allows(code: int, final: int) -> bool:
+    if code == UNDECIDED:
+        return True
+    if code == CONTACT or code > SECTORS:
+        return final != OPEN
+    return final == code
+
+
+def equations(system: EnclosedSpace, codes: Sequence[int], weight: float) -> Ball:
+    """Rows a with a d = 0 for the difference d of two solutions with these statuses, as balls, each with a weight.
+
+    d is zero at open nodes, S d in the normal direction of nodes in contact, and in both others where nodes stick.
+    """
+    held = list[int]()
+    separate = list[int]()
+    for i, (code, tau) in enumerate(zip(codes, system.tau.tolist(), strict=True)):
+        own = [t for t in tau if t >= 0]
+        if code == OPEN:
+            separate += [i, *own]
+        elif code != UNDECIDED:
+            held += [i, *own] if code == STICK else [i]
+    # any numbers are weights
+    weight = float(np.sqrt(weight * np.max(np.abs(system.S))))
+    factor = weight / np.linalg.norm(system.S[held], axis=1, keepdims=True)
+    rows = Ball(system.S[held], system.S_rad[held]) * Ball.exact(factor)
+    return Ball.joined(rows, Ball.exact(weight * np.eye(len(system.g))[separate]))
+
+
 def is_complete(system: EnclosedSpace, codes: Sequence[int]) -> bool:
     """Whether every node has a final code that it can have."""
     tangents = np.sum(system.tau >= 0, axis=1).tolist()
@@ -199,8 +258,8 @@ class _Form:
     least: float
 
     @classmethod
-    def of(cls, system: EnclosedSpace, values: Array) -> _Form | None:
-        """None where Q is not proven definite."""
+    def of(cls, system: EnclosedSpace, values: Array, held: Ball | None = None) -> _Form | None:
+        """None where Q is not proven definite, or not with the squares of the rows that are held at zero."""
         numbers = SpaceWeights.of(system, values)
         if numbers is None or not system.smallest_eigenvalue > 0:
             return None
@@ -211,7 +270,7 @@ class _Form:
         turn = Ball(numbers.theta / unit, numbers.off[:, None] / unit * SAFE + TINY)
         turn = Ball(turn.mid, np.where(system.tau >= 0, turn.rad, 0.0))
         push = numbers.nu * unit
-        least = _least(system, numbers, turn, push, unit)
+        least = _least(system, numbers, turn, push, unit, held)
         return cls(system, numbers, turn, push, least) if least > 0 else None
 
     # -- enclosure -------------------------------------------------------------------------------------------------
@@ -327,8 +386,10 @@ class _Form:
         return off
 
 
-def _least(system: EnclosedSpace, numbers: SpaceWeights, turn: Ball, push: Array, unit: Array) -> float:
-    """Lower bound of the smallest eigenvalue of Q, at most 0 where none positive is proven."""
+def _least(
+    system: EnclosedSpace, numbers: SpaceWeights, turn: Ball, push: Array, unit: Array, held: Ball | None
+) -> float:
+    """Lower bound of the smallest eigenvalue of Q + held'held, at most 0 where none positive is proven."""
     tau, p = system.tau, len(system.tau)
     S = Ball(system.S, system.S_rad)
     form = Ball(S.mid.copy(), S.rad.copy())
@@ -348,6 +409,8 @@ def _least(system: EnclosedSpace, numbers: SpaceWeights, turn: Ball, push: Array
         rows = S[t[used]] * Ball.exact(weight[:, None])
         spread = spread + Ball(rows.mid.T, rows.rad.T) @ rows
     Q = form - Ball(0.5 * spread.mid, 0.5 * spread.rad)
+    if held is not None:
+        Q = Q + Ball(held.mid.T, held.rad.T) @ held
     normal = np.arange(p)
     Q.mid[normal, normal] -= 0.5 * numbers.wide
     Q.rad[normal, normal] += 2 * UNIT * (np.abs(Q.mid[normal, normal]) + numbers.wide)
