@@ -212,9 +212,15 @@ def test_other_leaves():
 
 def test_below_the_root_of_the_tree():
     problem, records = proven("block")
-    split = [records[0], ["b", 0, [5, 0]], records[1], ["u", ""], {"roots": 1, "undecided": 1, "leaves": 2}]
-    report = verify(problem, proof_of(split))
-    assert "below the root" in " ".join(report.failures)
+    end = {"roots": 1, "undecided": 1, "leaves": 2}
+    # node 0 is open, or it is in contact
+    ways = [["b", 0, children] for children in ([5, 0], [0, 5])]
+    reports = [verify(problem, proof_of([records[0], way, records[1], ["u", ""], end])) for way in ways]
+    assert sorted(report.ok for report in reports) == [False, True]
+    assert "the only one in it" in str(min(reports, key=lambda report: report.ok))
+    without = ["m", records[1][1], [], *records[1][3:]]
+    report = verify(problem, proof_of([records[0], ways[0], without, ["u", ""], end]))
+    assert "below the root of the tree without a leaf" in " ".join(report.failures)
     twice = [records[0], ["b", 0, [5, 0]], records[1], records[1], {"roots": 2, "undecided": 0, "leaves": 2}]
     assert not verify(problem, proof_of(twice)).ok
     after = [records[0], records[1], records[1], {"roots": 1, "undecided": 0, "leaves": 2}]
