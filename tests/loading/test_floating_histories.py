@@ -41,7 +41,7 @@ def compared(problem, alphas):
 
 
 @pytest.mark.few(1, 3)
-@pytest.mark.parametrize("seeds", [(5, 8, 14), (16, 17, 21), (23, 25, 27), (30, 31, 42), range(0, 20), range(50, 70)])
+@pytest.mark.parametrize("seeds", [(5, 8, 14), (16, 17, 21), (23, 25, 27), (30, 31, 42), range(8), range(50, 58)])
 def test_random_bodies_against_rationals_step_by_step(seeds):
     found = [compared(random_body(seed), [0.25, 0.5, 0.0]) for seed in seeds]
     assert any(history.counts[-1] for history in found)
