@@ -6,7 +6,7 @@ import pytest
 from browser import find_browser
 from parted_meshes import grid
 
-from enumsol import enumerate_roots, fem, gallery, write_report
+from enumsol import LoadStep, enumerate_roots, fem, gallery, histories, write_report
 
 pytest.importorskip("plotly")
 pytestmark = pytest.mark.skipif(find_browser() is None, reason="no headless browser (Debian's package chromium)")
@@ -97,6 +97,18 @@ def test_the_switch_between_light_and_dark(browser, page, tmp_path):
     browser.evaluate("window.dispatchEvent(new Event('afterprint'))")
     browser.evaluate("byId('theme').click()")
     assert brightness(browser, tmp_path)[0] < 0.2
+
+
+def test_pictures_of_a_history_are_dark_in_the_dark_and_light_on_paper(browser, tmp_path):
+    found = histories(gallery.two_node_square(), [LoadStep(1.0), LoadStep(3.5)])
+    write_report(found, tmp_path / "history.html")
+    for colours, medium in (("light", ""), ("dark", ""), ("dark", "print")):
+        show(browser, tmp_path / "history.html", colours=colours, medium=medium)
+        browser.evaluate("document.querySelector('[data-step]:not([hidden]) img').scrollIntoView()")
+        browser.screenshot(tmp_path / "shot.png")
+        pixels = matplotlib.image.imread(tmp_path / "shot.png")[..., :3].mean(axis=2)
+        bright = float(np.mean(pixels > 0.8))
+        assert bright < 0.1 if (colours, medium) == ("dark", "") else bright > 0.7
 
 
 def test_enlargements(browser, page):
