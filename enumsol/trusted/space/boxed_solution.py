@@ -7,13 +7,13 @@ status changes; what counts is a set of matrices that holds all its derivatives 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enumsol.arithmetic.ball_arrays import Ball, determinant_sign
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, upper_norm, upper_sum
+from enumsol.arithmetic.balls import SAFE, TINY, upper_sum
+from enumsol.trusted.space.natural_map import MARGIN, Discs, Step
 from enumsol.trusted.space.space_uniqueness import LARGEST_UNIT, LooseSolution
 
 if TYPE_CHECKING:
@@ -31,8 +31,6 @@ _STEPS, _HALVINGS = 8, 24
 #: Size of the box that is tried first, relative to the forces that would hold one node alone; and how often a set
 #: around a box is made larger.
 _FIRST, _WIDENINGS = 1.0, 6
-#: What a writer of proofs asks for beyond what a checker does.
-_MARGIN = 2.0**-10
 
 
 @dataclass(frozen=True)
@@ -67,7 +65,7 @@ def box_around(system: EnclosedSpace, y: Array) -> Ball | None:
 
 def is_inside(y: Ball, box: Ball, errors: float = 1.0) -> bool:
     """Whether all of a ball lies in a box (for ``errors`` see ``solution_in_box``)."""
-    share = 1.0 - (errors - 1.0) * _MARGIN
+    share = 1.0 - (errors - 1.0) * MARGIN
     return bool(np.all((np.abs(y.mid - box.mid) + y.rad) * SAFE <= share * box.rad))
 
 
@@ -103,62 +101,6 @@ def _moderate(system: EnclosedSpace) -> bool:
     return bool(np.max(np.maximum(system.unit, 1.0 / system.unit)) <= LARGEST_UNIT)
 
 
-@dataclass(frozen=True)
-class _Corners:
-    """Derivatives of P in a box: those in ``core`` plus sum t_k u_k v_k', |t_k| <= 1/2, u_k and v_k columns."""
-
-    core: Ball
-    u: Array
-    v: Array
-
-
-@dataclass(frozen=True)
-class _Step:
-    """y - Y N(y), N the natural map, for all y within a radius of a point c.
-
-    It is c + move + E (y - c) + sum t_k G_k (V_k (y - c)), |t_k| <= 1/2, for some of these numbers within bounds.
-
-    Attributes
-    ----------
-    move : Ball of shape (m,)
-    E : (m, m) array
-        Upper bounds.
-    G, V : Balls of shapes (m, k) and (k, m)
-    Y : (m, m) array
-    """
-
-    move: Ball
-    E: Array
-    G: Ball
-    V: Ball
-    Y: Array
-
-    @cached_property
-    def _slopes(self) -> Array:
-        """Bounds of V G / 2."""
-        return np.asarray(0.5 * (self.V @ Ball.exact(self.G.mid)).size)
-
-    def shares(self, radius: Array) -> Array | None:
-        """s > 0 for which what is called xi below is less; no claim. None where there is none."""
-        more = 1.0 + 4.0 * _MARGIN
-        try:
-            found = np.linalg.solve(np.eye(len(self.V.mid)) - more * self._slopes, 0.5 * more * self.V.size @ radius)
-        except np.linalg.LinAlgError:
-            return None
-        return np.asarray(found + TINY) if np.all(found >= 0) else None
-
-    def reach(self, radius: Array, shares: Array) -> Array:
-        """Bounds of y - c = G s + b with |b| <= radius and |s| <= shares."""
-        return (radius + upper_product(np.abs(self.G.mid), shares)) * SAFE
-
-    def contracts(self, radius: Array, shares: Array, errors: float) -> bool:
-        """Whether the step maps all c + G s + b with |b| <= radius and |s| <= shares to such with less of both."""
-        more = SAFE * (1.0 + (errors - 1.0) * _MARGIN)
-        xi = (upper_product(self._slopes, shares) + 0.5 * upper_product(self.V.size, radius)) * SAFE
-        left = self.move.size + upper_product(self.E, self.reach(radius, shares)) + upper_product(self.G.rad, xi)
-        return bool(np.all(xi * more < shares) and np.all(left * SAFE * more < radius))
-
-
 class _NaturalMap:
     """N(y) = y - P(y + rho w) in (lambda_n, tau) without units (theory, (12.10)).
 
@@ -179,6 +121,7 @@ class _NaturalMap:
         self.rho = rho
         moved = self.S * Ball.exact(rho[:, None])
         self.free = Ball.exact(np.eye(len(rho))) - moved
+        self._discs = Discs(self.tau, Ball.exact(np.ones(len(self.tau))))
 
     # -- boxes -----------------------------------------------------------------------------------------------------
 
@@ -219,7 +162,7 @@ class _NaturalMap:
             point = point + step.move.mid
         return point
 
-    def _mapped(self, centre: Array, radius: Array, errors: float) -> tuple[_Step, Array] | None:
+    def _mapped(self, centre: Array, radius: Array, errors: float) -> tuple[Step, Array] | None:
         """The step around a box, and shares, with which it maps a set that holds the box into its interior."""
         reach = radius
         for _ in range(_WIDENINGS):
@@ -230,7 +173,7 @@ class _NaturalMap:
             needed = step.reach(radius, shares)
             if np.all(needed <= reach):
                 return (step, reach) if step.contracts(radius, shares, errors) else None
-            reach = np.maximum(reach, needed) * (1.0 + _MARGIN)
+            reach = np.maximum(reach, needed) * (1.0 + MARGIN)
         return None
 
     def _closer(self, centre: Array) -> Ball | None:
@@ -254,14 +197,16 @@ class _NaturalMap:
 
     # -- the operator ----------------------------------------------------------------------------------------------
 
-    def _step(self, centre: Array, radius: Array) -> _Step | None:
+    def _step(self, centre: Array, radius: Array) -> Step | None:
         """Krawczyk's operator in a box; None where its middle matrix is singular."""
         m = len(centre)
         point = Ball.exact(centre)
         w = self.g - (self.S @ point[:, None])[:, 0]
         z = point + Ball.exact(self.rho) * w
         wide = Ball(z.mid, (z.rad + upper_sum(self.free.size * radius, axis=1)) * SAFE)
-        corners = self._corners(wide)
+        corners = self._discs.corners(wide)
+        if corners is None:
+            return None
         M = Ball.exact(np.eye(m)) - corners.core @ self.free
         try:
             Y = np.asarray(np.linalg.inv(M.mid), dtype=np.float64)
@@ -271,90 +216,7 @@ class _NaturalMap:
             return None
         inverse = Ball.exact(Y)
         E = (Ball.exact(np.eye(m)) - inverse @ M).size
-        move = (inverse @ (self._projected(z) - point)[:, None])[:, 0]
-        return _Step(move, E, inverse @ Ball.exact(corners.u), Ball.exact(corners.v.T) @ self.free, Y)
-
-    def _projected(self, z: Ball) -> Ball:
-        """P of a ball: lambda_n at least 0, and tau in the disc of that radius."""
-        out = Ball(z.mid.copy(), z.rad.copy())
-        for i, t in enumerate(self.tau):
-            most = max(float(z.mid[i]), 0.0)
-            out.mid[i] = most
-            if len(t):
-                length = float(np.linalg.norm(z.mid[t]))
-                share = 1.0 if length <= most else most / length
-                out.mid[t] = share * z.mid[t]
-                # |P(z) - P(z')| <= |z_t - z_t'| + |z_n - z_n'|
-                rounded = 16 * UNIT * (most + length)
-                out.rad[t] = (float(upper_norm(z.rad[t])) + z.rad[i] + rounded) * SAFE + TINY
-        return out
-
-    def _corners(self, z: Ball) -> _Corners:
-        """All derivatives of P at points of a box, and their convex hull."""
-        m = len(z.mid)
-        core = Ball(np.zeros((m, m)), np.zeros((m, m)))
-        pairs = [pair for i, t in enumerate(self.tau) if (pair := self._corner(core, z, i, t)) is not None]
-        u, v = (np.array([pair[k] for pair in pairs]).reshape(-1, m).T for k in (0, 1))
-        for a, b in pairs:
-            half = 0.5 * np.outer(a, b)
-            core.mid[...] += half
-            core.rad[...] += 2 * UNIT * np.abs(core.mid) * (half != 0)
-        return _Corners(core, u, v)
-
-    def _corner(self, core: Ball, z: Ball, i: int, t: NDArray[np.intp]) -> tuple[Array, Array] | None:
-        """Put a node's derivatives into the core; u and v if there is a term t u v' with t from 0 to 1."""
-        low, high = float(z.mid[i] - z.rad[i]), float(z.mid[i] + z.rad[i])
-        # rounded outwards
-        low, high = low - 2 * UNIT * abs(low) - TINY, high + 2 * UNIT * abs(high) + TINY
-        u, v = np.zeros(len(z.mid)), np.zeros(len(z.mid))
-        if high < 0:
-            return None
-        loose = low <= 0
-        v[i] = 1.0
-        if not len(t):
-            core.mid[i, i], u[i] = (0.0, 1.0) if loose else (1.0, 0.0)
-            return (u, v) if loose else None
-        length, away = float(np.linalg.norm(z.mid[t])), float(upper_norm(z.rad[t]))
-        least, most = (length - away) / SAFE - 8 * UNIT * length - TINY, (length + away) * SAFE + 8 * UNIT * length
-        sticks, slips = least <= high, most >= low
-        if not slips:
-            core.mid[i, i] = core.mid[t, t] = 1.0
-            return None
-        block = np.ix_(t, t)
-        if not least > 0 or (loose and sticks):
-            # any mixture of 0, of the unit matrix and of slips in any direction
-            core.mid[i, i], core.rad[i, i] = (0.5, 0.5) if loose else (1.0, 0.0)
-            core.rad[t, i] = 1.0
-            core.rad[block] = 0.5
-            core.mid[t, t] = 0.5
-            return None
-        e = z.mid[t] / length
-        # directions of the box are no farther from e
-        turn = (2.0 * away / length if len(t) > 1 else 0.0) * SAFE + 8 * UNIT
-        across = np.eye(len(t)) - np.outer(e, e) if len(t) > 1 else np.zeros((1, 1))
-        # of e e' and of 1 - e e'
-        bent = 3.0 * turn if len(t) > 1 else 0.0
-        ratio_low, ratio_high = max(low, 0.0) / most / SAFE, min(1.0, high / least * SAFE)
-        core.rad[t, i] = turn
-        if sticks:
-            # 1 - t (e e' + (1 - ratio) (1 - e e')), and t e for lambda_n
-            core.mid[i, i] = core.mid[t, t] = 1.0
-            core.rad[block] = (bent + (1.0 - ratio_low) * (len(t) > 1) + 8 * UNIT) * SAFE
-            u[t], v[t] = e, -e
-            return u, v
-        if loose:
-            # t times those of slip
-            core.mid[block] = 0.5 * ratio_high * across
-            core.rad[block] = (0.5 * ratio_high * np.abs(across) + ratio_high * bent + 8 * UNIT) * SAFE
-            u[i], u[t] = 1.0, e
-            return u, v
-        core.mid[i, i], core.mid[t, i] = 1.0, e
-        middle, half = 0.5 * (ratio_low + ratio_high), 0.5 * (ratio_high - ratio_low) * SAFE + 4 * UNIT
-        core.mid[block] = middle * across
-        core.rad[block] = (half * np.abs(across) + ratio_high * bent + 8 * UNIT) * SAFE
-        return None
-
-
-def upper_product(matrix: Array, vector: Array) -> Array:
-    """Upper bound of a product without negative entries."""
-    return np.asarray(upper_sum(matrix * vector, axis=1))
+        move = (inverse @ (self._discs.projected(z) - point)[:, None])[:, 0]
+        G, V = inverse @ Ball.exact(corners.u), Ball.exact(corners.v.T) @ self.free
+        nothing = np.zeros(len(V.mid))
+        return Step(move, E, G, V, Y, np.zeros(m), nothing, nothing)

@@ -1,0 +1,481 @@
+"""The trusted test in 3D that the solutions in a box of forces and alpha are one curve (theory, section 12.8).
+
+Krawczyk's operator is applied to the natural map with alpha as one more unknown and one linear equation more, for all
+values of that equation's right-hand side, the curve's parameter, at once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.arithmetic.ball_arrays import Ball, determinant_sign
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, upper_norm
+from enumsol.condensation.condensed import node_units
+from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.model.sectors import SECTORS
+from enumsol.trusted.space.natural_map import MARGIN, Corners, Discs, Step, split_off, upper_product
+from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, STICK
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.enclosure import CondensedEnclosure
+
+    Array = NDArray[np.float64]
+
+#: Slip in any direction, as in continuation.
+SLIP = SECTORS + 1
+#: How often a set around a box is made larger, its image taken again.
+_WIDENINGS, _IMAGES = 6, 3
+#: What a writer of proofs asks for.
+ERRORS = 2.0
+#: What is proposed: how much more room the radii have than the curve seems to need, in the hope that this suffices for
+#: what the room itself adds; the least radius relative to the largest; and steps of Newton's method.
+_ROOMS, _LEAST, _STEPS = (1.2, 1.3, 1.5, 1.5, 1.5, 1.5, 1.5), 1e-3, 8
+#: Factors of the steps of the natural map at a node that changes its status.
+_FACTORS = (1.0, 4.0, 16.0, 64.0, 256.0, 0.25, 0.0625, 0.015625)
+
+
+@dataclass(frozen=True, eq=False)
+class CurveBox:
+    """All x = (lambda_n, both lambda_t, alpha) with |t| <= half and |x - centre - t direction| <= radius.
+
+    Here t = border (x - centre). All arrays have shape (3p + 1,), in the problem's units, all normals first, but for
+    ``rho``, (3p,): steps of the natural map relative to those of AlphaProblem, positive. What is said does not depend
+    on them.
+    """
+
+    centre: Array
+    direction: Array
+    border: Array
+    half: float
+    radius: Array
+    rho: Array
+
+
+@dataclass(frozen=True, eq=False)
+class AlphaProblem:
+    """A problem in 3D for all alpha, as balls: q w = g0 + alpha g1 - S y, and y / q in discs (F0 + alpha F1) lambda_n.
+
+    q is 1 but for the second component of nodes with two coefficients that are not the same: then it is their ratio,
+    which must not depend on alpha.
+
+    Attributes
+    ----------
+    S, g0, g1 : Balls of shapes (3p, 3p), (3p,) and (3p,), in units of the nodes
+    F0, F1 : (p,) arrays
+        Exact, those of the first component that has friction.
+    inverse : Ball of shape (3p,)
+        1 / q.
+    tau : places of the tau of every node, none, one or two
+    force : (3p,) array, powers of two
+        Forces of the problem are as many times those here.
+    """
+
+    S: Ball
+    g0: Ball
+    g1: Ball
+    F0: Array
+    F1: Array
+    inverse: Ball
+    tau: Sequence[NDArray[np.intp]]
+    force: Array
+
+    @classmethod
+    def of(cls, enclosure: CondensedEnclosure) -> AlphaProblem:
+        """Of a problem whose nodes have coefficients with the same ratio for all alpha.
+
+        Raises
+        ------
+        NotEnclosedError
+            The ratio of a node depends on alpha, or something over- or underflows.
+        """
+        problem, p = enclosure.problem, enclosure.problem.p
+        coefficients, slopes = np.array(problem.friction), np.array(problem.friction_slope)
+        occurs = (coefficients != 0) | (slopes != 0)
+        ratio = Ball.exact(np.ones(3 * p))
+        for i in np.flatnonzero(np.all(occurs, axis=0)):
+            (one, one_slope), (other, other_slope) = [
+                (Fraction(float(coefficients[k, i])), Fraction(float(slopes[k, i]))) for k in range(2)
+            ]
+            if one * other_slope != other * one_slope:
+                raise NotEnclosedError(f"the ratio of both coefficients of node {i} changes with alpha")
+            q = other / one if one else other_slope / one_slope
+            exact = Fraction(float(q)) == q
+            ratio.mid[2 * p + i], ratio.rad[2 * p + i] = float(q), 0.0 if exact else 2 * UNIT * abs(float(q))
+        first = np.where(occurs[0], 0, 1), np.arange(p)
+        factor = np.tile(node_units(enclosure.S, p), 3)
+        # the size of the load does not matter
+        force, length = factor, 1.0 / factor
+        with np.errstate(over="ignore", invalid="ignore"):
+            pair = force[:, None] / length[None, :]
+            S = ratio[:, None] * Ball(enclosure.S * pair, enclosure.S_rad * pair + TINY)
+            g0 = ratio * Ball(enclosure.g0 / length, enclosure.g0_rad / length + TINY)
+            g1 = ratio * Ball(enclosure.g1 / length, enclosure.g1_rad / length + TINY)
+            inverse = Ball(1.0 / ratio.mid, (2.0 * ratio.rad / ratio.mid + 2 * UNIT) / ratio.mid * SAFE)
+            inverse = Ball(inverse.mid, np.where((ratio.mid == 1) & (ratio.rad == 0), 0.0, inverse.rad))
+        if not (S.finite and g0.finite and g1.finite):
+            raise NotEnclosedError("the condensed problem over- or underflows float64; expected data in other units")
+        tau = [np.array([(1 + k) * p + i for k in range(2) if occurs[k, i]], dtype=np.intp) for i in range(p)]
+        return cls(S, g0, g1, coefficients[first], slopes[first], inverse, tau, force)
+
+    @property
+    def p(self) -> int:
+        """Number of contact nodes."""
+        return len(self.F0)
+
+    @cached_property
+    def rho(self) -> Array:
+        """Steps of the natural map, (3p,): one for lambda_n and one for tau of every node."""
+        S = self.S.mid / self.inverse.mid
+        rho = np.sqrt(np.diagonal(np.linalg.inv(S)) / np.diagonal(S))
+        for t in self.tau:
+            rho[t] = np.min(rho[t], initial=np.inf)
+        return rho
+
+    @cached_property
+    def part(self) -> Ball:
+        """The derivative of y / q, (3p, 3p)."""
+        return Ball(np.diag(self.inverse.mid), np.diag(self.inverse.rad))
+
+    def moves(self, rho: Array) -> Ball:
+        """The derivative of (z, alpha) with respect to (y, alpha), (3p + 1, 3p + 1)."""
+        m = 3 * self.p
+        out = Ball(np.eye(m + 1), np.zeros((m + 1, m + 1)))
+        out[:m, :m] = self.part - self.S * Ball.exact(rho[:, None])
+        out[:m, m] = Ball.exact(rho) * self.g1
+        return out
+
+    def friction(self, alpha: Ball) -> Ball:
+        """Coefficients for all alpha of a ball, (p,)."""
+        return Ball.exact(self.F0) + alpha * Ball.exact(self.F1)
+
+
+@dataclass(frozen=True, eq=False)
+class SolutionCurve:
+    """The solutions in a box: one for every t from -half to half, and they are continuous in t.
+
+    Attributes
+    ----------
+    box : CurveBox
+    sign : int
+        Of the bordered determinant: alpha increases with t where a root's index is this, and decreases otherwise.
+    spread : (3p + 1,) array
+        The solution at t is no farther from centre + t direction.
+    slope : Ball of shape (3p + 1,)
+        Holds all (x(t) - x(t')) / (t - t'); without bounds where none are known.
+    statuses : tuple of p codes or None
+        OPEN, STICK, SLIP or FRICTIONLESS where it holds strictly along all of the curve.
+    """
+
+    box: CurveBox
+    sign: int
+    spread: Array
+    slope: Ball
+    statuses: tuple[int | None, ...]
+
+    def at(self, t: float | Ball) -> Ball:
+        """Bounds of the solution at t, or of those at all t of a ball."""
+        where = t if isinstance(t, Ball) else Ball.exact(np.array(float(t)))
+        point = Ball.exact(self.box.centre) + where * Ball.exact(self.box.direction)
+        return Ball(point.mid, (point.rad + self.spread) * SAFE)
+
+    def parameter(self, x: Ball) -> Ball:
+        """Bounds of t at points within a ball."""
+        return parameter_in(self.box, x)
+
+    @property
+    def rises(self) -> int:
+        """The sign of d alpha / dt along all of the curve; 0 where it is not known, or changes."""
+        low, high = self.slope.mid[-1] - self.slope.rad[-1] * SAFE, self.slope.mid[-1] + self.slope.rad[-1] * SAFE
+        return int(low > 0) - int(high < 0)
+
+    @property
+    def index(self) -> int:
+        """Of its roots; 0 where it is not known, or changes."""
+        return self.sign * self.rises
+
+    @property
+    def alphas(self) -> tuple[Fraction, Fraction]:
+        """Between them are all alpha of the curve."""
+        box = self.box
+        reach = Fraction(abs(float(box.direction[-1]))) * Fraction(box.half) + Fraction(float(self.spread[-1]))
+        return Fraction(float(box.centre[-1])) - reach, Fraction(float(box.centre[-1])) + reach
+
+
+def parameter_in(box: CurveBox, x: Ball) -> Ball:
+    """Bounds of t = border (x - centre) at all points of a ball."""
+    return (Ball.exact(box.border[None]) @ (x - Ball.exact(box.centre))[:, None])[0, 0]
+
+
+def lies_in(box: CurveBox, x: Ball) -> bool:
+    """Whether all points of a ball lie in a box."""
+    t = parameter_in(box, x)
+    beside = (x - Ball.exact(box.centre)) - t * Ball.exact(box.direction)
+    return bool(t.size <= box.half and np.all(beside.size <= box.radius))
+
+
+def only_curve(problem: AlphaProblem, box: CurveBox, errors: float = 1.0) -> SolutionCurve | None:
+    """The curve that the solutions in a box are, or None where that is not proven.
+
+    Parameters
+    ----------
+    problem : AlphaProblem
+    box : CurveBox
+        With positive radii.
+    errors : 1 proves; a writer of proofs takes more, so that a checker comes to the same answer
+    """
+    arrays = (box.centre, box.direction, box.border, box.radius)
+    if not all(array.shape == (3 * problem.p + 1,) and np.all(np.isfinite(array)) for array in arrays):
+        return None
+    if not np.isfinite(box.half) or box.half < 0 or not np.all(box.radius > 0):
+        return None
+    if box.rho.shape != (3 * problem.p,) or not np.all(box.rho > 0) or not np.all(np.isfinite(box.rho)):
+        return None
+    with np.errstate(all="ignore"):
+        return _CurveMap(problem, box.centre, box.direction, box.border, box.half, box.rho).curve(box, errors)
+
+
+def box_around(
+    problem: AlphaProblem,
+    x: Array,
+    direction: Array,
+    border: Array,
+    half: float,
+    changing: Sequence[int] = (),
+    *,
+    roomy: bool = True,
+) -> CurveBox | None:
+    """A box that seems to hold one curve only, which runs near x; no claim.
+
+    Parameters
+    ----------
+    changing : nodes whose status changes in the box
+    roomy : whether its radii are to be as large as they may be
+    """
+    with np.errstate(all="ignore"):
+        rho = np.ones(3 * problem.p)
+        for i in changing:
+            found: list[tuple[float, Array]] = []
+            for factor in _FACTORS:
+                for places in ([i], problem.tau[i], [i, *problem.tau[i]]):
+                    other = rho.copy()
+                    other[places] *= factor
+                    found.append((_CurveMap(problem, x, direction, border, half, other).turned(), other))
+            rho = min(found, key=lambda pair: pair[0])[1]
+        return _CurveMap(problem, x, direction, border, half, rho).proposed(roomy=roomy)
+
+
+@dataclass(frozen=True, eq=False)
+class CurvePoint:
+    """A solution x as floats have it, the direction of its curve, and statuses by the signs of their conditions."""
+
+    x: Array
+    direction: Array
+    statuses: tuple[int | None, ...]
+
+
+def curve_point(problem: AlphaProblem, x: Array, border: Array) -> CurvePoint | None:
+    """The point of a solution's curve near x with border (x' - x) = 0; no claim.
+
+    Its direction has the product 1 with the border; at a change of statuses it is that of one side.
+    """
+    rho, step = np.ones(3 * problem.p), None
+    with np.errstate(all="ignore"):
+        for _ in range(_STEPS):
+            near = _CurveMap(problem, x, np.zeros_like(x), border, 0.0, rho)
+            step = near.step(np.zeros_like(x))
+            if step is None:
+                return None
+            moved = (step.move.mid + step.G.mid @ step.first) * near.unit
+            x = x + moved
+            if np.all(np.abs(moved) <= 4 * UNIT * np.max(np.abs(x))):
+                break
+        z = Ball.exact(np.append(near.z.mid, near.alpha.mid))
+        statuses = tuple(near.status(z, i) for i in range(problem.p))
+        return None if step is None else CurvePoint(x, step.Y[:, -1] * near.unit, statuses)
+
+
+class _CurveMap:
+    """The natural map along c + t d, |t| <= half, with the equation border (x - c) = t, in units of the nodes."""
+
+    def __init__(
+        self, problem: AlphaProblem, centre: Array, direction: Array, border: Array, half: float, rho: Array
+    ) -> None:
+        self.problem, self.half, self.rho = problem, half, rho
+        steps = problem.rho * rho
+        self.unit = np.append(problem.force, 1.0)
+        self.c, self.d, self.e = centre / self.unit, direction / self.unit, border * self.unit
+        m = 3 * problem.p
+        self.Z = problem.moves(steps)
+        y = problem.inverse * Ball.exact(self.c[:m])
+        self.alpha = Ball.exact(self.c[m])
+        w = problem.g0 + self.alpha * problem.g1 - (problem.S @ Ball.exact(self.c[:m, None]))[:, 0]
+        self.z = y + Ball.exact(steps) * w
+        self.y = y
+        self.zd = (self.Z @ Ball.exact(self.d)[:, None])[:, 0]
+
+    # -- boxes -----------------------------------------------------------------------------------------------------
+
+    def curve(self, box: CurveBox, errors: float) -> SolutionCurve | None:
+        radius = box.radius / self.unit
+        found = self._mapped(radius, errors)
+        sign = 0 if found is None else determinant_sign(Ball.exact(found[0].Y))
+        if found is None or sign == 0:
+            return None
+        spread, wide, step = self._spread(*found, radius)
+        z = self._along(wide)
+        statuses = tuple(self.status(z, i) for i in range(self.problem.p))
+        off = self._slope(step)
+        slope = Ball(box.direction.copy(), off * self.unit)
+        return SolutionCurve(box, sign, spread * self.unit, slope, statuses)
+
+    def turned(self) -> float:
+        """How far corners are from being too wide for the test: less than 1 where they are not."""
+        step = self.step(self.zd.size * self.half)
+        return np.inf if step is None else float(np.max(step.slopes, initial=0.0))
+
+    def proposed(self, *, roomy: bool) -> CurveBox | None:
+        """A box with radii of about what the curve needs, or as large as they may be."""
+        wide = self.zd.size * self.half
+        for room in _ROOMS:
+            step = self.step(wide)
+            found = None if step is None else step.balanced(self.half, 1.0, room)
+            if step is None or found is None:
+                return None
+            found = np.maximum(found, _LEAST * np.max(found)) + TINY
+            shares = step.shares(found, self.half)
+            if shares is None:
+                return None
+            wide = self._width(step, found, shares)
+            if self._mapped(found, ERRORS) is not None:
+                break
+        else:
+            return None
+        radius = found
+        if roomy:
+            # parts of the curve are to have room beside it
+            radius = 2.0 * radius
+            if self._mapped(radius, ERRORS) is None:
+                return None
+            size = float(np.max(np.abs(self.d))) * self.half
+            while np.max(radius) < size and self._mapped(2.0 * radius, ERRORS) is not None:
+                radius = 2.0 * radius
+        unit = self.unit
+        return CurveBox(self.c * unit, self.d * unit, self.e / unit, self.half, radius * unit, self.rho)
+
+    def _mapped(self, radius: Array, errors: float) -> tuple[Step, Array] | None:
+        """The operator around a box, and shares, with which it maps sets that hold the box into their interiors."""
+        wide = self.zd.size * self.half + upper_product(self.Z.size, radius)
+        for _ in range(_WIDENINGS):
+            step = self.step(wide)
+            shares = None if step is None else step.shares(radius, self.half)
+            if step is None or shares is None:
+                return None
+            needed = self._width(step, radius, shares)
+            if np.all(needed <= wide):
+                return (step, shares) if step.contracts(radius, shares, errors, self.half) else None
+            wide = np.maximum(wide, needed) * (1.0 + MARGIN)
+        return None
+
+    def _width(self, step: Step, radius: Array, shares: Array) -> Array:
+        """Bounds of what (z, alpha) are away from those of c, for x = c + t d + G s + b."""
+        turned = (self.Z @ Ball.exact(step.G.mid)).size
+        return (self.zd.size * self.half + upper_product(self.Z.size, radius) + upper_product(turned, shares)) * SAFE
+
+    def _spread(self, step: Step, shares: Array, radius: Array) -> tuple[Array, Array, Step]:
+        """Bounds of the distances from c + t d of all solutions, of (z, alpha) there, and the operator for those."""
+        wide = self._width(step, radius, shares)
+        for _ in range(_IMAGES):
+            for _ in range(_IMAGES):
+                radius, shares = step.left(radius, shares, self.half), step.xi(radius, shares, self.half)
+            wide = np.minimum(wide, self._width(step, radius, shares))
+            # the same solutions, whatever the shares are
+            radius = step.reach(radius, shares)
+            closer = self.step(wide)
+            found = None if closer is None else closer.shares(radius, self.half)
+            if closer is None or found is None:
+                return radius, wide, step
+            step, shares = closer, np.zeros(len(closer.along))
+        return radius, wide, step
+
+    def _slope(self, step: Step) -> Array:
+        """How far differences over t are from d at most; infinite where that is not known."""
+        radius = step.balanced(1.0, 0.0, 1.1)
+        if radius is not None:
+            radius = np.maximum(radius, UNIT * np.max(radius)) + TINY
+            shares = step.shares(radius, 1.0, 0.0)
+            if shares is not None and step.contracts(radius, shares, 1.0, 1.0, 0.0):
+                for _ in range(_IMAGES):
+                    radius, shares = step.left(radius, shares, 1.0, 0.0), step.xi(radius, shares, 1.0, 0.0)
+                return step.reach(radius, shares)
+        return np.full(len(self.d), np.inf)
+
+    # -- the operator ----------------------------------------------------------------------------------------------
+
+    def _along(self, wide: Array) -> Ball:
+        """(z, alpha) at all points that are no farther from that of c."""
+        z = Ball.joined(self.z, self.alpha[None])
+        return Ball(z.mid, (z.rad + wide) * SAFE)
+
+    def step(self, wide: Array) -> Step | None:
+        """Krawczyk's operator where (z, alpha) is no farther from that of c.
+
+        None where its middle matrix is singular or there is no bound of derivatives.
+        """
+        m = len(self.c) - 1
+        near = self._along(wide)
+        F1 = Ball.exact(self.problem.F1)
+        corners = Discs(self.problem.tau, self.problem.friction(near[m]), F1).corners(near[:m])
+        if corners is None:
+            return None
+        B = self._bordered(corners)
+        try:
+            Y = np.asarray(np.linalg.inv(B.mid), dtype=np.float64)
+        except np.linalg.LinAlgError:
+            return None
+        if not np.all(np.isfinite(Y)):
+            return None
+        inverse = Ball.exact(Y)
+        E = (Ball.exact(np.eye(m + 1)) - inverse @ B).size
+        at = Discs(self.problem.tau, self.problem.friction(self.alpha), F1).projected(self.z)
+        move = (inverse[:, :m] @ (at - self.y)[:, None])[:, 0]
+        d = Ball.exact(self.d)[:, None]
+        drift = (inverse @ (B @ d - Ball.exact(np.eye(m + 1)[:, m:])))[:, 0]
+        G, V = inverse[:, :m] @ Ball.exact(corners.u), Ball.exact(corners.v.T) @ self.Z
+        # what goes along the columns of G is a matter of the shares
+        first, move = split_off(G, move)
+        along, rest = split_off(G, drift)
+        pushed = 0.5 * (V @ d)[:, 0].size if len(V.mid) else np.zeros(0)
+        return Step(move, E, G, V, Y, rest.size, first, (np.abs(along) + pushed) * SAFE)
+
+    def _bordered(self, corners: Corners) -> Ball:
+        m = len(self.c) - 1
+        M = Ball(np.zeros((m, m + 1)), np.zeros((m, m + 1)))
+        M[:, :m] = self.problem.part
+        M = M - corners.core @ self.Z
+        return Ball.joined(M, Ball.exact(self.e[None]))
+
+    def status(self, z: Ball, i: int) -> int | None:
+        """The status that a node has strictly at all arguments, if it has one."""
+        t, F = self.problem.tau[i], self.problem.friction(z[-1])[i]
+        low, high = float(z.mid[i] - z.rad[i] * SAFE), float(z.mid[i] + z.rad[i] * SAFE)
+        if high < 0:
+            return OPEN
+        if low <= 0:
+            return None
+        if not len(t):
+            return FRICTIONLESS
+        length, away = float(np.linalg.norm(z.mid[t])), float(upper_norm(z.rad[t]))
+        least, most = (length - away) / SAFE - 8 * UNIT * length, (length + away) * SAFE + 8 * UNIT * length
+        F_low, F_high = float(F.mid - F.rad) / SAFE, float(F.mid + F.rad) * SAFE
+        if F_low > 0 and most < F_low * low / SAFE:
+            return STICK
+        return SLIP if least > max(F_high, 0.0) * high * SAFE else None

@@ -1,0 +1,124 @@
+"""Curves of solutions in boxes (theory, section 12.8), against a closed form of one node and enumerations."""
+
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from problems3d import SLIDING, forces, from_compliance, random_compliance, sliding_node
+
+import enumsol
+from enumsol.arithmetic.ball_arrays import Ball
+from enumsol.trusted.space.solution_curve import (
+    AlphaProblem,
+    box_around,
+    curve_point,
+    lies_in,
+    only_curve,
+    parameter_in,
+)
+
+
+def box_of(given, x, half, roomy=True):
+    border = np.eye(len(x))[-1]
+    point = curve_point(given, x, border)
+    border = point.direction / (point.direction @ point.direction)
+    return box_around(given, point.x, point.direction, border, half, roomy=roomy)
+
+
+def test_the_curve_is_that_of_the_closed_form():
+    given = AlphaProblem.of(SLIDING.enclosure)
+    box = box_of(given, np.append(sliding_node(0.5), 0.5), 0.02)
+    curve = only_curve(given, box)
+    assert (curve.index, curve.rises, len(curve.statuses)) == (1, 1, 1)
+    for alpha in np.linspace(0.49, 0.51, 9):
+        x = Ball.exact(np.append(sliding_node(alpha), alpha))
+        assert lies_in(box, x)
+        at = curve.at(parameter_in(box, x))
+        assert np.all(np.abs(at.mid - x.mid) <= at.rad + 1e-12)
+
+
+def test_slopes_are_those_between_points_of_the_curve():
+    given = AlphaProblem.of(SLIDING.enclosure)
+    curve = only_curve(given, box_of(given, np.append(sliding_node(0.5), 0.5), 0.02))
+    one, other = (np.append(sliding_node(alpha), alpha) for alpha in (0.495, 0.505))
+    change = other - one
+    slope = change / (curve.box.border @ change)
+    assert np.all(np.abs(slope - curve.slope.mid) <= curve.slope.rad + 1e-9)
+
+
+def test_friction_may_be_negative_beside_the_interval():
+    given = AlphaProblem.of(SLIDING.enclosure)
+    curve = only_curve(given, box_of(given, np.array([1.0, 0.0, 0.0, 0.0]), 0.01))
+    assert curve.alphas[0] < 0 < curve.alphas[1]
+    at = curve.at(0.0)
+    assert np.all(np.abs(at.mid - [1.0, 0.0, 0.0, 0.0]) <= at.rad + 1e-14)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_solutions_in_a_box_are_those_of_its_curve(seed):
+    rng = np.random.default_rng([seed, 5])
+    S, g = random_compliance(rng, 2), rng.normal(size=6)
+    g[:2] += 1.0
+    problem = from_compliance(S, g, 0.0, friction_slope=1.0)
+    given = AlphaProblem.of(problem.enclosure)
+    root = enumsol.enumerate_roots(problem, 0.75)[0]
+    box = next(
+        found for half in 0.1 ** np.arange(1, 6) if (found := box_of(given, np.append(forces(root), 0.75), half))
+    )
+    curve = only_curve(given, box)
+    low, high = (float(end) for end in curve.alphas)
+    seen = 0
+    for alpha in np.linspace(low, high, 9):
+        for other in enumsol.enumerate_roots(problem, Fraction(float(alpha))):
+            x = Ball(np.append(forces(other), alpha), np.full(7, 1e-12))
+            if lies_in(box, x):
+                at = curve.at(parameter_in(box, x))
+                assert np.all(np.abs(at.mid - x.mid) <= at.rad + x.rad)
+                seen += 1
+    assert seen >= 5
+
+
+def test_no_curve_is_seen_where_there_may_be_two_or_none():
+    given = AlphaProblem.of(SLIDING.enclosure)
+    x = np.append(sliding_node(0.5), 0.5)
+    box = box_of(given, x, 0.02)
+    wide = replace(box, half=2.0, radius=np.full(4, 5.0))
+    away = replace(box, centre=box.centre + np.array([0.5, 0.0, 0.0, 0.0]))
+    thin = replace(box, radius=1e-9 * box.radius)
+    assert [only_curve(given, other) for other in (wide, away, thin)] == [None] * 3
+
+
+def test_what_is_no_box_is_refused():
+    given = AlphaProblem.of(SLIDING.enclosure)
+    box = box_of(given, np.append(sliding_node(0.5), 0.5), 0.02)
+    others = {"half": -1.0}, {"half": np.nan}, {"radius": 0 * box.radius}, {"rho": -box.rho}, {"centre": box.centre[1:]}
+    for wrong in others:
+        assert only_curve(given, replace(box, **wrong)) is None
+
+
+def test_a_fold_lies_in_a_box():
+    # the gallery's node sticks up to a fold, and slips back from it
+    problem = enumsol.gallery.get("one-node-3d-3").build().replace(friction=0.0, friction_slope=1.0)
+    given = AlphaProblem.of(problem.enclosure)
+    jammed, *_ = enumsol.enumerate_roots(problem, 5)
+    path = enumsol.follow(problem, jammed, -jammed.index, (0.5, 6))
+    (fold,) = path.folds
+    k = fold.point
+    line = np.column_stack([path.lambda_n, path.lambda_t[:, :, 0], path.lambda_t[:, :, 1], path.alpha])
+    before, after = (line[k] + 1e-3 * (line[n] - line[k]) for n in (k - 1, k + 1))
+    ahead, behind = (one / np.linalg.norm(one) for one in (line[k] - before, after - line[k]))
+    border = (ahead + behind) / np.linalg.norm(ahead + behind)
+    chord = after - before
+    length = float(border @ chord)
+    box = box_around(given, before + 0.5 * chord, chord / length, border, 0.6 * length, [0])
+    curve = only_curve(given, box)
+    assert (curve.rises, curve.statuses) == (0, (None,))
+    side = 0.5 * min(before[-1] - fold.alpha, after[-1] - fold.alpha, key=abs)
+    counts = []
+    for alpha in (fold.alpha + side, fold.alpha - side):
+        roots = enumsol.enumerate_roots(problem, Fraction(alpha))
+        inside = [root for root in roots if lies_in(box, Ball.exact(np.append(forces(root), alpha)))]
+        counts.append(len(inside))
+    assert counts == [2, 0]
