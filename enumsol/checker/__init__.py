@@ -47,7 +47,10 @@ What checker and search share
       ``trusted.space.leaves`` and ``trusted.space.turning``, what a complete assignment holds and which leaves
       share a root; ``trusted.space.space_uniqueness``, the test that a whole problem has one solution only;
       ``trusted.space.boxed_solution``, the test that a box of forces holds exactly one, and which of these are
-      the same; ``model.sectors``, the ends of sectors; ``condensation.space_condensed``, balls for S and g in the
+      the same, with the derivatives of ``trusted.space.natural_map``; over an interval of alpha
+      ``trusted.space.solution_curve``, the test that a box holds one curve of solutions,
+      ``trusted.space.curve_chains``, that boxes hold one whole curve, and ``trusted.space.pieces``, what holds over a
+      piece of alpha; ``model.sectors``, the ends of sectors; ``condensation.space_condensed``, balls for S and g in the
       variables in which friction is isotropic; of bodies that nothing holds ``condensation.floating_space``, the same
       with G and h, and ``trusted.space.resultants``, what multipliers and balance prove; ``model.problem3d``,
       ``model.slip_mean`` and ``model.friction``, the data and their checks;

@@ -107,6 +107,9 @@ class GraphVerificationReport:
         Pieces without a tree: their only branch is proven to hold all solutions.
     within : float or None
         Of a body that nothing holds: all this is about solutions whose rigid displacement is within this bound.
+    curves : int or None
+        In 3D, where the proof holds no selections and arcs: curves of solutions from end to end of the interval, or
+        closed.
     """
 
     ok: bool
@@ -120,11 +123,15 @@ class GraphVerificationReport:
     open: int = 0
     closed: int = 0
     within: float | None = None
+    curves: int | None = None
 
     @property
     def complete(self) -> bool:
-        """Every solution for every alpha in the interval lies on one of the arcs, whose ends are joined as proven."""
-        return self.ok and self.arcs is not None and not self.open
+        """Every solution for every alpha in the interval lies on one of the arcs, whose ends are joined as proven.
+
+        In 3D on one of the curves.
+        """
+        return self.ok and (self.arcs is not None or self.curves is not None) and not self.open
 
     def _repr_html_(self) -> str:
         return html_lines(repr(self).splitlines())
@@ -137,10 +144,12 @@ class GraphVerificationReport:
             found += f", {self.closed} of them with one solution, by one certificate"
         if not self.ok:
             return _refusal(where, self.failures, found)
+        if self.curves is None:
+            found += f"; every solution lies in one of {counted(len(self.selections), 'selection')}"
         return "\n".join(
             (
                 f"proof: verified{where}",
-                f"  {found}; every solution lies in one of {counted(len(self.selections), 'selection')}",
+                f"  {found}",
                 *([] if self.within is None else [f"  within rigid displacements of {self.within:g}"]),
                 *self._arcs(ends),
                 f"  certified data: {_DATA[self.data]}",
@@ -149,6 +158,11 @@ class GraphVerificationReport:
         )
 
     def _arcs(self, ends: tuple[float, ...]) -> list[str]:
+        if self.curves is not None:
+            curves = counted(self.curves, "curve")
+            if self.complete:
+                return [f"  every solution for every alpha in [{ends[0]:g}, {ends[1]:g}] lies on {curves}"]
+            return [f"  {curves}; left open in {counted(self.open, 'piece')} of alpha"]
         if self.arcs is None:
             return ["  the proof does not hold their arcs"]
         arcs = counted(self.arcs, "arc")

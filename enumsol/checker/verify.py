@@ -90,6 +90,11 @@ def verify(
 
             graphs = FloatingGraphChecker
         return graphs(cast("ContactProblem", problem), header, progress).run(lines)
+    if isinstance(header, dict) and header.get("kind") == "graph":
+        from enumsol.checker.space_graph import SpaceGraphChecker  # for graphs in 3D only
+
+        problem.check_held("a graph")
+        return SpaceGraphChecker(cast("ContactProblem3D", problem), header, progress).run(lines)
     return checker(problem, progress).run(proof)
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.arithmetic.ball_arrays import Ball
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, gamma, upper_norm
 from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.condensed import LARGEST_FRICTION, cholesky_factor, load_unit, node_units
@@ -167,6 +168,22 @@ _OVERFLOW = "the condensed problem over- or underflows float64; expected data in
 
 
 @dataclass(frozen=True)
+class PieceTurn:
+    """How a problem changes along a piece of alpha: with s from -1 to 1 by ``g + s g_turn`` and ``disc + s disc_turn``.
+
+    Attributes
+    ----------
+    g, g_turn : Ball of shape (m,)
+    disc, disc_turn : Ball of shape (p,)
+    """
+
+    g: Ball
+    g_turn: Ball
+    disc: Ball
+    disc_turn: Ball
+
+
+@dataclass(frozen=True)
 class EnclosedSpace(EnclosedSystem, FrictionUnits):
     """A SpaceSystem as balls: S, g and F for the data as given.
 
@@ -178,6 +195,16 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
 
     tau: NDArray[np.intp]
     unit: Vector
+
+    @property
+    def discs(self) -> Ball:
+        """Radii of the discs of tau over lambda_n, shape (p,): one, but over a piece of alpha (see PieceSpace)."""
+        return Ball.exact(np.ones(len(self.F)))
+
+    @property
+    def turn(self) -> PieceTurn | None:
+        """How g and discs change along a piece of alpha; None at one alpha."""
+        return None
 
     @cached_property
     def largest_norm(self) -> float:
@@ -230,3 +257,141 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
         if not all(np.all(np.isfinite(array)) for array in (scaled, scaled_rad, load, load_rad)):
             raise NotEnclosedError(_OVERFLOW)
         return cls(scaled, scaled_rad, load, load_rad, F, F_rad, tau, unit)
+
+
+@dataclass(frozen=True)
+class PieceSpace(EnclosedSpace):
+    """All problems over a piece of alpha as balls, in variables that do not depend on alpha (theory, section 12.9).
+
+    lambda_t is F tau with one F for the whole piece, so that S is the same everywhere and |tau| is at most the radius
+    of a disc times lambda_n. g and these radii are affine in alpha; here they are the balls of the whole piece.
+
+    Attributes
+    ----------
+    disc, disc_rad : (p,) arrays
+        See ``discs``.
+    along : PieceTurn or None
+        See ``turn``.
+    """
+
+    disc: Vector
+    disc_rad: Vector
+    along: PieceTurn | None
+
+    @property
+    def turn(self) -> PieceTurn | None:
+        """The same to first order; None over a point."""
+        return self.along
+
+    @property
+    def discs(self) -> Ball:
+        """F(alpha) over F for all alpha of the piece, shape (p,)."""
+        return Ball(self.disc, self.disc_rad)
+
+    @classmethod
+    def over(
+        cls,
+        enclosure: CondensedEnclosure,
+        piece: tuple[Fraction, Fraction],
+        alpha: Fraction,
+        units: tuple[Vector, Vector],
+    ) -> PieceSpace:
+        """Balls for the exact data over a piece, a point perhaps, with F the float next to that at ``alpha``.
+
+        Parameters
+        ----------
+        enclosure : CondensedEnclosure of a problem whose nodes have coefficients of constant ratios
+        piece : from where to where
+        alpha : where F is taken
+        units : force and length, (p,) arrays of powers of two (see SpaceSystem)
+
+        Raises
+        ------
+        NotEnclosedError
+            Something over- or underflows.
+        """
+        problem, (force, length) = enclosure.problem, units
+        F, F_rad = _references(problem, alpha)
+        if (why := _out_of_range(F)) is not None:
+            raise NotEnclosedError(why)
+        scale = friction_units(F)
+        discs = _quotients(problem, piece, F)
+        F, F_rad = F * scale, F_rad * scale
+        tau, rows, node, axis = places(F > 0)
+        unit = np.concatenate([np.ones(problem.p), scale[node, axis]])
+        weight = Ball(np.r_[np.ones(problem.p), F[node, axis]], np.r_[np.zeros(problem.p), F_rad[node, axis]])
+        middle, half = (piece[0] + piece[1]) / 2, (piece[1] - piece[0]) / 2
+        S, S_rad, g, g_rad = enclosure.in_units(middle, np.tile(force, 3), np.tile(length, 3))
+        with np.errstate(over="ignore", invalid="ignore"):
+            scaled = Ball(S, S_rad)[np.ix_(rows, rows)] * weight[:, None] * weight
+            load = weight * Ball(g, g_rad)[rows]
+            turn = Ball(enclosure.g1 / np.tile(length, 3), enclosure.g1_rad / np.tile(length, 3) * SAFE + TINY)[rows]
+            turn = weight * (turn * Ball(np.array(float(half)), np.array(2 * UNIT * float(half))))
+            whole = Ball(load.mid, (load.rad + turn.size) * SAFE) if half else load
+        if not (scaled.finite and whole.finite):
+            raise NotEnclosedError(_OVERFLOW)
+        disc, disc_turn = discs
+        along = PieceTurn(load, turn, disc, disc_turn) if half else None
+        rad = (disc.rad + disc_turn.size) * SAFE
+        # the exact S is symmetric
+        S_rad = np.maximum(scaled.rad, scaled.rad.T) + np.abs(scaled.mid - scaled.mid.T)
+        S = np.tril(scaled.mid) + np.tril(scaled.mid, -1).T
+        return cls(S, S_rad * SAFE, whole.mid, whole.rad, F, F_rad, tau, unit, disc.mid, rad, along)
+
+
+def _references(problem: Any, alpha: Fraction) -> tuple[Matrix, Matrix]:
+    """Coefficients at alpha, (p, 2), with radii: the first of a node that occurs is a float, the other one follows.
+
+    Raises
+    ------
+    NotEnclosedError
+        The ratio of both changes with alpha, or there is only one, which changes.
+    """
+    found = np.zeros((2, problem.p, 2))
+    pairs = zip(*(part.tolist() for part in (*problem.friction, *problem.friction_slope)), strict=True)
+    for i, (one, other, one_slope, other_slope) in enumerate(pairs):
+        first, second = (_affine(one, one_slope), _affine(other, other_slope))
+        if first[0] * second[1] != second[0] * first[1] or (any(first) != any(second) and (one_slope or other_slope)):
+            raise NotEnclosedError(_RATIO.format(problem.node_ids[i]))
+        at = [part[0] + alpha * part[1] for part in (first, second)]
+        reference, k = (Fraction(float(at[0])), 0) if at[0] else (Fraction(float(at[1])), 1)
+        found[0, i, k] = float(reference)
+        if k == 0 and at[1]:
+            exact = reference * at[1] / at[0]
+            found[0, i, 1] = float(exact)
+            found[1, i, 1] = 0.0 if Fraction(float(exact)) == exact else 2 * UNIT * float(exact)
+    return found[0], found[1]
+
+
+_RATIO = "the ratio of the coefficients of friction of contact node {} changes with alpha; expected a constant one"
+
+
+def _affine(value: float, slope: float) -> tuple[Fraction, Fraction]:
+    return Fraction(value), Fraction(slope)
+
+
+def _quotients(problem: Any, piece: tuple[Fraction, Fraction], F: Matrix) -> tuple[Ball, Ball]:
+    """The coefficients in the middle of a piece and half their changes, over those of ``F``; 1 and 0 without any.
+
+    Raises
+    ------
+    NotEnclosedError
+        One is negative, or is positive where that of ``F`` is zero.
+    """
+    ends = [
+        [exactly_at(end, *pair) for end in piece] for pair in zip(problem.friction, problem.friction_slope, strict=True)
+    ]
+    mid, rad = np.zeros((2, problem.p)), np.zeros((2, problem.p))
+    for i, (by, *values) in enumerate(zip(F.tolist(), *ends[0], *ends[1], strict=True)):
+        if min(values) < 0 or (not any(by) and max(values) > 0):
+            raise NotEnclosedError("a coefficient of friction is negative, or begins to be positive, within a piece")
+        one, other = values[:2] if by[0] else values[2:]
+        reference = Fraction(by[0] or by[1])
+        exact = (
+            ((one + other) / 2 / reference, (other - one) / 2 / reference) if reference else (Fraction(1), Fraction(0))
+        )
+        for k, number in enumerate(exact):
+            mid[k, i] = float(number)
+            rad[k, i] = 0.0 if Fraction(mid[k, i]) == number else UNIT * abs(mid[k, i]) * SAFE + TINY
+    disc, turn = (Ball(mid[k], rad[k]) for k in (0, 1))
+    return disc, turn

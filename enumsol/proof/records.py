@@ -47,6 +47,7 @@ class Limits:
     declared : forms that were declared before
     components : of all forces, in 3D
     modes : rigid modes of a body that nothing holds
+    boxes : around curves, in a graph in 3D
     """
 
     codes: Codes
@@ -54,6 +55,7 @@ class Limits:
     declared: Sequence[DeclaredForm] = ()
     components: int = 0
     modes: int = 0
+    boxes: int = 0
 
     @property
     def p(self) -> int:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.model.sectors import DEEPEST, RUN
-from enumsol.proof.reading import bytes_from, numbers_from, quoted
+from enumsol.proof.reading import bytes_from, numbers_from, quoted, rational_from
 from enumsol.proof.records import (
     ClosingRecord,
     DeclaredForm,
@@ -30,6 +30,8 @@ from enumsol.proof.records import (
 from enumsol.trusted.space.sector_rows import FORCE, GAP, RIGHT, UNDECIDED
 
 if TYPE_CHECKING:
+    from fractions import Fraction
+
     from numpy.typing import NDArray
 
     from enumsol.trusted.space.sector_rows import Row
@@ -155,12 +157,93 @@ class BoxedRoot(Solved):
         return self.mid, self.rad, *self.enclosure
 
 
+@dataclass(frozen=True, eq=False)
+class CurveBoxRecord(Record):
+    """A box around a curve of solutions over alpha, or around a point of one.
+
+    Attributes
+    ----------
+    centre, direction, border, radius : (3p + 1,) arrays
+    rho : (3p,) array
+    half : float
+    """
+
+    kind, sizes = "w", (7,)
+
+    centre: Array
+    direction: Array
+    border: Array
+    radius: Array
+    rho: Array
+    half: float
+
+    @classmethod
+    def of(cls, entries: list[Any], limits: Limits) -> CurveBoxRecord:
+        """The numbers; RecordError where there are not as many as there must be."""
+        try:
+            c, d, e, radius = (numbers_from(part, 3 * limits.p + 1) for part in entries[:4])
+            rho = numbers_from(entries[4], 3 * limits.p)
+            (half,) = numbers_from([entries[5]], 1)
+        except ValueError as error:
+            raise RecordError(f"a box around a curve cannot be read: {error}") from None
+        return cls(c, d, e, radius, rho, float(half))
+
+
+@dataclass(frozen=True)
+class CutPiece(Record):
+    """The piece of alpha is cut here; the subtrees of both parts follow, the lower one first."""
+
+    kind, sizes = "a", (2,)
+
+    alpha: str
+
+    def between(self, low: Fraction, high: Fraction) -> Fraction:
+        """Where it is cut; RecordError where that is not within the piece."""
+        try:
+            alpha = rational_from(self.alpha)
+        except ValueError as error:
+            raise RecordError(f"a piece is cut nowhere: {error}") from None
+        if not low < alpha < high:
+            raise RecordError("a piece is not cut within")
+        return alpha
+
+
+@dataclass(frozen=True)
+class _Boxed(Record):
+    """Base of leaves that refer to a box around a curve."""
+
+    sizes = (2,)
+
+    box: int
+
+    @classmethod
+    def of(cls, entries: list[Any], limits: Limits) -> Any:
+        """The number of the box."""
+        if type(entries[0]) is not int or not 0 <= entries[0] < limits.boxes:
+            raise RecordError(f"there is no box {quoted(entries[0])}")
+        return cls(entries[0])
+
+
+class InCurveBox(_Boxed):
+    """All solutions over the piece lie in this box."""
+
+    kind = "k"
+
+
+class ThroughCurveBox(_Boxed):
+    """There is one regular root at every alpha of the piece, in this box at the middle."""
+
+    kind = "r"
+
+
 #: All kinds of leaves in 3D.
 LEAVES = table_of(
     ExcludedInSpace, ExcludedBySlipForm, NoRoot, RegularRoot, BoxedRoot, OnlyRoot, Unloaded, UndecidedRecord
 )
 #: The same of a body that nothing holds; others rest on a stiffness that is positive definite.
 FLOATING_LEAVES = table_of(ExcludedInSpace, Unbalanced, NoRoot, RegularRoot, UndecidedRecord)
+#: Of a tree over alpha, too.
+PIECE_LEAVES = table_of(ExcludedInSpace, NoRoot, InCurveBox, ThroughCurveBox, UndecidedRecord)
 
 
 def _row(row: Any, p: int) -> Row:

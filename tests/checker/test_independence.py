@@ -21,6 +21,7 @@ CHECKERS = (
     "enumsol.checker.floating",
     "enumsol.checker.graph_checker",
     "enumsol.checker.history_checker",
+    "enumsol.checker.space_graph",
 )
 IN_SPACE = {
     "enumsol.checker.space_checker",
@@ -31,6 +32,7 @@ IN_SPACE = {
     "enumsol.trusted.space.slip_forms",
     "enumsol.trusted.space.leaves",
     "enumsol.trusted.space.boxed_solution",
+    "enumsol.trusted.space.natural_map",
     "enumsol.trusted.space.space_uniqueness",
     "enumsol.trusted.space.turning",
     "enumsol.condensation.space_condensed",
@@ -89,6 +91,9 @@ SHARED = {
     "trusted.space.boxed_solution": {
         *("BoxedSolution", "apart_in_boxes", "box_around", "is_inside", "solution_in_box")
     },
+    "trusted.space.solution_curve": None,
+    "trusted.space.curve_chains": None,
+    "trusted.space.pieces": {"AlphaPiece"},
     "trusted.space.space_uniqueness": {
         *(
             "LARGEST_UNIT",
@@ -234,7 +239,7 @@ def test_no_module_of_the_search_is_loaded_by_a_verification(tmp_path):
     )
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     modules = set(json.loads(done.stdout.splitlines()[-1]))
-    assert modules >= {*CHECKERS, "enumsol.checker.hull"}
+    assert modules >= {*CHECKERS, "enumsol.checker.hull"} - {"enumsol.checker.space_graph"}
     assert not {module for module in modules if is_search(module)}
     assert not modules & IN_SPACE
 

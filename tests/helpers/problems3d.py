@@ -147,3 +147,30 @@ def block_on_springs(rng, spring):
         forces=forces,
         friction=rng.uniform(0.2, 0.7),
     )
+
+
+#: One node that slips for every alpha > 0 that is not too large, with the friction alpha.
+SLIDING = from_compliance(np.diag([1.0, 2.0, 4.0]), np.array([1.0, 3.0, 4.0]), 0.0, friction_slope=1.0)
+
+
+def sliding_node(alpha):
+    """lambda of ``SLIDING`` while it slips: (3 - 2 alpha d1, 4 - 4 alpha d2) is along d; the angle by bisection."""
+    low, high = 0.0, 0.5 * np.pi
+    for _ in range(200):
+        phi = 0.5 * (low + high)
+        d = np.cos(phi), np.sin(phi)
+        turned = (3 - 2 * alpha * d[0]) * d[1] - (4 - 4 * alpha * d[1]) * d[0]
+        low, high = (low, phi) if turned > 0 else (phi, high)
+    return np.array([1.0, alpha * np.cos(low), alpha * np.sin(low)])
+
+
+def random_over_alpha(p, seed):
+    """Load, or friction, or both change with alpha; one coefficient a node."""
+    rng = np.random.default_rng(1000 * p + seed)
+    X = rng.standard_normal((3 * p, 3 * p))
+    F = 10 ** rng.uniform(-0.5, 0.7, p)
+    slope = rng.uniform(0.2, 1.0) if seed % 3 else 0.0
+    g = rng.standard_normal(3 * p)
+    problem = from_compliance(X @ X.T + 0.05 * np.eye(3 * p), g, (F, F))
+    load = None if seed % 3 == 1 else rng.standard_normal(problem.n)
+    return problem.replace(friction=(F, F), friction_slope=(slope * F, slope * F), load_slope=load)

@@ -34,6 +34,8 @@ _WIDENED = 0.125
 _CONTRACTIONS = 10
 #: Contractions of a box that holds exactly one zero, down to rounding.
 _REFINEMENTS = 60
+#: The same over a piece of alpha, over which the zero moves.
+_OVER_PIECE = 2
 #: Boxes of directions narrower than this hold a point, and forces known no better are not known; neither is halved for.
 _POINT = 2.0**-24
 #: Rigid modes that move what the equations fix by no more than this, relatively, are left free by them.
@@ -141,6 +143,8 @@ class _State(NamedTuple):
     G: Ball
     J: Ball
     box: Box
+    #: Derivatives of G along a piece of alpha.
+    G_turn: Ball | None = None
 
 
 class _Leaf:
@@ -171,6 +175,11 @@ class _Leaf:
         self.rows += [size + mode for mode in range(modes) if mode not in free]
         self.column = [self.closed.index(i) for i in self.turning]
         self.t = tau[self.turning].reshape(-1, 2)
+        turn = system.turn
+        self.piece = turn is not None
+        self.discs: tuple[Ball, Ball | None] = system.discs[self.turning], None
+        if turn is not None:
+            self.discs = turn.disc[self.turning], turn.disc_turn[self.turning]
         # v = w / unit; slips as ``slips`` of FrictionUnits has them, which have the same directions
         self.slip_scale = system.slip_scale[self.turning][:, None] / system.unit[self.t]
         E = np.zeros((size + modes, len(self.rows)))
@@ -276,8 +285,9 @@ class _Leaf:
         ``rough``: only in the directions in which dG/dpsi is surely not singular, so that those of other nodes are cut.
         """
         q = len(angle)
-        point = self._state(angle, np.zeros(q))
-        if point is None:
+        point = self._state(angle, np.zeros(q), still=True)
+        across = self._state(angle, np.zeros(q)) if self.piece else point
+        if point is None or across is None:
             return None
         if not (state.J.finite and point.J.finite):
             return None
@@ -291,14 +301,19 @@ class _Leaf:
         # Y times the second derivatives first: they are large where Y is small
         bends = self._bends(state, angle, radius)
         wide = (inverse @ Ball(bends.mid.reshape(q, -1), bends.rad.reshape(q, -1))).size.reshape(q, q, q) * radius
-        slope = inverse @ point.J
+        slope = inverse @ across.J
         slope = Ball(slope.mid, (slope.rad + upper_sum(wide, axis=2)) * SAFE)
         slope = smaller(slope, inverse @ state.J)
-        return (Ball.exact(np.eye(q)) - slope) @ span - inverse @ point.G
+        move = (Ball.exact(np.eye(q)) - slope) @ span - inverse @ point.G
+        if across.G_turn is not None:
+            # from the middle of a piece to any alpha, the angles held, then to any angles
+            along = inverse @ across.G_turn
+            move = Ball(move.mid, (move.rad + along.size) * SAFE)
+        return move
 
     def _refined(self, angle: Array, radius: Array, reach: Array) -> SpaceRoot | Open | None:
         """The one zero of a box, enclosed as closely as floats can."""
-        for _ in range(_REFINEMENTS):
+        for _ in range(_OVER_PIECE if self.piece else _REFINEMENTS):
             if np.any(self._outside(angle, radius)):
                 return None
             state = self._state(angle, radius)
@@ -413,14 +428,19 @@ class _Leaf:
         key = angle.tobytes()
         if self._last is None or self._last[0] != key:
             directions = turned_by(self.centre, angle)
-            self._last = key, Turning.of(self.system, self.E, self.rows, self.column, self.t, directions, self.free)
+            at = self.rows, self.column, self.t
+            self._last = key, Turning.of(self.system, self.E, at, directions, self.discs, self.free)
         return self._last[1]
 
-    def _state(self, angle: Array, radius: Array) -> _State | None:
-        """y, w, G and dG/dpsi over a box; None where the linear system is not proven regular in it."""
+    def _state(self, angle: Array, radius: Array, *, still: bool = False) -> _State | None:
+        """y, w, G and dG/dpsi over a box; None where the linear system is not proven regular in it.
+
+        Over all of a piece of alpha, if there is one, or ``still`` in its middle.
+        """
         turning = self._turning(angle)
         q = len(self.turning)
-        box = None if turning is None else turning.over(radius[:q], Ball(angle[q:], radius[q:]))
+        free = Ball(np.zeros(1), np.full(1, 0.0 if still else 1.0)) if self.piece else Ball(angle[q:], radius[q:])
+        box = None if turning is None else turning.over(radius[:q], free)
         if box is None:
             return None
         (v1, v2), (dv1, dv2) = self._slips(box.w), self._slips(box.dw)
@@ -431,6 +451,9 @@ class _Leaf:
         corrected = J[diagonal, diagonal] + (v1 * turned[:, 1] - v2 * turned[:, 0])
         J.mid[diagonal, diagonal], J.rad[diagonal, diagonal] = corrected.mid, corrected.rad
         G = v1 * d2 - v2 * d1
+        if self.piece:
+            s1, s2 = self._slips(box.ds[:, 0])
+            return _State(box.y, box.w, G, J, box, s1 * d2 - s2 * d1)
         if self.free:
             (s1, s2), w = self._slips(box.ds), box.w[self.free]
             G = Ball.joined(G, w)
@@ -475,7 +498,9 @@ class _Leaf:
         for i in self.stick:
             t = [int(k) for k in tau[i] if k >= 0]
             if t:
-                units, most, uncertain = unit[t] * scale[i], y.mid[i] * scale[i], y.rad[i] * scale[i]
+                units, disc = unit[t] * scale[i], self.system.discs[i]
+                most, uncertain = y.mid[i] * scale[i] * disc.mid, y.rad[i] * scale[i] * (disc.mid + disc.rad)
+                uncertain += abs(y.mid[i]) * scale[i] * disc.rad
                 length = float(np.linalg.norm(y.mid[t] * units))
                 mid.append(most - length)
                 uncertain += float(upper_norm(y.rad[t] * units)) + 16 * UNIT * (abs(most) + length)

@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS, CONTACT, UNDECIDED = range(7)
 #: Kinds of rows (theory, section 12.2); a row is (kind, node, number), the number that of a direction or sector.
 GAP, FORCE, TAU, SLIP, END, ALONG, TANGENT, CHORD, LEFT, RIGHT = range(10)
+#: Rows in which lambda_n has the radius of the disc as a factor.
+_OF_DISCS = END, TANGENT, CHORD
 FORBIDDEN, NONNEGATIVE, FREE = range(3)
 Row = tuple[int, int, int]
 #: Rows whose terms and signs are kept: the same ones occur in many exclusions.
@@ -157,6 +159,8 @@ class Multiplied:
     def of(cls, system: EnclosedSpace, codes: Sequence[int], rows: Sequence[Row], values: Array) -> Multiplied | None:
         """None where a multiplier has the wrong sign."""
         size, units, tau = len(system.g), system.row_unit.tolist(), system.tau.tolist()
+        discs, known = system.discs.mid.tolist(), system.discs.rad.tolist()
+        unsure = [0.0] * size
         sums = [[0.0] * size for _ in range(4)]  # numbers of Python: faster one by one than those of arrays
         w_sum, w_sizes, y_sum, y_sizes = sums
         pushes = []
@@ -169,6 +173,9 @@ class Multiplied:
             for i, coefficient in zip(*_terms(row, *tau[node], size), strict=True):
                 # a power of two: nothing is rounded but what underflows, which is less than TINY
                 factor = coefficient * units[i]
+                if i == node and row[0] in _OF_DISCS:
+                    unsure[i] += abs(value * factor) * known[node]
+                    factor *= discs[node]
                 term = value * factor
                 if i < size:
                     y_sum[i] += term
@@ -183,7 +190,7 @@ class Multiplied:
         y, y_size, c, c_size = np.array(sums)
         k = gamma(len(rows) + 24)
         k *= 1.0 + 2.0 * k  # the sizes are sums as long
-        return cls(y, k * y_size * SAFE + TINY, c, k * c_size * SAFE + TINY, pushes)
+        return cls(y, k * y_size * SAFE + TINY, c, (k * c_size + (1.0 + k) * np.array(unsure)) * SAFE + TINY, pushes)
 
 
 @np.errstate(over="ignore", invalid="ignore")

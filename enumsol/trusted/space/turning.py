@@ -108,6 +108,8 @@ class Turning:
         Those that P picks.
     off : (q,) array
         How much directions may be off in the units of y, for every node.
+    share : Ball of shape (q,), or None
+        Over a piece of alpha forces in T are 1 + s share times d, with s from -1 to 1, which is free (PieceTurn).
     """
 
     d: Array
@@ -119,16 +121,16 @@ class Turning:
     matrix: Ball
     rows: Sequence[int]
     off: Array
+    share: Ball | None = None
 
     @classmethod
     def of(
         cls,
         system: EnclosedSpace,
         E: Array,
-        rows: Sequence[int],
-        column: Sequence[int],
-        t: NDArray[np.intp],
+        at: tuple[Sequence[int], Sequence[int], NDArray[np.intp]],
         directions: tuple[Array, Array],
+        swept: tuple[Ball, Ball | None],
         free: Sequence[int] = (),
     ) -> Turning | None:
         """None where the equations are not proven regular for these directions.
@@ -138,29 +140,37 @@ class Turning:
         system : EnclosedSpace
             Of a body that nothing holds m counts its rigid modes, whose rows and unknowns are the last of all.
         E : (m, n) array, without the directions
-        rows : of the unknowns in y, n
-        column : of the turning nodes' normal forces among the unknowns, q
-        t : (q, 2), the rows of the turning nodes' tangential forces
+        at : rows of the unknowns in y, n; columns of the turning nodes' normal forces among them, q; and, (q, 2), the
+            rows of the turning nodes' tangential forces
         directions : as of ``turned_by``
+        swept : of the turning nodes, (q,), tau over lambda_n where they slip; over a piece of alpha for s = 0, and what
+            one s more adds
         free : rows of the free unknowns in y, k
         """
+        (rows, column, t), (discs, turn) = at, swept
         units = system.unit[t]
-        d, turned = (part / units for part in directions)
+        d, turned = (part * discs.mid[:, None] / units for part in directions)
+        share = None if turn is None else Ball(turn.mid / discs.mid, _quotient_error(turn, discs))
+        piece = system.turn
+        loads = [system.balls[1]] if piece is None else [piece.g, piece.g_turn]
         if not len(rows):  # every node is open
-            none, start = Ball.exact(np.zeros((0, 0))), system.balls[1]
-            start = _stacked(Ball.exact(np.zeros_like(start.mid)), start)
-            change = Ball.exact(np.zeros((len(start.mid), 0)))
-            return cls(d, turned, Ball.exact(np.zeros(0)), start, none, change, none, rows, np.zeros(0))
+            none = Ball.exact(np.zeros((0, len(loads) - 1)))
+            start, *others = (_stacked(Ball.exact(np.zeros_like(load.mid)), load) for load in loads)
+            change = Ball.exact(np.zeros((len(start.mid), len(others))))
+            for k, other in enumerate(others):
+                change[:, k] = other
+            return cls(d, turned, Ball.exact(np.zeros(0)), start, none, change, none, rows, np.zeros(0), share)
         E = E.copy()
         E[t, np.asarray(column, dtype=np.intp)[:, None]] = d
-        (S, g, _), sparse, both = system.balls, Ball.exact(E), np.r_[t.ravel(), np.asarray(free, dtype=np.intp)]
+        (S, _, _), sparse, both = system.balls, Ball.exact(E), np.r_[t.ravel(), np.asarray(free, dtype=np.intp)]
         SE = S @ sparse
         matrix = SE[rows]
         inverse = Inverse.of(matrix)
         if inverse is None:
             return None
         # columns: the load, and unit forces in the sectors
-        load = Ball(np.column_stack([g.mid, S.mid[:, both]]), np.column_stack([g.rad, S.rad[:, both]]))
+        columns = [*loads, S[:, both]]
+        load = Ball(*(np.column_stack([getattr(part, name) for part in columns]) for name in ("mid", "rad")))
         near = Ball.exact(inverse.near(load.mid[rows]))
         left = load - SE @ near
         # what is left of the equations is rounding; (P S E0)^-1 is taken of that, and S E0 (P S E0)^-1, which is
@@ -171,12 +181,20 @@ class Turning:
         w.mid[rows], w.rad[rows] = 0.0, 0.0
         x = near + rest
         y = sparse @ x
-        unit_forces = np.zeros_like(y.mid[:, 1:])
+        k = len(loads)
+        unit_forces = np.zeros_like(y.mid[:, k:])
         unit_forces[both, np.arange(len(both))] = 1.0
-        start, change = _stacked(y[:, 0], w[:, 0]), _stacked(Ball.exact(unit_forces) - y[:, 1:], w[:, 1:])
+        start, change = _stacked(y[:, 0], w[:, 0]), _stacked(Ball.exact(unit_forces) - y[:, k:], w[:, k:])
         change = Ball(np.where(np.arange(len(change.mid))[:, None] < len(y.mid), 1.0, -1.0) * change.mid, change.rad)
         x = x[list(column)]
-        return cls(d, turned, x[:, 0], start, x[:, 1:], change, matrix, rows, LIBRARY / np.min(units, axis=1))
+        B = x[:, k:]
+        if piece is not None:
+            # s is what is left free
+            change, B = _beside(change, _stacked(y[:, 1:2], w[:, 1:2])), _beside(B, -x[:, 1:2])
+        off = (LIBRARY * (discs.mid + discs.rad) + discs.rad * (1.0 + LIBRARY)) / np.min(units, axis=1)
+        if share is not None:
+            off = off * (1.0 + share.size) * SAFE
+        return cls(d, turned, x[:, 0], start, B, change, matrix, rows, off, share)
 
     @property
     def sign(self) -> int:
@@ -229,6 +247,12 @@ class Turning:
             start, base = start + (lone @ free[:, None])[:, 0], base - (self.B[:, 2 * q :] @ free[:, None])[:, 0]
         moved, push, ahead = self._turned(self.change, radius)
         B_moved, B_push, B_ahead = self._turned(self.B, radius)
+        share = Ball.exact(np.zeros(q)) if self.share is None else self.share
+        if self.share is not None:
+            grown = share * Ball(np.zeros(1), free.rad)
+            more = Ball.exact(np.ones(q)) + grown
+            moved, push, ahead = moved + ahead * grown, push * more, ahead * more
+            B_moved, B_push, B_ahead = B_moved + B_ahead * grown, B_push * more, B_ahead * more
         x, z, straight = base, Ball.exact(np.zeros((q, q))), Ball.exact(np.zeros((q, q)))
         shift = Ball.exact(np.zeros((q, len(free.mid))))
         if q:
@@ -244,9 +268,12 @@ class Turning:
             for _ in range(2):
                 # the mean value form: what the box adds to the values in its middle, dx = -z x dpsi
                 moves = (z * x) @ span
-                x = smaller(x, point.x - (moves + shift @ beside if len(free.mid) else moves)[:, 0])
+                lag = shift if self.share is None else shift + (straight @ (share * x)[:, None])
+                x = smaller(x, point.x - (moves + lag @ beside if len(free.mid) else moves)[:, 0])
         across, along = push - moved @ z, ahead - moved @ straight
         value, slope, lone = start + (moved @ x[:, None])[:, 0], across * x, lone - moved @ shift
+        if self.share is not None:
+            lone = lone + along @ (share * x)[:, None]
         if point is not None:
             moves = slope @ span
             moves = moves + lone @ beside if len(free.mid) else moves
@@ -258,3 +285,13 @@ class Turning:
 
 def _stacked(upper: Ball, lower: Ball) -> Ball:
     return Ball(np.concatenate([upper.mid, lower.mid]), np.concatenate([upper.rad, lower.rad]))
+
+
+def _beside(left: Ball, right: Ball) -> Ball:
+    return Ball(np.hstack([left.mid, right.mid]), np.hstack([left.rad, right.rad]))
+
+
+def _quotient_error(one: Ball, other: Ball) -> Array:
+    """Radius of a quotient of balls around that of their midpoints, of which the other's are positive."""
+    size = np.abs(one.mid / other.mid)
+    return np.asarray((4 * UNIT * size + (one.rad + size * other.rad) / (other.mid - other.rad)) * SAFE)

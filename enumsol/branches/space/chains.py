@@ -1,0 +1,253 @@
+"""Curves of solutions in 3D over alpha as chains of boxes, each proven to hold one curve (theory, section 12.8).
+
+Where to put the boxes is told by paths of continuation, in floats; what a chain says does not depend on them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.continuation.follow import follow
+from enumsol.continuation.path_data import PathStatus
+from enumsol.errors import EnumsolError
+from enumsol.trusted.space.curve_chains import CurveChain, CurveLink, goes_on, link_between
+from enumsol.trusted.space.solution_curve import (
+    ERRORS,
+    CurveBox,
+    box_around,
+    curve_point,
+    only_curve,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from fractions import Fraction
+
+    from numpy.typing import NDArray
+
+    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.trusted.space.solution_curve import AlphaProblem, SolutionCurve
+
+    Array = NDArray[np.float64]
+
+#: How much longer than the way between its joints a box is; the shortest way between two joints, relative to the
+#: length of a path's step; by how much the way grows.
+_LONGER, _SHORTEST, _GROWTH = 1.05, 1e-7, 2.0
+#: The longest way from a corner to the ends of its box, likewise, and by how much it shrinks.
+_WIDEST, _NARROWER = 0.4, 0.3
+#: How far a skeleton is prolonged beyond the interval, relative to its last step.
+_BEYOND = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Chain(CurveChain):
+    """One curve of solutions, through boxes that overlap, as far as it is proven.
+
+    Attributes
+    ----------
+    whole : bool
+        Whether it has the length that was asked for.
+    """
+
+    whole: bool
+
+    @property
+    def boxes(self) -> list[CurveBox]:
+        """Those of the links."""
+        return [link.curve.box for link in self.links]
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """Points along a curve of solutions, in floats.
+
+    Attributes
+    ----------
+    points : (N, 3p + 1) array
+    corners : sequence of int
+        Points at which a status changes.
+    closed : bool
+    """
+
+    points: Array
+    corners: Sequence[int]
+    closed: bool
+
+
+def chain_through(
+    given: AlphaProblem, problem: ContactProblem3D, x: Array, interval: tuple[Fraction, Fraction]
+) -> Chain | None:
+    """The curve through a regular root x, (3p + 1,), until it leaves the interval on both sides or is closed.
+
+    None where not even its beginning is proven; ``whole`` says whether all of it is.
+    """
+    skeleton = skeleton_through(problem, x, (float(interval[0]), float(interval[1])))
+    return None if skeleton is None else ChainBuilder(given).chain(skeleton)
+
+
+def skeleton_through(problem: ContactProblem3D, x: Array, span: tuple[float, float]) -> Skeleton | None:
+    """What continuation finds, a little longer than the interval; None if it does not start."""
+    p = problem.p
+    start = float(x[-1]), x[:p], x[p:-1].reshape(2, p).T
+    try:
+        ahead = follow(problem, start, 1, span)
+        closed = ahead.status == PathStatus.CLOSED
+        paths = [ahead] if closed else [follow(problem, start, -1, span), ahead]
+    except EnumsolError:
+        return None
+    lines = [
+        np.column_stack([path.lambda_n, path.lambda_t[:, :, 0], path.lambda_t[:, :, 1], path.alpha]) for path in paths
+    ]
+    corners = [sorted(item.point for item in path.transitions if item.nodes) for path in paths]
+    if closed:
+        return Skeleton(lines[0], corners[0], closed=True)
+    for k, (line, path) in enumerate(zip(lines, paths, strict=True)):
+        if path.status == PathStatus.INTERVAL_LEFT:
+            lines[k] = np.vstack([line, line[-1] + _BEYOND * (line[-1] - line[-2])])
+    back, last = lines[0][::-1], len(lines[0]) - 1
+    places = {last - k for k in corners[0]} | {last + k for k in corners[1]}
+    return Skeleton(np.vstack([back, lines[1][1:]]), sorted(places), closed=False)
+
+
+class ChainBuilder:
+    """Puts boxes along skeletons.
+
+    Parameters
+    ----------
+    problem : AlphaProblem
+    """
+
+    def __init__(self, problem: AlphaProblem) -> None:
+        self.problem = problem
+        self.unit = np.append(problem.force, 1.0)
+
+    def chain(self, skeleton: Skeleton) -> Chain | None:
+        """A chain along a skeleton, as far as it is proven."""
+        line = skeleton.points
+        first = self.joint(*self._at(line, 0.0))
+        if first is None:
+            return None
+        links: list[CurveLink] = []
+        joints = [first]
+        place, last = 0.0, len(line) - 1.0
+        for low, high in (*self._around(skeleton), (last, last)):
+            if not self._filled(line, place, low, links, joints, closed=skeleton.closed and low == last):
+                break
+            place = low
+            if low < high:
+                found = self._link(line, low, high, joints[-1], links[-1] if links else None)
+                if found is None:
+                    break
+                links.append(found[0])
+                joints.append(found[1])
+                place = high
+        whole = place == last
+        closed = skeleton.closed and whole and bool(links) and goes_on(links[-1], links[0], first)
+        return Chain(links, joints, closed, whole) if links else None
+
+    def _around(self, skeleton: Skeleton) -> list[tuple[float, float]]:
+        """Places before and after every corner between which one box is proven."""
+        line, last = skeleton.points, len(skeleton.points) - 1
+        found = []
+        for corner in skeleton.corners:
+            if 0 < corner < last:
+                share = _WIDEST
+                while share > _SHORTEST:
+                    start = self.joint(*self._at(line, corner - share))
+                    if start is not None and self._link(line, corner - share, corner + share, start, None) is not None:
+                        break
+                    share *= _NARROWER
+                found.append((corner - share, corner + share))
+        return found
+
+    def _filled(
+        self,
+        line: Array,
+        place: float,
+        last: float,
+        links: list[CurveLink],
+        joints: list[SolutionCurve],
+        *,
+        closed: bool,
+    ) -> bool:
+        """Add links from one place of a skeleton to another one; whether that place is reached.
+
+        ``closed``: that place is the first joint.
+        """
+        way = 1.0
+        while place < last:
+            further = min(place + way, last)
+            end = joints[0] if closed and further == last else None
+            found = self._link(line, place, further, joints[-1], links[-1] if links else None, end)
+            if found is None:
+                way = 0.5 * (further - place)
+                if way < _SHORTEST:
+                    return False
+                continue
+            links.append(found[0])
+            joints.append(found[1])
+            place, way = further, _GROWTH * (further - place)
+        return True
+
+    def joint(self, x: Array, direction: Array) -> SolutionCurve | None:
+        """The solution near a point, in a box without length across a direction."""
+        border = self.across(direction)
+        near = curve_point(self.problem, x, border)
+        if near is None:
+            return None
+        box = box_around(self.problem, near.x, near.direction, border, 0.0, roomy=False)
+        found = None if box is None else only_curve(self.problem, box, ERRORS)
+        return None if found is None or None in found.statuses else found
+
+    def across(self, direction: Array) -> Array:
+        """The border in which a direction has the product one, orthogonal to it in units of the nodes."""
+        scaled = direction / self.unit
+        return np.asarray(scaled / (scaled @ scaled) / self.unit)
+
+    def _at(self, line: Array, place: float) -> tuple[Array, Array]:
+        """A point of the polygon, and the direction of its edge there."""
+        k = min(int(place), len(line) - 2)
+        edge = line[k + 1] - line[k]
+        return line[k] + (place - k) * edge, edge
+
+    def _link(
+        self,
+        line: Array,
+        place: float,
+        further: float,
+        joint: SolutionCurve,
+        former: CurveLink | None,
+        end: SolutionCurve | None = None,
+    ) -> tuple[CurveLink, SolutionCurve] | None:
+        """A box from a joint to the one at another place of the skeleton, and that joint."""
+        following = self.joint(*self._at(line, further)) if end is None else end
+        if following is None:
+            return None
+        start, chord = joint.at(0.0).mid, following.at(0.0).mid - joint.at(0.0).mid
+        border = self._between(joint, following, chord)
+        length = float(border @ chord)
+        if not length > 0:
+            return None
+        direction = chord / length
+        before, after = joint.statuses, following.statuses
+        changing = [i for i in range(self.problem.p) if before[i] != after[i]]
+        box = box_around(self.problem, start + 0.5 * chord, direction, border, 0.5 * _LONGER * length, changing)
+        curve = None if box is None else only_curve(self.problem, box, ERRORS)
+        if curve is None:
+            return None
+        link = link_between(curve, joint, following)
+        if link is None or (former is not None and not goes_on(former, link, joint)):
+            return None
+        return link, following
+
+    def _between(self, one: SolutionCurve, other: SolutionCurve, chord: Array) -> Array:
+        """A border for a chord: the tangents at both ends go on along it."""
+        total = np.zeros_like(chord)
+        for joint in (one, other):
+            scaled = joint.box.direction / self.unit
+            scaled = scaled / np.linalg.norm(scaled)
+            total += scaled * np.sign(scaled @ (chord / self.unit))
+        return np.asarray(total / np.linalg.norm(total) / self.unit)

@@ -1,0 +1,145 @@
+"""All solutions of a problem in 3D over an interval of alpha: whole curves in boxes, and the tree that shows it.
+
+Theory, section 12.9. The tree finds the curves: at a solution that lies in no box yet a curve is followed through it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.branches.space.chains import chain_through
+from enumsol.proof.proof_file import Proof
+from enumsol.proof.records import UndecidedRecord
+from enumsol.proof.space_records import CurveBoxRecord
+from enumsol.proof.writer import ProofWriter, unit_exponents
+from enumsol.search.space.piece_tree import OpenLeaf, PieceTree
+from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.trusted.space.curve_chains import apart, leaves_interval
+from enumsol.trusted.space.solution_curve import AlphaProblem
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from enumsol.branches.space.chains import Chain
+    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.search.outcome import StopReason
+    from enumsol.trusted.space.solution_curve import CurveBox
+
+    Array = NDArray[np.float64]
+
+#: After so many curves that are not proven to be whole no further one is followed.
+_FAILURES = 3
+#: What the record of an open leaf says.
+_OPEN = "solutions there lie on no curve that is known"
+
+
+@dataclass(eq=False)
+class SpaceCover:
+    """Curves over an interval, and what is proven of them.
+
+    Attributes
+    ----------
+    problem : ContactProblem3D
+    interval : first and last alpha
+    chains : list of Chain
+        Whole curves.
+    records : list
+        Of the tree, in the order of a walk; open leaves among them.
+    failed : int
+        Curves that were met and are not whole.
+    nodes : int
+    stopped : StopReason or None
+        Why the tree was not searched to its end.
+    """
+
+    problem: ContactProblem3D
+    interval: tuple[Fraction, Fraction]
+    chains: list[Chain] = field(default_factory=list)
+    records: list[Any] = field(default_factory=list)
+    failed: int = 0
+    nodes: int = 0
+    stopped: StopReason | None = None
+
+    @property
+    def gaps(self) -> list[tuple[Fraction, Fraction]]:
+        """Pieces of alpha over which something is not decided, in order, those that touch as one."""
+        found: list[tuple[Fraction, Fraction]] = []
+        for low, high in sorted((leaf.low, leaf.high) for leaf in self.records if isinstance(leaf, OpenLeaf)):
+            if found and low <= found[-1][1]:
+                found[-1] = found[-1][0], max(high, found[-1][1])
+            else:
+                found.append((low, high))
+        return found
+
+    def _units(self) -> tuple[Array, Array]:
+        system = SpaceSolvers(self.problem, sum(self.interval) / 2, "verified").system
+        return system.force, system.length
+
+    def search(self, max_nodes: int | None = None) -> None:
+        """Search the tree.
+
+        Raises
+        ------
+        NotEnclosedError
+            The data cannot be enclosed.
+        """
+        given = AlphaProblem.of(self.problem.enclosure)
+
+        def more(x: Array) -> list[CurveBox]:
+            # what is left open costs as much at every further point of the same curve
+            chain = chain_through(given, self.problem, x, self.interval) if self.failed < _FAILURES else None
+            if chain is None or not self._is_new(chain):
+                self.failed += 1
+                return []
+            self.chains.append(chain)
+            return chain.boxes
+
+        tree = PieceTree(self.problem.enclosure, self.interval, self._units(), more=more, max_nodes=max_nodes)
+        self.records = tree.run()
+        self.nodes, self.stopped = tree.nodes, tree.stopped
+
+    def _is_new(self, chain: Chain) -> bool:
+        """Whether a chain is proven to be whole, and none that is known."""
+        whole = chain.whole and (chain.closed or leaves_interval(chain.links, chain.joints, self.interval))
+        return whole and all(
+            other.closed != chain.closed or apart(chain.joints, other.links, self.interval) for other in self.chains
+        )
+
+    def proof(self) -> Proof:
+        """Curves and tree for ``enumsol.verify``."""
+        writer = ProofWriter()
+        writer.write(
+            {
+                "format": "enumsol-proof",
+                "version": 1,
+                "kind": "graph",
+                "problem": self.problem.fingerprint,
+                "interval": [str(end) for end in self.interval],
+                "p": self.problem.p,
+                "data": "problem",
+                **unit_exponents(*self._units()),
+            }
+        )
+        for chain in self.chains:
+            writer.write({"curve": len(chain.links)})
+            for k, joint in enumerate(chain.joints):
+                writer.write(_box(joint.box))
+                if k < len(chain.links):
+                    writer.write(_box(chain.links[k].curve.box))
+        writer.write({"tree": True})
+        leaves = gaps = 0
+        for record in self.records:
+            is_open = isinstance(record, OpenLeaf)
+            gaps += is_open
+            leaves += is_open or record.kind not in ("a", "b")
+            writer.write((UndecidedRecord(_OPEN) if is_open else record).write())
+        writer.write({"curves": len(self.chains), "leaves": leaves, "gaps": gaps})
+        return writer.close()
+
+
+def _box(box: CurveBox) -> list[Any]:
+    return CurveBoxRecord(box.centre, box.direction, box.border, box.radius, box.rho, box.half).write()

@@ -1,0 +1,124 @@
+"""Checker of trees over alpha in 3D: all solutions over an interval lie on curves in boxes (theory, section 12.9).
+
+A tree is given by its records in the order of a walk: ``["a", alpha]`` (the piece is cut there), ``["b", node, codes]``
+(a status is split), ``["x", rows, multipliers]`` (no solution over the piece), ``["n"]`` (the same, by the equations of
+a leaf), ``["k", box]`` (all solutions of a leaf lie in the box), ``["r", box]`` (the roots of a leaf, one at every
+alpha, are an arc, which is in the box at the middle) and ``["u", reason]`` (open: a gap).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.condensation.affine import exactly_at
+from enumsol.proof.reading import RefusedError, quoted
+from enumsol.proof.records import Branching, Limits, NoRoot, RecordError, UndecidedRecord, kind_of
+from enumsol.proof.space_records import PIECE_LEAVES, CutPiece, ExcludedInSpace, InCurveBox, ThroughCurveBox
+from enumsol.trusted.space.pieces import AlphaPiece
+from enumsol.trusted.space.sector_rows import UNDECIDED, is_sector_covering
+from enumsol.trusted.space.space_uniqueness import is_complete
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+    from fractions import Fraction
+
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.enclosure import CondensedEnclosure
+    from enumsol.trusted.space.solution_curve import CurveBox
+
+    Array = NDArray[np.float64]
+    Codes = tuple[int, ...]
+
+
+@dataclass
+class PieceTreeChecker:
+    """Checks one tree over an interval.
+
+    Attributes
+    ----------
+    enclosure : CondensedEnclosure
+    units : force and length, (p,) arrays of powers of two
+    boxes : sequence of CurveBox
+        Each is proven to hold one curve.
+    fail : called with what a leaf does not prove
+    leaves : int
+    gaps : list of (low, high)
+        Pieces of open leaves.
+    """
+
+    enclosure: CondensedEnclosure
+    units: tuple[Array, Array]
+    boxes: Sequence[CurveBox]
+    fail: Callable[[str], object]
+    leaves: int = 0
+    gaps: list[tuple[Fraction, Fraction]] = field(default_factory=list)
+
+    def run(self, low: Fraction, high: Fraction, records: Iterator[Any]) -> None:
+        """Check the records of the tree over [low, high]; none is read after its last one.
+
+        Raises
+        ------
+        RefusedError
+            They are no tree.
+        """
+        problem = self.enclosure.problem
+        pairs = list(zip(problem.friction, problem.friction_slope, strict=True))
+        ends = [[exactly_at(end, *pair) for end in (low, high)] for pair in pairs]
+        occurs = [[max(values) > 0 for values in zip(*both, strict=True)] for both in ends]
+        self._tangents = [one + other for one, other in zip(*occurs, strict=True)]
+        waiting: list[tuple[Fraction, Fraction, Codes]] = [(low, high, (UNDECIDED,) * problem.p)]
+        piece = AlphaPiece(self.enclosure, low, high, self.units)
+        while waiting:
+            low, high, codes = waiting.pop()
+            if (low, high) != (piece.low, piece.high):
+                piece = AlphaPiece(self.enclosure, low, high, self.units)
+            record = next(records, None)
+            if not isinstance(record, list):
+                raise RefusedError("the tree over alpha ends before all of it is decided")
+            try:
+                waiting += self._below(piece, codes, record)[::-1]
+            except ValueError as error:
+                raise RefusedError(f"leaf {self.leaves + 1} of the tree over alpha: {error}") from None
+
+    def _below(self, piece: AlphaPiece, codes: Codes, record: list[Any]) -> list[tuple[Fraction, Fraction, Codes]]:
+        """What a record leaves to those after it, or nothing, and the leaf is checked."""
+        kind = record[0] if record else None
+        if kind == CutPiece.kind:
+            alpha = CutPiece.read(record, Limits(codes)).between(piece.low, piece.high)
+            return [(piece.low, alpha, codes), (alpha, piece.high, codes)]
+        if kind == Branching.kind:
+            split = Branching.covering(record, codes, self._covers)
+            return [(piece.low, piece.high, below) for below in split.below(codes)]
+        known = kind_of(record, PIECE_LEAVES)
+        if known is None:
+            raise RecordError(f"unknown kind of record {quoted(kind)}")
+        leaf = known.read(record, Limits(codes, boxes=len(self.boxes)))
+        self.leaves += 1
+        if isinstance(leaf, UndecidedRecord):
+            self.gaps.append((piece.low, piece.high))
+        elif (why := self._wrong(piece, codes, leaf)) is not None:
+            self.fail(f"leaf {self.leaves} of the tree over alpha: {why}")
+        return []
+
+    def _covers(self, node: int, code: int, children: list[int]) -> bool:
+        return is_sector_covering(code, children, self._tangents[node])
+
+    def _wrong(self, piece: AlphaPiece, codes: Codes, leaf: Any) -> str | None:
+        """What a leaf does not prove; None if all is proven."""
+        if isinstance(leaf, ExcludedInSpace):
+            return None if piece.margin(codes, leaf.rows, leaf.values) > 0 else "its multipliers do not exclude it"
+        if not is_complete(piece.whole, codes):
+            return "its statuses are not final"
+        if isinstance(leaf, NoRoot):
+            return None if piece.held(codes) is None else "it is not proven to hold no root"
+        if isinstance(leaf, InCurveBox):
+            inside = piece.holds_all(codes, self.boxes[leaf.box])
+            return None if inside else "its roots are not proven to lie in its box"
+        if isinstance(leaf, ThroughCurveBox):
+            met = piece.meets(codes, self.boxes[leaf.box])
+            return None if met else "its roots are not proven to be an arc through its box"
+        raise AssertionError(leaf)

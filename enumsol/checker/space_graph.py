@@ -1,0 +1,171 @@
+"""Checker of a branch graph in 3D: every solution over an interval lies on curves, each given by boxes.
+
+Records: a header ``{"format": "enumsol-proof", "version": 1, "kind": "graph", "problem": <fingerprint>, "interval":
+[a, b], "p": p, "data": "problem", "force", "length"}``; for every curve ``{"curve": n}`` with n boxes, and these as
+``["w", centre, direction, border, radius, rho, half]`` between n + 1 boxes without length around the points that they
+share (see ``trusted.space.curve_chains``); ``{"tree": true}`` and the records of a tree (see ``checker.piece_tree``),
+whose boxes are numbered in the order of the curves, points left out; at the end ``{"curves", "leaves", "gaps"}``.
+
+What is checked: every curve is one, and leaves the interval at both ends or is closed; no two are the same; the leaves
+of the tree cover all solutions, and those of a leaf lie on one of the curves.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from enumsol.checker.piece_tree import PieceTreeChecker
+from enumsol.checker.reports import MAX_FAILURES, GraphVerificationReport
+from enumsol.condensation.affine import exactly_at
+from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
+from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.proof.reading import RefusedError, data_of, exponents_from, quoted, rational_from, same
+from enumsol.proof.records import Limits
+from enumsol.proof.space_records import CurveBoxRecord
+from enumsol.trusted.space.curve_chains import apart, whole_chain
+from enumsol.trusted.space.sector_rows import UNDECIDED
+from enumsol.trusted.space.solution_curve import AlphaProblem, CurveBox
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+    from fractions import Fraction
+
+    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.trusted.space.curve_chains import CurveChain
+
+#: More boxes of one curve than this are no honest proof's.
+_MOST_BOXES = 1 << 20
+
+
+class SpaceGraphChecker:
+    """Checks the records of a graph's proof in 3D.
+
+    Parameters
+    ----------
+    problem : ContactProblem3D
+    header : the proof's first record
+    progress : callable, optional
+        Called with the number of leaves checked.
+    """
+
+    def __init__(
+        self, problem: ContactProblem3D, header: dict[str, Any], progress: Callable[[int], object] | None
+    ) -> None:
+        self.problem, self.header, self.progress = problem, header, progress
+        self.failures: list[str] = []
+        self.interval: tuple[Fraction, Fraction] | None = None
+        self.curves: list[CurveChain] = []
+        self.boxes: list[CurveBox] = []
+        self.leaves = 0
+        self.gaps: list[tuple[Fraction, Fraction]] = []
+
+    def run(self, records: Iterator[Any]) -> GraphVerificationReport:
+        """Check all records after the header."""
+        try:
+            self._check(records)
+        except RefusedError as refusal:
+            self.failures.append(str(refusal))
+        except (NotEnclosedError, InvalidProblemError, InvalidArgumentError) as error:
+            self.failures.append(f"the problem's data cannot be enclosed: {error}")
+        return GraphVerificationReport(
+            not self.failures,
+            tuple(self.failures),
+            self.interval,
+            1,
+            self.leaves,
+            frozenset(),
+            "problem",
+            open=len(self.gaps),
+            curves=len(self.curves),
+        )
+
+    def _fail(self, message: str) -> None:
+        self.failures.append(message)
+        if len(self.failures) == MAX_FAILURES:
+            raise RefusedError(f"the check ends after {MAX_FAILURES} failures")
+
+    def _check(self, records: Iterator[Any]) -> None:
+        units = self._read_header()
+        enclosure = CondensedEnclosure.from_problem(self.problem)
+        given = AlphaProblem.of(enclosure)
+        record = next(records, None)
+        while isinstance(record, dict) and record.keys() == {"curve"}:
+            self._curve(given, record["curve"], records)
+            record = next(records, None)
+        self._compare()
+        if record != {"tree": True}:
+            raise RefusedError("the tree over alpha is missing")
+        assert self.interval is not None
+        tree = PieceTreeChecker(enclosure, units, self.boxes, self._fail)
+        tree.run(*self.interval, records)
+        self.leaves, self.gaps = tree.leaves, tree.gaps
+        if self.progress is not None:
+            self.progress(self.leaves)
+        claim = {"curves": len(self.curves), "leaves": self.leaves, "gaps": len(self.gaps)}
+        footer = next(records, None)
+        if not same(footer, claim):
+            self._fail(f"the counts at the end are {quoted(footer)}; the records give {claim!r}")
+        if next(records, None) is not None:
+            self._fail("records follow after the end of the proof")
+
+    def _read_header(self) -> tuple[Any, Any]:
+        if data_of(self.header, cast("Any", self.problem), "graph") != "problem":
+            raise RefusedError("a proof about a problem in 3D certifies the problem's own data only")
+        try:
+            self.interval, units = _read(self.header, self.problem)
+        except ValueError as error:
+            raise RefusedError(f"the header cannot be read: {error}") from None
+        return units
+
+    def _curve(self, given: AlphaProblem, count: Any, records: Iterator[Any]) -> None:
+        number = len(self.curves) + 1
+        if type(count) is not int or not 0 < count <= _MOST_BOXES:
+            raise RefusedError(f"curve {number} has {quoted(count)} boxes")
+        limits = Limits((UNDECIDED,) * self.problem.p)
+        found = []
+        for _ in range(2 * count + 1):
+            try:
+                said = _box_from(next(records, None), limits)
+            except ValueError as error:
+                raise RefusedError(f"curve {number} cannot be read: {error}") from None
+            found.append(CurveBox(said.centre, said.direction, said.border, said.half, said.radius, said.rho))
+        assert self.interval is not None
+        chain = whole_chain(given, found[1::2], found[::2], self.interval)
+        if chain is None:
+            raise RefusedError(f"curve {number} is not proven to be one from end to end")
+        self.boxes += found[1::2]
+        self.curves.append(chain)
+
+    def _compare(self) -> None:
+        """Refuse curves that may be the same: whole ones are, if they have a point in common."""
+        assert self.interval is not None
+        for k, one in enumerate(self.curves):
+            for other in self.curves[:k]:
+                if one.closed == other.closed and not apart(one.joints, other.links, self.interval):
+                    self._fail("two curves may be the same")
+
+
+def _read(header: dict[str, Any], problem: ContactProblem3D) -> tuple[tuple[Fraction, Fraction], tuple[Any, Any]]:
+    """The interval, and units of forces and displacements."""
+    ends = header.get("interval")
+    if not isinstance(ends, list) or len(ends) != 2:
+        raise ValueError("there is no interval")
+    low, high = map(rational_from, ends)
+    if not low < high:
+        raise ValueError("an interval is empty")
+    force, length = (exponents_from(header.get(key), problem.p) for key in ("force", "length"))
+    if len({a + b for a, b in zip(force, length, strict=True)}) != 1:
+        raise ValueError("the units are no common scaling of energy")
+    for pair in zip(problem.friction, problem.friction_slope, strict=True):
+        if min(min(exactly_at(end, *pair)) for end in (low, high)) < 0:
+            raise ValueError("friction is negative in the interval")
+    return (low, high), (np.ldexp(1.0, np.array(force)), np.ldexp(1.0, np.array(length)))
+
+
+def _box_from(record: Any, limits: Limits) -> CurveBoxRecord:
+    if not isinstance(record, list) or record[:1] != [CurveBoxRecord.kind]:
+        raise ValueError(f"{quoted(record)} is no box")
+    found: CurveBoxRecord = CurveBoxRecord.read(record, limits)
+    return found

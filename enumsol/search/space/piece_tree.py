@@ -1,0 +1,268 @@
+"""The tree over alpha, statuses and sectors: all solutions lie in boxes around curves (theory, section 12.9)."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from enumsol.condensation.space_condensed import SpaceSystem
+from enumsol.model.sectors import DEEPEST, SECTORS, level_of, width_level
+from enumsol.model.statuses import CONTACT, UNDECIDED
+from enumsol.proof.records import Branching, NoRoot
+from enumsol.proof.space_records import CutPiece, ExcludedInSpace, InCurveBox, ThroughCurveBox
+from enumsol.relaxation.engine import PRUNE_MARGIN
+from enumsol.relaxation.space_relaxation import SpaceEngine
+from enumsol.search.outcome import StopReason
+from enumsol.search.space.space_search import SpaceSplitting
+from enumsol.search.splitting import ImposedRows
+from enumsol.support.deadlines import TimeOverError, look
+from enumsol.trusted.space.leaves import Open, SpaceRoot
+from enumsol.trusted.space.pieces import AlphaPiece
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.enclosure import CondensedEnclosure
+    from enumsol.relaxation.space_relaxation import SpaceRelaxation
+    from enumsol.selections.solution import Codes
+    from enumsol.trusted.space.solution_curve import CurveBox
+
+    Array = NDArray[np.float64]
+
+#: Pieces whose engines are kept.
+_KEPT = 32
+#: Leaves are tested from this level of their sectors on.
+_TRIED = 3
+
+
+@dataclass(frozen=True)
+class OpenLeaf:
+    """A part of the tree that is not decided.
+
+    Attributes
+    ----------
+    low, high : Fraction
+        The piece of alpha.
+    codes : the partial assignment
+    forces : (3p,) array or None
+        Of a solution at the middle of the piece that lies in no box.
+    """
+
+    low: Fraction
+    high: Fraction
+    codes: Codes
+    forces: Array | None
+
+
+class _Examined:
+    """A piece with what the search needs of it."""
+
+    def __init__(self, piece: AlphaPiece) -> None:
+        self.piece = piece
+        middle = piece.at(piece.middle, piece.middle)
+        self.point = middle
+        self.system = SpaceSystem(middle.S, middle.g, middle.F, middle.tau, middle.unit, *piece.units)
+        self.engine = SpaceEngine(self.system)
+        self.splitting = SpaceSplitting(self.engine)
+        self.rows = ImposedRows(self.splitting, self.system.p)
+
+    def root(self, codes: Codes) -> SpaceRelaxation:
+        return self.engine.root(*self.rows.over(codes, range(self.system.p)))
+
+
+class PieceTree:
+    """Covers all solutions over an interval of alpha by boxes around curves, as far as it can.
+
+    Parameters
+    ----------
+    enclosure : CondensedEnclosure
+    interval : (a, b), Fractions
+    units : force and length, (p,) arrays of powers of two
+    boxes : sequence of CurveBox
+        Each holds exactly one curve of solutions.
+    more : callable, optional
+        Called with a solution (forces and alpha, in the units of the problem) that lies in none of them; gives boxes
+        along its curve, which lie in ``boxes`` then.
+    max_nodes : int, optional
+    smallest : pieces are cut down to this share of the interval
+
+    Attributes
+    ----------
+    boxes : list of CurveBox
+    nodes : int
+    stopped : StopReason or None
+    """
+
+    def __init__(
+        self,
+        enclosure: CondensedEnclosure,
+        interval: tuple[Fraction, Fraction],
+        units: tuple[Array, Array],
+        boxes: Sequence[CurveBox] = (),
+        more: Callable[[Array], Sequence[CurveBox]] | None = None,
+        max_nodes: int | None = None,
+        smallest: float = 2.0**-30,
+    ) -> None:
+        self._enclosure, self._units, self.interval = enclosure, units, interval
+        self._more, self._most = more, max_nodes
+        self._least = Fraction(smallest) * (interval[1] - interval[0])
+        self._pieces: OrderedDict[tuple[Fraction, Fraction], _Examined] = OrderedDict()
+        self.nodes = 0
+        #: Why the search ended early, if it did.
+        self.stopped: StopReason | None = None
+        self.boxes: list[CurveBox] = []
+        self._take(boxes)
+
+    def _take(self, boxes: Sequence[CurveBox]) -> None:
+        """Boxes more, and all of them as arrays."""
+        self.boxes += boxes
+        if not self.boxes:
+            return
+        self._c, self._d, self._e, self._b = (
+            np.array([getattr(box, name) for box in self.boxes]) for name in ("centre", "direction", "border", "radius")
+        )
+        self._h = np.array([box.half for box in self.boxes])
+        reach = np.abs(self._d[:, -1]) * self._h + self._b[:, -1]
+        self._low, self._high = self._c[:, -1] - reach, self._c[:, -1] + reach
+
+    def _examined(self, low: Fraction, high: Fraction) -> _Examined:
+        key = low, high
+        found = self._pieces.get(key)
+        if found is None:
+            found = self._pieces[key] = _Examined(AlphaPiece(self._enclosure, low, high, self._units))
+            if len(self._pieces) > _KEPT:
+                self._pieces.popitem(last=False)
+        else:
+            self._pieces.move_to_end(key)
+        return found
+
+    def run(self) -> list[Any]:
+        """Records of the tree, in the order of a walk; what is open is an OpenLeaf."""
+        records: list[Any] = []
+        stack: list[Any] = [(*self.interval, (UNDECIDED,) * self._enclosure.problem.p, None, -1, False)]
+        while stack:
+            if self.stopped is None and self._most is not None and self.nodes >= self._most:
+                self.stopped = StopReason.NODE_LIMIT
+            if self.stopped is None:
+                try:
+                    look()
+                except TimeOverError:
+                    self.stopped = StopReason.TIME_LIMIT
+            low, high, codes, *others = stack.pop()
+            if self.stopped is not None:
+                records.append(OpenLeaf(low, high, codes, None))
+                continue
+            self.nodes += 1
+            record, below = self._step(low, high, codes, *others)
+            records.append(record)
+            stack += below[::-1]
+        return records
+
+    def _step(
+        self, low: Fraction, high: Fraction, codes: Codes, parent: Any, changed: int, last: bool
+    ) -> tuple[Any, list[Any]]:
+        at = self._examined(low, high) if parent is None else parent[0]
+        final = not {CONTACT, UNDECIDED} & set(codes)
+        if final and parent is None:
+            done = self._leaf(at, codes)
+            if done is not None:
+                return done
+        if parent is None:
+            relaxation = at.root(codes)
+        else:
+            relaxation = parent[1].child(*at.rows.of(changed, codes[changed]), last=last)
+        if relaxation.pruned and relaxation.bound > PRUNE_MARGIN:
+            numbers, values = relaxation.multipliers()
+            rows = [at.engine.rows[number] for number in numbers.tolist()]
+            if at.piece.margin(codes, rows, values, 2.0) > 0:
+                return ExcludedInSpace(rows, values), []
+            return self._halved(at, codes)
+        if final and all(code < SECTORS or width_level(code - SECTORS) >= _TRIED for code in codes):
+            done = self._leaf(at, codes) if parent is not None else None
+            if done is not None:
+                return done
+            node = self._widest(codes)
+        else:
+            node = relaxation.most_promising(codes, relaxation.violations(codes))
+            node = self._widest(codes) if node < 0 else node
+        if node < 0:
+            return self._halved(at, codes)
+        return self._branched(at, codes, node, relaxation)
+
+    @staticmethod
+    def _widest(codes: Codes) -> int:
+        """The node with the widest sector that can be halved; -1 if there is none."""
+        sectors = [i for i, code in enumerate(codes) if code > SECTORS and level_of(code - SECTORS) < DEEPEST]
+        return min(sectors, key=lambda i: width_level(codes[i] - SECTORS)) if sectors else -1
+
+    def _branched(self, at: _Examined, codes: Codes, node: int, relaxation: Any) -> tuple[Any, list[Any]]:
+        children = at.splitting.children(codes, node, relaxation)
+        below = []
+        for k, child in enumerate(children):
+            there = (*codes[:node], child, *codes[node + 1 :])
+            below.append((at.piece.low, at.piece.high, there, (at, relaxation), node, k + 1 == len(children)))
+        return Branching(node, list(children)), below
+
+    def _halved(self, at: _Examined, codes: Codes, forces: Array | None = None) -> tuple[Any, list[Any]]:
+        low, high = at.piece.low, at.piece.high
+        if high - low <= self._least:
+            return self._open(at, codes, forces), []
+        middle = at.piece.middle
+        return CutPiece(str(middle)), [(x, y, codes, None, -1, False) for x, y in ((low, middle), (middle, high))]
+
+    def _open(self, at: _Examined, codes: Codes, forces: Array | None) -> OpenLeaf:
+        return OpenLeaf(at.piece.low, at.piece.high, codes, forces)
+
+    def _met(self, piece: AlphaPiece, root: SpaceRoot) -> int | None:
+        """The box of a root in a point of alpha, along whose curve new ones are put if there is none."""
+        number = self._box(piece, root)
+        if number is None and self._more is not None:
+            self._take(self._more(np.append(piece.forces(root.y).mid, float(piece.middle))))
+            number = self._box(piece, root)
+        return number
+
+    def _leaf(self, at: _Examined, codes: Codes) -> tuple[Any, list[Any]] | None:
+        """A leaf that is decided, or halved; None where statuses are to be split further."""
+        piece = at.piece
+        found = piece.held(codes)
+        if found is None:
+            return NoRoot(), []
+        if (number := self._box(piece, found)) is not None:
+            return InCurveBox(number), []
+        # is it the piece or the sectors that are too wide?
+        there = piece.point.held(codes)
+        if there is None:
+            return self._halved(at, codes)
+        if isinstance(there, SpaceRoot):
+            number = self._met(piece.point, there)
+            if number is None:
+                return self._open(at, codes, piece.forces(there.y).mid), []
+            if isinstance(found, SpaceRoot):
+                return ThroughCurveBox(number), []
+            return self._halved(at, codes)
+        return None if self._box(piece.point, there) is None else self._halved(at, codes)
+
+    def _box(self, piece: AlphaPiece, found: SpaceRoot | Open) -> int | None:
+        """The box in which forces lie."""
+        if not self.boxes or found.y is None:
+            return None
+        forces = piece.forces(found.y)
+        near = np.flatnonzero((self._low <= float(piece.low)) & (float(piece.high) <= self._high))
+        if not len(near):
+            return None
+        x = np.append(forces.mid, float(piece.middle)) - self._c[near]
+        rad = np.append(forces.rad, float(piece.high - piece.low) / 2)
+        t = np.sum(self._e[near] * x, axis=1)
+        inside = np.abs(t) + np.abs(self._e[near]) @ rad <= self._h[near]
+        beside = np.abs(x - t[:, None] * self._d[near])
+        inside &= np.all(beside <= self._b[near], axis=1)
+        for k in near[inside].tolist():
+            if piece.lies_in(found.y, self.boxes[k], 2.0):
+                return int(k)
+        return None

@@ -1,0 +1,150 @@
+"""The trusted test that boxes which share points hold one curve from end to end (theory, section 12.9)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.arithmetic.ball_arrays import Ball
+from enumsol.arithmetic.balls import SAFE
+from enumsol.trusted.space.solution_curve import lies_in, only_curve, parameter_in
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from fractions import Fraction
+
+    from enumsol.trusted.space.solution_curve import AlphaProblem, CurveBox, SolutionCurve
+
+
+@dataclass(frozen=True, eq=False)
+class CurveLink:
+    """A curve in a box and the part of it between two of its points.
+
+    Attributes
+    ----------
+    curve : SolutionCurve
+    start, end : Balls
+        t at both points; those of ``end`` are larger.
+    """
+
+    curve: SolutionCurve
+    start: Ball
+    end: Ball
+
+
+def link_between(curve: SolutionCurve, start: SolutionCurve, end: SolutionCurve) -> CurveLink | None:
+    """The part of a curve between two of its points, if both lie in its box and in this order."""
+    ends = start.at(0.0), end.at(0.0)
+    if not all(lies_in(curve.box, x) for x in ends):
+        return None
+    low, high = (parameter_in(curve.box, x) for x in ends)
+    between = high - low
+    return CurveLink(curve, low, high) if between.mid > between.rad * SAFE else None
+
+
+def goes_on(before: CurveLink, after: CurveLink, joint: SolutionCurve) -> bool:
+    """Whether two links with a point in common run through it in the same direction.
+
+    Where all statuses hold strictly the curve is smooth, and the slope of the point is its direction.
+    """
+    if None in joint.statuses:
+        return False
+    signs = []
+    for link in (before, after):
+        along = (Ball.exact(link.curve.box.border[None]) @ joint.slope[:, None])[0, 0]
+        signs.append(int(along.mid > along.rad * SAFE) - int(along.mid < -along.rad * SAFE))
+    return signs[0] * signs[1] > 0
+
+
+@dataclass(frozen=True, eq=False)
+class CurveChain:
+    """One whole curve over an interval.
+
+    Attributes
+    ----------
+    links : sequence of CurveLink
+    joints : sequence of SolutionCurve
+        One more than links: its points between them, and both ends.
+    closed : bool
+        Whether the last point is the first one.
+    """
+
+    links: Sequence[CurveLink]
+    joints: Sequence[SolutionCurve]
+    closed: bool
+
+
+def whole_chain(
+    problem: AlphaProblem, boxes: Sequence[CurveBox], points: Sequence[CurveBox], interval: tuple[Fraction, Fraction]
+) -> CurveChain | None:
+    """The curve through boxes, if it leaves the interval at both ends or is closed; None where that is not proven.
+
+    Parameters
+    ----------
+    problem : AlphaProblem
+    boxes : of n curves, one after the other
+    points : n + 1 boxes without length around the solutions that two of them share, and the ends; the last one is the
+        first one again where the curve is closed
+    interval : first and last alpha
+    """
+    if not boxes or len(points) != len(boxes) + 1 or any(point.half != 0 for point in points):
+        return None
+    joints = [only_curve(problem, point) for point in points]
+    curves = [only_curve(problem, box) for box in boxes]
+    known = [joint for joint in joints if joint is not None]
+    links = []
+    if len(known) < len(joints):
+        return None
+    for curve, start, end in zip(curves, known[:-1], known[1:], strict=True):
+        link = None if curve is None else link_between(curve, start, end)
+        if link is None:
+            return None
+        links.append(link)
+    if not all(map(goes_on, links[:-1], links[1:], known[1:-1])):
+        return None
+    if _same(points[0], points[-1]):
+        return CurveChain(links, known, True) if goes_on(links[-1], links[0], known[0]) else None
+    return CurveChain(links, known, False) if leaves_interval(links, known, interval) else None
+
+
+def leaves_interval(
+    links: Sequence[CurveLink], joints: Sequence[SolutionCurve], interval: tuple[Fraction, Fraction]
+) -> bool:
+    """Whether both ends of a curve are beyond an interval, and all that its first and last box hold beyond them."""
+    return _leaves(links[0], joints[0], -1, interval) and _leaves(links[-1], joints[-1], 1, interval)
+
+
+def apart(joints: Sequence[SolutionCurve], links: Sequence[CurveLink], interval: tuple[Fraction, Fraction]) -> bool:
+    """Whether a whole curve with these points is another one than that of some links, over an interval.
+
+    Its points inside the interval, of which there is one at least, lie in none of the links. Those beyond it say
+    nothing: two chains along one curve end at different points there.
+    """
+    inside = [joint for joint in joints if interval[0] < joint.alphas[0] and joint.alphas[1] < interval[1]]
+    return bool(inside) and all(_outside(link.curve.box, joint.at(0.0)) for joint in inside for link in links)
+
+
+def _outside(box: CurveBox, x: Ball) -> bool:
+    """Whether all of a ball is beyond a box."""
+    t = parameter_in(box, x)
+    if abs(t.mid) - t.rad * SAFE > box.half:
+        return True
+    beside = (x - Ball.exact(box.centre)) - t * Ball.exact(box.direction)
+    return bool(np.any(np.abs(beside.mid) - beside.rad * SAFE > box.radius))
+
+
+def _same(one: CurveBox, other: CurveBox) -> bool:
+    """Whether two boxes are given by the same numbers, so that they hold the same solution."""
+    parts = ("centre", "direction", "border", "radius", "rho")
+    return all(np.array_equal(getattr(one, part), getattr(other, part)) for part in parts)
+
+
+def _leaves(link: CurveLink, end: SolutionCurve, side: int, interval: tuple[Fraction, Fraction]) -> bool:
+    """Whether an end is beyond the interval, and the rest of its box is, too: alpha increases or decreases in it."""
+    alpha, rises = end.at(0.0)[-1], link.curve.rises * side
+    low, high = (float(np.nextafter(x, y)) for x, y in ((float(interval[0]), -np.inf), (float(interval[1]), np.inf)))
+    if rises > 0:
+        return bool(alpha.mid - alpha.rad * SAFE >= high)
+    return bool(rises < 0 and alpha.mid + alpha.rad * SAFE <= low)

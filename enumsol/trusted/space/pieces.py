@@ -1,0 +1,131 @@
+"""The trusted core in 3D over a piece of alpha: no solution, or all of them in a box (theory, section 12.9)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.arithmetic.ball_arrays import Ball
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT
+from enumsol.condensation.space_condensed import PieceSpace
+from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
+from enumsol.trusted.space.sector_rows import sector_margin
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.enclosure import CondensedEnclosure
+    from enumsol.trusted.space.sector_rows import Row
+    from enumsol.trusted.space.solution_curve import CurveBox
+
+    Array = NDArray[np.float64]
+
+#: What a writer of proofs asks for beyond what a checker does, of the size of a box.
+_MARGIN = 2.0**-10
+
+
+@dataclass(frozen=True, eq=False)
+class AlphaPiece:
+    """A problem over a piece of alpha.
+
+    Attributes
+    ----------
+    enclosure : CondensedEnclosure
+    low, high : Fraction
+    units : force and length, (p,) arrays of powers of two
+    """
+
+    enclosure: CondensedEnclosure
+    low: Fraction
+    high: Fraction
+    units: tuple[Array, Array]
+
+    @property
+    def middle(self) -> Fraction:
+        """Where the float F is taken that makes tau of lambda_t."""
+        return (self.low + self.high) / 2
+
+    def at(self, low: Fraction, high: Fraction) -> PieceSpace:
+        """A part of the piece, or a point of it, in the variables of the whole."""
+        return PieceSpace.over(self.enclosure, (low, high), self.middle, self.units)
+
+    @cached_property
+    def whole(self) -> PieceSpace:
+        """All of it."""
+        return self.at(self.low, self.high)
+
+    @cached_property
+    def ends(self) -> tuple[PieceSpace, PieceSpace]:
+        """Both ends."""
+        return self.at(self.low, self.low), self.at(self.high, self.high)
+
+    def margin(self, codes: Sequence[int], rows: Sequence[Row], values: Array, errors: float = 1.0) -> float:
+        """Proven lower bound on the energy over a partial assignment and the piece; positive: there is no solution.
+
+        With fixed multipliers the bound is concave in alpha, so that it is least at an end.
+        """
+        least = np.inf
+        for end in self.ends:
+            least = min(least, sector_margin(end, codes, rows, values, errors))
+            if not least > 0:
+                break
+        return least
+
+    def forces(self, y: Ball) -> Ball:
+        """Forces in the units of the problem, (3p,), all normals first, of scaled ones."""
+        system, (force, _), p = self.whole, self.units, len(self.units[0])
+        found = Ball(np.zeros(3 * p), np.zeros(3 * p))
+        # powers of two but for F: what is rounded besides is less than TINY
+        found[:p] = Ball(y.mid[:p] * force, y.rad[:p] * force + TINY)
+        for k in (0, 1):
+            nodes = np.flatnonzero(system.tau[:, k] >= 0)
+            part = y[system.tau[nodes, k]] * Ball(system.F[nodes, k], system.F_rad[nodes, k])
+            found[(1 + k) * p + nodes] = Ball(part.mid * force[nodes], part.rad * force[nodes] + TINY)
+        return found
+
+    def held(self, codes: Sequence[int]) -> SpaceRoot | Open | None:
+        """What a leaf holds at every alpha of the piece: exactly one root, none (None), or it is not settled."""
+        return settle(self.whole, codes)
+
+    @cached_property
+    def point(self) -> AlphaPiece:
+        """The middle alone."""
+        return AlphaPiece(self.enclosure, self.middle, self.middle, self.units)
+
+    def meets(self, codes: Sequence[int], box: CurveBox, errors: float = 1.0) -> bool:
+        """Whether the roots of a leaf, one at every alpha, are an arc that is in a box at the middle of the piece."""
+        if not isinstance(self.held(codes), SpaceRoot):
+            return False
+        there = self.point.held(codes)
+        return isinstance(there, SpaceRoot) and self.point.lies_in(there.y, box, errors)
+
+    def holds_all(self, codes: Sequence[int], box: CurveBox, errors: float = 1.0) -> bool:
+        """Whether all roots of a leaf are in a box, at every alpha of the piece."""
+        found = self.held(codes)
+        return found is None or (found.y is not None and self.lies_in(found.y, box, errors))
+
+    def lies_in(self, y: Ball, box: CurveBox, errors: float = 1.0) -> bool:
+        """Whether all points with these scaled forces and an alpha of the piece lie in a box around a curve.
+
+        A point x lies in it if |t| <= h and |x - c - t d| <= b, t = e'(x - c); see ``CurveBox``.
+        """
+        middle = float(self.middle)
+        # the middle as a float, and ends rounded outwards
+        off = max(self.high - Fraction(middle), Fraction(middle) - self.low)
+        alpha = Ball(np.array([middle]), np.array([float(off) * (1.0 + 4 * UNIT) + TINY]))
+        x = Ball.joined(self.forces(y), alpha) - Ball.exact(box.centre)
+        share = 1.0 - (errors - 1.0) * _MARGIN
+        d, e, n = box.direction, box.border, len(box.centre)
+        along = (Ball.exact(e[None, :]) @ x[:, None])[0, 0]
+        if not (abs(along.mid) + along.rad) * SAFE <= share * box.half:
+            return False
+        # x - c - d e'(x - c), of every number once
+        turn = Ball.exact(np.eye(n)) - Ball.exact(d[:, None]) * Ball.exact(e[None, :])
+        beside = (turn @ x[:, None])[:, 0]
+        return bool(np.all(beside.size * SAFE <= share * box.radius))

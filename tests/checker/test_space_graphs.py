@@ -1,0 +1,96 @@
+"""Proofs of all solutions in 3D over an interval, against solutions at sampled alphas, and mutants of them."""
+
+import copy
+import functools
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from problems3d import random_over_alpha
+from proof_tools import proof_of, records_of
+
+from enumsol import enumerate_roots, verify
+from enumsol.arithmetic.ball_arrays import Ball
+from enumsol.branches.space.cover import SpaceCover
+from enumsol.trusted.space.solution_curve import lies_in
+
+INTERVAL = Fraction(0), Fraction(1)
+
+
+@functools.cache
+def covered(p, seed):
+    cover = SpaceCover(random_over_alpha(p, seed), INTERVAL)
+    cover.search(max_nodes=600)
+    return cover
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("p", "seed"), [(2, 2), (2, 7)])
+def test_a_proof_says_that_all_solutions_lie_on_its_curves(p, seed):
+    cover = covered(p, seed)
+    report = verify(cover.problem, cover.proof())
+    assert report.ok
+    assert not cover.gaps
+    assert report.complete
+    assert f"every solution for every alpha in [0, 1] lies on {report.curves} curve" in repr(report)
+    assert report.curves == len(cover.chains)
+    boxes = [box for chain in cover.chains for box in chain.boxes]
+    for alpha in np.linspace(0.01, 0.99, 7):
+        roots = enumerate_roots(cover.problem, alpha)
+        assert roots.complete
+        crossed = 0
+        for chain in cover.chains:
+            at = np.array([joint.at(0.0).mid[-1] for joint in chain.joints]) - alpha
+            crossed += int(np.sum(at[1:] * at[:-1] < 0))
+        assert crossed == len(roots)
+        for root in roots:
+            x = np.concatenate([root.lambda_n, *root.lambda_t.T, [alpha]])
+            assert any(lies_in(box, Ball(x, 1e-12 * np.abs(x) + 1e-13)) for box in boxes)
+
+
+def mutants(records, rng, count):
+    """Records that were changed in one place."""
+    for _ in range(count):
+        found = copy.deepcopy(records)
+        k = int(rng.integers(1, len(found)))
+        way = int(rng.integers(5))
+        if way == 0:
+            del found[k]
+        elif way == 1:
+            found.insert(k, copy.deepcopy(found[int(rng.integers(1, len(found)))]))
+        elif way == 2:
+            other = int(rng.integers(1, len(found)))
+            found[k], found[other] = found[other], found[k]
+        elif isinstance(found[k], list) and found[k][0] == "w":
+            part = found[k][int(rng.integers(1, 6))]
+            i = int(rng.integers(len(part)))
+            part[i] = float(part[i] * 10 ** rng.uniform(-3, 3) * rng.choice([-1, 1]) + rng.choice([0, 1e-6, 1e-3]))
+        elif isinstance(found[k], list) and found[k][0] in "ark":
+            found[k] = [str(rng.choice(["a", "r", "k", "n", "u"])), found[k][1]]
+            found[k] = found[k][:1] if found[k][0] == "n" else found[k]
+        elif isinstance(found[k], list) and found[k][0] == "b":
+            found[k][2] = [code + int(rng.integers(-1, 2)) for code in found[k][2]]
+        else:
+            found[0]["interval"] = [
+                str(Fraction(int(rng.integers(-3, 1)), 2)),
+                str(Fraction(int(rng.integers(1, 4)), 2)),
+            ]
+        yield found
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "count"), [(2, 40)])
+def test_what_mutants_say_is_refused_or_true(seed, count):
+    """All that can be claimed of this problem over this interval is one curve, with gaps or none."""
+    cover = covered(2, seed)
+    problem, records = cover.problem, records_of(cover.proof())
+    refused = 0
+    for found in mutants(records, np.random.default_rng(7), count):
+        if found == records:
+            continue
+        report = verify(problem, proof_of(found))
+        refused += not report.ok
+        if report.ok:
+            assert report.interval == INTERVAL
+            assert report.curves == len(cover.chains) or report.open
+    assert refused > count // 2

@@ -1,0 +1,36 @@
+"""Whole curves through several boxes (theory, sections 12.8 and 12.9)."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from problems3d import SLIDING, sliding_node
+
+from enumsol.branches.space import chains
+from enumsol.branches.space.chains import chain_through
+from enumsol.trusted.space.curve_chains import apart
+from enumsol.trusted.space.solution_curve import AlphaProblem
+
+
+def test_one_curve_followed_twice_is_not_two(monkeypatch):
+    # the second chain ends farther from the interval, in none of the first one's boxes
+    given, interval, found = AlphaProblem.of(SLIDING.enclosure), (Fraction(2, 5), Fraction(3, 5)), []
+    for alpha, beyond in ((0.5, 0.05), (0.55, 2.0)):
+        monkeypatch.setattr(chains, "_BEYOND", beyond)
+        found.append(chain_through(given, SLIDING, np.append(sliding_node(alpha), alpha), interval))
+    one, other = found
+    assert one.whole
+    assert other.whole
+    assert float(other.joints[-1].alphas[0]) > float(one.joints[-1].alphas[1]) + 0.004
+    assert not apart(other.joints, one.links, interval)
+    assert not apart(one.joints, other.links, interval)
+
+
+@pytest.mark.parametrize("alpha", [0.41, 0.59])
+def test_a_chain_reaches_beyond_both_ends(alpha):
+    interval = Fraction(2, 5), Fraction(3, 5)
+    chain = chain_through(AlphaProblem.of(SLIDING.enclosure), SLIDING, np.append(sliding_node(alpha), alpha), interval)
+    ends = sorted(joint.alphas for joint in (chain.joints[0], chain.joints[-1]))
+    assert ends[0][1] < interval[0]
+    assert ends[1][0] > interval[1]
+    assert all(link.curve.index == 1 for link in chain.links)

@@ -1,0 +1,186 @@
+"""Exclusion and leaves over a piece of alpha in 3D against solutions and minima at sampled alphas."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from space_proofs import random_problem
+
+from enumsol import enumerate_roots
+from enumsol.arithmetic.ball_arrays import Ball
+from enumsol.model.sectors import SECTORS, nearest, start_of
+from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.trusted.space.leaves import Open, SpaceRoot
+from enumsol.trusted.space.pieces import AlphaPiece
+from enumsol.trusted.space.sector_rows import CONTACT, OPEN, STICK, UNDECIDED, row_sign, sector_margin, sector_row_terms
+from enumsol.trusted.space.solution_curve import CurveBox
+
+LOW, HIGH = Fraction(1, 4), Fraction(1, 2)
+
+
+def changing_problem(p, seed, isotropic=False):
+    """Load and friction change with alpha, the coefficients of every node by one factor."""
+    rng = np.random.default_rng(seed)
+    problem = random_problem(p, seed)
+    F1 = 2.0 ** rng.integers(-1, 3, p) if isotropic else rng.uniform(0.5, 3.0, p)
+    F2 = F1 if isotropic else 2.0 * F1
+    slope = rng.choice([-1.0, 0.5, 1.0])
+    return problem.replace(
+        friction=(F1, F2), friction_slope=(slope * F1, slope * F2), load_slope=rng.standard_normal(problem.n)
+    )
+
+
+def piece_of(problem, low=LOW, high=HIGH):
+    system = SpaceSolvers(problem, (low + high) / 2, "verified").system
+    return AlphaPiece(problem.enclosure, low, high, (system.force, system.length))
+
+
+def sector_at(tau, level):
+    """The sector of a level that holds a direction."""
+    number = nearest(*(tau / np.hypot(*tau)), level)
+    x, y = (float(z) for z in start_of(number))
+    first = 1 << level
+    return number if x * tau[1] - y * tau[0] >= 0 else first + (number - first - 1) % first
+
+
+def codes_at(root, F, level):
+    """Those of the leaf of a level that holds a root."""
+    names = [status.value for status in root.statuses]
+    final = {"open": OPEN, "stick": STICK}
+    return [
+        final[name] if name in final else SECTORS + sector_at(root.lambda_t[i] / F[i], level)
+        for i, name in enumerate(names)
+    ]
+
+
+def rows_of(codes, rng):
+    """Some rows that the codes allow, with multipliers of allowed signs."""
+    rows = []
+    for i, code in enumerate(codes):
+        number = code - SECTORS
+        kinds = [(0, 0), (1, 0), (6, int(rng.integers(8, 16)))]
+        kinds += [(2, k) for k in (0, 1)] if code == OPEN else [(4 - 1, k) for k in (0, 1)] if code == STICK else []
+        kinds += [(kind, number) for kind in (7, 8, 9)] if code > SECTORS else []
+        rows += [(kind, i, n) for kind, n in kinds]
+    values = rng.exponential(size=len(rows))
+    free = [row_sign(codes[row[1]], row) == 2 for row in rows]
+    return rows, np.where(free, values * rng.choice([-1, 1], len(rows)), values)
+
+
+def least_at(problem, piece, alpha, rows, values):
+    """The minimum over all forces of the energy less the rows, in floats, from S, g and F of the problem."""
+    p, (force, length) = problem.p, piece.units
+    middle, at = problem.friction_at(piece.middle), problem.friction_at(alpha)
+    disc = at[:, 0] / middle[:, 0]
+    size = np.concatenate([force, middle[:, 0] * force, middle[:, 1] * force])
+    work = float(force[0] * length[0])
+    S = size[:, None] * problem.condensed.S * size / work
+    g = size * problem.condensed.free_displacements(alpha) / work
+    a, b = np.zeros(3 * p), np.zeros(3 * p)
+    places = np.array([[p + i, 2 * p + i] for i in range(p)])
+    for row, value in zip(rows, values, strict=True):
+        for k, factor in zip(*sector_row_terms(row, places, 3 * p), strict=True):
+            x = factor * (disc[k] if k < p and row[0] in (6, 7) else 1.0)
+            if k < 3 * p:
+                a[k] += value * x
+            else:
+                b[k - 3 * p] += value * x
+    h = g + a - S @ b
+    y = np.linalg.solve(S, h) / 2
+    return float(y @ S @ y - h @ y - b @ g)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_multipliers_prove_the_least_minimum_over_a_piece(seed):
+    """The bound is that of an end, and no minimum between is less."""
+    rng = np.random.default_rng(seed)
+    problem = changing_problem(2, seed)
+    piece = piece_of(problem)
+    for codes in [(UNDECIDED, CONTACT), (OPEN, STICK), (SECTORS + 9, SECTORS + 70), (STICK, SECTORS + 5)]:
+        rows, values = rows_of(codes, rng)
+        ends = [least_at(problem, piece, alpha, rows, values) for alpha in (LOW, HIGH)]
+        inside = [least_at(problem, piece, LOW + (HIGH - LOW) * Fraction(k, 7), rows, values) for k in range(1, 7)]
+        size = 1.0 + abs(min(ends))
+        assert min(inside) >= min(ends) - 1e-9 * size
+        for end, bound in zip(piece.ends, ends, strict=True):
+            assert bound - 1e-6 * size <= sector_margin(end, codes, rows, values) <= bound + 1e-9 * size
+        assert (piece.margin(codes, rows, values) > 0) == (min(ends) > 0)
+
+
+@pytest.mark.parametrize(
+    ("p", "seed"),
+    [(1, 0), (1, 22), *(pytest.param(*case, marks=pytest.mark.slow) for case in [(2, 0), (2, 5), (3, 4)])],
+)
+def test_no_root_over_a_piece_is_missed(p, seed):
+    """Leaves that hold a root at some alpha of a piece are not empty, and bounds of their forces hold it."""
+    problem = changing_problem(p, seed)
+    settled = 0
+    for alpha in (Fraction(1, 4), Fraction(13, 32), Fraction(1, 2)):
+        F = problem.friction_at(alpha)
+        for root in enumerate_roots(problem, alpha):
+            for level, width in ((4, Fraction(1, 16)), (9, Fraction(1, 256)), (12, Fraction(1, 4096))):
+                piece = piece_of(problem, max(alpha - width, LOW), min(alpha + width, HIGH))
+                codes = codes_at(root, F, level)
+                found = piece.held(codes)
+                assert found is not None
+                if found.y is not None:
+                    forces = piece.forces(found.y)
+                    near = np.concatenate([root.lambda_n, *root.lambda_t.T])
+                    assert np.all(np.abs(forces.mid - near) <= forces.rad + 1e-9 * np.max(np.abs(near)))
+                settled += isinstance(found, SpaceRoot)
+    assert settled
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
+def test_a_root_over_a_piece_is_one_at_every_alpha(seed):
+    """What is said to be the roots' enclosure over the piece holds that of every point of it, and no more is known."""
+    problem = changing_problem(2, seed, isotropic=True)
+    alpha = Fraction(3, 8)
+    for root in enumerate_roots(problem, alpha):
+        codes = codes_at(root, problem.friction_at(alpha), 8)
+        width = Fraction(1, 64)
+        while not isinstance(piece_of(problem, alpha - width, alpha + width).held(codes), SpaceRoot):
+            width /= 2
+            assert width > Fraction(1, 2**20)
+        piece = piece_of(problem, alpha - width, alpha + width)
+        whole = piece.forces(piece.held(codes).y)
+        for k in range(5):
+            at = alpha + width * Fraction(k - 2, 2)
+            point = AlphaPiece(problem.enclosure, at, at, piece.units)
+            there = point.held(codes)
+            assert isinstance(there, SpaceRoot)
+            forces = point.forces(there.y)
+            assert np.all(np.abs(forces.mid - whole.mid) <= whole.rad + forces.rad)
+            assert there.index == piece.held(codes).index
+
+
+def test_points_of_a_piece_are_in_a_box_if_all_corners_are():
+    rng = np.random.default_rng(4)
+    problem = changing_problem(1, 3)
+    piece = piece_of(problem)
+    said = {True: 0, False: 0}
+    for _ in range(200):
+        y = Ball(rng.standard_normal(3), rng.exponential(size=3) * 0.2)
+        forces = piece.forces(y)
+        d, e = rng.standard_normal(4), rng.standard_normal(4)
+        d = d / (e @ d)
+        centre = np.append(forces.mid, 0.375) + 0.1 * rng.standard_normal(4)
+        box = CurveBox(centre, d, e, float(rng.exponential() * 4), rng.exponential(size=4) * 4, np.ones(3))
+        inside = piece.lies_in(y, box)
+        said[inside] += 1
+        corners = (
+            np.append(forces.mid + s[:3] * forces.rad, float(HIGH if s[3] > 0 else LOW)) - centre
+            for s in np.array(np.meshgrid(*[[-1, 1]] * 4)).reshape(4, -1).T
+        )
+        t = [(e @ x, x) for x in corners]
+        really = all(abs(k) <= box.half and np.all(np.abs(x - k * d) <= box.radius) for k, x in t)
+        assert inside == really
+    assert min(said.values()) > 20
+
+
+def test_what_is_not_proven_over_a_piece_is_left_open():
+    """A wide piece of a problem whose solution changes its status holds no regular root in any leaf of it."""
+    problem = changing_problem(1, 22)
+    piece = piece_of(problem, Fraction(0), Fraction(64))
+    codes = (SECTORS + 4,)
+    assert isinstance(piece.held(codes), Open | None)
