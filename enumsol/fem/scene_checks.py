@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -11,9 +12,6 @@ from enumsol.fem.basis_problems import outward_normal
 from enumsol.fem.pairs import faced
 from enumsol.model.cells import boundary_facets
 from enumsol.support.messages import counted
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 #: Share of the contact nodes of a part that may touch another body before that is refused as a wall between both.
 _WALL = 0.5
@@ -99,7 +97,8 @@ def _refuse_cracks(scene: Any, nodes: Any, parts: list[str]) -> None:
 def scene_notes(scene: Any) -> list[str]:
     """What may be meant otherwise."""
     checks = (_unfaced, _shared, _alone, _rest, _loaded_contact, _reach, _units, _friction)
-    return [note for check in checks for note in check(scene)]
+    with np.errstate(over="ignore"):  # what overflows is out of proportion, and told as such
+        return [note for check in checks for note in check(scene)]
 
 
 def _unfaced(scene: Any) -> list[str]:
@@ -214,7 +213,7 @@ def _friction(scene: Any) -> list[str]:
     given: Mapping[str, Any] = {"friction": scene.options["friction"], "friction2": scene.options["friction2"]}
     notes = []
     for name, value in given.items():
-        each = value.values() if hasattr(value, "values") else [value]
+        each = value.values() if isinstance(value, Mapping) else [value]
         steep = max((float(np.ravel(own)[0]) for own in each if own is not None), default=0.0)
         if steep > _STEEP:
             notes.append(f"{name} is {steep:g}; coefficients of friction above 1 are rare")
