@@ -207,7 +207,7 @@ def _is_in_space(problem: object) -> TypeIs[ContactProblem3D]:
 
 
 def _floating_solvers() -> type[Solvers]:
-    from enumsol.search.floating import FloatingSolvers  # for bodies that nothing holds only
+    from enumsol.search.floating_solvers import FloatingSolvers  # for bodies that nothing holds only
 
     return FloatingSolvers
 

@@ -46,7 +46,7 @@ Arithmetic = Literal["fast", "verified", "exact"]
 
 
 class Solvers(SearchSetup):
-    """Solvers and certifier for one problem at one alpha (of a body that is held; ``search.floating`` has others).
+    """Solvers and certifier for one problem at one alpha (of a body that is held; for others ``floating_solvers``).
 
     Parameters
     ----------

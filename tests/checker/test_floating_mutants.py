@@ -173,7 +173,7 @@ def test_no_multipliers_exclude_a_solution():
 
 def _proposals(problem):
     """Multipliers that the relaxation of a selection ends with, times some factors."""
-    from enumsol.search.floating import FloatingSolvers
+    from enumsol.search.floating_solvers import FloatingSolvers
     from enumsol.search.splitting import ImposedRows, PlaneSplitting
 
     solvers = FloatingSolvers(problem, 0, "verified", 1e-9)

@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from enumsol.condensation.enclosure import NotEnclosedError
-from enumsol.search.floating import WEAK
+from enumsol.search.floating_solvers import WEAK
 from enumsol.search.interval.subintervals import IntervalCertifier
 from enumsol.trusted.exclusion import exclusion_margin
 from enumsol.trusted.over_interval import EnclosedPiece

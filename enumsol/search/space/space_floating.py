@@ -17,7 +17,7 @@ from enumsol.proof.records import NoRoot, Unbalanced
 from enumsol.proof.space_records import FLOATING_LEAVES, ExcludedInSpace
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.certifiers.protocol import Refine, UndecidedPart, Unrecorded
-from enumsol.search.floating import FloatingReader, weakly_held
+from enumsol.search.floating_solvers import FloatingReader, weakly_held
 from enumsol.search.setup import HeldByNothing
 from enumsol.search.space.space_search import SpaceCertifier
 from enumsol.search.space.space_setup import SpaceSolvers
