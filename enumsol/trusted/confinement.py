@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import linprog, nnls
 
 from enumsol.arithmetic.balls import SAFE, TINY, gamma, upper_norm
 from enumsol.condensation.enclosure import NotEnclosedError
@@ -85,6 +84,8 @@ def motion_beside(system: FloatingSystem, resultants: Sequence[Array]) -> Array:
     around = _WIDER * np.vstack([np.zeros(len(h)), np.eye(len(h)), -np.eye(len(h))])
     wide = (columns[:, None, :] + around).reshape(-1, len(h)).T
     try:
+        from scipy.optimize import nnls  # only bodies that nothing holds need it
+
         forces, _ = nnls(wide, h / size)
     except RuntimeError:  # it does not converge
         return h
@@ -141,6 +142,8 @@ class _Cells:
         r = len(self._reach)
         ones, limits = np.ones((len(rays), 1)), [(-1.0, 1.0)] * r + [(0.0, None)]
         rows = np.hstack([-rays / size[:, None], ones])
+        from scipy.optimize import linprog  # only bodies that nothing holds need it
+
         found = linprog(np.r_[np.zeros(r), -1.0], rows, np.zeros(len(rays)), bounds=limits)
         if found.status != 0:
             return None

@@ -1,4 +1,4 @@
-"""docs/proof_format.md, section 5.6, suffices: a checker made from it accepts proofs of bodies that nothing holds."""
+"""What docs/proof_format.md says suffices: a checker made from it accepts proofs of bodies that nothing holds."""
 
 import functools
 

@@ -1,6 +1,6 @@
 """All solutions of a problem in 3D over an interval of alpha: whole curves in boxes, and the tree that shows it.
 
-Theory, section 12.9. The tree finds the curves: at a solution that lies in no box yet a curve is followed through it.
+The tree finds the curves (theory, section 12.9): at a solution that lies in no box yet a curve is followed through it.
 """
 
 from __future__ import annotations
