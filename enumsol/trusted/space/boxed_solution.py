@@ -13,7 +13,7 @@ import numpy as np
 
 from enumsol.arithmetic.ball_arrays import Ball, determinant_sign
 from enumsol.arithmetic.balls import SAFE, TINY, upper_sum
-from enumsol.trusted.space.natural_map import MARGIN, Discs, Step
+from enumsol.trusted.space.natural_map import MARGIN, Discs, Step, middle_inverse
 from enumsol.trusted.space.space_uniqueness import LARGEST_UNIT, LooseSolution
 
 if TYPE_CHECKING:
@@ -208,14 +208,11 @@ class _NaturalMap:
         if corners is None:
             return None
         M = Ball.exact(np.eye(m)) - corners.core @ self.free
-        try:
-            Y = np.asarray(np.linalg.inv(M.mid), dtype=np.float64)
-        except np.linalg.LinAlgError:
+        found = middle_inverse(M)
+        if found is None:
             return None
-        if not np.all(np.isfinite(Y)):
-            return None
+        Y, E = found
         inverse = Ball.exact(Y)
-        E = (Ball.exact(np.eye(m)) - inverse @ M).size
         move = (inverse @ (self._discs.projected(z) - point)[:, None])[:, 0]
         G, V = inverse @ Ball.exact(corners.u), Ball.exact(corners.v.T) @ self.free
         nothing = np.zeros(len(V.mid))

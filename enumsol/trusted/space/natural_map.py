@@ -204,6 +204,17 @@ class Discs:
         return []
 
 
+def middle_inverse(M: Ball) -> tuple[Array, Array] | None:
+    """Y, about the inverse of the middle of M, and a bound of |I - Y M|; None where that middle is singular."""
+    try:
+        Y = np.asarray(np.linalg.inv(M.mid), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        return None
+    if not np.all(np.isfinite(Y)):
+        return None
+    return Y, (Ball.exact(np.eye(len(Y))) - Ball.exact(Y) @ M).size
+
+
 @dataclass(frozen=True)
 class Step:
     """x - Y N(x), N the natural map, for all x = c + t d + b within a radius of a point c, |t| <= h.

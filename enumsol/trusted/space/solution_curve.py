@@ -18,7 +18,7 @@ from enumsol.arithmetic.balls import SAFE, TINY, UNIT, upper_norm
 from enumsol.condensation.condensed import node_units
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.model.sectors import SECTORS
-from enumsol.trusted.space.natural_map import MARGIN, Corners, Discs, Step, split_off, upper_product
+from enumsol.trusted.space.natural_map import MARGIN, Corners, Discs, Step, middle_inverse, split_off, upper_product
 from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, STICK
 
 if TYPE_CHECKING:
@@ -437,14 +437,11 @@ class _CurveMap:
         if corners is None:
             return None
         B = self._bordered(corners)
-        try:
-            Y = np.asarray(np.linalg.inv(B.mid), dtype=np.float64)
-        except np.linalg.LinAlgError:
+        found = middle_inverse(B)
+        if found is None:
             return None
-        if not np.all(np.isfinite(Y)):
-            return None
+        Y, E = found
         inverse = Ball.exact(Y)
-        E = (Ball.exact(np.eye(m + 1)) - inverse @ B).size
         at = Discs(self.problem.tau, self.problem.friction(self.alpha), F1).projected(self.z)
         move = (inverse[:, :m] @ (at - self.y)[:, None])[:, 0]
         d = Ball.exact(self.d)[:, None]
