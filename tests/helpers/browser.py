@@ -6,13 +6,17 @@ import fcntl
 import itertools
 import json
 import os
+import select
 import shutil
 import signal
 import tempfile
+import time
 
 #: What a browser without a graphics card, or Plotly's way to read colours, is warned of.
 HARMLESS = ("GL Driver Message", "software WebGL", "willReadFrequently")
 NAMES = ("chromium", "chromium-browser", "google-chrome", "chrome")
+#: Seconds after which a browser that says nothing, or a page on which nothing comes, is given up.
+LONGEST = 120
 
 
 def find_browser():
@@ -31,7 +35,8 @@ class Browser:
         self._profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         command = [
             *(path, "--headless=new", "--remote-debugging-pipe", "--no-sandbox", "--disable-gpu", "--no-first-run"),
-            *("--disable-dev-shm-usage", "--disable-extensions", f"--user-data-dir={self._profile.name}"),
+            *("--disable-dev-shm-usage", "--disable-extensions", "--disable-background-networking", "--disable-sync"),
+            *("--disable-component-update", "--disable-renderer-backgrounding", f"--user-data-dir={self._profile.name}"),
             *("--force-device-scale-factor=1", f"--window-size={width},{height}", "about:blank"),
         ]
 
@@ -66,6 +71,7 @@ class Browser:
 
     def _message(self):
         while b"\0" not in self._pending:
+            assert select.select([self._read], [], [], LONGEST)[0], f"the browser has said nothing for {LONGEST} s"
             part = os.read(self._read, 1 << 20)
             assert part, "the browser has ended"
             self._pending += part
@@ -82,18 +88,26 @@ class Browser:
         """Open a file, and wait until its script has started."""
         self._events.clear()
         self.call("Page.navigate", url=path.resolve().as_uri())
-        script = """new Promise((done) => {
-            const look = () => (document.body && document.body.dataset.ready === "yes") ? done(true)
-                : document.getElementById("failed") && !document.getElementById("failed").hidden ? done(false)
-                : setTimeout(look, 20);
-            look();
-        })"""
-        assert self.evaluate(script), "the page says that it failed"
+        failed = "document.getElementById('failed') && !document.getElementById('failed').hidden ? 'failed' : ''"
+        state = self.wait_for(f"document.body && document.body.dataset.ready === 'yes' ? 'ready' : {failed}")
+        assert state == "ready", "the page says that it failed"
         self.settle()
 
     def settle(self):
-        """Wait until what was begun has been drawn."""
-        self.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(1))))")
+        """Wait until what was begun has been drawn; a page that is not shown draws nothing."""
+        drawn = "requestAnimationFrame(() => requestAnimationFrame(() => done(1)))"
+        self.evaluate(f"new Promise((done) => {{ {drawn}; setTimeout(() => done(0), 2000); }})")
+
+    def wait_for(self, script, before_a_look=None):
+        """The value of an expression as soon as it holds; what makes it hold may be done again before each look."""
+        last = time.monotonic() + LONGEST
+        while time.monotonic() < last:
+            if before_a_look is not None:
+                before_a_look()
+            if value := self.evaluate(script):
+                return value
+            time.sleep(0.02)
+        raise AssertionError(f"after {LONGEST} s this still does not hold: {script}")
 
     def evaluate(self, script):
         """The value of an expression; promises are awaited."""

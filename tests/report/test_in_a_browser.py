@@ -109,22 +109,22 @@ def test_pointing_and_clicking(browser, pages, graphs):
         return [x, box.top + layout.yaxis._offset + layout.yaxis.l2p(trace.y[k]), trace.x[k]];
     }})()"""
     browser.evaluate("byId('diagram').scrollIntoView()")
-    x, y, alpha = browser.evaluate(place)
-    browser.mouse("mouseMoved", x - 3, y)
-    browser.mouse("mouseMoved", x, y)
-    browser.settle()
-    pointed = browser.evaluate(
-        "new Promise((done) => { const look = () => { const t = document.querySelector('.hoverlayer').textContent;"
-        " t ? done(t) : setTimeout(look, 20); }; look(); })"
-    )
+
+    def point():
+        """Plotly takes no notice of a move that comes while it draws: the mouse moves until it is seen."""
+        x, y, alpha = browser.evaluate(place)
+        browser.mouse("mouseMoved", x - 3, y)
+        browser.mouse("mouseMoved", x, y)
+        browser.settle()
+        return x, y, alpha
+
+    pointed = browser.wait_for("document.querySelector('.hoverlayer').textContent", point)
+    alpha = point()[2]
     assert f"branch {branch.number}, arc {arc.number}" in pointed
     assert "alpha" in pointed
     assert any(status.value in pointed for status in arc.statuses)
-    browser.click(x, y)
-    browser.evaluate(
-        "new Promise((done) => { const look = () => state.branch !== null ? done(1) : setTimeout(look, 20); look(); })"
-    )
-    assert browser.evaluate("state.branch") == branch.number
+    chosen = browser.wait_for("state.branch === null ? '' : String(state.branch)", lambda: browser.click(*point()[:2]))
+    assert chosen == str(branch.number)
     assert browser.evaluate("state.alpha") == pytest.approx(alpha)
     assert browser.evaluate("document.querySelectorAll('#arcs tbody tr').length") == len(branch.arcs)
     assert browser.evaluate("document.querySelector('tr.chosen').dataset.branch") == str(branch.number)

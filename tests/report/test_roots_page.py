@@ -233,8 +233,7 @@ def browser():
 
 def drawn(browser, count):
     """Wait until so many scenes are drawn."""
-    look = f"document.querySelectorAll('.scene[data-drawn]').length >= {count} ? done(1) : setTimeout(look, 20)"
-    browser.evaluate(f"new Promise((done) => {{ const look = () => {look}; look(); }})")
+    browser.wait_for(f"document.querySelectorAll('.scene[data-drawn]').length >= {count}")
 
 
 @in_a_browser
