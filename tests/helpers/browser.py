@@ -36,8 +36,8 @@ class Browser:
         command = [
             *(path, "--headless=new", "--remote-debugging-pipe", "--no-sandbox", "--disable-gpu", "--no-first-run"),
             *("--disable-dev-shm-usage", "--disable-extensions", "--disable-background-networking", "--disable-sync"),
-            *("--disable-component-update", "--disable-renderer-backgrounding", f"--user-data-dir={self._profile.name}"),
-            *("--force-device-scale-factor=1", f"--window-size={width},{height}", "about:blank"),
+            *("--disable-component-update", "--disable-renderer-backgrounding", "--force-device-scale-factor=1"),
+            *(f"--user-data-dir={self._profile.name}", f"--window-size={width},{height}", "about:blank"),
         ]
 
         files = [(os.POSIX_SPAWN_DUP2, ends[0], 3), (os.POSIX_SPAWN_DUP2, ends[1], 4)]
