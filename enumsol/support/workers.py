@@ -23,6 +23,8 @@ _LONGEST = 160
 _TRIES, _RENEWALS = 3, 20
 #: Tasks handed out at a time, for each worker; where their number is not known, for all.
 _AHEAD, _MANY = 4, 64
+#: Seconds that a broken pool has to end the tasks that it was handed; it forgets one that comes while it breaks.
+_PATIENCE = 1.0
 
 
 @dataclass(eq=False)
@@ -54,9 +56,11 @@ class Crew:
         self.redone = 0
         self._renewals = 0
         self._told = False
-        self._out: dict[Job, Future[Any]] = {}
+        #: Futures, each with the number of renewals before it was handed out; the last pool that is known to be broken.
+        self._out: dict[Job, tuple[Future[Any], int]] = {}
+        self._broken = -1
         self._here: deque[Job] = deque()
-        self._done: SimpleQueue[Job] = SimpleQueue()
+        self._done: SimpleQueue[tuple[Job, Future[Any]]] = SimpleQueue()
 
     @property
     def room(self) -> int:
@@ -78,37 +82,53 @@ class Crew:
                 job = self._here.popleft()
                 job.result = job.function(*job.arguments)
                 return job
+            forgotten = [job for job, (_, pool) in self._out.items() if pool <= self._broken]
+            if forgotten:
+                seconds = _PATIENCE if seconds is None else min(seconds, _PATIENCE)
             try:
-                job = self._done.get(timeout=seconds)
+                job, future = self._done.get(timeout=seconds)
             except Empty:
-                return None
-            if job in self._out and self._finished(job, self._out.pop(job)):
+                if not forgotten or seconds == 0:
+                    return None
+                for job in forgotten:
+                    del self._out[job]
+                    self._lost(job)
+                continue
+            if self._out.get(job, (None, 0))[0] is future and self._finished(job, *self._out.pop(job)):
                 return job
         raise AssertionError("no task was handed out")
 
     def cancel(self) -> None:
         """Forget what has not been done; what has not begun never will."""
-        for future in self._out.values():
+        for future, _ in self._out.values():
             future.cancel()
         self._out.clear()
         self._here.clear()
 
-    def _finished(self, job: Job, future: Future[Any]) -> bool:
+    def _finished(self, job: Job, future: Future[Any], pool: int) -> bool:
         """Whether there is a result; otherwise the task is handed out again."""
         try:
             job.result = _result_of(future)
         except _Lost as loss:
-            self.redone += 1
+            if isinstance(loss.__cause__, BrokenExecutor):
+                self._broken = max(self._broken, pool)
             self._tell(f"{loss}; what it had to do is done again")
-            self._hand_out(job)
+            self._lost(job)
             return False
         return True
+
+    def _lost(self, job: Job) -> None:
+        """Hand out once more what was lost."""
+        self.redone += 1
+        self._hand_out(job)
 
     def _hand_out(self, job: Job) -> None:
         while self._executor is not None and job.tries < _TRIES:
             try:
                 future = _submitted(self._executor, job)
             except _Lost as loss:
+                if isinstance(loss.__cause__, BrokenExecutor):
+                    self._broken = self._renewals
                 if self._renewed():
                     self._tell(f"{loss}; what it had to do is done again")
                     continue
@@ -116,8 +136,8 @@ class Crew:
                 self._tell(f"{loss}; the calling process does the rest", again=True)
                 break
             job.tries += 1
-            self._out[job] = future
-            future.add_done_callback(lambda _: self._done.put(job))
+            self._out[job] = future, self._renewals
+            future.add_done_callback(lambda done: self._done.put((job, done)))
             return
         self._here.append(job)
 

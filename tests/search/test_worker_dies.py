@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,7 @@ import enumsol
 from enumsol import Proof, enumerate_roots, gallery, multiplicity_table, verify, write_problem
 from enumsol.cli.pool import RenewedPool
 from enumsol.search import parallel
+from enumsol.support import workers
 from enumsol.support.workers import Crew
 
 #: What takes a process down.
@@ -105,6 +107,29 @@ class Cancelling(DyingExecutor):
 def test_a_task_that_was_cancelled(wedge):
     with ThreadPoolExecutor(1) as pool, pytest.warns(RuntimeWarning, match="a task was cancelled"):
         found = enumerate_roots(*wedge, executor=Cancelling(pool, 12))
+    check(found, *wedge)
+
+
+class Forgetting(DyingExecutor):
+    """Breaks with its first task, and forgets the next, which came at that moment: its future never ends."""
+
+    def submit(self, function, /, *args, **kwargs):
+        if len(self.futures) > 1:
+            raise BrokenProcessPool("broken")
+        future = Future()
+        if not self.futures:
+            future.set_exception(BrokenProcessPool("broken"))
+        self.futures.append(future)
+        return future
+
+
+def test_a_task_that_a_broken_pool_forgets(square, wedge, monkeypatch):
+    monkeypatch.setattr(workers, "_PATIENCE", 0.05)
+    with pytest.warns(RuntimeWarning, match="a worker died"):
+        table = multiplicity_table(square, ALPHAS, executor=Forgetting(None, 0))
+    check_table(table, square)
+    with pytest.warns(RuntimeWarning, match="a worker died"):
+        found = enumerate_roots(*wedge, executor=Forgetting(None, 0))
     check(found, *wedge)
 
 
