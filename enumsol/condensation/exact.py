@@ -89,7 +89,7 @@ class ExactSystem:
             The problem has more than EXACT_DOF_LIMIT degrees of freedom.
         """
         problem.friction_at(alpha)
-        return ExactCondensed(*_condensed(problem), condensed_exactly=True, zero=None).system(rational(alpha))
+        return ExactCondensed(*_Given.of(problem).condensed, condensed_exactly=True, zero=None).system(rational(alpha))
 
 
 class UncondensedSystem:
@@ -151,10 +151,8 @@ class UncondensedSystem:
     @cached_property
     def _matrices(self) -> tuple[list[Any], list[Any], list[Any], list[Any]]:
         """A and B, by their rows, f(alpha), and gap and slip offset."""
-        f, slope = _loads(self._problem)
-        alpha = rational(self._alpha)
-        A, B = (rational_matrix(M.toarray()).tolist() for M in (self._problem.A, self._problem.contact_rows))
-        return A, B, [x + alpha * y for x, y in zip(f, slope, strict=True)], _offset(self._problem)
+        given, alpha = _Given.of(self._problem), rational(self._alpha)
+        return given.A.tolist(), given.B.tolist(), [x + alpha * y for x, y in given.loads.tolist()], given.offset
 
     def solved(self, turned: Any, unknown: Any, sign: int) -> tuple[list[Any], list[Any], int] | None:
         """The unknowns y of a selection, u, and the sign of det M; None where M is singular.
@@ -284,10 +282,10 @@ class ExactCondensed:
         TooLargeError
             The problem has more than EXACT_DOF_LIMIT degrees of freedom.
         """
-        rows, g0, g1, F0, F1 = _condensed(problem.on_springs)
-        N = rational_matrix(problem.modes.N)
-        G = (rational_matrix(problem.contact_rows.toarray()) * N).transpose().tolist()
-        h = (N.transpose() * fmpq_mat([list(pair) for pair in zip(*_loads(problem), strict=True)])).tolist()
+        given, N = _Given.of(problem.on_springs), rational_matrix(problem.modes.N)
+        rows, g0, g1, F0, F1 = given.condensed
+        G = (given.B * N).transpose().tolist()
+        h = (N.transpose() * given.loads).tolist()
         bordered = [(*row, *(mode[k] for mode in G)) for k, row in enumerate(rows)]
         bordered += [(*mode, *([fmpq(0)] * len(G))) for mode in G]
         reach = tuple(rational(float(x)) for x in problem.modes.reach(problem.rigid_reach))
@@ -303,7 +301,7 @@ class ExactCondensed:
         TooLargeError
             The problem has more than EXACT_DOF_LIMIT degrees of freedom.
         """
-        return cls(*_condensed(problem), condensed_exactly=True, zero=vanishing_alpha(problem, "problem"))
+        return cls(*_Given.of(problem).condensed, condensed_exactly=True, zero=vanishing_alpha(problem, "problem"))
 
     @property
     def S(self) -> Any:  # noqa: N802 (the field's letter)
@@ -400,23 +398,52 @@ def _times(value: Any, factor: int) -> Any:
     return value.p * (factor // value.q)
 
 
-def _condensed(problem: ProblemData) -> _Parts:
-    """S as a tuple of rows, g0, g1, F0 and F1 without any rounding.
+@dataclass(frozen=True)
+class _Given:
+    """A problem's data without any rounding.
 
-    Raises
-    ------
-    TooLargeError
-        The problem has more than EXACT_DOF_LIMIT degrees of freedom.
+    Attributes
+    ----------
+    A, B : fmpq_mat (n, n) and (2p, n)
+    loads : fmpq_mat (n, 2)
+        f and load_slope.
+    offset : list of 2p fmpq
+        Gap and slip offset.
+    friction : pair of tuples of p fmpq
     """
-    _check_size(problem)
-    p = problem.p
-    B = rational_matrix(problem.contact_rows.toarray())
-    rhs = [[*row, *load] for row, *load in zip(B.transpose().tolist(), *_loads(problem), strict=True)]
-    table = (B * solved(rational_matrix(problem.A.toarray()), fmpq_mat(rhs))).tolist()
-    g0 = tuple(row[2 * p] - o for row, o in zip(table, _offset(problem), strict=True))
-    g1 = tuple(row[2 * p + 1] for row in table)
-    F0, F1 = (tuple(rational(v) for v in part) for part in problem.friction)
-    return tuple(tuple(row[: 2 * p]) for row in table), g0, g1, F0, F1
+
+    A: Any
+    B: Any
+    loads: Any
+    offset: list[Any]
+    friction: tuple[tuple[Any, ...], ...]
+
+    @classmethod
+    def of(cls, problem: ProblemData) -> _Given:
+        """Read them.
+
+        Raises
+        ------
+        TooLargeError
+            The problem has more than EXACT_DOF_LIMIT degrees of freedom.
+        """
+        _check_size(problem)
+        slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
+        start = problem.slip_offset if problem.exact_offset is None else problem.exact_offset
+        A, B = (rational_matrix(M.toarray()) for M in (problem.A, problem.contact_rows))
+        loads = rational_matrix(np.column_stack([problem.f, slope]))
+        offset, *friction = ([rational(x) for x in part] for part in ((*problem.gap, *start), *problem.friction))
+        return cls(A, B, loads, offset, tuple(map(tuple, friction)))
+
+    @property
+    def condensed(self) -> _Parts:
+        """S as a tuple of rows, g0, g1, F0 and F1."""
+        rhs = [[*row, *load] for row, load in zip(self.B.transpose().tolist(), self.loads.tolist(), strict=True)]
+        table, size = (self.B * solved(self.A, fmpq_mat(rhs))).tolist(), self.B.nrows()
+        g0 = tuple(row[size] - o for row, o in zip(table, self.offset, strict=True))
+        g1 = tuple(row[size + 1] for row in table)
+        F0, F1 = self.friction
+        return tuple(tuple(row[:size]) for row in table), g0, g1, F0, F1
 
 
 def _check_size(problem: ProblemData) -> None:
@@ -425,15 +452,3 @@ def _check_size(problem: ProblemData) -> None:
             f'arithmetic="exact" condenses at most n = {EXACT_DOF_LIMIT} degrees of freedom in rationals and the '
             f"problem has n = {problem.n}; use another arithmetic, or condense the body to its contact nodes first"
         )
-
-
-def _loads(problem: ProblemData) -> tuple[list[Any], list[Any]]:
-    """f and load_slope."""
-    slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
-    return [rational(v) for v in problem.f.tolist()], [rational(v) for v in slope.tolist()]
-
-
-def _offset(problem: ProblemData) -> list[Any]:
-    """Gap and slip offset."""
-    start = problem.slip_offset if problem.exact_offset is None else problem.exact_offset
-    return [rational(v) for v in (*problem.gap, *start)]

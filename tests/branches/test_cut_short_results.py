@@ -11,7 +11,7 @@ from generators import integer_problem as integer_data, random_problem, singular
 from path_problems import generic_problem, integer_problem, mirrored_problem
 
 from enumsol import branch_graph, enumerate_roots, gallery, multiplicity_table
-from enumsol.branches import BranchGraph, construction
+from enumsol.branches import BranchGraph, ways
 from enumsol.branches.enclosed import tracing
 from enumsol.errors import Interrupted
 
@@ -123,7 +123,7 @@ def test_an_interruption_keeps_the_selections_of_a_group_that_are_finished(monke
 def test_exact_algebra_stops_soon_after_an_interrupted_search(monkeypatch):
     full = complete_graph("chain-4")
     assert full.stats.selections > 8
-    monkeypatch.setattr(construction, "_SELECTIONS_AFTER_INTERRUPT", 0)
+    monkeypatch.setattr(ways, "_SELECTIONS_AFTER_INTERRUPT", 0)
 
     def progress(stage, share):
         if stage == "search" and share == 1.0:

@@ -18,7 +18,7 @@ from path_problems import (
 from two_graphs import differences, steps, two_graphs
 
 from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery, verify
-from enumsol.branches import construction
+from enumsol.branches import ways
 from enumsol.branches.enclosed import tracing
 
 KINDS = ("friction", "load", "both")
@@ -166,7 +166,7 @@ def test_exact_algebra_that_would_take_too_long_is_not_begun(monkeypatch):
     exactly = branch_graph(problem, (0.0, 6.0))
     assert exactly.complete
     assert [v.alpha for v in exactly.vertices if v.kind == "bifurcation"] == [3.0]
-    monkeypatch.setattr(construction, "LARGEST_EXACT_WORK", 0)
+    monkeypatch.setattr(ways, "LARGEST_EXACT_WORK", 0)
     graph = branch_graph(problem, (0.0, 6.0))
     assert not graph.complete
     assert any("is not decided" in reason for reason in graph.reasons)

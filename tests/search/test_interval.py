@@ -9,7 +9,7 @@ from flint import fmpq
 from path_problems import generic_problem, one_node
 
 from enumsol import ContactProblem, gallery
-from enumsol.branches import branch_graph, construction
+from enumsol.branches import branch_graph, ways
 from enumsol.branches.exact.gluing import glue
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.errors import IncompleteGraphError, Interrupted, InvalidArgumentError, TooLargeError
@@ -186,7 +186,7 @@ def test_an_interrupted_search_keeps_its_arcs():
 @pytest.mark.parametrize(("boxes", "followed"), [(500, False), (1, True)])
 def test_after_an_interrupted_search_not_all_is_followed(boxes, followed, tree_only, monkeypatch):
     """Only until so many boxes are made, and the graph says so."""
-    monkeypatch.setattr(construction, "_BOXES_AFTER_INTERRUPT", boxes)
+    monkeypatch.setattr(ways, "_BOXES_AFTER_INTERRUPT", boxes)
     found = []
 
     def stop(stage, share):

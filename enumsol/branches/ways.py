@@ -1,0 +1,331 @@
+"""The ways in which a graph is worked out: what is searched, what certifies it, and how arcs are followed.
+
+By balls, where the problem can be enclosed; by algebra in rationals, where that is fast or balls leave something open;
+and by algebra for a body that nothing holds.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from flint import fmpq_mat
+
+from enumsol.arithmetic.rationals import rational
+from enumsol.branches.enclosed.following import follow_selections
+from enumsol.branches.enclosed.make_traced import make_traced
+from enumsol.branches.enclosed.single_branches import ClosedPieces
+from enumsol.branches.enclosed.traced import TracedProblem
+from enumsol.branches.exact.gluing import glue
+from enumsol.branches.exact.make_elements import make_arcs, make_vertices
+from enumsol.branches.proof_records import write_graph_proof
+from enumsol.condensation.data import EXACT_DOF_LIMIT
+from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.condensation.exact import FAST_EXACT_DOF, ExactCondensed, check_definite
+from enumsol.condensation.unloaded import never_loaded, vanishing_alpha
+from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.search.certifiers.interval_certifiers import ExactIntervalCertifier, VerifiedIntervalCertifier
+from enumsol.search.interval.floating_interval import FloatingIntervalCertifier, on_weak_springs
+from enumsol.search.interval.interval_parallel import run_parallel
+from enumsol.search.interval.subintervals import FastIntervalCertifier, IntervalSearch
+from enumsol.search.outcome import Stop, StopReason
+from enumsol.support.deadlines import Deadline, TimeOverError, over, within
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from concurrent.futures import Executor
+    from fractions import Fraction
+
+    from enumsol.branches.elements import Arc, Vertex
+    from enumsol.branches.enclosed.following import Followed
+    from enumsol.condensation.condensed import CondensedProblem
+    from enumsol.model.problem import ContactProblem
+    from enumsol.proof.proof_file import Proof
+    from enumsol.search.interval.subintervals import IntervalCertifier, SearchedPiece
+    from enumsol.selections.solution import Codes
+    from enumsol.support.deadlines import Limited
+
+Arithmetic = Literal["fast", "verified", "exact"]
+
+#: Exact algebra is not begun where it would take more than this by ``_exact_work``: some five minutes.
+LARGEST_EXACT_WORK = 2**22
+#: Boxes in which arcs are followed when the search was interrupted.
+_BOXES_AFTER_INTERRUPT = 500
+#: Selections whose arcs are then worked out without rounding: 8 at least, or so many by p^2.
+_SELECTIONS_AFTER_INTERRUPT = 4096
+
+
+@dataclass
+class Made:
+    """Vertices and arcs, how they were found, and what cut that short."""
+
+    vertices: Sequence[Vertex]
+    arcs: Sequence[Arc]
+    reasons: Sequence[str]
+    stops: list[Stop]
+    exact: ExactCondensed | None = None
+    followed: Followed | None = None
+
+    def proof(self, search: IntervalSearch, problem: ContactProblem) -> Callable[[], Proof | None] | None:
+        """What makes the proof, once it is asked for; None when there is none, or the time was over."""
+        if not search.checkable or not search.pieces or any(not stop.interrupted for stop in self.stops):
+            return None
+        if search.stopped is not None:
+            return None
+        if self.exact is None or self.exact.condensed_exactly:
+            return partial(_proof_of_problem, problem, search.interval, search.pieces, self.followed)
+        return partial(write_graph_proof, problem, search.interval, "condensed", search.pieces, None)
+
+
+class Way:
+    """Base of the ways: the search over the interval, and the selections that it leaves.
+
+    Attributes
+    ----------
+    problem : ContactProblem
+    condensed : CondensedProblem
+        What the relaxations of the search are about.
+    certifier : IntervalCertifier
+    origin : Fraction or None
+        The alpha at which g vanishes.
+    exact : ExactCondensed or None
+        The problem in rationals, where arcs are worked out by algebra.
+    """
+
+    problem: ContactProblem
+    certifier: IntervalCertifier
+    exact: ExactCondensed | None
+
+    @property
+    def condensed(self) -> CondensedProblem:
+        """What the relaxations of the search are about."""
+        return self.problem.condensed
+
+    @property
+    def origin(self) -> Fraction | None:
+        """The alpha at which g vanishes."""
+        raise NotImplementedError
+
+    def search(
+        self,
+        interval: tuple[Fraction, Fraction],
+        max_nodes: int | None,
+        deadline: float | None,
+        progress: Callable[[float], object] | None,
+    ) -> IntervalSearch:
+        """The search over the interval, not begun yet."""
+        problem, leaves, origin = self.condensed, self.certifier, self.origin
+        return IntervalSearch(
+            problem, interval, origin, leaves, max_nodes=max_nodes, deadline=deadline, progress=progress
+        )
+
+    def candidates(self, search: IntervalSearch, executor: Executor | None) -> set[Codes]:
+        """The selections that may hold somewhere; Ctrl-C keeps those that were found."""
+        if self.exact is not None and self.exact.unloaded:
+            # lambda = 0 is the only solution at every alpha, and every selection holds there: one is enough
+            return {(OPEN,) * self.exact.p}
+        try:
+            self.close(search)
+            if executor is None:
+                search.run()
+            else:
+                run_parallel(executor, search)
+        except KeyboardInterrupt:
+            search.stopped = Stop(StopReason.INTERRUPTED, search.nodes)
+        return search.selections
+
+    def close(self, search: IntervalSearch) -> None:
+        """Find pieces that need no tree, while there is time; none are known here."""
+
+    def made(
+        self,
+        search: IntervalSearch,
+        candidates: set[Codes],
+        tick: Callable[[float], object] | None,
+        limits: Limited,
+        stops: list[Stop],
+    ) -> Made:
+        """Arcs worked out by the deadline of ``limits``; what is not joined by the one that holds here stays open."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class ByAlgebra(Way):
+    """Arcs as functions of alpha in rationals: nothing stays open but what the time does not suffice for."""
+
+    problem: ContactProblem
+    exact: ExactCondensed
+    certifier: IntervalCertifier
+    followed: Followed | None = None
+
+    @classmethod
+    def of(cls, problem: ContactProblem, exact: ExactCondensed, arithmetic: Arithmetic) -> ByAlgebra:
+        """With the certifier of an arithmetic."""
+        certifier: IntervalCertifier = FastIntervalCertifier()
+        if arithmetic == "exact":
+            certifier = ExactIntervalCertifier(exact)
+        elif arithmetic == "verified":
+            certifier = VerifiedIntervalCertifier(problem, exact)
+        return cls(problem, exact, certifier)
+
+    @property
+    def origin(self) -> Fraction | None:
+        """The alpha at which g vanishes."""
+        return self.exact.zero
+
+    def made(
+        self,
+        search: IntervalSearch,
+        candidates: set[Codes],
+        tick: Callable[[float], object] | None,
+        limits: Limited,
+        stops: list[Stop],
+    ) -> Made:
+        """See ``Way.made``."""
+        a, b = (rational(end) for end in search.interval)
+        # after Ctrl-C only as much as takes a moment
+        few = max(8, _SELECTIONS_AFTER_INTERRUPT // self.problem.p**2)
+        most = few if any(stop.interrupted for stop in stops) else None
+        gluing = glue(self.exact, candidates, a, b, tick, cut_short=bool(stops), most=most, limits=limits)
+        stops += [] if gluing.stopped is None else [gluing.stopped]
+        arcs = make_arcs(gluing)
+        return Made(make_vertices(gluing, arcs), arcs, gluing.reasons, stops, self.exact, self.followed)
+
+
+class ForFloating(ByAlgebra):
+    """The same for a body that nothing holds, searched on weak springs (theory, section 14.8)."""
+
+    @classmethod
+    def of(cls, problem: ContactProblem, exact: ExactCondensed, arithmetic: Arithmetic) -> ForFloating:
+        """With the certifier of an arithmetic."""
+        return cls(problem, exact, FloatingIntervalCertifier(problem, checkable=arithmetic == "verified"))
+
+    @property
+    def condensed(self) -> CondensedProblem:
+        """The body on weak springs."""
+        return on_weak_springs(self.problem)
+
+
+class ByBalls(Way):
+    """Arcs in ball arithmetic; by algebra where balls leave something open and that does not take too long.
+
+    Parameters
+    ----------
+    traced : TracedProblem
+    """
+
+    exact = None
+
+    def __init__(self, traced: TracedProblem) -> None:
+        self.problem, self.traced, self.closed = traced.problem, traced, ClosedPieces()
+        self.certifier = VerifiedIntervalCertifier(traced.problem, None, traced.origin)
+
+    @property
+    def origin(self) -> Fraction | None:
+        """The alpha at which g vanishes."""
+        return self.traced.origin
+
+    def close(self, search: IntervalSearch) -> None:
+        """Find pieces that need no tree, while there is time."""
+        search.closed = self.closed.pieces
+        with suppress(TimeOverError), within(Deadline(search.deadline)):
+            self.closed.find(self.traced)
+
+    def made(
+        self,
+        search: IntervalSearch,
+        candidates: set[Codes],
+        tick: Callable[[float], object] | None,
+        limits: Limited,
+        stops: list[Stop],
+    ) -> Made:
+        """See ``Way.made``."""
+        problem = self.problem
+        followed = follow_selections(
+            self.traced,
+            search.pieces,
+            tick,
+            known=self.closed.traces,
+            cut_short=bool(stops),
+            # after Ctrl-C only as much as takes a moment
+            most=_BOXES_AFTER_INTERRUPT if any(stop.interrupted for stop in stops) else None,
+            limits=limits,
+        )
+        joined = followed.joined
+        stops += [] if followed.stopped is None else [followed.stopped]
+        large = over() or problem.n > EXACT_DOF_LIMIT or _exact_work(problem, candidates) > LARGEST_EXACT_WORK
+        if (joined.ordered and not joined.open) or stops or large:
+            return Made(*make_traced(self.traced, joined), followed.reasons, stops, followed=followed)
+        # several conditions vanish at one alpha, or a selection is singular
+        algebra = ByAlgebra(problem, ExactCondensed.from_problem(problem), self.certifier, followed)
+        return algebra.made(search, candidates, tick, limits, stops)
+
+
+def way_of(problem: ContactProblem, interval: tuple[Fraction, Fraction], arithmetic: Arithmetic) -> Way:
+    """The way for a problem: by algebra where that is fast, and where balls cannot hold the data.
+
+    Raises
+    ------
+    InvalidArgumentError, TooLargeError
+        Nothing holds the body, and there is no such graph of it.
+    TooLargeError
+        Exact arithmetic was asked for and the problem is too large for it.
+    TimeOverError
+        The body is so large that the time was over before it was condensed.
+    """
+    if problem.modes is not None:
+        return ForFloating.of(problem, _floating(problem), arithmetic)
+    large = arithmetic == "verified" and problem.n > FAST_EXACT_DOF
+    at_rest = large and never_loaded(problem)
+    if large and not at_rest and (traced := _traced(problem, interval)) is not None:
+        return ByBalls(traced)
+    if arithmetic != "exact" and problem.n > (EXACT_DOF_LIMIT if at_rest else FAST_EXACT_DOF):
+        return ByAlgebra.of(problem, ExactCondensed.from_condensed(problem), arithmetic)
+    exact = ExactCondensed.from_problem(problem)
+    if not problem.condensed.definite:
+        check_definite(exact.S)
+    return ByAlgebra.of(problem, exact, arithmetic)
+
+
+def _floating(problem: ContactProblem) -> ExactCondensed:
+    """The body that nothing holds in rationals; refused if its stiffness on springs is not positive definite."""
+    exact, size = ExactCondensed.floating(problem), 2 * problem.p
+    if not problem.on_springs.condensed.definite:
+        check_definite(fmpq_mat([list(row[:size]) for row in exact.rows[:size]]))
+    return exact
+
+
+def _exact_work(problem: ContactProblem, candidates: set[Codes]) -> int:
+    """What exact algebra of selections costs, roughly, in units of 7e-5 s: (slips whose friction varies + 1) size^3.
+
+    Measured with wedges of 6 to 32 contact nodes and 40 to 170 degrees of freedom.
+    """
+    varying = np.array(problem.friction[1]) != 0
+    codes = np.array(sorted(candidates), dtype=np.intp).reshape(-1, problem.p)
+    slips = np.sum(((codes == SLIP_PLUS) | (codes == SLIP_MINUS)) & varying, axis=1)
+    sizes = np.sum(codes != OPEN, axis=1) + np.sum(codes == STICK, axis=1)
+    return int(np.sum((slips + 1) * sizes**3))
+
+
+def _traced(problem: ContactProblem, interval: tuple[Fraction, Fraction]) -> TracedProblem | None:
+    """The problem in balls; None where its data cannot be enclosed."""
+    try:
+        return TracedProblem(problem, interval, vanishing_alpha(problem, "problem"))
+    except NotEnclosedError:
+        return None
+
+
+def _proof_of_problem(
+    problem: ContactProblem,
+    interval: tuple[Fraction, Fraction],
+    pieces: Sequence[SearchedPiece],
+    followed: Followed | None,
+) -> Proof | None:
+    """The proof for the problem's own data, with the arcs where they can be followed in balls."""
+    if followed is None and problem.modes is None and (traced := _traced(problem, interval)) is not None:
+        followed = follow_selections(traced, pieces)
+    whole = followed is None or followed.stopped is None
+    return write_graph_proof(problem, interval, "problem", pieces, followed if whole else None)
