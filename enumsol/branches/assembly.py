@@ -6,17 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 import networkx as nx
 
-from enumsol.branches.elements import CUTS, Arc, Branch, Component, Vertex, VertexKind, index_sum
-from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
-from enumsol.roots.slip_signs import named_statuses
+from enumsol.branches.elements import CUTS, Arc, Branch, Component, Vertex, VertexKind, index_sum, tangential
+from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK, ContactStatus
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence, Set
 
     from enumsol.arithmetic.algebraic import CriticalAlpha
     from enumsol.branches.elements import Pair
     from enumsol.roots.root import RootFamily
-    from enumsol.selections.solution import ActiveSets, Codes
+    from enumsol.selections.solution import Codes
 
     #: Arcs that end at a vertex from the left, and that begin there to the right.
     Sides = tuple[list[Arc], list[Arc]]
@@ -41,8 +40,7 @@ def make_vertex(
     alpha: CriticalAlpha,
     sides: Sides,
     state: Pair,
-    active: ActiveSets,
-    slip_sign: Callable[[int], int],
+    names: Sequence[frozenset[ContactStatus]],
     selections: Sequence[Codes],
     *,
     border: bool,
@@ -54,13 +52,11 @@ def make_vertex(
 
     Parameters
     ----------
-    state : forces and displacements, (2p,) arrays
-    active : codes that hold at every node
-    slip_sign : the sign of u_t at a node, which names the slip where there is no friction
+    state : forces and displacements, (2p,) arrays, in 3D (3p,)
+    names : the statuses that hold at every node
     bounded : it reaches a bound of the rigid displacement, beyond which arcs are not known
     """
-    p, (forces, w) = len(active), state
-    statuses, names = named_statuses(active, slip_sign)
+    p, (forces, w) = len(names), state
     dimension = 0 if family is None else family.dimension
     kind = VertexKind.UNSETTLED
     if settled:
@@ -71,12 +67,12 @@ def make_vertex(
         alpha=float(alpha),
         kind=kind,
         border=border,
-        statuses=statuses,
-        active=names,
+        statuses=tuple(next(status for status in ContactStatus if status in held) for held in names),
+        active=tuple(names),
         lambda_n=forces[:p],
-        lambda_t=forces[p:],
+        lambda_t=tangential(forces, p),
         u_n=w[:p],
-        u_t=w[p:],
+        u_t=tangential(w, p),
         family=family,
         index_left=left,
         index_right=right,
@@ -86,16 +82,16 @@ def make_vertex(
     )
 
 
-def with_exact_zeros(state: Pair, active: ActiveSets) -> Pair:
+def with_exact_zeros(state: Pair, active: Sequence[Set[int]]) -> Pair:
     """Forces and displacements with exact zeros where the statuses say so."""
     (forces, w), p = state, len(active)
     for i, codes in enumerate(active):
         if OPEN in codes:
-            forces[[i, p + i]] = 0.0
+            forces[i::p] = 0.0
         if codes - {OPEN}:
             w[i] = 0.0
         if STICK in codes or {SLIP_PLUS, SLIP_MINUS} <= codes:
-            w[p + i] = 0.0
+            w[p + i :: p] = 0.0
     return forces + 0.0, w + 0.0
 
 

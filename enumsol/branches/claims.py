@@ -168,9 +168,10 @@ class Claims:
         places = [Fraction(group[0].alpha) for group in groups]
         # where nothing holds the body there may be no solution at an end, and no vertex
         first, last = self._interval
-        if not groups or places[0] > first:
+        outer = [CriticalAlpha.rational(rational(end)) for end in (first, last)]
+        if not groups or groups[0][0].exact.compare(outer[0]) > 0:
             places, at, between = [first, *places], [0, *at], [0, *between] if groups else []
-        if places[-1] < last:
+        if not groups or groups[-1][0].exact.compare(outer[1]) < 0:
             places, at, between = [*places, last], [*at, 0], [*between, 0]
         return MultiplicitySteps(tuple(places), tuple(at), tuple(between), exact=True)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from enumsol.branches.graph import BranchGraph
 from enumsol.branches.graph_data import GraphStats
@@ -12,6 +12,7 @@ from enumsol.branches.ways import way_of
 from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.errors import Interrupted, InvalidArgumentError, TooLargeError
+from enumsol.model.contact_body import ContactBody
 from enumsol.model.problem import ContactProblem
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.support.arguments import (
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from enumsol.branches.ways import Arithmetic
+    from enumsol.model.problem3d import ContactProblem3D
     from enumsol.support.arguments import AlphaLike
 
 #: Of the time that is left when arcs are begun: for working them out, and for joining them too, where there is a limit.
@@ -38,7 +40,7 @@ _WORKED_OUT, _JOINED = 0.55, 0.75
 
 
 def branch_graph(
-    problem: ContactProblem,
+    problem: ContactProblem | ContactProblem3D,
     interval: tuple[AlphaLike, AlphaLike],
     arithmetic: Arithmetic = "verified",
     *,
@@ -55,7 +57,8 @@ def branch_graph(
 
     Parameters
     ----------
-    problem : ContactProblem
+    problem : ContactProblem or ContactProblem3D
+        In 3D the coefficients of a node must have the same ratio for all alpha, and something must hold the body.
     interval : pair of alphas
         First and last alpha, in increasing order: float, Fraction or whatever enumerate_roots accepts as alpha.
     arithmetic : {"verified", "fast", "exact"}
@@ -69,6 +72,9 @@ def branch_graph(
         "fast": exact algebra, but the search trusts floats; never claimed to be complete; S and g as computed beyond 24
         degrees of freedom. "exact": everything in rationals, for the problem's own matrices of up to 250 degrees of
         freedom, and slow beyond some ten contact nodes.
+        In 3D there is only "verified": solutions lie on curves in boxes, followed in balls (theory, sections 12.8 to
+        12.10), which takes seconds to minutes for one or two contact nodes. What stays open is named in
+        ``graph.reasons``.
     progress : callable, optional
         Called with the name of the stage ("search", "arcs") and the share of it that is done.
     max_nodes : int, optional
@@ -78,7 +84,7 @@ def branch_graph(
         seconds at most.
     executor : concurrent.futures.Executor, optional
         Searches the pieces of the interval, and parts of large ones, in its workers. The graph and its proof are those
-        found without it.
+        found without it. Not used in 3D.
 
     Returns
     -------
@@ -87,8 +93,8 @@ def branch_graph(
     Raises
     ------
     InvalidArgumentError
-        The interval or another argument is out of range, or friction is negative somewhere in the interval (the node
-        and the alpha are named).
+        The interval or another argument is out of range, friction is negative somewhere in the interval (the node
+        and the alpha are named), or the arithmetic of a problem in 3D is not "verified".
     TooLargeError
         Exact arithmetic was asked for and the problem is too large for it.
     MissingDependencyError
@@ -106,17 +112,21 @@ def branch_graph(
     ...
     complete: yes (proven)
     """
-    instance_of(problem, ContactProblem, "problem")
+    given: Any = problem
+    if not isinstance(given, ContactBody):
+        instance_of(given, ContactProblem, "problem")
     a, b = (Fraction(end) for end in alpha_interval(interval))
     one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
-    if problem.modes is not None:
-        _check_floating(problem, arithmetic)
     optional_callable(progress, "progress")
     optional_executor(executor)
     max_nodes, time_limit = optional_count(max_nodes, "max_nodes"), optional_seconds(time_limit)
-    _check_friction(problem, a, b)
     started = time.perf_counter()
     limits = Deadline.after(started, time_limit)
+    if not isinstance(problem, ContactProblem):
+        return _in_space(problem, (a, b), arithmetic, progress, max_nodes, limits)
+    if problem.modes is not None:
+        _check_floating(problem, arithmetic)
+    _check_friction(problem, a, b)
     try:
         with within(limits):
             way = way_of(problem, (a, b), arithmetic)
@@ -154,6 +164,25 @@ def branch_graph(
     if any(stop.interrupted for stop in made.stops):
         raise Interrupted("branch_graph was interrupted; the arcs found so far are kept", graph)
     return graph
+
+
+def _in_space(
+    problem: ContactProblem3D,
+    interval: tuple[Fraction, Fraction],
+    arithmetic: Arithmetic,
+    progress: Callable[[str, float], object] | None,
+    max_nodes: int | None,
+    limits: Deadline,
+) -> BranchGraph:
+    """The graph of a problem in 3D."""
+    from enumsol.branches.space.space_graph import space_graph  # continuation, and what only 3D needs
+
+    problem.check_held("branch_graph in 3D")
+    if arithmetic != "verified":
+        raise InvalidArgumentError(f'arithmetic is "{arithmetic}" for a problem in 3D; expected "verified"')
+    for end in interval:
+        problem.friction_at(end)
+    return space_graph(problem, interval, progress, max_nodes, limits)
 
 
 def _check_floating(problem: ContactProblem, arithmetic: Arithmetic) -> None:

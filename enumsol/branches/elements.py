@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from enumsol.selections.solution import Codes
     from enumsol.support.arguments import AlphaLike
 
-    #: Forces and displacements, arrays of length 2p.
+    #: Forces and displacements, arrays of length 2p, in 3D of length 3p: all normals first.
     Pair = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
@@ -56,6 +56,11 @@ class VertexKind(TextEnum):
     BOUND = "bound"
     #: On the interval's border.
     END = "end"
+
+
+def tangential(values: NDArray[np.float64], p: int) -> NDArray[np.float64]:
+    """The tangential part of forces or displacements of p nodes: (p,), in 3D (p, 2)."""
+    return values[p:] if len(values) == 2 * p else values[p:].reshape(2, p).T
 
 
 def index_sum(indices: Iterable[int | None]) -> int | None:
@@ -122,6 +127,10 @@ class ArcValues(Protocol):
     def at(self, alpha: Fraction) -> Pair:
         """At an alpha of the arc; beside its rounded ends, those of a point on it."""
 
+    def record(self) -> dict[str, Any]:
+        """What a file needs besides the selection and an alpha inside the arc."""
+        return {}
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Arc:
@@ -180,7 +189,10 @@ class Arc:
         return self.begin.compare(alpha) < 0 < self.end.compare(alpha)
 
     def state(self, alpha: AlphaLike) -> Pair:
-        """Forces and displacements at an alpha of the arc, both (2p,), normal ones first; errors as ``values``."""
+        """Forces and displacements at an alpha of the arc, normal ones first; errors as ``values``.
+
+        Both have shape (2p,), in 3D (3p,).
+        """
         exact = alpha_value(alpha)
         value = float(exact)
         if self.dimension:
@@ -194,7 +206,7 @@ class Arc:
         return self._values.at(Fraction(exact))
 
     def values(self, alpha: AlphaLike) -> Pair:
-        """(lambda_n, lambda_t) at an alpha of the arc, arrays of shape (p,) [force].
+        """(lambda_n, lambda_t) at an alpha of the arc, arrays of shape (p,), in 3D (p,) and (p, 2) [force].
 
         Exact, then rounded, on a graph whose ``arcs_by`` is "exact"; else in double arithmetic.
 
@@ -203,13 +215,13 @@ class Arc:
         InvalidArgumentError
             alpha is outside the arc, or the arc is a sheet.
         """
-        forces = self.state(alpha)[0]
-        return forces[: len(self.statuses)], forces[len(self.statuses) :]
+        forces, p = self.state(alpha)[0], len(self.statuses)
+        return forces[:p], tangential(forces, p)
 
     def displacements(self, alpha: AlphaLike) -> Pair:
-        """(u_n, u_t) at an alpha of the arc, two arrays of shape (p,) [length]; errors as ``values``."""
-        moves = self.state(alpha)[1]
-        return moves[: len(self.statuses)], moves[len(self.statuses) :]
+        """(u_n, u_t) at an alpha of the arc, of the shapes of ``values`` [length]; errors as there."""
+        moves, p = self.state(alpha)[1], len(self.statuses)
+        return moves[:p], tangential(moves, p)
 
     def sampled(self, count: int = 33) -> NDArray[np.float64]:
         """Values of alpha along the arc, denser towards its ends (Chebyshev points), ends included."""

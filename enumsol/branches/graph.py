@@ -14,8 +14,9 @@ from enumsol.branches.figures.graph_plots import plot_graph
 from enumsol.branches.graph_data import GraphData
 from enumsol.branches.graph_files import load_graph, save_graph, write_graphml
 from enumsol.branches.graph_text import arcs_frame, graph_html, graph_text, vertices_frame
-from enumsol.branches.roots_at import roots_at, roots_of
+from enumsol.branches.roots_at import roots_at, roots_on
 from enumsol.errors import IncompleteGraphError, InvalidArgumentError
+from enumsol.model.problem import ContactProblem
 from enumsol.support.arguments import alpha_value
 
 if TYPE_CHECKING:
@@ -36,7 +37,7 @@ class BranchGraph(GraphData):
 
     Attributes
     ----------
-    problem : ContactProblem
+    problem : ContactProblem or ContactProblem3D
     interval, exact_interval : (float, float), (Fraction, Fraction)
     arithmetic, arcs_by, certified_data : str
         How leaves were decided; how arcs were followed, "exact" (functions of alpha in rationals) or "balls"; and what
@@ -224,9 +225,9 @@ class BranchGraph(GraphData):
         """An alpha up to which uniqueness follows without any search (theory, section 5.6), if there is one.
 
         F^2 lmax((S^-1)_nn) lmax(S_tt) < 1 at every contact node; evaluated in floats. None for a body that nothing
-        holds.
+        holds, and in 3D.
         """
-        if self.problem.modes is not None:
+        if self.problem.modes is not None or not isinstance(self.problem, ContactProblem):
             return None
         return uniqueness_bound(self.problem.condensed, self.interval)
 
@@ -236,7 +237,7 @@ class BranchGraph(GraphData):
             alpha = 0.5 * (arc.lo + arc.hi)
             if arc.grazing or not arc.lo < alpha < arc.hi:
                 continue
-            roots = roots_of(self, alpha, arc.selections)
+            roots = roots_on(self, alpha, [arc])
             if len(roots) and roots[0].regular:
                 return roots[0]
         return None

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     from enumsol.branches.elements import Arc, Branch, Component, Vertex
     from enumsol.condensation.exact import ExactCondensed
-    from enumsol.model.problem import ContactProblem
     from enumsol.proof.proof_file import Proof
     from enumsol.search.interval.subintervals import SearchedPiece
     from enumsol.support.arguments import AlphaLike
@@ -60,7 +59,7 @@ class GraphData(Immutable):
 
     Attributes
     ----------
-    problem : ContactProblem
+    problem : ContactProblem or ContactProblem3D
     exact : ExactCondensed or None
         The condensed problem in rationals, on which the arcs rest; None where they were followed in ball arithmetic.
     exact_interval : (Fraction, Fraction)
@@ -77,7 +76,7 @@ class GraphData(Immutable):
         Makes the proof; not kept in files.
     """
 
-    problem: ContactProblem
+    problem: Any
     exact: ExactCondensed | None
     exact_interval: tuple[Fraction, Fraction]
     arithmetic: str

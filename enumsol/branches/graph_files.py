@@ -25,6 +25,7 @@ from enumsol.condensation.unloaded import vanishing_alpha
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.mesh import BodyMesh
 from enumsol.model.problem import ContactProblem
+from enumsol.model.problem3d import ContactProblem3D
 from enumsol.model.statuses import ContactStatus
 from enumsol.roots.root import Polytope, RootFamily
 from enumsol.support.arguments import file_path
@@ -42,6 +43,8 @@ FORMAT, VERSION = "enumsol-branch-graph", 3
 #: Version 1 gave kinds to the vertices of graphs that were not complete; only its complete graphs are read. Before
 #: version 3 every vertex with a single arc was "broken".
 _READ = (1, 2, 3)
+#: Contact rows in 3D, and in 2D.
+_ROWS = ("Bn", "Bt1", "Bt2"), ("Bn", "Bt")
 #: Arrays of a vertex.
 _VALUES = ("lambda_n", "lambda_t", "u_n", "u_t")
 _FRACTION = re.compile(r"-?\d+(/\d+)?", re.ASCII)
@@ -101,31 +104,52 @@ def _from_record(kind: type[_Graph], record: dict[str, Any]) -> _Graph:
     exact, values = _values(problem, record, (first, last))
     balls = exact is None
     vertices = tuple(_vertex(k, item, balls=balls) for k, item in enumerate(record["vertices"]))
-    arcs = tuple(_arc(k, item, vertices, values) for k, item in enumerate(record["arcs"]))
+    arcs = tuple(_arc(k, item, vertices, values(item)) for k, item in enumerate(record["arcs"]))
     reasons, stats = tuple(record["reasons"]), GraphStats(**record["stats"])
     return kind(problem, exact, (first, last), record["arithmetic"], vertices, arcs, reasons, stats)
 
 
 def _values(
-    problem: ContactProblem, record: dict[str, Any], interval: tuple[Fraction, Fraction]
-) -> tuple[ExactCondensed | None, Callable[[Codes, Fraction], ArcValues]]:
-    """The condensed problem in rationals, if arcs rest on it, and what gives an arc its values."""
+    problem: ContactProblem | ContactProblem3D, record: dict[str, Any], interval: tuple[Fraction, Fraction]
+) -> tuple[ExactCondensed | None, Callable[[dict[str, Any]], ArcValues]]:
+    """The condensed problem in rationals, if arcs rest on it, and what gives the arc of a record its values."""
+    if not isinstance(problem, ContactProblem):
+        from enumsol.branches.space.make_curved import CurvedArcValues  # for graphs in 3D only
+        from enumsol.trusted.space.solution_curve import AlphaProblem
+
+        given = AlphaProblem.of(problem.enclosure)
+
+        def along(item: dict[str, Any]) -> ArcValues:
+            codes, knots = tuple(item["selections"][0]), np.array(item["knots"], dtype=np.float64)
+            borders = np.array(item["borders"], dtype=np.float64)
+            size = 3 * problem.p + 1
+            if knots.shape != (len(borders) + 1, size) or borders.shape[1:] != (size,):
+                raise ValueError("knots of an arc")
+            return CurvedArcValues(given, problem, codes, knots, borders)
+
+        return None, along
+
+    def of_selection(make: Callable[[Codes, Fraction], ArcValues], item: dict[str, Any]) -> ArcValues:
+        return make(tuple(item["selections"][0]), _fraction(item["sample"]))
+
     if record.get("arcs_by", "exact") == "balls":
         traced = TracedProblem(problem, interval, vanishing_alpha(problem, "problem"))
-        return None, partial(TracedArcValues, traced)
+        return None, partial(of_selection, partial(TracedArcValues, traced))
     exactly = record["condensed_exactly"]
     exact = exact_condensed(problem) if exactly else ExactCondensed.from_condensed(problem)
-    return exact, partial(ExactArcValues, exact)
+    return exact, partial(of_selection, partial(ExactArcValues, exact))
 
 
 # -- the problem -------------------------------------------------------------------------------------------------------
 
 
-def _problem_record(problem: ContactProblem) -> dict[str, Any]:
+def _problem_record(problem: ContactProblem | ContactProblem3D) -> dict[str, Any]:
+    plane = isinstance(problem, ContactProblem)
     return {
-        **{name: _matrix_record(getattr(problem, name)) for name in ("A", "Bn", "Bt")},
+        **{name: _matrix_record(getattr(problem, name)) for name in (*_ROWS[plane], "A")},
         **{name: getattr(problem, name).tolist() for name in ("f", "gap", "slip_offset")},
         "friction": [part.tolist() for part in problem.friction],
+        **({} if isinstance(problem, ContactProblem) else _space_record(problem)),
         "load_slope": None if problem.load_slope is None else problem.load_slope.tolist(),
         "node_ids": list(problem.node_ids),
         **_rigid_record(problem),
@@ -134,7 +158,14 @@ def _problem_record(problem: ContactProblem) -> dict[str, Any]:
     }
 
 
-def _rigid_record(problem: ContactProblem) -> dict[str, Any]:
+def _space_record(problem: ContactProblem3D) -> dict[str, Any]:
+    return {
+        "friction_slope": [part.tolist() for part in problem.friction_slope],
+        "areas": None if problem.areas is None else problem.areas.tolist(),
+    }
+
+
+def _rigid_record(problem: ContactProblem | ContactProblem3D) -> dict[str, Any]:
     if problem.rigid_modes is None:
         return {}
     return {"rigid_modes": problem.rigid_modes.tolist(), "max_rigid_displacement": problem.max_rigid_displacement}
@@ -155,28 +186,34 @@ def _matrix_record(matrix: Any) -> dict[str, Any]:
     return {"shape": list(coo.shape), "row": rows.tolist(), "col": columns.tolist(), "value": coo.data.tolist()}
 
 
-def _problem(record: dict[str, Any]) -> ContactProblem:
+def _problem(record: dict[str, Any]) -> ContactProblem | ContactProblem3D:
     def matrix(item: dict[str, Any]) -> sp.csc_array:
         return sp.csc_array(sp.coo_array((item["value"], (item["row"], item["col"])), shape=tuple(item["shape"])))
 
-    friction = tuple(np.array(part, dtype=np.float64) for part in record["friction"])
-    return ContactProblem(
-        matrix(record["A"]),
-        matrix(record["Bn"]),
-        matrix(record["Bt"]),
-        record["f"],
-        gap=record["gap"],
-        friction=(friction[0], friction[1]),
-        load_slope=record["load_slope"],
-        slip_offset=record["slip_offset"],
-        node_ids=record["node_ids"],
-        coordinates=record["coordinates"],
-        mesh=None
+    def pair(name: str) -> tuple[Any, Any]:
+        one, other = (np.array(part, dtype=np.float64) for part in record[name])
+        return one, other
+
+    more: dict[str, Any] = {
+        "gap": record["gap"],
+        "friction": pair("friction"),
+        "load_slope": record["load_slope"],
+        "slip_offset": record["slip_offset"],
+        "node_ids": record["node_ids"],
+        "coordinates": record["coordinates"],
+        "mesh": None
         if (mesh := record.get("mesh")) is None
         else BodyMesh(mesh["points"], mesh["cells"], matrix(mesh["motion"]), mesh["offset"], lame=mesh.get("lame")),
-        rigid_modes=record.get("rigid_modes"),
-        max_rigid_displacement=record.get("max_rigid_displacement"),
-    )
+        "rigid_modes": record.get("rigid_modes"),
+        "max_rigid_displacement": record.get("max_rigid_displacement"),
+    }
+    plane = "Bt" in record
+    matrices: Any = [matrix(record[name]) for name in ("A", *_ROWS[plane])]
+    data: Any = (*matrices, record["f"])
+    if plane:
+        return ContactProblem(*data, **more)
+    more |= {"friction_slope": pair("friction_slope"), "areas": record["areas"]}
+    return ContactProblem3D(*data, **more)
 
 
 # -- vertices and arcs -------------------------------------------------------------------------------------------------
@@ -274,6 +311,7 @@ def _arc_record(arc: Arc, vertices: Sequence[Vertex]) -> dict[str, Any]:
         "grazing": arc.grazing,
         "selections": [list(codes) for codes in arc.selections],
         "sample": str(arc.sample),
+        **arc._values.record(),
         # beside a place that was left open; elsewhere an arc reaches up to its vertices
         **{
             name: str(end.enclosure()[0])
@@ -283,9 +321,7 @@ def _arc_record(arc: Arc, vertices: Sequence[Vertex]) -> dict[str, Any]:
     }
 
 
-def _arc(
-    number: int, item: dict[str, Any], vertices: Sequence[Vertex], values: Callable[[Codes, Fraction], ArcValues]
-) -> Arc:
+def _arc(number: int, item: dict[str, Any], vertices: Sequence[Vertex], values: ArcValues) -> Arc:
     selections = tuple(tuple(codes) for codes in item["selections"])
     sample = _fraction(item["sample"])
     lo, begin = _arc_end(item.get("from"), vertices[item["tail"]])
@@ -300,7 +336,7 @@ def _arc(
         begin=begin,
         end=end,
         sample=sample,
-        _values=values(selections[0], sample),
+        _values=values,
     )
 
 
@@ -316,7 +352,10 @@ def _arc_end(known: str | None, vertex: Vertex) -> tuple[float, CriticalAlpha]:
 
 
 def write_graphml(data: GraphData, file: str | Path) -> None:
-    """Write vertices and arcs as GraphML for other graph programs (arrays at the vertices as text, no functions)."""
+    """Write vertices and arcs as GraphML for other graph programs (arrays at the vertices as text, no functions).
+
+    In 3D the tangential arrays have both components of a node after each other.
+    """
     plain = nx.MultiGraph(complete=data.complete, standing=data.claims.standing.value)
     for v in data.vertices:
         plain.add_node(
@@ -324,7 +363,7 @@ def write_graphml(data: GraphData, file: str | Path) -> None:
             alpha=v.alpha,
             kind=v.kind.value,
             statuses=" ".join(_names(v.statuses)),
-            **{name: " ".join(map(repr, getattr(v, name).tolist())) for name in _VALUES},
+            **{name: " ".join(map(repr, np.ravel(getattr(v, name)).tolist())) for name in _VALUES},
         )
     for arc in data.arcs:
         plain.add_edge(

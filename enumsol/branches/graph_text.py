@@ -6,6 +6,7 @@ from collections import Counter
 from typing import TYPE_CHECKING
 
 from enumsol.branches.elements import VertexKind
+from enumsol.roots.root_set import by_axis
 from enumsol.support.messages import counted, html_lines, html_table
 
 if TYPE_CHECKING:
@@ -112,10 +113,11 @@ def vertices_frame(data: GraphData) -> pd.DataFrame:
             "kind": v.kind.value,
             "node": node,
             "active": " ".join(sorted(s.value for s in v.active[i])),
-            "lambda_n": v.lambda_n[i],
-            "lambda_t": v.lambda_t[i],
-            "u_n": v.u_n[i],
-            "u_t": v.u_t[i],
+            **{
+                column: part[i]
+                for name in ("lambda_n", "lambda_t", "u_n", "u_t")
+                for column, part in by_axis(name, getattr(v, name))
+            },
             "index_left": v.index_left,
             "index_right": v.index_right,
         }

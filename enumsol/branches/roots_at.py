@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from enumsol.arithmetic.rationals import rational
 from enumsol.condensation.affine import exactly_at
+from enumsol.model.problem import ContactProblem
 from enumsol.model.statuses import FRICTIONLESS, OPEN
 from enumsol.roots.builder import RootBuilder, in_order, root_family
 from enumsol.roots.components import connected_components
@@ -22,6 +23,7 @@ from enumsol.support.arguments import alpha_value
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from enumsol.branches.elements import Arc, Vertex
     from enumsol.branches.graph_data import GraphData
     from enumsol.selections.solution import Codes, SelectionSolution
     from enumsol.support.arguments import Alpha, AlphaLike
@@ -35,14 +37,24 @@ def roots_at(data: GraphData, alpha: AlphaLike) -> RootSet:
     InvalidArgumentError
         alpha is outside the interval.
     """
-    arcs, vertices, near = data.located(alpha)
+    return roots_on(data, alpha_value(alpha), *data.located(alpha))
+
+
+def roots_on(
+    data: GraphData, alpha: Alpha, arcs: Sequence[Arc], vertices: Sequence[Vertex] = (), near: Sequence[Vertex] = ()
+) -> RootSet:
+    """Those of some arcs, of vertices at ``alpha``, and of ones of which only bounds are known, ``alpha`` in them."""
+    if not isinstance(data.problem, ContactProblem):
+        from enumsol.branches.space.roots_on_arcs import roots_on_arcs  # for problems in 3D only
+
+        return roots_on_arcs(data, alpha, arcs, vertices, near)
     beside = {v.number for v in near}
-    arcs += [arc for arc in data.arcs if beside & {arc.tail, arc.head}]
+    arcs = [*arcs, *(arc for arc in data.arcs if beside & {arc.tail, arc.head})]
     codes = {c for arc in arcs for c in arc.selections} | {c for v in (*vertices, *near) for c in v.selections}
-    return roots_of(data, alpha_value(alpha), sorted(codes))
+    return _roots_of(data, alpha, sorted(codes))
 
 
-def roots_of(data: GraphData, alpha: Alpha, selections: Sequence[Codes]) -> RootSet:
+def _roots_of(data: GraphData, alpha: Alpha, selections: Sequence[Codes]) -> RootSet:
     """Roots and families that the selections have at ``alpha``; in floats where these find all of them."""
     problem = data.problem
     if data.exact is None or problem.modes is not None:

@@ -50,7 +50,9 @@ What checker and search share
       the same, with the derivatives of ``trusted.space.natural_map``; over an interval of alpha
       ``trusted.space.solution_curve``, the test that a box holds one curve of solutions,
       ``trusted.space.curve_chains``, that boxes hold one whole curve, and ``trusted.space.pieces``, what holds over a
-      piece of alpha; ``model.sectors``, the ends of sectors; ``condensation.space_condensed``, balls for S and g in the
+      piece of alpha (where such a curve changes its statuses or turns back is a matter of
+      ``trusted.space.curve_events``: a proof does not hold that, and it is not checked);
+      ``model.sectors``, the ends of sectors; ``condensation.space_condensed``, balls for S and g in the
       variables in which friction is isotropic; of bodies that nothing holds ``condensation.floating_space``, the same
       with G and h, and ``trusted.space.resultants``, what multipliers and balance prove; ``model.problem3d``,
       ``model.slip_mean`` and ``model.friction``, the data and their checks;

@@ -10,7 +10,7 @@ from enumsol.cli import options
 from enumsol.cli.common import (
     ExitStatus,
     finish,
-    load_problem,
+    load_any_problem,
     node_row,
     note,
     parse_interval,
@@ -25,6 +25,7 @@ from enumsol.errors import InvalidArgumentError
 if TYPE_CHECKING:
     from enumsol.branches import BranchGraph
     from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import ContactProblem3D
     from enumsol.support.arguments import Alpha
 
 
@@ -78,7 +79,7 @@ def graph(
     check_outputs(json=json_file, csv=csv_file)
     check_named_files(save=save_file, graphml=graphml_file, proof=proof_file)
     check_plot(plot_file)
-    interval, body = parse_interval(first, last), load_problem(problem)
+    interval, body = parse_interval(first, last), load_any_problem(problem)
     chosen = None if nodes is None else [body.node_ids[node_row(body, label.strip())] for label in nodes.split(",")]
     drawn: dict[str, Any] = {"quantity": quantity, "nodes": chosen, "title": problem, "units": parse_units(units)}
     if chosen is not None and quantity in ("norm", "sum_n", "sum_t"):
@@ -117,7 +118,7 @@ _STEPS = {
 
 
 def build(
-    problem: ContactProblem,
+    problem: ContactProblem | ContactProblem3D,
     interval: tuple[Alpha, Alpha],
     arithmetic: options.Arithmetic = "verified",
     jobs: int = 1,
@@ -145,7 +146,7 @@ def read_graph(file: str, problem: ContactProblem) -> BranchGraph:
     from enumsol.branches import BranchGraph
 
     found = BranchGraph.load(file)
-    if not _same_problem(found.problem, problem):
+    if not isinstance(found.problem, type(problem)) or not _same_problem(found.problem, problem):
         raise InvalidArgumentError(f"--graph is {file}, a graph of another problem; expected one of PROBLEM")
     return found
 

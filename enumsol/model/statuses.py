@@ -51,6 +51,15 @@ FORWARD, BACKWARD = 7, 8
 SLIDING = {FORWARD: (OPEN, SLIP_PLUS), BACKWARD: (OPEN, SLIP_MINUS)}
 
 
+def space_status(code: int, u_t: Floats) -> ContactStatus:
+    """The status in 3D of a final code, a sector among them; u_t, (2,), names that of a node without friction."""
+    if code == OPEN:
+        return ContactStatus.OPEN
+    if code == STICK or (code == FRICTIONLESS and not np.any(u_t)):
+        return ContactStatus.STICK
+    return ContactStatus.SLIP
+
+
 def contact_status(code: int, u_t: float) -> ContactStatus:
     """The status of a final code; the sign of u_t names the slip of a node without friction."""
     if code == FRICTIONLESS:

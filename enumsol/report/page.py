@@ -11,6 +11,7 @@ from enumsol.branches import BranchGraph
 from enumsol.branches.figures.graph_plots import checked_units
 from enumsol.errors import InvalidArgumentError
 from enumsol.loading.history import History
+from enumsol.model.problem import ContactProblem
 from enumsol.report.content import listed, report_content
 from enumsol.report.given import given_section, with_unit
 from enumsol.report.history_page import history_page
@@ -50,8 +51,8 @@ def write_report(
 
     It needs no network.
 
-    The page of a graph has the branches against alpha (pointing shows values and statuses, a click on a branch its
-    arcs), the number of solutions, a slider over alpha with the deformed bodies of all solutions (without a mesh:
+    The page of a graph in 2D has the branches against alpha (pointing shows values and statuses, a click on a branch
+    its arcs), the number of solutions, a slider over alpha with the deformed bodies of all solutions (without a mesh:
     forces and displacements of the contact nodes), tables of branches, transitions and folds, and what is certified. It
     says "complete" only where ``graph.complete`` does; of a graph that was cut short it says what is missing.
 
@@ -108,6 +109,8 @@ def write_report(
     place = file_path(file, "file")
     words = (instance_of(title, str, "title"), checked_units(units), tuple(commands), _checked_scene(scene))
     if isinstance(solutions, BranchGraph):
+        if not isinstance(solutions.problem, ContactProblem):
+            raise InvalidArgumentError("solutions is a graph of a problem in 3D; expected one in 2D, or a RootSet")
         page = report_page(solutions, *words)
     elif isinstance(solutions, RootSet):
         page = roots_page(solutions, *words)

@@ -487,7 +487,11 @@ def _region(item: Undecided) -> str:
 
 def _columns(name: str, arrays: list[NDArray[np.float64]]) -> list[tuple[str, NDArray[np.float64]]]:
     """A quantity of all roots as columns of a frame: one, or in 3D one an axis."""
-    values = np.concatenate(arrays) if arrays else np.zeros(0)
+    return by_axis(name, np.concatenate(arrays) if arrays else np.zeros(0))
+
+
+def by_axis(name: str, values: NDArray[np.float64]) -> list[tuple[str, NDArray[np.float64]]]:
+    """Values of nodes as columns with their names: one, or in 3D one an axis."""
     return [(name, values)] if values.ndim == 1 else [(f"{name}{k + 1}", values[:, k]) for k in range(values.shape[1])]
 
 

@@ -15,7 +15,7 @@ from enumsol.condensation.condensed import condensation_of
 from enumsol.condensation.floating import RigidRows
 from enumsol.condensation.floating_space import FloatingSpace
 from enumsol.errors import InvalidArgumentError
-from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, STICK, UNDECIDED, ContactStatus
+from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, STICK, UNDECIDED, ContactStatus, space_status
 from enumsol.roots.enumeration import Enumeration
 from enumsol.roots.root import Enclosure, Root
 from enumsol.roots.root_set import RootSet, Undecided
@@ -76,8 +76,7 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         outcome = self.outcome
         distinct, doubtful = self._distinct()
         roots = [
-            self._loose(root) if isinstance(root, LooseSolution) else self._root(codes, root)
-            for codes, root in distinct
+            self._loose(root) if isinstance(root, LooseSolution) else self.root(codes, root) for codes, root in distinct
         ]
         if self.unloaded:
             roots = [self._rest()]
@@ -101,7 +100,8 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
 
     # -- in the user's terms ---------------------------------------------------------------------------------------
 
-    def _root(self, codes: Codes, found: SpaceRoot) -> Root:
+    def root(self, codes: Codes, found: SpaceRoot) -> Root:
+        """The root that a leaf holds."""
         system, p = self.system, self.system.p
         forces, F = found.y.mid, system.F
         lambda_n = forces[:p] * system.force
@@ -113,8 +113,8 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         u_t = np.where((np.array(codes) == STICK)[:, None] & (F > 0), 0.0, u_t)
         return Root(
             alpha=self.alpha,
-            statuses=tuple(_status(code, u_t[i]) for i, code in enumerate(codes)),
-            active=tuple(frozenset((_status(code, u_t[i]),)) for i, code in enumerate(codes)),
+            statuses=tuple(space_status(code, u_t[i]) for i, code in enumerate(codes)),
+            active=tuple(frozenset((space_status(code, u_t[i]),)) for i, code in enumerate(codes)),
             lambda_n=lambda_n,
             lambda_t=lambda_t,
             u_n=u_n,
@@ -312,17 +312,9 @@ def _common(leaves: Sequence[tuple[ContactStatus | str | None, ...]]) -> tuple[C
 _DOUBTFUL = "two leaves hold roots that could not be told apart"
 
 
-def _status(code: int, u_t: Array) -> ContactStatus:
-    if code == OPEN:
-        return ContactStatus.OPEN
-    if code == STICK or (code == FRICTIONLESS and not np.any(u_t)):
-        return ContactStatus.STICK
-    return ContactStatus.SLIP
-
-
 def _possible(found: LooseSolution, i: int, u_t: Array, *, rubs: bool) -> list[ContactStatus]:
     """The statuses that a node may have."""
-    touching = [_status(FRICTIONLESS, u_t)] if found.stick[i] else []
+    touching = [space_status(FRICTIONLESS, u_t)] if found.stick[i] else []
     if rubs:
         touching = [ContactStatus.STICK] * bool(found.stick[i]) + [ContactStatus.SLIP] * bool(found.slip[i])
     return [ContactStatus.OPEN] * bool(found.open[i]) + touching

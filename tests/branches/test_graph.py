@@ -209,3 +209,9 @@ def test_kinds_of_vertices_are_texts_too(square, tmp_path):
     file.write_text(file.read_text().replace('"kind": "fold"', '"kind": "cusp"', 1))
     with pytest.raises(InvalidArgumentError, match=r"damaged .*'cusp'"):
         BranchGraph.load(file)
+
+
+def test_the_first_number_is_that_at_the_first_alpha_also_if_this_is_no_float():
+    graph = branch_graph(gallery.two_node_square(), ("1/10", "9/10"))
+    assert graph.steps[1:] == ([1, 1], [1])
+    assert graph.uniqueness_limit is None

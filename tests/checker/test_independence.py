@@ -93,6 +93,7 @@ SHARED = {
     },
     "trusted.space.solution_curve": None,
     "trusted.space.curve_chains": None,
+    "trusted.space.curve_events": None,
     "trusted.space.pieces": {"AlphaPiece"},
     "trusted.space.space_uniqueness": {
         *(

@@ -3,8 +3,7 @@
 import numpy as np
 import oracles3d
 import pytest
-from problems3d import from_compliance, random_coupled
-from scipy.optimize import brentq
+from problems3d import OneNode, from_compliance, random_coupled
 
 import enumsol
 from enumsol import InvalidArgumentError
@@ -91,82 +90,6 @@ def test_gradients_are_those_of_differences(seed, r):
 
 
 # -- one node: alpha is a function of the angle of slip ----------------------------------------------------------------
-
-
-def cross(a, b):
-    return a[0] * b[1] - a[1] * b[0]
-
-
-class OneNode:
-    """One node with isotropic friction; on its slipping branch alpha is a quotient of functions of the slip angle.
-
-    With d the direction of slip, n = g_n / (S_nn + F S_nt d), and v = g_t - n (S_tn + F S_tt d) has no part across d.
-    """
-
-    def __init__(self, seed, load):
-        rng = np.random.default_rng([seed, 3])
-        X = rng.normal(size=(3, 3))
-        self.S, self.load = X @ X.T + 0.05 * np.eye(3), load
-        self.g, self.slope = rng.normal(size=(2, 3))
-        self.g[0] += 1.0
-        self.F = float(rng.uniform(0.5, 4.0))
-
-    @property
-    def problem(self):
-        if self.load:
-            return from_compliance(self.S, self.g, self.F, load_slope=np.linalg.solve(self.S, self.slope))
-        return from_compliance(self.S, self.g, 0.0, friction_slope=1.0)
-
-    def _terms(self, phi):
-        """Numerator and denominator of alpha, with derivatives."""
-        S, d, e = self.S, np.array([np.cos(phi), np.sin(phi)]), np.array([-np.sin(phi), np.cos(phi)])
-        Sd, Se = S[1:, 1:] @ d, S[1:, 1:] @ e
-
-        def plain(g):
-            """Without friction."""
-            return tuple(cross(g[1:], t) * S[0, 0] - g[0] * cross(S[1:, 0], t) for t in (d, e))
-
-        def rubbing(g):
-            """What friction multiplies."""
-            s, ds = S[0, 1:] @ d, S[0, 1:] @ e
-            return (
-                cross(g[1:], d) * s - g[0] * cross(Sd, d),
-                cross(g[1:], e) * s + cross(g[1:], d) * ds - g[0] * (cross(Se, d) + cross(Sd, e)),
-            )
-
-        if not self.load:
-            return (*plain(self.g), *rubbing(self.g))
-        return tuple(
-            one + self.F * more for g in (self.g, self.slope) for one, more in zip(plain(g), rubbing(g), strict=True)
-        )
-
-    def alpha(self, phi):
-        a, _, b, _ = self._terms(phi)
-        return -a / b
-
-    def turning(self, phi):
-        a, da, b, db = self._terms(phi)
-        return da * b - a * db
-
-    def at(self, phi):
-        """alpha and the forces if the node slips in that direction, else None."""
-        alpha, d = self.alpha(phi), np.array([np.cos(phi), np.sin(phi)])
-        F = self.F if self.load else alpha
-        g = self.g + (alpha * self.slope if self.load else 0.0)
-        n = g[0] / (self.S[0, 0] + F * self.S[0, 1:] @ d)
-        v = g[1:] - n * (self.S[1:, 0] + F * self.S[1:, 1:] @ d)
-        return (alpha, n, n * F * d) if n > 0 and v @ d > 0 and F > 0 else None
-
-    def folds(self):
-        """Angles at which alpha turns back on the slipping branch."""
-        grid = np.linspace(-np.pi, np.pi, 2001)
-        values = self.turning(grid)
-        found = []
-        for k in np.flatnonzero(values[:-1] * values[1:] < 0):
-            phi = brentq(self.turning, grid[k], grid[k + 1], xtol=1e-15)
-            if abs(self.alpha(phi)) < 50 and self.at(phi) is not None:
-                found.append(phi)
-        return found
 
 
 def folds_met(load, most):

@@ -10,9 +10,10 @@ import numpy as np
 from enumsol.arithmetic.algebraic import EnclosedAlpha
 from enumsol.arithmetic.rationals import rational
 from enumsol.branches.assembly import make_vertex, sides_of, with_exact_zeros
-from enumsol.branches.elements import Arc
+from enumsol.branches.elements import Arc, ArcValues
 from enumsol.branches.enclosed.joining import EventPlaceKind
 from enumsol.model.statuses import FINAL, FRICTIONLESS, contact_status
+from enumsol.roots.slip_signs import named_statuses
 
 if TYPE_CHECKING:
     from collections.abc import Sequence, Set
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class TracedArcValues:
+class TracedArcValues(ArcValues):
     """Values in double arithmetic, with the rounding errors of S.
 
     Attributes
@@ -99,8 +100,7 @@ def _vertex(traced: TracedProblem, number: int, place: EventPlace, exact: Enclos
         exact,
         sides,
         with_exact_zeros(state, active) if settled else state,
-        active,
-        _slip_signs(traced, place.members, middle, active).__getitem__,
+        named_statuses(active, _slip_signs(traced, place.members, middle, active).__getitem__)[1],
         place.members,
         border=place.low == place.high and place.low in traced.interval,
         settled=settled,

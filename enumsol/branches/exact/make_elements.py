@@ -11,11 +11,11 @@ from flint import fmpq
 
 from enumsol.arithmetic.rationals import rational, to_fraction
 from enumsol.branches.assembly import degree_of, make_vertex, sides_of, with_exact_zeros
-from enumsol.branches.elements import Arc
+from enumsol.branches.elements import Arc, ArcValues
 from enumsol.model.statuses import RowKind, contact_status
 from enumsol.roots.builder import polytope
 from enumsol.roots.root import RootFamily
-from enumsol.roots.slip_signs import sign_over
+from enumsol.roots.slip_signs import named_statuses, sign_over
 from enumsol.selections.functions import SelectionFunctions
 from enumsol.selections.ordered_field import FiberSelections, as_float
 from enumsol.selections.polytopes import dot
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class ExactArcValues:
+class ExactArcValues(ArcValues):
     """Values from exact functions, rounded last.
 
     Attributes
@@ -118,8 +118,7 @@ def _vertex(gluing: Gluing, number: int, glued: GluedVertex, sides: Sides) -> Ve
         glued.alpha,
         sides,
         _values(gluing, glued),
-        glued.active,
-        partial(_slip_sign, gluing, glued),
+        named_statuses(glued.active, partial(_slip_sign, gluing, glued))[1],
         glued.members,
         border=border,
         settled=glued.settled,

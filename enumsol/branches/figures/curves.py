@@ -23,7 +23,7 @@ _FIRST, _MOST = 9, 1025
 
 
 class Curve(NamedTuple):
-    """Points along an arc: alphas (k,), lambda and w there (k, 2p), and the quantities drawn (k, columns)."""
+    """Points along an arc: alphas (k,), lambda and w there (k, 2p), in 3D (k, 3p), and what is drawn (k, columns)."""
 
     alphas: Floats
     forces: Floats
@@ -93,7 +93,9 @@ class _Polygon:
         points = [self._arc.state(float(alpha)) for alpha in alphas[: 1 if lo == hi else None]]
         points *= 1 if len(points) == len(alphas) else len(alphas)
         forces, moves = (np.array([point[part] for point in points]) for part in (0, 1))
-        values = np.concatenate([columns(item, forces, moves) for item in self._quantities], axis=1)
+        values = np.concatenate(
+            [columns(item, forces, moves, len(self._arc.statuses)) for item in self._quantities], axis=1
+        )
         return Curve(alphas, forces, moves, values)
 
     def refine(self, width: float, height: Floats, tolerance: float) -> None:
@@ -223,16 +225,23 @@ def quantity_of(name: Any) -> Quantity:
     return QUANTITIES[one_of(name, "quantity", QUANTITIES)]
 
 
-def columns(quantity: Quantity, forces: Floats, moves: Floats) -> Floats:
-    """Values at solutions, shape (..., p), or (..., 1) of an overview, from lambda and w of shape (..., 2p)."""
-    p = forces.shape[-1] // 2
+def columns(quantity: Quantity, forces: Floats, moves: Floats, p: int) -> Floats:
+    """Values at solutions of p nodes, shape (..., p), or (..., 1) of an overview.
+
+    lambda and w have shape (..., 2p), or in 3D (..., 3p); then tangential values are lengths of vectors.
+    """
     if quantity.name == "norm":
         return np.asarray(np.linalg.norm(forces, axis=-1, keepdims=True))
     part = moves if quantity.dimension == "length" else forces
-    half = part[..., :p] if quantity.name.endswith("_n") else part[..., p:]
-    return half if quantity.by_node else np.sum(half, axis=-1, keepdims=True)
+    if quantity.name.endswith("_n"):
+        return part[..., :p] if quantity.by_node else np.sum(part[..., :p], axis=-1, keepdims=True)
+    along = part[..., p:].reshape(*part.shape[:-1], -1, p)
+    along = along if quantity.by_node else np.sum(along, axis=-1, keepdims=True)
+    return along[..., 0, :] if part.shape[-1] == 2 * p else np.asarray(np.linalg.norm(along, axis=-2))
 
 
 def state_columns(quantity: Quantity, state: Any) -> Floats:
     """The same of a vertex, or of another state with lambda_n, lambda_t, u_n and u_t."""
-    return columns(quantity, np.concatenate([state.lambda_n, state.lambda_t]), np.concatenate([state.u_n, state.u_t]))
+    pairs = (state.lambda_n, state.lambda_t), (state.u_n, state.u_t)
+    forces, moves = (np.concatenate([normal, along.ravel(order="F")]) for normal, along in pairs)
+    return columns(quantity, forces, moves, len(state.statuses))

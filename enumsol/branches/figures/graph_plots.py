@@ -72,7 +72,8 @@ def plot_graph(
     ----------
     quantity : {"norm", "sum_n", "sum_t", "lambda_n", "lambda_t", "u_n", "u_t"}, optional
         The first three are overviews: norm of all contact forces (the default), sums of normal and of tangential
-        forces. The others are of single nodes; default "lambda_n" if nodes are named.
+        forces. The others are of single nodes; default "lambda_n" if nodes are named. In 3D tangential ones are the
+        lengths of vectors.
     nodes : sequence of node labels, optional
         Default: all of up to three nodes, otherwise the three on which branches differ most.
     multiplicity : bool

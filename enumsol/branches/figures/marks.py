@@ -19,6 +19,7 @@ STATUS_STYLES: dict[ContactStatus, Any] = {
     ContactStatus.STICK: (0, (5, 2.5)),
     ContactStatus.SLIP_PLUS: (0, (6, 1.6, 1.2, 1.6)),
     ContactStatus.SLIP_MINUS: (0, (1.2, 1.6)),
+    ContactStatus.SLIP: (0, (6, 1.6, 1.2, 1.6)),
 }
 #: Of overviews, by the index of the arc.
 INDEX_STYLES: dict[int | None, Any] = {1: "-", -1: (0, (5, 2.5)), None: (0, (1.2, 1.6))}

@@ -57,7 +57,7 @@ def family_range(problem: ContactProblem, v: Vertex, quantity: Quantity, column:
     if family is None:
         value = float(state_columns(quantity, v)[column])
         return value, value
-    values = columns(quantity, *family_states(problem, v.alpha, family))[:, column]
+    values = columns(quantity, *family_states(problem, v.alpha, family), problem.p)[:, column]
     return float(np.min(values)), float(np.max(values))
 
 
@@ -76,7 +76,7 @@ def sheet_range(
     for alpha in alphas[1:-1]:
         points = np.concatenate([family.vertices for family in roots_at(float(alpha)).families])
         forces = points.transpose(0, 2, 1).reshape(len(points), -1)
-        values = columns(quantity, forces, forces)[:, column]
+        values = columns(quantity, forces, forces, problem.p)[:, column]
         ranges.append((float(values.min()), float(values.max())))
     first, last = (family_range(problem, v, quantity, column) for v in ends)
     low, high = np.array([first, *ranges, last]).T

@@ -13,6 +13,7 @@ import numpy as np
 from enumsol.continuation.follow import follow
 from enumsol.continuation.path_data import PathStatus
 from enumsol.errors import EnumsolError
+from enumsol.support.deadlines import look
 from enumsol.trusted.space.curve_chains import CurveChain, CurveLink, goes_on, link_between
 from enumsol.trusted.space.solution_curve import (
     ERRORS,
@@ -179,6 +180,7 @@ class ChainBuilder:
         """
         way = 1.0
         while place < last:
+            look()
             further = min(place + way, last)
             end = joints[0] if closed and further == last else None
             found = self._link(line, place, further, joints[-1], links[-1] if links else None, end)

@@ -5,6 +5,7 @@ The tree finds the curves (theory, section 12.9): at a solution that lies in no 
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
@@ -18,10 +19,13 @@ from enumsol.proof.space_records import CurveBoxRecord
 from enumsol.proof.writer import ProofWriter, unit_exponents
 from enumsol.search.space.piece_tree import OpenLeaf, PieceTree
 from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.support.deadlines import TimeOverError
 from enumsol.trusted.space.curve_chains import apart, leaves_interval
 from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from enumsol.branches.space.chains import Chain
@@ -79,8 +83,8 @@ class SpaceCover:
         system = SpaceSolvers(self.problem, sum(self.interval) / 2, "verified").system
         return system.force, system.length
 
-    def search(self, max_nodes: int | None = None) -> None:
-        """Search the tree.
+    def search(self, max_nodes: int | None = None, progress: Callable[[str, float], object] | None = None) -> None:
+        """Search the tree; ``progress`` is called as by ``branch_graph``.
 
         Raises
         ------
@@ -88,17 +92,23 @@ class SpaceCover:
             The data cannot be enclosed.
         """
         given = AlphaProblem.of(self.problem.enclosure)
+        tick = None if progress is None else lambda share: progress("search", share)
 
         def more(x: Array) -> list[CurveBox]:
             # what is left open costs as much at every further point of the same curve
-            chain = chain_through(given, self.problem, x, self.interval) if self.failed < _FAILURES else None
+            chain = None
+            with suppress(TimeOverError):
+                if self.failed < _FAILURES:
+                    chain = chain_through(given, self.problem, x, self.interval)
             if chain is None or not self._is_new(chain):
                 self.failed += 1
                 return []
             self.chains.append(chain)
             return chain.boxes
 
-        tree = PieceTree(self.problem.enclosure, self.interval, self._units(), more=more, max_nodes=max_nodes)
+        tree = PieceTree(
+            self.problem.enclosure, self.interval, self._units(), more=more, max_nodes=max_nodes, tick=tick
+        )
         self.records = tree.run()
         self.nodes, self.stopped = tree.nodes, tree.stopped
 

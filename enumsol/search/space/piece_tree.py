@@ -90,6 +90,8 @@ class PieceTree:
         Called with a solution (forces and alpha, in the units of the problem) that lies in none of them; gives boxes
         along its curve, which lie in ``boxes`` then.
     max_nodes : int, optional
+    tick : callable, optional
+        Called with the share of the tree that is done, every child of a node being as large as the others.
     smallest : pieces are cut down to this share of the interval
 
     Attributes
@@ -107,10 +109,11 @@ class PieceTree:
         boxes: Sequence[CurveBox] = (),
         more: Callable[[Array], Sequence[CurveBox]] | None = None,
         max_nodes: int | None = None,
+        tick: Callable[[float], object] | None = None,
         smallest: float = 2.0**-30,
     ) -> None:
         self._enclosure, self._units, self.interval = enclosure, units, interval
-        self._more, self._most = more, max_nodes
+        self._more, self._most, self._tick = more, max_nodes, tick
         self._least = Fraction(smallest) * (interval[1] - interval[0])
         self._pieces: OrderedDict[tuple[Fraction, Fraction], _Examined] = OrderedDict()
         self.nodes = 0
@@ -146,6 +149,7 @@ class PieceTree:
         """Records of the tree, in the order of a walk; what is open is an OpenLeaf."""
         records: list[Any] = []
         stack: list[Any] = [(*self.interval, (UNDECIDED,) * self._enclosure.problem.p, None, -1, False)]
+        sizes, done = [1.0], 0.0
         while stack:
             if self.stopped is None and self._most is not None and self.nodes >= self._most:
                 self.stopped = StopReason.NODE_LIMIT
@@ -154,7 +158,7 @@ class PieceTree:
                     look()
                 except TimeOverError:
                     self.stopped = StopReason.TIME_LIMIT
-            low, high, codes, *others = stack.pop()
+            (low, high, codes, *others), size = stack.pop(), sizes.pop()
             if self.stopped is not None:
                 records.append(OpenLeaf(low, high, codes, None))
                 continue
@@ -162,6 +166,10 @@ class PieceTree:
             record, below = self._step(low, high, codes, *others)
             records.append(record)
             stack += below[::-1]
+            sizes += [size / len(below)] * len(below) if below else []
+            done += 0.0 if below else size
+            if self._tick is not None:
+                self._tick(min(done, 1.0))
         return records
 
     def _step(

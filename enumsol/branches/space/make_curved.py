@@ -1,0 +1,290 @@
+"""Vertices and arcs in the user's terms, made from whole curves in 3D (theory, section 12.10)."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from enumsol.arithmetic.algebraic import EnclosedAlpha
+from enumsol.arithmetic.rationals import rational
+from enumsol.branches.assembly import make_vertex, sides_of, with_exact_zeros
+from enumsol.branches.elements import Arc, ArcValues, VertexKind, tangential
+from enumsol.branches.space.pieces import Run, Turn
+from enumsol.model.statuses import space_status
+from enumsol.trusted.space.solution_curve import curve_point
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence, Set
+
+    from numpy.typing import NDArray
+
+    from enumsol.branches.assembly import Sides
+    from enumsol.branches.elements import Pair, Vertex
+    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.model.statuses import ContactStatus
+    from enumsol.selections.solution import Codes
+    from enumsol.trusted.space.solution_curve import AlphaProblem
+
+    Array = NDArray[np.float64]
+    Bounds = tuple[Fraction, Fraction]
+
+#: Steps to the parameter of an alpha, and how near that comes, relative to the larger of 1 and alpha.
+_STEPS, _NEAR = 60, 2.0**-50
+
+
+@dataclass(frozen=True, eq=False)
+class CurvedArcValues(ArcValues):
+    """Values in double arithmetic along a part of a curve on which alpha goes one way.
+
+    Attributes
+    ----------
+    given : AlphaProblem
+    problem : ContactProblem3D
+    codes : statuses
+    knots : (K + 1, 3p + 1) array
+        Points (lambda_n, both lambda_t, alpha) in the order of alpha.
+    borders : (K, 3p + 1) array
+        Rows of the parameter between two of them.
+    """
+
+    given: AlphaProblem
+    problem: ContactProblem3D
+    codes: Codes
+    knots: Array
+    borders: Array
+
+    def point(self, alpha: float) -> Array:
+        """Forces and alpha of the solution on the arc; beside its ends those of its first or last knot."""
+        k = bisect_right(self.knots[:, -1].tolist(), alpha) - 1
+        if not 0 <= k < len(self.borders):
+            return np.asarray(self.knots[max(0, min(k, len(self.borders)))])
+        start, end, border = self.knots[k], self.knots[k + 1], self.borders[k]
+        low, high, share = 0.0, 1.0, float((alpha - start[-1]) / (end[-1] - start[-1]))
+        x: Array = start + share * (end - start)
+        for _ in range(_STEPS):
+            found = curve_point(self.given, start + share * (end - start), border)
+            if found is None:
+                break
+            x, off = found.x, float(found.x[-1] - alpha)
+            if abs(off) <= _NEAR * max(1.0, abs(alpha)):
+                break
+            low, high = (share, high) if off < 0 else (low, share)
+            # by the curve's direction, which has the product one with the border
+            length = float(border @ (end - start))
+            rate = float(found.direction[-1]) * length
+            ahead = share - off / rate if rate else low
+            share = ahead if low < ahead < high else 0.5 * (low + high)
+        return x
+
+    def at(self, alpha: Fraction) -> Pair:
+        """Forces and displacements at an alpha."""
+        return state_of(self.problem, self.point(float(alpha)), [{code} for code in self.codes])
+
+    def record(self) -> dict[str, Any]:
+        """Its points, and the rows of the parameter between them."""
+        return {"knots": self.knots.tolist(), "borders": self.borders.tolist()}
+
+
+def state_of(problem: ContactProblem3D, x: Array, active: Sequence[Set[int]]) -> Pair:
+    """Forces and displacements of forces and alpha x, with the zeros of the statuses that hold at every node."""
+    forces, condensed = x[:-1], problem.condensed
+    w = condensed.free_displacements(float(x[-1])) - condensed.S @ forces
+    return with_exact_zeros((forces + 0.0, w), active)
+
+
+@dataclass
+class _Place:
+    """Where a vertex will be."""
+
+    alphas: Bounds
+    x: Array
+    selections: tuple[Codes, ...]
+    border: bool
+    settled: bool
+
+
+@dataclass
+class _Piece:
+    """An arc that will be, and the numbers of its places."""
+
+    run: Run
+    ends: tuple[int, int]
+    begin: Fraction | None
+    end: Fraction | None
+
+
+@dataclass
+class CurvedGraph:
+    """Vertices and arcs of whole curves over an interval.
+
+    Attributes
+    ----------
+    problem : ContactProblem3D
+    given : AlphaProblem
+    interval : first and last alpha
+    """
+
+    problem: ContactProblem3D
+    given: AlphaProblem
+    interval: Bounds
+    reasons: list[str] = field(default_factory=list)
+    _places: list[_Place] = field(default_factory=list)
+    _pieces: list[_Piece] = field(default_factory=list)
+
+    # -- curves ----------------------------------------------------------------------------------------------------
+
+    def add(self, parts: Sequence[Run | Turn]) -> None:
+        """Take in a whole curve; only what lies over the interval."""
+        known: dict[int, int] = {}
+        for part in parts:
+            if isinstance(part, Turn) and not part.settled and self._side(part.alphas) in (0, None):
+                low, high = (float(end) for end in part.alphas)
+                self.reasons.append(
+                    f"between alpha = {low!r} and {high!r} it stayed open how a curve changes its statuses or turns"
+                )
+        for k, part in enumerate(parts):
+            if isinstance(part, Run):
+                self._take(parts, k, known)
+
+    def _take(self, parts: Sequence[Run | Turn], k: int, known: dict[int, int]) -> None:
+        run = parts[k]
+        if not isinstance(run, Run):
+            return
+        # in the order of alpha; a closed curve goes on from its end to its first turn
+        before, after = k - 1, (k + 1) % len(parts) if isinstance(parts[0], Turn) else k + 1
+        ends = [(before, run.start), (after, run.end)][:: run.rises]
+        sides = [self._side(self._alphas(parts, number, beyond)) for number, beyond in ends]
+        if sides[0] == 1 or sides[1] == -1:
+            return
+        numbers: list[int] = []
+        inner: list[Fraction | None] = []
+        for (number, beyond), side, way in zip(ends, sides, (-1, 1), strict=True):
+            if side == way:
+                numbers.append(self._border(run, self.interval[way > 0]))
+                inner.append(None)
+                continue
+            # a whole curve ends beyond the interval
+            turn = cast("Turn", parts[number])
+            if number not in known:
+                known[number] = self._turn(turn, settled=turn.settled and side == 0)
+            numbers.append(known[number])
+            settled = self._places[known[number]].settled
+            # beside what is open an arc is known to hold up to its last point
+            reach = beyond if not turn.settled else turn.alphas
+            inner.append(None if settled else reach[way < 0])
+        begin, end = (self._limits(numbers[j], inner[j]) for j in (0, 1))
+        if begin < end:
+            self._pieces.append(_Piece(run, (numbers[0], numbers[1]), inner[0], inner[1]))
+        else:
+            self.reasons.append(f"an arc near alpha = {float(begin)!r} is too short to be told")
+
+    def _limits(self, number: int, inner: Fraction | None) -> Fraction:
+        return sum(self._places[number].alphas, Fraction(0)) / 2 if inner is None else inner
+
+    def _alphas(self, parts: Sequence[Run | Turn], number: int, beyond: Bounds) -> Bounds:
+        """Bounds of alpha at an end of a run."""
+        turn = parts[number] if 0 <= number < len(parts) else None
+        return turn.alphas if isinstance(turn, Turn) else beyond
+
+    def _side(self, alphas: Bounds) -> int | None:
+        """-1 below the interval, 0 inside, 1 above it; None where it may be either."""
+        (a, b), (low, high) = self.interval, alphas
+        if high < a:
+            return -1
+        if low > b:
+            return 1
+        return 0 if a < low and high < b else None
+
+    def _border(self, run: Run, alpha: Fraction) -> int:
+        x = self._values(run).point(float(alpha))
+        self._places.append(_Place((alpha, alpha), x, (run.codes,), border=True, settled=True))
+        return len(self._places) - 1
+
+    def _turn(self, turn: Turn, *, settled: bool) -> int:
+        a, b = self.interval
+        alphas = turn.alphas if settled else (max(turn.alphas[0], a), min(turn.alphas[1], b))
+        if not settled and turn.settled:
+            low, high = (float(end) for end in turn.alphas)
+            self.reasons.append(
+                f"whether a change between alpha = {low!r} and {high!r} lies inside the interval stayed open"
+            )
+        self._places.append(_Place(alphas, turn.x, turn.selections, border=False, settled=settled))
+        return len(self._places) - 1
+
+    def _values(self, run: Run) -> CurvedArcValues:
+        knots, borders = np.array(run.knots)[:: run.rises], np.array(run.borders)[:: run.rises]
+        return CurvedArcValues(self.given, self.problem, run.codes, knots, borders)
+
+    # -- in the user's terms ---------------------------------------------------------------------------------------
+
+    def made(self) -> tuple[list[Vertex], list[Arc]]:
+        """Vertices in the order of alpha, and arcs."""
+        order = sorted(range(len(self._places)), key=lambda k: self._places[k].alphas)
+        number = {old: new for new, old in enumerate(order)}
+        places = [self._places[k] for k in order]
+        exact = [EnclosedAlpha(*map(rational, place.alphas)) for place in places]
+        pieces = sorted(self._pieces, key=lambda piece: (number[piece.ends[0]], number[piece.ends[1]]))
+        arcs = [self._arc(k, piece, number, exact) for k, piece in enumerate(pieces)]
+        sides = sides_of(arcs, len(places))
+        vertices = [self._vertex(k, place, exact[k], sides[k]) for k, place in enumerate(places)]
+        self.reasons += unordered(vertices)
+        return vertices, arcs
+
+    def _arc(self, number: int, piece: _Piece, numbers: dict[int, int], exact: Sequence[EnclosedAlpha]) -> Arc:
+        run = piece.run
+        tail, head = (numbers[end] for end in piece.ends)
+        begin, end = (
+            exact[vertex] if known is None else EnclosedAlpha(rational(known), rational(known))
+            for vertex, known in ((tail, piece.begin), (head, piece.end))
+        )
+        low, high = begin.enclosure()[1], end.enclosure()[0]
+        sample, values = (low + high) / 2, self._values(run)
+        return Arc(
+            number=number,
+            statuses=self._statuses(run.codes, values.at(sample)),
+            lo=float(begin),
+            hi=float(end),
+            tail=tail,
+            head=head,
+            index=run.index or None,
+            selections=(run.codes,),
+            begin=begin,
+            end=end,
+            sample=sample,
+            _values=values,
+        )
+
+    def _statuses(self, codes: Codes, state: Pair) -> tuple[ContactStatus, ...]:
+        slip = tangential(state[1], self.problem.p)
+        return tuple(map(space_status, codes, slip))
+
+    def _vertex(self, number: int, place: _Place, exact: EnclosedAlpha, sides: Sides) -> Vertex:
+        active = [frozenset(codes) for codes in zip(*place.selections, strict=True)]
+        state = state_of(self.problem, place.x, active if place.settled else [frozenset()] * self.problem.p)
+        named = [self._statuses(codes, state) for codes in place.selections]
+        names = tuple(frozenset(held) for held in zip(*named, strict=True))
+        return make_vertex(
+            number,
+            exact,
+            sides,
+            state,
+            names,
+            place.selections,
+            border=place.border,
+            settled=place.settled,
+        )
+
+
+def unordered(vertices: Sequence[Vertex]) -> list[str]:
+    """Vertices at which the number of solutions changes and which bounds of alpha do not put in an order."""
+    changing = [v for v in vertices if not v.border and v.kind not in (VertexKind.TRANSITION, VertexKind.UNSETTLED)]
+    return [
+        f"which of the vertices {one.number} and {other.number} is at the smaller alpha stayed open, near {one.alpha!r}"
+        for k, one in enumerate(changing)
+        for other in changing[k + 1 :]
+        if one.exact.compare(other.exact) == 0
+    ]

@@ -1,0 +1,375 @@
+"""What a whole curve in 3D says over alpha: runs on which statuses hold and alpha goes one way, and turns between them.
+
+A turn is where exactly one condition changes its sign, or where alpha turns back, once; a part of the curve of which
+neither could be shown is left open (theory, section 12.10).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.support.deadlines import look
+from enumsol.trusted.space.curve_events import CurveMotion
+from enumsol.trusted.space.solution_curve import box_around, curve_point, lies_in, only_curve, parameter_in
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from enumsol.selections.solution import Codes
+    from enumsol.trusted.space.curve_chains import CurveChain, CurveLink
+    from enumsol.trusted.space.solution_curve import AlphaProblem, CurvePoint, SolutionCurve
+
+    Array = NDArray[np.float64]
+
+#: How often a part is halved; of bisections in floats; how far from what they find the points beside it are put first,
+#: relative to the part, by what factor farther then, and how often.
+_HALVINGS, _BISECTIONS = 10, 60
+_BESIDE, _FARTHER, _TRIALS = 2.0**-44, 8.0, 12
+#: The same beside a smooth fold, where alpha is a square of the distance.
+_BESIDE_FOLD = 2.0**-24
+#: Parts are longer than the way between their ends by this, and wider than their ends are known.
+_LONGER, _ROUNDED = 1.05, 16.0
+#: Where a part is cut: at the first of these shares where the solution is regular.
+_CUTS = (0.5, 0.4375, 0.59375)
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A proven point of a curve, at which all statuses hold strictly.
+
+    Attributes
+    ----------
+    point : SolutionCurve
+        Without length.
+    motion : CurveMotion
+        With the border of the link that it lies in.
+    """
+
+    point: SolutionCurve
+    motion: CurveMotion
+
+    @property
+    def codes(self) -> Codes:
+        """The statuses."""
+        return tuple(code for code in self.point.statuses if code is not None)
+
+    @cached_property
+    def x(self) -> Array:
+        """Forces and alpha, in the middle of their bounds."""
+        return self.point.at(0.0).mid
+
+    @property
+    def alphas(self) -> tuple[Fraction, Fraction]:
+        """Bounds of alpha."""
+        return self.point.alphas
+
+    @cached_property
+    def rises(self) -> int:
+        """The sign of d alpha / dt; 0 where it is not known."""
+        return self.motion.rises(self.codes)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A part of a curve on which alpha goes one way and the statuses stay.
+
+    Attributes
+    ----------
+    codes : statuses
+    rises : int
+    index : int
+        Of the roots on it.
+    knots : sequence of (3p + 1,) arrays
+        Points on it, in floats, in the order of the curve.
+    borders : sequence of (3p + 1,) arrays
+        Rows of the parameter between two of them.
+    start, end : pairs of Fraction
+        Bounds of alpha at its first and last point that is known.
+    """
+
+    codes: Codes
+    rises: int
+    index: int
+    knots: tuple[Array, ...]
+    borders: tuple[Array, ...]
+    start: tuple[Fraction, Fraction]
+    end: tuple[Fraction, Fraction]
+
+    def joined(self, other: Run) -> Run:
+        """With the run that goes on from it."""
+        knots, borders = (*self.knots, *other.knots[1:]), (*self.borders, *other.borders)
+        return replace(self, knots=knots, borders=borders, end=other.end)
+
+
+@dataclass(frozen=True, eq=False)
+class Turn:
+    """Between two runs.
+
+    Attributes
+    ----------
+    alphas : pair of Fraction
+        Between them is all alpha of it.
+    x : (3p + 1,) array
+        A point of it, in floats.
+    selections : statuses on both sides, one or two
+    settled : bool
+        One condition changes its sign once, or alpha turns back once, and nothing else happens.
+    """
+
+    alphas: tuple[Fraction, Fraction]
+    x: Array
+    selections: tuple[Codes, ...]
+    settled: bool
+
+
+def runs_and_turns(problem: AlphaProblem, chain: CurveChain) -> list[Run | Turn]:
+    """Those of a whole curve, in its order; runs and turns alternate.
+
+    Begins and ends with a run, but for a curve that is closed and has a turn: it begins with that and ends with a run.
+    """
+    found: list[Run | Turn] = []
+    for link, start, end in zip(chain.links, chain.joints[:-1], chain.joints[1:], strict=True):
+        look()
+        for part in LinkCutter(problem, link).parts(start, end):
+            _append(found, part)
+    if chain.closed:
+        first = next((k for k, part in enumerate(found) if isinstance(part, Turn)), 0)
+        ahead, found = found[:first], found[first:]
+        for part in ahead:
+            _append(found, part)
+    return found
+
+
+def _append(found: list[Run | Turn], part: Run | Turn) -> None:
+    """Put a part behind others: a run goes on where the statuses and the direction are those of the last one."""
+    if not found or isinstance(part, Run) != isinstance(found[-1], Run):
+        found.append(part)
+        return
+    last = found.pop()
+    if isinstance(last, Run) and isinstance(part, Run):
+        if (last.codes, last.rises) != (part.codes, part.rises):
+            raise AssertionError("a curve changes at a regular point")
+        found.append(last.joined(part))
+    elif isinstance(last, Turn) and isinstance(part, Turn):
+        ends = (*last.alphas, *part.alphas)
+        selections = tuple(dict.fromkeys((*last.selections, *part.selections)))
+        found.append(Turn((min(ends), max(ends)), part.x, selections, settled=False))
+
+
+class LinkCutter:
+    """Cuts the curve of a link into runs and turns.
+
+    Parts have the border of the link and end in solutions that lie in its box. Two curves with the same border that
+    share a point go on together as long as both are in their boxes, of which they do not reach the sides.
+    """
+
+    def __init__(self, problem: AlphaProblem, link: CurveLink) -> None:
+        self.problem, self.curve = problem, link.curve
+        self.border = link.curve.box.border
+
+    def parts(self, start: SolutionCurve, end: SolutionCurve) -> list[Run | Turn]:
+        """From one joint to another one."""
+        return self._cut(self.curve, self._place(start), self._place(end), None, _HALVINGS)
+
+    def _place(self, point: SolutionCurve) -> Place:
+        return Place(point, CurveMotion(self.problem, point, self.border))
+
+    def _cut(
+        self, curve: SolutionCurve | None, start: Place, end: Place, codes: Codes | None, times: int
+    ) -> list[Run | Turn]:
+        """Runs and turns between two places.
+
+        Parameters
+        ----------
+        curve : one in whose box both places lie, None to look for one
+        codes : the statuses that hold all along, if that is known
+        times : how often it may be halved
+        """
+        curve = self._between(start, end) if curve is None else curve
+        if curve is not None:
+            motion = CurveMotion(self.problem, curve)
+            corner = None
+            if codes is None:
+                codes, corner = self._statuses(motion, start, end)
+            found = None
+            if corner is not None:
+                found = self._corner(motion, start, end, corner, times)
+            elif codes is not None:
+                found = self._smooth(motion, start, end, codes)
+            if found is not None:
+                return found
+        middle = self._middle(start, end) if times else None
+        if middle is None:
+            return [self._left_open(curve, start, end)]
+        halves = (start, middle), (middle, end)
+        found = []
+        for one, other in halves:
+            for part in self._cut(None, one, other, codes, times - 1):
+                _append(found, part)
+        return found
+
+    def _statuses(self, motion: CurveMotion, start: Place, end: Place) -> tuple[Codes | None, int | None]:
+        """The statuses that hold all along, or the node that changes its status exactly once, or neither."""
+        loose = [i for i, codes in enumerate(motion.possible) if len(codes) > 1]
+        if not loose:
+            return start.codes, None
+        if len(loose) > 1 or len(motion.possible[loose[0]]) > 2:
+            return None, None
+        i, here = loose[0], start.codes
+        other = next((code for code in motion.possible[i] if code != here[i]), here[i])
+        # the condition passes zero once at most
+        if not motion.decides(here, i, other):
+            return None, None
+        return (here, None) if here == end.codes else (None, i)
+
+    def _smooth(self, motion: CurveMotion, start: Place, end: Place, codes: Codes) -> list[Run | Turn] | None:
+        """Where the statuses do not change: one run, or two with a fold between them."""
+        rises = motion.rises(codes)
+        if rises:
+            return [self._run(start, end, codes, rises)]
+        if not (start.rises and end.rises and motion.bends(codes)):
+            return None
+        # the derivative of alpha is monotone
+        if start.rises == end.rises:
+            return [self._run(start, end, codes, start.rises)]
+        sides = self._beside(start, end, lambda point: bool(point.direction[-1] > 0), _BESIDE_FOLD)
+        if sides is None or [side.rises for side in sides] != [start.rises, end.rises]:
+            return None
+        alphas = self._fold(*sides)
+        turn = Turn(alphas, 0.5 * (sides[0].x + sides[1].x), (codes,), settled=True)
+        before, after = self._run(start, sides[0], codes, start.rises), self._run(sides[1], end, codes, end.rises)
+        return [before, turn, after]
+
+    def _corner(self, motion: CurveMotion, start: Place, end: Place, i: int, times: int) -> list[Run | Turn] | None:
+        """Where one node changes its status once."""
+        one, other = start.codes, end.codes
+        sides = self._beside(start, end, lambda point: point.statuses[i] == one[i], _BESIDE)
+        if sides is None or (sides[0].codes, sides[1].codes) != (one, other):
+            return None
+        near = self._between(*sides)
+        motion = motion if near is None else CurveMotion(self.problem, near)
+        if not (motion.rises(one) and motion.rises(other)):
+            return None
+        step = self._step(*sides)
+        reach = Fraction(0)
+        for codes in (one, other):
+            speed = motion.speed(codes)
+            if speed is None:
+                return None
+            reach = max(reach, Fraction(float(speed.size[-1])) * step)
+        alphas = sides[0].alphas[0] - reach, sides[0].alphas[1] + reach
+        turn = Turn(alphas, 0.5 * (sides[0].x + sides[1].x), (one, other), settled=True)
+        found: list[Run | Turn] = []
+        for part in (
+            *self._cut(self.curve, start, sides[0], one, times - 1),
+            turn,
+            *self._cut(self.curve, sides[1], end, other, times - 1),
+        ):
+            _append(found, part)
+        return found
+
+    # -- places ----------------------------------------------------------------------------------------------------
+
+    def _near(self, start: Place, end: Place, share: float) -> CurvePoint | None:
+        """The point of the curve with this share of the way, in floats."""
+        return curve_point(self.problem, start.x + share * (end.x - start.x), self.border)
+
+    def _at(self, start: Place, end: Place, share: float) -> Place | None:
+        """The place there, proven."""
+        near = self._near(start, end, share)
+        if near is None:
+            return None
+        box = box_around(self.problem, near.x, near.direction, self.border, 0.0, roomy=False)
+        point = None if box is None else only_curve(self.problem, box)
+        if point is None or None in point.statuses or not lies_in(self.curve.box, point.at(0.0)):
+            return None
+        return self._place(point)
+
+    def _middle(self, start: Place, end: Place) -> Place | None:
+        found = (self._at(start, end, share) for share in _CUTS)
+        return next((place for place in found if place is not None), None)
+
+    def _beside(
+        self, start: Place, end: Place, is_before: Callable[[CurvePoint], bool], least: float
+    ) -> tuple[Place, Place] | None:
+        """Places close to where something changes, on both sides of it."""
+        low, high = 0.0, 1.0
+        for _ in range(_BISECTIONS):
+            middle = 0.5 * (low + high)
+            point = self._near(start, end, middle)
+            if point is None or middle in (low, high):
+                break
+            low, high = (middle, high) if is_before(point) else (low, middle)
+        share, away = 0.5 * (low + high), least
+        for _ in range(_TRIALS):
+            if not 0.0 < share - away < share + away < 1.0:
+                return None
+            sides = self._at(start, end, share - away), self._at(start, end, share + away)
+            if sides[0] is not None and sides[1] is not None and self._tells(sides[0], sides[1]):
+                return sides[0], sides[1]
+            away *= _FARTHER
+        return None
+
+    @staticmethod
+    def _tells(one: Place, other: Place) -> bool:
+        """Whether two places are proven to be on different sides."""
+        return one.codes != other.codes or one.rises * other.rises < 0
+
+    def _between(self, start: Place, end: Place) -> SolutionCurve | None:
+        """A curve in a box of its own that has two places of the link."""
+        chord = end.x - start.x
+        length = float(self.border @ chord)
+        if not length > 0:
+            return None
+        changing = [i for i, pair in enumerate(zip(start.codes, end.codes, strict=True)) if pair[0] != pair[1]]
+        middle, half = start.x + 0.5 * chord, 0.5 * _LONGER * length
+        box = box_around(self.problem, middle, chord / length, self.border, half, changing, roomy=False)
+        if box is None:
+            return None
+        least = _ROUNDED * np.maximum(start.point.spread, end.point.spread)
+        curve = only_curve(self.problem, replace(box, radius=np.maximum(box.radius, least)))
+        if curve is None or not all(lies_in(curve.box, place.point.at(0.0)) for place in (start, end)):
+            return None
+        return curve
+
+    # -- what is known ---------------------------------------------------------------------------------------------
+
+    def _run(self, start: Place, end: Place, codes: Codes, rises: int) -> Run:
+        knots, index = (start.x, end.x), self.curve.sign * rises
+        return Run(codes, rises, index, knots, (self.border,), start.alphas, end.alphas)
+
+    def _left_open(self, curve: SolutionCurve | None, start: Place, end: Place) -> Turn:
+        """A part of which is not known what it does."""
+        alphas = (self.curve if curve is None else curve).alphas
+        selections = tuple(dict.fromkeys((start.codes, end.codes)))
+        return Turn(alphas, 0.5 * (start.x + end.x), selections, settled=False)
+
+    def _step(self, start: Place, end: Place) -> Fraction:
+        """An upper bound of how much the parameter increases between two places."""
+        ends = [parameter_in(self.curve.box, place.point.at(0.0)) for place in (start, end)]
+        return sum(
+            (Fraction(float(t.mid)) * s + Fraction(float(t.rad)) for s, t in zip((-1, 1), ends, strict=True)),
+            Fraction(0),
+        )
+
+    def _fold(self, before: Place, after: Place) -> tuple[Fraction, Fraction]:
+        """Bounds of alpha where it turns back once between two places, beyond both of them.
+
+        Its derivative is monotone, so that alpha lies on one side of its tangents.
+        """
+        step, sign = self._step(before, after), before.rises
+        inner = [sign * place.alphas[0 if sign > 0 else 1] for place in (before, after)]
+        outer = []
+        for place in (before, after):
+            speed = place.motion.speed(place.codes)
+            if speed is not None:
+                outer.append(sign * place.alphas[1 if sign > 0 else 0] + Fraction(float(speed.size[-1])) * step)
+        ends = sign * max(inner), sign * min(outer)
+        return min(ends), max(ends)

@@ -1,0 +1,113 @@
+"""branch_graph in 3D: whole curves, and the tree that shows that there are no others (theory, section 12.9)."""
+
+from __future__ import annotations
+
+import time
+from typing import TYPE_CHECKING
+
+from enumsol.branches.graph import BranchGraph
+from enumsol.branches.graph_data import GraphStats
+from enumsol.branches.space.cover import SpaceCover
+from enumsol.branches.space.make_curved import CurvedGraph
+from enumsol.branches.space.pieces import runs_and_turns
+from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.errors import Interrupted
+from enumsol.proof.space_records import CutPiece
+from enumsol.search.outcome import Stop, StopReason
+from enumsol.support.deadlines import Deadline, TimeOverError, within
+from enumsol.trusted.space.solution_curve import AlphaProblem
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from fractions import Fraction
+
+    from enumsol.branches.elements import Arc, Vertex
+    from enumsol.model.problem3d import ContactProblem3D
+
+#: Gaps that are named one by one.
+_NAMED = 5
+
+
+def space_graph(
+    problem: ContactProblem3D,
+    interval: tuple[Fraction, Fraction],
+    progress: Callable[[str, float], object] | None,
+    max_nodes: int | None,
+    limits: Deadline,
+) -> BranchGraph:
+    """See ``branch_graph``.
+
+    Raises
+    ------
+    Interrupted
+        On Ctrl-C; ``partial`` has the curves that were found.
+    """
+    started = time.perf_counter()
+    cover = SpaceCover(problem, interval)
+    stop: Stop | None = None
+    reasons: list[str] = []
+    try:
+        with within(limits):
+            cover.search(max_nodes, progress)
+        stop = None if cover.stopped is None else Stop(cover.stopped, cover.nodes)
+    except NotEnclosedError as error:
+        reasons.append(str(error))
+    except TimeOverError:
+        stop = Stop(StopReason.TIME_LIMIT, cover.nodes)
+    except KeyboardInterrupt:
+        stop = Stop(StopReason.INTERRUPTED, cover.nodes)
+    searched = time.perf_counter()
+    reasons += [] if stop is None else [str(stop)]
+    with within(limits.extended(started)):
+        vertices, arcs, open_parts = _elements(cover, interval, progress)
+    graph = BranchGraph(
+        problem=problem,
+        exact=None,
+        exact_interval=interval,
+        arithmetic="verified",
+        vertices=tuple(vertices),
+        arcs=tuple(arcs),
+        undecided=(*reasons, *([] if reasons else _gaps(cover)), *open_parts),
+        stats=GraphStats(
+            pieces=1 + sum(isinstance(record, CutPiece) for record in cover.records),
+            nodes=cover.nodes,
+            selections=len({arc.selections for arc in arcs}),
+            search_seconds=searched - started,
+            seconds=time.perf_counter() - started,
+        ),
+        make_proof=None if reasons else cover.proof,
+    )
+    if stop is not None and stop.interrupted:
+        raise Interrupted("branch_graph was interrupted; the curves found so far are kept", graph)
+    return graph
+
+
+def _elements(
+    cover: SpaceCover, interval: tuple[Fraction, Fraction], progress: Callable[[str, float], object] | None
+) -> tuple[Sequence[Vertex], Sequence[Arc], Sequence[str]]:
+    """Vertices and arcs of the curves, and what stayed open about them."""
+    if not cover.chains:
+        return (), (), ()
+    given = AlphaProblem.of(cover.problem.enclosure)
+    made = CurvedGraph(cover.problem, given, interval)
+    for k, chain in enumerate(cover.chains):
+        if progress is not None:
+            progress("arcs", k / len(cover.chains))
+        try:
+            made.add(runs_and_turns(given, chain))
+        except TimeOverError:
+            made.reasons.append(f"the time was over before curve {k + 1} of {len(cover.chains)} was cut into arcs")
+    if progress is not None:
+        progress("arcs", 1.0)
+    vertices, arcs = made.made()
+    return vertices, arcs, made.reasons
+
+
+def _gaps(cover: SpaceCover) -> list[str]:
+    """Where solutions may be missing, in words."""
+    found = [
+        f"solutions may be missing for alpha in [{float(low):.8g}, {float(high):.8g}]"
+        for low, high in cover.gaps[:_NAMED]
+    ]
+    more = len(cover.gaps) - _NAMED
+    return [*found, f"and {more} gaps more"] if more > 0 else found

@@ -1,0 +1,221 @@
+"""The trusted tests in 3D of what happens along a curve in a box (theory, section 12.10).
+
+Which way alpha goes, where it turns back, and where a node changes its status.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.arithmetic.ball_arrays import Ball, solution
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, upper_norm
+from enumsol.trusted.space.natural_map import upper_product
+from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, STICK
+from enumsol.trusted.space.solution_curve import SLIP
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from enumsol.trusted.space.solution_curve import AlphaProblem, SolutionCurve
+
+    Array = NDArray[np.float64]
+
+#: Pairs of statuses between which one condition decides: the sign of |z_t| - F z_n, or of z_n.
+_BY_FRICTION = frozenset({STICK, SLIP})
+_BY_CONTACT = (frozenset({OPEN, SLIP}), frozenset({OPEN, FRICTIONLESS}))
+
+
+class CurveMotion:
+    """How the solutions of a curve in a box move with its parameter.
+
+    Derivatives with respect to t are bounded for all points of the curve that have given statuses; at its kinks they
+    are those of one side.
+
+    Parameters
+    ----------
+    problem : AlphaProblem
+    curve : SolutionCurve
+    border : (3p + 1,) array, optional
+        The row e of the parameter; that of the curve's box by default, and of another box that holds a point if the
+        curve is a point.
+    """
+
+    def __init__(self, problem: AlphaProblem, curve: SolutionCurve, border: Array | None = None) -> None:
+        self.problem = problem
+        unit, box, m = np.append(problem.force, 1.0), curve.box, 3 * problem.p
+        self._border = (box.border if border is None else border) * unit
+        self._Z = problem.moves(problem.rho)
+        centre, spread = Ball.exact(box.centre / unit), curve.spread / unit
+        moved = (self._Z @ Ball.exact(box.direction / unit)[:, None])[:, 0].size * box.half
+        w = problem.g0 + centre[m] * problem.g1 - (problem.S @ centre[:m, None])[:, 0]
+        z = Ball.joined(problem.inverse * centre[:m] + Ball.exact(problem.rho) * w, centre[m][None])
+        #: (z, alpha) at all points of the curve.
+        self.z = Ball(z.mid, (z.rad + moved + upper_product(self._Z.size, spread)) * SAFE + TINY)
+        self._F = problem.friction(self.z[m])
+        self._speeds: dict[tuple[int, ...], Ball | None] = {}
+
+    # -- statuses --------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def possible(self) -> tuple[frozenset[int], ...]:
+        """The statuses that every node may have at points of the curve."""
+        return tuple(map(self._possible, range(self.problem.p)))
+
+    def _possible(self, i: int) -> frozenset[int]:
+        low, high = _ends(self.z[i])
+        found = {OPEN} if low <= 0 else set()
+        if high < 0:
+            return frozenset(found)
+        if not len(self.problem.tau[i]):
+            return frozenset(found | {FRICTIONLESS})
+        least, most = self._lengths(i)
+        F_low, F_high = _ends(self._F[i])
+        if F_high >= 0 and least <= F_high * high * SAFE + TINY:
+            found.add(STICK)
+        if F_low < 0 or most >= F_low * max(low, 0.0) / SAFE - TINY:
+            found.add(SLIP)
+        return frozenset(found)
+
+    def _lengths(self, i: int) -> tuple[float, float]:
+        """Bounds of |z_t|; the lower one may be negative."""
+        t = self.problem.tau[i]
+        length, away = float(np.linalg.norm(self.z.mid[t])), float(upper_norm(self.z.rad[t]))
+        rounded = 8 * UNIT * length + TINY
+        return length - away * SAFE - rounded, length + away * SAFE + rounded
+
+    # -- first derivatives -----------------------------------------------------------------------------------------
+
+    def speed(self, codes: Sequence[int]) -> Ball | None:
+        """dx/dt where the nodes have these statuses, scaled, (3p + 1,); the last one is that of alpha.
+
+        None where there is no bound.
+        """
+        key = tuple(codes)
+        if key not in self._speeds:
+            B, m = self._bordered(key), 3 * self.problem.p
+            right = np.zeros((m + 1, 1))
+            right[m] = 1.0
+            found = None if B is None else solution(B, Ball.exact(right))
+            self._speeds[key] = None if found is None else found[:, 0]
+        return self._speeds[key]
+
+    def rises(self, codes: Sequence[int]) -> int:
+        """The sign of the derivative of alpha where the nodes have these statuses; 0 where it is not known."""
+        speed = self.speed(codes)
+        return 0 if speed is None else _sign(speed[-1])
+
+    def _bordered(self, codes: Sequence[int]) -> Ball | None:
+        """The derivatives of the natural map and the border, (3p + 1, 3p + 1)."""
+        m, D = 3 * self.problem.p, self._derivative(codes)
+        if D is None:
+            return None
+        M = Ball(np.zeros((m, m + 1)), np.zeros((m, m + 1)))
+        M[:, :m] = self.problem.part
+        return Ball.joined(M - D @ self._Z, Ball.exact(self._border[None]))
+
+    def _derivative(self, codes: Sequence[int]) -> Ball | None:
+        """That of the projection P with respect to (z, alpha), by (12.17)."""
+        m = 3 * self.problem.p
+        D = Ball(np.zeros((m, m + 1)), np.zeros((m, m + 1)))
+        for i, (code, t) in enumerate(zip(codes, self.problem.tau, strict=True)):
+            if code == OPEN:
+                continue
+            D.mid[i, i] = 1.0
+            if code == STICK:
+                D.mid[t, t] = 1.0
+            elif code == SLIP:
+                found = self._direction(i)
+                if found is None:
+                    return None
+                e, across, inverse = found
+                D[t, i] = self._F[i] * e
+                D[np.ix_(t, t)] = self._F[i] * self.z[i] * inverse * across
+                D[t, m] = Ball.exact(self.problem.F1[i]) * self.z[i] * e
+        return D
+
+    def _direction(self, i: int) -> tuple[Ball, Ball, Ball] | None:
+        """e = z_t / |z_t|, 1 - e e' and 1 / |z_t|; None where z_t may vanish."""
+        t, (least, most) = self.problem.tau[i], self._lengths(i)
+        if not least > 0:
+            return None
+        middle, half = 0.5 * (1.0 / least + 1.0 / most), 0.5 * (1.0 / least - 1.0 / most)
+        inverse = Ball(np.array(middle), np.array((half + 4 * UNIT * middle) * SAFE))
+        if len(t) == 1:
+            return Ball.exact(np.sign(self.z.mid[t])), Ball.exact(np.zeros((1, 1))), inverse
+        e = self.z[t] * inverse
+        return e, Ball.exact(np.eye(2)) - e[:, None] * e[None, :], inverse
+
+    # -- conditions ------------------------------------------------------------------------------------------------
+
+    def decides(self, codes: Sequence[int], i: int, other: int) -> int:
+        """The sign with which the condition grows that tells a node's status from another one.
+
+        It is that of |z_t| - F z_n between stick and slip, and of z_n between open and contact. 0 where it does not
+        grow, or fall, along all of the curve, for both statuses of the node, or where another condition decides.
+        """
+        pair = frozenset({codes[i], other})
+        if pair != _BY_FRICTION and pair not in _BY_CONTACT:
+            return 0
+        signs = set()
+        for code in pair:
+            speed = self.speed((*codes[:i], code, *codes[i + 1 :]))
+            signs.add(0 if speed is None else self._grows(i, speed, contact=pair != _BY_FRICTION))
+        return signs.pop() if len(signs) == 1 else 0
+
+    def _grows(self, i: int, speed: Ball, *, contact: bool) -> int:
+        moved = (self._Z @ speed[:, None])[:, 0]
+        if contact:
+            return _sign(moved[i])
+        found = self._direction(i)
+        if found is None:
+            return 0
+        along = (found[0][None] @ moved[self.problem.tau[i], None])[0, 0]
+        return _sign(along - self._F[i] * moved[i] - Ball.exact(self.problem.F1[i]) * moved[-1] * self.z[i])
+
+    # -- second derivatives ----------------------------------------------------------------------------------------
+
+    def bends(self, codes: Sequence[int]) -> int:
+        """The sign of the second derivative of alpha where the nodes have these statuses; 0 where it is not known."""
+        speed, m = self.speed(codes), 3 * self.problem.p
+        B = None if speed is None else self._bordered(codes)
+        if speed is None or B is None:
+            return 0
+        moved = (self._Z @ speed[:, None])[:, 0]
+        right = Ball(np.zeros((m + 1, 1)), np.zeros((m + 1, 1)))
+        for i, code in enumerate(codes):
+            if code == SLIP:
+                bent = self._bent(i, moved)
+                if bent is None:
+                    return 0
+                right[self.problem.tau[i], 0] = bent
+        found = solution(B, right)
+        return 0 if found is None else _sign(found[m, 0])
+
+    def _bent(self, i: int, moved: Ball) -> Ball | None:
+        """The second derivative of F z_n e along a node's speed (12.24)."""
+        found, t = self._direction(i), self.problem.tau[i]
+        if found is None:
+            return None
+        e, across, inverse = found
+        F, F1, z, two = self._F[i], Ball.exact(self.problem.F1[i]), self.z[i], Ball.exact(np.array(2.0))
+        normal, alpha, tangential = moved[i], moved[-1], moved[t]
+        beside = (across @ tangential[:, None])[:, 0] * inverse
+        along = (e[None] @ tangential[:, None])[0, 0] * inverse
+        size = (beside[None] @ beside[:, None])[0, 0]
+        turned = two * (F * normal + F1 * alpha * z) * beside
+        return two * F1 * alpha * normal * e + turned - F * z * (two * along * beside + size * e)
+
+
+def _ends(ball: Ball) -> tuple[float, float]:
+    """Rounded outwards."""
+    low, high = float(ball.mid - ball.rad), float(ball.mid + ball.rad)
+    return low - 2 * UNIT * abs(low) - TINY, high + 2 * UNIT * abs(high) + TINY
+
+
+def _sign(ball: Ball) -> int:
+    return int(np.sign(ball.mid)) if abs(ball.mid) > ball.rad * SAFE else 0

@@ -1,0 +1,226 @@
+"""Branch graphs of problems in 3D (theory, sections 12.9 and 12.10)."""
+
+import re
+from dataclasses import replace
+from fractions import Fraction
+from math import sqrt
+
+import numpy as np
+import pytest
+from problems3d import SLIDING, OneNode, random_over_alpha, sliding_node
+
+import enumsol
+from enumsol.branches.elements import VertexKind
+from enumsol.branches.space.chains import chain_through
+from enumsol.branches.space.make_curved import unordered
+from enumsol.branches.space.pieces import Run, Turn, runs_and_turns
+from enumsol.trusted.space.curve_events import CurveMotion
+from enumsol.trusted.space.sector_rows import STICK
+from enumsol.trusted.space.solution_curve import SLIP, AlphaProblem
+
+#: SLIDING sticks as soon as alpha is the length of (3/2, 1).
+STUCK = sqrt(3.25)
+SLIPPING, STICKING = enumsol.ContactStatus.SLIP, enumsol.ContactStatus.STICK
+
+
+@pytest.fixture(scope="module")
+def graph():
+    return enumsol.branch_graph(SLIDING, (1.78, 1.82), max_nodes=60)
+
+
+def test_a_node_that_slips_until_it_sticks(graph):
+    assert graph.complete
+    assert [v.kind for v in graph.vertices] == ["end", "transition", "end"]
+    vertex = graph.transitions[0]
+    low, high = vertex.enclosure
+    assert low**2 < Fraction(13, 4) < high**2
+    assert high - low < 1e-8
+    assert vertex.active == (frozenset({SLIPPING, STICKING}),)
+    assert vertex.lambda_t == pytest.approx(np.array([[1.5, 1.0]]), abs=1e-8)
+    assert [(arc.statuses, arc.index, arc.grazing) for arc in graph.arcs] == [
+        ((SLIPPING,), 1, False),
+        ((STICKING,), 1, False),
+    ]
+    assert len(graph.branches) == len(graph.components) == 1
+    assert graph.multiplicity_at(1.8) == graph.at_least(1.8) == 1
+    assert graph.uniqueness_limit is None
+    assert graph.steps[1:] == ([1, 1, 1], [1, 1])
+
+
+def test_values_along_arcs_are_those_of_the_closed_form(graph):
+    for alpha in (1.78, 1.795, 1.8025):
+        n, t = graph.arcs[0].values(alpha)
+        assert [*n, *t[0]] == pytest.approx(sliding_node(alpha), abs=1e-12)
+        u_n, u_t = graph.arcs[0].displacements(alpha)
+        assert u_n.tolist() == [0.0]
+        assert u_t[0] == pytest.approx([3.0 - 2.0 * t[0, 0], 4.0 - 4.0 * t[0, 1]], abs=1e-12)
+    assert graph.arcs[1].displacements(1.805)[1].tolist() == [[0.0, 0.0]]
+
+
+def test_roots_are_those_of_a_search(graph):
+    for alpha in (1.78, 1.8, 1.82):
+        found, known = graph.roots_at(alpha), enumsol.enumerate_roots(SLIDING, alpha)
+        assert found.complete
+        assert [root.index for root in found] == [root.index for root in known] == [1]
+        assert found[0].lambda_t == pytest.approx(known[0].lambda_t, abs=1e-12)
+        assert found[0].statuses == known[0].statuses
+    assert [root.statuses for root in graph.starting_points()] in ([(SLIPPING,)], [(STICKING,)])
+
+
+def test_roots_within_the_bounds_of_a_vertex_are_undecided(graph):
+    found = graph.roots_at(float(graph.transitions[0].exact))
+    assert not found.complete
+    assert len(found.undecided) == 1
+    assert found.at_least == 1
+
+
+def test_its_proof_is_verified(graph):
+    report = enumsol.verify(SLIDING, graph.proof)
+    assert report.ok
+    assert report.complete
+
+
+def test_files_frames_and_figures(graph, tmp_path):
+    graph.save(tmp_path / "graph.json")
+    read = enumsol.BranchGraph.load(tmp_path / "graph.json")
+    assert read.complete
+    assert read.problem.fingerprint == SLIDING.fingerprint
+    assert read.steps == graph.steps
+    for one, other in zip(graph.arcs, read.arcs, strict=True):
+        assert np.array_equal(one.state(one.sample)[0], other.state(one.sample)[0])
+    assert {"lambda_t1", "lambda_t2"} < set(graph.vertices_frame().columns)
+    assert graph.to_frame()["statuses"].tolist() == ["slip", "stick"]
+    graph.write_graphml(tmp_path / "graph.graphml")
+    figure = graph.plot("lambda_t", nodes=[0], zoom=False)
+    heights = [y for line in figure.axes[0].lines for y in np.asarray(line.get_ydata()).tolist()]
+    assert max(heights) == pytest.approx(STUCK, abs=1e-6)
+
+
+def test_a_damaged_file_is_refused(graph, tmp_path):
+    place = tmp_path / "graph.json"
+    graph.save(place)
+    damaged = re.sub(r'"borders": \[\[', '"borders": [[0.0], [', place.read_text(encoding="utf-8"), count=1)
+    place.write_text(damaged, encoding="utf-8")
+    with pytest.raises(enumsol.InvalidArgumentError, match="damaged"):
+        enumsol.BranchGraph.load(place)
+
+
+def test_a_search_that_is_cut_short_is_not_complete():
+    graph = enumsol.branch_graph(SLIDING, (1.78, 1.82), max_nodes=3)
+    assert not graph.complete
+    assert "max_nodes = 3" in graph.reasons[0] or graph.reasons[0].startswith("stopped")
+    assert graph.proof is None
+    with pytest.raises(enumsol.IncompleteGraphError):
+        graph.multiplicity_at(1.8)
+
+
+def test_what_is_refused():
+    with pytest.raises(enumsol.InvalidArgumentError, match='arithmetic is "fast" for a problem in 3D'):
+        enumsol.branch_graph(SLIDING, (1, 2), "fast")
+    with pytest.raises(enumsol.InvalidArgumentError, match="expected F >= 0"):
+        enumsol.branch_graph(SLIDING, (-1, 2))
+    with pytest.raises(enumsol.NotHeldError):
+        enumsol.branch_graph(enumsol.gallery.block_on_table3d(), (0, 1))
+
+
+def test_a_graph_in_3d_has_no_page_yet(graph, tmp_path):
+    with pytest.raises(enumsol.InvalidArgumentError, match="in 3D"):
+        enumsol.write_report(graph, tmp_path / "page.html")
+
+
+# -- what happens along a curve ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def sliding():
+    """SLIDING as balls, and its curve for alpha near 1/2."""
+    given, interval = AlphaProblem.of(SLIDING.enclosure), (Fraction(49, 100), Fraction(51, 100))
+    return given, chain_through(given, SLIDING, np.append(sliding_node(0.5), 0.5), interval)
+
+
+def test_motion_is_that_of_differences(sliding):
+    given, chain = sliding
+    for joint in chain.joints:
+        alpha, border = joint.at(0.0).mid[-1], np.array([0.0, 0.0, 0.0, 1.0])
+        speed = CurveMotion(given, joint, border).speed((SLIP,))
+        step = 1e-5
+        change = (sliding_node(alpha + step) - sliding_node(alpha - step)) / (2 * step)
+        unit = given.force
+        assert speed.mid[:3] * unit == pytest.approx(change, abs=1e-8)
+        assert np.all(speed.rad < 1e-6)
+        assert speed.mid[3] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("row", [0, 1])
+def test_second_derivatives_are_those_of_differences(sliding, row):
+    # with a border along a force, alpha is a function of that force
+    given, chain = sliding
+    joint = chain.joints[1]
+    alpha, border = joint.at(0.0).mid[-1], np.zeros(4)
+    border[1 + row] = 1.0
+    steps = np.array([-1e-3, 0.0, 1e-3])
+    force = np.array([sliding_node(alpha + s)[1 + row] for s in steps])
+    first = np.polyfit(force - force[1], steps, 2)
+    assert np.sign(first[0]) == CurveMotion(given, joint, border).bends((SLIP,))
+    assert CurveMotion(given, joint, border).speed((SLIP,)).mid[3] == pytest.approx(first[1], rel=1e-4)
+
+
+def test_only_the_condition_between_two_statuses_decides(sliding):
+    given, chain = sliding
+    motion = CurveMotion(given, chain.links[0].curve)
+    assert motion.possible == (frozenset({SLIP}),)
+    # |z_t| - alpha z_n falls while alpha rises
+    assert motion.decides((SLIP,), 0, STICK) in (0, -motion.rises((SLIP,)))
+    assert motion.decides((SLIP,), 0, SLIP) == 0
+
+
+def test_vertices_of_the_same_bounds_are_not_in_an_order(graph):
+    # a transition changes no number, a fold does
+    vertex = graph.transitions[0]
+    fold = replace(vertex, kind=VertexKind.FOLD)
+    assert unordered([vertex, vertex]) == unordered([vertex, fold]) == unordered([fold]) == []
+    assert len(unordered([fold, vertex, fold])) == 1
+
+
+@pytest.mark.slow
+def test_counts_along_random_graphs_are_those_of_searches():
+    problem = random_over_alpha(2, 2)
+    graph = enumsol.branch_graph(problem, (0, 1))
+    assert graph.complete
+    for alpha in np.linspace(0.03, 0.97, 4).tolist():
+        known, found = enumsol.enumerate_roots(problem, alpha), graph.roots_at(alpha)
+        assert known.complete
+        assert graph.multiplicity_at(alpha) == len(known) == len(found)
+        assert found.complete
+        for one, other in zip(known, found, strict=True):
+            assert one.lambda_n == pytest.approx(other.lambda_n, abs=1e-10)
+
+
+def test_runs_and_turns_alternate(sliding):
+    given, chain = sliding
+    parts = runs_and_turns(given, chain)
+    assert [type(part) for part in parts] == [Run]
+    assert not any(isinstance(part, Turn) for part in parts)
+    assert parts[0].index == 1
+
+
+# -- folds -------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1])
+def test_folds_of_one_node_are_those_of_the_closed_form(seed):
+    node = OneNode(seed, load=True)
+    phi = node.folds()[0]
+    fold, given = node.alpha(phi), AlphaProblem.of(node.problem.enclosure)
+    alpha, n, t = node.at(phi + 0.02)
+    start, interval = np.array([n, *t, alpha]), (Fraction(fold) - Fraction(1, 500), Fraction(fold) + Fraction(1, 500))
+    parts = runs_and_turns(given, chain_through(given, node.problem, start, interval))
+    assert [type(part) for part in parts] == [Run, Turn, Run]
+    low, high = parts[1].alphas
+    assert parts[1].settled
+    assert parts[1].selections == ((SLIP,),)
+    assert high - low < 1e-12
+    assert low - Fraction(1, 10**14) < Fraction(fold) < high + Fraction(1, 10**14)
+    assert sorted((parts[0].index, parts[2].index)) == [-1, 1]
+    assert parts[0].rises == -parts[2].rises
