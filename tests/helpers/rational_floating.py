@@ -84,7 +84,7 @@ class FloatingForms(Forms):
         return found
 
     def excludes(self, terms):
-        """(5.5), with the multipliers as they are or changed until G y = h."""
+        """(5.6), with the multipliers as they are or changed until G y = h."""
         return self._excludes(terms) or self._excludes(self._balanced(terms))
 
     def _excludes(self, terms):
@@ -117,7 +117,7 @@ class FloatingForms(Forms):
         return _solution(flat, [2 * x - y for x, y in zip(self.h, slope, strict=True)])
 
     def margin(self, terms, z):
-        """By how much (5.5) holds."""
+        """By how much (5.6) holds."""
         v, constant, turn = self._gathered(terms)
         right = column_of(v) + fmpq_mat(self.G).transpose() * column_of(z)
         value = -constant - (right.transpose() * self.own.solve(right))[0, 0] / 4 + _dot(z, self.h)
