@@ -40,13 +40,16 @@ def audit(
 
     The distance between two points is sqrt(e^2 + a^2). Here e is the energy norm sqrt(d' S d) of the difference d of
     their contact forces, relative to the largest sqrt(g' S^-1 g) on the graph's interval, so that the forces of every
-    solution have at most length one; a is their difference in alpha, in twentieths of the interval.
+    solution have at most length one; a is their difference in alpha, in twentieths of the interval. Of a body that
+    nothing holds the difference of rigid displacements counts as well (theory, section 9.1).
 
     Parameters
     ----------
     path : Path, sequence of Path, pandas.DataFrame, or file name of a CSV
         Points in the order in which they were computed. Frames and CSV files have the columns alpha, lambda_n_X and
-        lambda_t_X, one X a contact node (others are ignored), and may name several paths in a column ``path``.
+        lambda_t_X, one X a contact node (others are ignored), and may name several paths in a column ``path``. Of a
+        body that nothing holds they also have rigid_0, rigid_1, ..: the coordinates q of its rigid displacement N q,
+        which equals u at the degrees of freedom ``problem.modes.held``.
     graph : BranchGraph
     tolerance : float
         Distance from the nearest arc or vertex at which a point lies off the graph, above 0 and below 1. For points of
@@ -122,7 +125,10 @@ class _Tally:
     def add(self, run: PointRun) -> None:
         """One run of points."""
         equation = self.chart.equation
-        points = [equation.point(float(a), forces) for a, forces in zip(run.alpha, run.forces, strict=True)]
+        points = [
+            equation.point(float(a), forces, rigid)
+            for a, forces, rigid in zip(run.alpha, run.forces, run.rigid, strict=True)
+        ]
         here: GraphPlace | None = None
         for k, x in enumerate(points):
             previous, here = here, self._locate(run, k, x, here)
@@ -136,6 +142,9 @@ class _Tally:
             place = GraphPlace(GraphPlaceKind.OUTSIDE, -1, math.nan)
             low, high = (float(end) for end in chart.graph.interval)
             verdict, reason = Verdict.NOT_COMPARED, f"outside the graph's interval [{low:.10g}, {high:.10g}]"
+        elif chart.beyond(run.rigid[k]):
+            place = GraphPlace(GraphPlaceKind.OUTSIDE, -1, math.nan)
+            verdict, reason = Verdict.NOT_COMPARED, "beyond the bound of the rigid displacement"
         else:
             place = chart.place(x, near)
             verdict, reason = Verdict.ON, ""

@@ -116,7 +116,6 @@ def follow_all(
     True
     """
     instance_of(problem, ContactProblem, "problem")
-    problem.check_held("follow_all")
     ends = alpha_interval(interval)
     optional_callable(progress, "progress")
     if graph is None:
@@ -151,7 +150,8 @@ class _Coverage:
 
     def start(self, start: Any) -> None:
         """Follow a start in both directions unless its arc was passed before."""
-        place = self.chart.place(self.chart.point(float(start.alpha), start.lambda_n, start.lambda_t))
+        x = self.chart.point(float(start.alpha), start.lambda_n, start.lambda_t, start.rigid_coordinates)
+        place = self.chart.place(x)
         if place.kind is GraphPlaceKind.ARC and place.distance <= POINT_TOLERANCE and place.number in self.visited:
             return
         for direction in (1, -1):
@@ -177,19 +177,21 @@ class _Coverage:
             for share in _SEEDS:
                 if arc.number in self.visited:
                     break
-                yield _seed(arc, arc.lo + share * (arc.hi - arc.lo))
+                alpha = arc.lo + share * (arc.hi - arc.lo)
+                yield _seed(self.chart, arc, alpha)
 
 
 class _Seed(NamedTuple):
-    """A root on an arc, to start from."""
+    """A root of the graph, to start from."""
 
     alpha: float
     lambda_n: NDArray[np.float64]
     lambda_t: NDArray[np.float64]
+    rigid_coordinates: NDArray[np.float64] | None
 
 
-def _seed(arc: Arc, alpha: float) -> _Seed:
-    return _Seed(alpha, *arc.values(alpha))
+def _seed(chart: GraphMap, arc: Arc, alpha: float) -> _Seed:
+    return _Seed(alpha, *arc.values(alpha), chart.rigid(chart.on_arc(arc, alpha)))
 
 
 def follow_arc(
@@ -221,8 +223,7 @@ def follow_arc(
         The arc does not end at the vertex, or is a sheet.
     """
     instance_of(problem, ContactProblem, "problem")
-    problem.check_held("follow_arc")
-    checked_graph(graph)
+    chart = GraphMap(graph, POINT_TOLERANCE)
     vertex, arc = positive_integer(vertex, "vertex", 0), positive_integer(arc, "arc", 0)
     chosen = next((item for item in graph.arcs if item.number == arc), None)
     point = next((item for item in graph.vertices if item.number == vertex), None)
@@ -233,11 +234,12 @@ def follow_arc(
     span: Any = interval if interval is not None else (float(graph.interval[0]), float(graph.interval[1]))
     sign = 1 if vertex == chosen.tail else -1
     if point.family is None:
-        tangents = start_tangents(problem, point, span, options)
+        start = _Seed(point.alpha, point.lambda_n, point.lambda_t, chart.rigid(chart.at_vertex(point)))
+        tangents = start_tangents(problem, start, span, options)
         fitting = [k for k, t in enumerate(tangents) if t.statuses == chosen.statuses and np.sign(t.dalpha) == sign]
         if len(fitting) == 1:
-            return follow(problem, point, 1, span, options, tangent=fitting[0])
-    middle = _seed(chosen, 0.5 * (chosen.lo + chosen.hi))
+            return follow(problem, start, 1, span, options, tangent=fitting[0])
+    middle = _seed(chart, chosen, 0.5 * (chosen.lo + chosen.hi))
     tangents = start_tangents(problem, middle, span, options)
     k = max(range(len(tangents)), key=lambda k: sign * tangents[k].dalpha)
     return follow(problem, middle, 1, span, options, tangent=k)

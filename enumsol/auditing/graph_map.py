@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from enumsol.branches.elements import Arc, Vertex
     from enumsol.branches.graph import BranchGraph
     from enumsol.continuation.condensed_equation import Vector
+    from enumsol.roots.root import Polytope
 
 #: Points at which the length of an arc is measured.
 _SAMPLES = 9
@@ -128,9 +129,9 @@ class GraphMap:
         self.curves = [arc for arc in self.arcs.values() if not arc.dimension]
         self._corners = {number: self._corner_points(vertex) for number, vertex in self.vertices.items()}
 
-    def point(self, alpha: float, lambda_n: Vector, lambda_t: Vector) -> Vector:
-        """Scaled point of the condensed equation."""
-        return self.equation.point(alpha, np.concatenate([lambda_n, lambda_t]))
+    def point(self, alpha: float, lambda_n: Vector, lambda_t: Vector, rigid: Vector | None = None) -> Vector:
+        """Scaled point of the condensed equation; ``rigid``: coordinates of the rigid displacement, if there is one."""
+        return self.equation.point(alpha, np.concatenate([lambda_n, lambda_t]), rigid)
 
     # -- distances ---------------------------------------------------------------------------------------------------
 
@@ -139,6 +140,10 @@ class GraphMap:
         low, high = (float(end) for end in self.graph.interval)
         slack = self.tolerance * self.equation.alpha_scale
         return not low - slack <= alpha <= high + slack
+
+    def beyond(self, rigid: Vector) -> bool:
+        """Whether the body has moved farther than the graph asks for, by more than the tolerance."""
+        return bool(np.any(np.abs(rigid) > self.equation.reach * (1 + self.tolerance)))
 
     def place(self, x: Vector, near: GraphPlace | None = None) -> GraphPlace:
         """Nearest arc or vertex; the arc of the point before is tried first, until one is close enough."""
@@ -210,7 +215,20 @@ class GraphMap:
 
     def on_arc(self, arc: Arc, alpha: float) -> Vector:
         """Scaled point of an arc."""
-        return self.point(alpha, *arc.values(alpha))
+        if not self.equation.modes:
+            return self.point(alpha, *arc.values(alpha))
+        return self.equation.point_of(alpha, *arc.state(alpha))
+
+    def at_vertex(self, vertex: Vertex) -> Vector:
+        """Scaled point of a vertex that is no family."""
+        if not self.equation.modes:
+            return self.point(vertex.alpha, vertex.lambda_n, vertex.lambda_t)
+        forces, moves = np.append(vertex.lambda_n, vertex.lambda_t), np.append(vertex.u_n, vertex.u_t)
+        return self.equation.point_of(vertex.alpha, forces, moves)
+
+    def rigid(self, x: Vector) -> Vector | None:
+        """Coordinates of the rigid displacement at a scaled point; None of a body that is held."""
+        return self.equation.rigid(x) if self.equation.modes else None
 
     def vertex_distance(self, x: Vector, number: int) -> float:
         """Distance of a point from a vertex, or from the nearest polytope of a family."""
@@ -218,11 +236,13 @@ class GraphMap:
 
     def _corner_points(self, vertex: Vertex) -> list[Vector]:
         if vertex.family is None:
-            return [self.point(vertex.alpha, vertex.lambda_n, vertex.lambda_t)[None, :]]
-        return [
-            np.array([self.point(vertex.alpha, corner[:, 0], corner[:, 1]) for corner in part.vertices])
-            for part in vertex.family.polytopes
-        ]
+            return [self.at_vertex(vertex)[None, :]]
+        return [self._corners_of(vertex.alpha, part) for part in vertex.family.polytopes]
+
+    def _corners_of(self, alpha: float, part: Polytope) -> Vector:
+        rigid = [None] * len(part.vertices) if part.rigid_coordinates is None else part.rigid_coordinates
+        corners = zip(part.vertices, rigid, strict=True)
+        return np.array([self.point(alpha, corner[:, 0], corner[:, 1], q) for corner, q in corners])
 
     def _hull_distance(self, x: Vector, corners: Vector) -> float:
         if len(corners) == 1:

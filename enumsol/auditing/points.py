@@ -12,6 +12,7 @@ import numpy as np
 
 from enumsol.continuation.path import Path
 from enumsol.errors import InvalidArgumentError
+from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,12 +41,15 @@ class PointRun:
     alpha : (m,) array
     forces : (m, 2p) array
         lambda_n and lambda_t [force].
+    rigid : (m, r) array
+        Of a body that nothing holds, coordinates of its rigid displacement; r is 0 for others.
     """
 
     path: Any
     rows: NDArray[np.intp]
     alpha: NDArray[np.float64]
     forces: NDArray[np.float64]
+    rigid: NDArray[np.float64]
 
 
 def read_points(
@@ -57,7 +61,7 @@ def read_points(
     ----------
     source : Path, sequence of Path, pandas.DataFrame, file name or open text file of a CSV, or list of PointRun
         Frames and files have the columns alpha, lambda_n_X and lambda_t_X, one X a contact node, and may name several
-        paths in a column ``path``. Other columns are ignored.
+        paths in a column ``path``; of a body that nothing holds rigid_0, rigid_1, .. as well. Others are ignored.
     problem : ContactProblem
     columns : {"auto", "rows", "labels"}
         Whether X is the node's row number or its label in ``problem.node_ids``. "auto": the one for which all columns
@@ -79,9 +83,10 @@ def read_points(
         if all(isinstance(item, PointRun) for item in source):
             for run in source:
                 _check_nodes(run.forces.shape[1] // 2, problem.p)
+                _check_modes(run.rigid.shape[1], problem)
             return tuple(source)
         if all(isinstance(item, Path) for item in source):
-            return tuple(_from_path(k, path, problem.p) for k, path in enumerate(source))
+            return tuple(_from_path(k, path, problem) for k, path in enumerate(source))
     if isinstance(source, (str, os.PathLike)) or hasattr(source, "read"):
         place = os.fspath(source) if isinstance(source, (str, os.PathLike)) else getattr(source, "name", "the file")
         name = name or str(place)
@@ -92,22 +97,35 @@ def read_points(
     raise InvalidArgumentError(f"path is a {kind}; expected a Path, several of them, a DataFrame or a CSV file")
 
 
-def _from_path(number: int, path: Path, p: int) -> PointRun:
-    _check_nodes(path.lambda_n.shape[1], p)
+def _from_path(number: int, path: Path, problem: ContactProblem) -> PointRun:
+    _check_nodes(path.lambda_n.shape[1], problem.p)
     if path.lambda_t.ndim == 3:
         raise InvalidArgumentError(f"path {number} is one in 3D; expected a path in 2D, as graphs are")
     forces = np.hstack([path.lambda_n, path.lambda_t])
-    finite = np.isfinite(path.alpha) & np.all(np.isfinite(forces), axis=1)
+    rigid = np.zeros((len(path), 0)) if path.rigid_coordinates is None else path.rigid_coordinates
+    _check_modes(rigid.shape[1], problem)
+    finite = np.isfinite(path.alpha) & np.all(np.isfinite(np.hstack([forces, rigid])), axis=1)
     if not np.all(finite):
         raise InvalidArgumentError(
             f"path {number} is not finite at point {int(np.argmin(finite))}; expected finite numbers"
         )
-    return PointRun(number, np.arange(len(path)), path.alpha, forces)
+    return PointRun(number, np.arange(len(path)), path.alpha, forces, rigid)
 
 
 def _check_nodes(found: int, p: int) -> None:
     if found != p:
         raise InvalidArgumentError(f"path has {found} contact nodes; expected the graph's {p}")
+
+
+def _modes(problem: ContactProblem) -> int:
+    return 0 if problem.modes is None else problem.modes.r
+
+
+def _check_modes(found: int, problem: ContactProblem) -> None:
+    if found != _modes(problem):
+        raise InvalidArgumentError(
+            f"path has a rigid displacement of {counted(found, 'coordinate')}; expected the graph's {_modes(problem)}"
+        )
 
 
 def _read_csv(source: str | os.PathLike[str] | IO[str], name: str) -> pd.DataFrame:
@@ -132,9 +150,24 @@ def _read_csv(source: str | os.PathLike[str] | IO[str], name: str) -> pd.DataFra
 def _from_frame(frame: pd.DataFrame, problem: ContactProblem, columns: Columns, name: str) -> tuple[PointRun, ...]:
     titles = _titles(frame, problem, columns, name)
     values = np.column_stack([_numbers(frame, title, name) for title in titles])
+    rigid = _rigid(frame, problem, name)
     return tuple(
-        PointRun(path, rows, values[rows, 0], values[rows, 1:]) for path, rows in _rows_by_path(frame, name).items()
+        PointRun(path, rows, values[rows, 0], values[rows, 1:], rigid[rows])
+        for path, rows in _rows_by_path(frame, name).items()
     )
+
+
+def _rigid(frame: pd.DataFrame, problem: ContactProblem, name: str) -> NDArray[np.float64]:
+    """Columns with the coordinates of the rigid displacement, (rows, r)."""
+    known, titles = list(frame.columns), [f"rigid_{mode}" for mode in range(_modes(problem))]
+    for title in titles:
+        if known.count(title) != 1:
+            raise InvalidArgumentError(
+                f"{name} has {known.count(title) or 'no'} column{'s' if title in known else ''} {title!r}; expected "
+                "one for every coordinate of the rigid displacement of a body that nothing holds"
+            )
+    columns = [_numbers(frame, title, name) for title in titles]
+    return np.reshape(columns, (len(titles), len(frame))).T
 
 
 # -- names of columns --------------------------------------------------------------------------------------------------

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from enumsol.branches.graph import BranchGraph
-    from enumsol.condensation.condensed import CondensedProblem
     from enumsol.roots.root import Root
     from enumsol.roots.root_set import RootSet
     from enumsol.support.arguments import AlphaLike
@@ -123,7 +122,7 @@ def link_samples(
     problem: ContactProblem,
     alphas: Iterable[AlphaLike],
     *,
-    arithmetic: str = "fast",
+    arithmetic: str | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> SampledGraph:
     """Roots at the samples, linked into branches by their selections.
@@ -139,8 +138,9 @@ def link_samples(
     problem : ContactProblem
     alphas : iterable of float, Fraction or whatever enumerate_roots accepts as alpha
         Sorted by the function; at least one.
-    arithmetic : str
-        Of ``enumerate_roots``.
+    arithmetic : str, optional
+        Of ``enumerate_roots``; by default "fast", which bodies that nothing holds do not have, and for these
+        "verified". Families are not linked.
     progress : callable, optional
         Called with the numbers of samples done and of all.
 
@@ -151,7 +151,7 @@ def link_samples(
     Raises
     ------
     InvalidArgumentError
-        There is no alpha, or one is not a finite number.
+        There is no alpha, or one is not a finite number; or arithmetic is none that the problem has.
 
     Examples
     --------
@@ -160,11 +160,11 @@ def link_samples(
     SampledGraph of 3 samples: 9 roots, 6 links (heuristic), 0 ambiguous pairs left open
     """
     instance_of(problem, ContactProblem, "problem")
-    problem.check_held("link_samples")
     optional_callable(progress, "progress")
     samples = sorted(set(alpha_list(alphas)))
     if not samples:
         raise InvalidArgumentError("alphas is empty; expected at least one number")
+    arithmetic = arithmetic or ("fast" if problem.modes is None else "verified")
     root_sets = []
     for k, alpha in enumerate(samples):
         root_sets.append(enumerate_roots(problem, alpha, arithmetic))  # type: ignore[arg-type]
@@ -176,12 +176,12 @@ def link_samples(
             graph.add_node((s, r), alpha=float(root.alpha), root=root, **{name: getattr(root, name) for name in _SHOWN})
     ambiguous: list[tuple[tuple[int, int], tuple[int, int]]] = []
     for s, (left, right) in enumerate(itertools.pairwise(root_sets)):
-        ambiguous += _link(graph, problem.condensed, s, left, right)
+        ambiguous += _link(graph, problem, s, left, right)
     return SampledGraph(graph, tuple(root_sets), tuple(ambiguous))
 
 
 def _link(
-    graph: Any, condensed: CondensedProblem, sample: int, left: RootSet, right: RootSet
+    graph: Any, problem: ContactProblem, sample: int, left: RootSet, right: RootSet
 ) -> list[tuple[tuple[int, int], tuple[int, int]]]:
     """Link neighbouring samples; returns the pairs left open."""
     free_left, free_right = set(range(len(left))), set(range(len(right)))
@@ -191,7 +191,7 @@ def _link(
             graph.add_edge((sample, i), (sample + 1, partners[0]), rule=LinkRule.SELECTION, heuristic=True)
             free_left.discard(i)
             free_right.discard(partners[0])
-    pairs = [(i, j) for i in sorted(free_left) for j in sorted(free_right) if _may_flip(condensed, left[i], right[j])]
+    pairs = [(i, j) for i in sorted(free_left) for j in sorted(free_right) if _may_flip(problem, left[i], right[j])]
     # two roots of one sample that differ by a flip may belong to a fold between the samples instead
     open_pairs = []
     for i, j in pairs:
@@ -203,25 +203,25 @@ def _link(
     return open_pairs
 
 
-def _may_flip(condensed: CondensedProblem, a: Root, b: Root) -> bool:
+def _may_flip(problem: ContactProblem, a: Root, b: Root) -> bool:
     """Whether the statuses differ at one node by a flip that both roots predict to happen between the samples."""
     nodes = [i for i, (x, y) in enumerate(zip(a.statuses, b.statuses, strict=True)) if x is not y]
     if len(nodes) != 1:
         return False
     step = float(b.alpha) - float(a.alpha)
     for root, other in ((a, b), (b, a)):
-        at = _vanishing(condensed, root, nodes[0], other.statuses[nodes[0]])
+        at = _vanishing(problem, root, nodes[0], other.statuses[nodes[0]])
         if at is not None and not float(a.alpha) - step <= at <= float(b.alpha) + step:
             return False
     return True
 
 
-def _vanishing(condensed: CondensedProblem, root: Root, node: int, target: ContactStatus) -> float | None:
+def _vanishing(problem: ContactProblem, root: Root, node: int, target: ContactStatus) -> float | None:
     """Predicted alpha at which the condition that keeps the node from status ``target`` vanishes; None when unknown."""
-    if root.dlambda_dalpha is None:
+    if root.dlambda_dalpha is None or root.du_dalpha is None:
         return None
-    alpha, change = float(root.alpha), root.dlambda_dalpha.T.ravel()
-    F = condensed.F0 + alpha * condensed.F1
+    alpha, (F0, F1) = float(root.alpha), problem.friction
+    F = F0 + alpha * F1
     forces, w = (np.concatenate(pair) for pair in ((root.lambda_n, root.lambda_t), (root.u_n, root.u_t)))
     status = root.statuses[node]
     if status is ContactStatus.OPEN:
@@ -233,7 +233,7 @@ def _vanishing(condensed: CondensedProblem, root: Root, node: int, target: Conta
     else:
         kind = RowKind.SLIP_FORWARD
     value = row_values(forces, w, F)[kind, node]
-    rate = row_values(change, condensed.g1 - condensed.S @ change, F)[kind, node]
+    rate = row_values(root.dlambda_dalpha.T.ravel(), root.du_dalpha.T.ravel(), F)[kind, node]
     if kind in (RowKind.CONE_PLUS, RowKind.CONE_MINUS):
-        rate += condensed.F1[node] * root.lambda_n[node]
+        rate += F1[node] * root.lambda_n[node]
     return None if rate == 0 else alpha - float(value) / float(rate)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from enumsol.arithmetic.balls import factor_above
-from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.errors import InvalidArgumentError, InvalidProblemError, NotHeldError
 from enumsol.support.arguments import Alpha, alpha_value
 from enumsol.support.immutable import Sealed, sealed
 
@@ -28,6 +28,8 @@ LARGEST_FRICTION = 1e100
 RHS_BLOCK = 16
 #: How many roundings for every row of S, with a unit diagonal, its eigenvalues may be off by.
 _ROUNDINGS = 4
+#: Rigid displacements whose contact nodes move less, squared and relative to the largest, move none.
+_MODE_RANK = 1e-14
 
 
 @dataclass(frozen=True)
@@ -226,6 +228,11 @@ class Condensation(Sealed):
         scale = self.node_scale
         return sealed(np.asarray(self.S / scale[:, None] / scale[None, :]))
 
+    @property
+    def bordered(self) -> NDArray[np.float64]:
+        """``balanced``, or of a body that nothing holds the matrix of theory, (14.9)."""
+        return self.balanced
+
     def free_displacements(self, alpha: AlphaLike) -> NDArray[np.float64]:
         """g(alpha), shape (m,) [length].
 
@@ -303,9 +310,47 @@ class FloatingCondensation(Condensation):
         change = np.zeros(N.shape[1]) if slope is None else N.T @ slope
         return sealed(np.asarray(N.T @ self.problem.f)), sealed(np.asarray(change))
 
+    @cached_property
+    def mixing(self) -> NDArray[np.float64]:
+        """L with L L' = G S^-1 G', the units of rigid displacements (theory, section 14.7), shape (r, r).
+
+        Raises
+        ------
+        NotHeldError
+            Some rigid displacement moves no contact node.
+        """
+        G = self.G / self.node_scale
+        size = np.linalg.norm(G, axis=1)
+        values, vectors = np.linalg.eigh(G @ G.T / np.outer(*(np.where(size > 0, size, 1.0),) * 2))
+        if values[0] <= _MODE_RANK * values[-1]:
+            raise NotHeldError(
+                f"rigid mode {int(np.argmax(np.abs(vectors[:, 0])))}, perhaps with others, moves no contact node: "
+                "contact cannot hold the body; expected a body that every rigid mode moves at its contact nodes"
+            )
+        return sealed(np.asarray(np.linalg.cholesky(G @ solved(self.balanced, G.T))))
+
+    @cached_property
+    def moves(self) -> NDArray[np.float64]:
+        """G in the units of ``balanced`` and of ``mixing``, shape (r, m); raises as ``mixing``."""
+        return sealed(np.asarray(np.linalg.solve(self.mixing, self.G / self.node_scale)))
+
+    @cached_property
+    def bordered(self) -> NDArray[np.float64]:
+        """The matrix of theory, (14.9), shape (m + r, m + r); raises as ``mixing``."""
+        G = self.moves
+        return sealed(np.block([[self.balanced, -G.T], [G, np.zeros((len(G), len(G)))]]))
+
     def displacement(self, alpha: AlphaLike, forces: NDArray[np.float64]) -> NDArray[np.float64]:
         """u less the rigid displacement: A_k^-1 (f(alpha) - B' lambda), shape (n,)."""
         return np.asarray(self.problem.on_springs.condensed.displacement(alpha, forces))
+
+
+def solved(S: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
+    """S^-1 times columns; of least length where S is singular within rounding."""
+    try:
+        return np.asarray(np.linalg.solve(S, right))
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.lstsq(S, right, rcond=None)[0])
 
 
 def condensation_of(problem: Any) -> Any:

@@ -27,8 +27,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.condensation.condensed import FloatingCondensation
-from enumsol.errors import NotHeldError
+from enumsol.condensation.condensed import FloatingCondensation, solved
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -47,8 +46,6 @@ if TYPE_CHECKING:
 STATUS_TOLERANCE = 1e-9
 #: Interval points at which the size of a load that varies is measured.
 _LOAD_SAMPLES = 9
-#: Rigid displacements whose contact nodes move less, squared and relative to the largest, move none.
-_MODE_RANK = 1e-14
 #: Parts of a unit tangent that are rounding, where the body moves as a whole.
 _RIGID_TOLERANCE = 1e-9
 
@@ -90,15 +87,12 @@ class ScaledEquation(ABC):
         condensed = path.condensed
         sigma, self.S = condensed.node_scale, condensed.balanced
         self.m = len(sigma)
-        modes = np.zeros((0, self.m))
-        if isinstance(condensed, FloatingCondensation):
-            modes = condensed.G / sigma
         #: L of theory, section 14.7.
-        self._mixing = _mixing(self.S, modes)
-        G, none = np.linalg.solve(self._mixing, modes), np.zeros((len(modes),) * 2)
+        self._mixing = condensed.mixing if isinstance(condensed, FloatingCondensation) else np.zeros((0, 0))
         #: Of theory, (14.9); without rigid modes S.
-        self.bordered = np.block([[self.S, -G.T], [G, none]]) if len(modes) else self.S
-        self._energy = np.block([[self.S, 0 * G.T], [0 * G, none + np.eye(len(modes))]]) if len(modes) else self.S
+        self.bordered = condensed.bordered
+        self._energy = np.eye(len(self.bordered))
+        self._energy[: self.m, : self.m] = self.S
         self.without = path.frictionless
         self.frictionless = self.without if self.without.ndim == 1 else np.all(self.without, axis=1)
         self._load = load = self._load_energy(interval, start, sigma)
@@ -119,7 +113,7 @@ class ScaledEquation(ABC):
             return 1.0
         # loads of size one: their squares neither overflow nor underflow
         loads = loads / size
-        forces = _solved(self._energy, loads.T)
+        forces = solved(self._energy, loads.T)
         energy = float(np.max(np.einsum("ij,ji->i", loads, forces)))
         return size * math.sqrt(energy) if energy > 0 else size
 
@@ -149,6 +143,14 @@ class ScaledEquation(ABC):
         """The scaled point x of unscaled alpha, lambda (m,) and q (r,), by default zero."""
         q = np.zeros(self.modes) if rigid is None else self._mixing.T @ rigid / self._load
         return np.concatenate([forces / self.force, q, [alpha / self.alpha_scale]])
+
+    def point_of(self, alpha: float, forces: Vector, moves: Vector) -> Vector:
+        """The scaled point x of a solution: q follows from its displacements, the unscaled (u_n, u_t), shape (m,)."""
+        x = self.point(alpha, forces)
+        if self.modes:
+            rest = moves / self.length - self.w(x)
+            x[self.m : -1] = np.linalg.lstsq(-self.bordered[: self.m, self.m :], rest, rcond=None)[0]
+        return x
 
     def alpha(self, x: Vector) -> float:
         """Unscaled alpha."""
@@ -299,31 +301,3 @@ class ScaledEquation(ABC):
         TooLargeError
             Too many selections hold there.
         """
-
-
-def _mixing(S: Vector, modes: Vector) -> Vector:
-    """L with L L' = G S^-1 G', shape (r, r).
-
-    Raises
-    ------
-    NotHeldError
-        Some rigid displacement moves no contact node.
-    """
-    if not len(modes):
-        return np.zeros((0, 0))
-    size = np.linalg.norm(modes, axis=1)
-    values, vectors = np.linalg.eigh(modes @ modes.T / np.outer(*(np.where(size > 0, size, 1.0),) * 2))
-    if values[0] <= _MODE_RANK * values[-1]:
-        raise NotHeldError(
-            f"rigid mode {int(np.argmax(np.abs(vectors[:, 0])))}, perhaps with others, moves no contact node: contact "
-            "cannot hold the body; expected a body that every rigid mode moves at its contact nodes"
-        )
-    return np.asarray(np.linalg.cholesky(modes @ _solved(S, modes.T)))
-
-
-def _solved(S: Vector, right: Vector) -> Vector:
-    """S^-1 times columns; of least length where S is singular within rounding."""
-    try:
-        return np.asarray(np.linalg.solve(S, right))
-    except np.linalg.LinAlgError:
-        return np.asarray(np.linalg.lstsq(S, right, rcond=None)[0])

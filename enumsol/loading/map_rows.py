@@ -47,6 +47,9 @@ class MapRow:
     unique : bool or None
         Whether there is one solution at every alpha; None: not known.
     seconds : float
+    within : float or None
+        Of a body that nothing holds: the numbers are those of solutions whose rigid displacement is within this bound
+        [length].
     """
 
     value: float
@@ -60,6 +63,7 @@ class MapRow:
     limit: float | None
     unique: bool | None
     seconds: float
+    within: float | None = None
 
     def count_at(self, alpha: Alpha) -> int:
         """Number of solutions at an alpha of the interval; a lower bound where the row is not exact."""

@@ -90,7 +90,7 @@ def multiplicity_map(
         Stop after this many seconds; what was done by then is kept.
     max_boxes : int
         Rectangles of alpha and the second parameter that are tried between two neighbouring values; 0: none, and
-        nothing is proven there. Nor is it with ``make``, or in arithmetic "fast".
+        nothing is proven there. Nor is it with ``make``, in arithmetic "fast", or of a body that nothing holds.
     **options
         Of `branch_graph`: ``arithmetic``, ``max_nodes``.
 
@@ -124,7 +124,7 @@ def multiplicity_map(
     if "interval" in options or "progress" in options:
         raise InvalidArgumentError("interval and progress are not options here; expected those of branch_graph")
     most = nonnegative_integer(max_boxes, "max_boxes")
-    if not isinstance(make, _Replaced) or options.get("arithmetic") == "fast":
+    if not isinstance(make, _Replaced) or make.problem.modes is not None or options.get("arithmetic") == "fast":
         most = 0
     work = _Rows(name, interval, values, make, options, optional_seconds(time_limit), most)
     try:
@@ -222,7 +222,6 @@ def map_row(
     """One row of a map (a module-level function, so that other processes can import it)."""
     started = time.perf_counter()
     problem = instance_of(make(value), ContactProblem, "the problem that over makes")
-    problem.check_held("multiplicity_map")
     graph = branch_graph(problem, interval, **options)
     steps, uniqueness = graph.claims.steps(), graph.claims.uniqueness()
     arcs = {vertex.number: [] for vertex in graph.folds}  # type: dict[int, list[tuple[str, ...]]]
@@ -242,6 +241,7 @@ def map_row(
         limit=uniqueness.limit,
         unique=uniqueness.throughout,
         seconds=time.perf_counter() - started,
+        within=None if problem.modes is None else problem.rigid_reach,
     )
 
 
@@ -407,8 +407,17 @@ class MultiplicityMap(Immutable):
             between = "says nothing about those between"
             if any(strip.unique for strip in self.strips):
                 between += f", but for one solution over {_percent(self.unique_between)} of alpha"
-            return f"complete: yes (proven at these values; {between})"
-        return f"complete: no (not proven at {sum(not row.complete for row in self.rows)} of {len(self.rows)} values)"
+            return f"complete: yes (proven at these values{self._within()}; {between})"
+        number = sum(not row.complete for row in self.rows)
+        return f"complete: no (not proven at {number} of {len(self.rows)} values{self._within()})"
+
+    def _within(self) -> str:
+        """Of bodies that nothing holds, within which rigid displacements the map is about solutions."""
+        bounds = [row.within for row in self.rows if row.within is not None]
+        if not bounds:
+            return ""
+        low, high = min(bounds), max(bounds)
+        return f", within rigid displacements of {low:g}" + (f" to {high:g}" if high > low else "")
 
     def __repr__(self) -> str:
         low, high = self.interval
@@ -480,7 +489,6 @@ def _parameter(problem: Any, over: Any) -> tuple[str, Callable[[float], ContactP
     if name not in ("friction", "gap", "load"):
         raise InvalidArgumentError(f"over is {shown(over)}; {_EXPECTED}")
     body = instance_of(problem, ContactProblem, "problem")
-    body.check_held("multiplicity_map")
     if name != "load":
         return name, _Replaced(body, name), _numbers(given)
     if not isinstance(given, tuple) or len(given) != 2:

@@ -89,10 +89,8 @@ class RootBuilder:
             _exact_slips=self.points.exact_slips(solution.vertices[0]),
         )
 
-    def _tangent(self, codes: Codes, force: NDArray[np.float64], w: NDArray[np.float64]) -> SelectionTangent | None:
-        if self.problem.modes is not None:
-            return None
-        return SelectionTangent(self.floats, self.problem.condensed, codes, force, w)
+    def _tangent(self, codes: Codes, force: NDArray[np.float64], w: NDArray[np.float64]) -> SelectionTangent:
+        return SelectionTangent(self.floats, condensation_of(self.problem), self.problem.friction[1], codes, force, w)
 
     def _rigid(self, solution: SelectionSolution) -> NDArray[np.float64] | None:
         """Coordinates of the rigid displacement of a body that nothing holds."""

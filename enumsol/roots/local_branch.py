@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import product
 from math import prod
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from enumsol.condensation.condensed import condensation_of
 from enumsol.errors import InvalidArgumentError, TooLargeError
 from enumsol.model.problem import ContactProblem
 from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, STATUSES, STICK, contact_status
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from enumsol.condensation.condensed import CondensedProblem
     from enumsol.model.statuses import ContactStatus
     from enumsol.selections.solution import Codes
     from enumsol.support.arguments import Alpha
@@ -55,7 +55,8 @@ class LocalBranchTest:
 
     The contact forces are a Lipschitz function of the load near the root, at fixed friction, exactly when the
     determinants of the normal map have one and the same sign, not zero, over all statuses that hold there. By
-    paper, Theorem 4.1, they then are one of the friction coefficients too, provided that F > 0 at every node.
+    paper, Theorem 4.1, they then are one of the friction coefficients too, provided that F > 0 at every node. Of a body
+    that nothing holds so is its rigid displacement; whether it is within its bound plays no part.
 
     Attributes
     ----------
@@ -112,6 +113,8 @@ def local_branch_test(problem: ContactProblem, root: SolutionPoint) -> LocalBran
         The root does not belong to the problem.
     TooLargeError
         More than MAX_SELECTIONS selections hold at the root.
+    NotHeldError
+        Some rigid displacement of a body that nothing holds moves no contact node.
 
     Examples
     --------
@@ -122,23 +125,22 @@ def local_branch_test(problem: ContactProblem, root: SolutionPoint) -> LocalBran
     a local Lipschitz branch exists in the load (1 selection holds)
     """
     instance_of(problem, ContactProblem, "problem")
-    problem.check_held("local_branch_test")
     active = getattr(root, "active", None)
     if not isinstance(active, tuple) or len(active) != problem.p:
         raise InvalidArgumentError(f"root is {type(root).__name__}; expected a Root with {problem.p} contact nodes")
-    return branch_test(problem.condensed, root)
+    return branch_test(condensation_of(problem), root)
 
 
-def branch_test(condensed: CondensedProblem, root: SolutionPoint) -> LocalBranchTest:
-    """The test at a root of the condensed problem; see local_branch_test."""
-    alpha = float(root.alpha)
-    frictionless = (condensed.F0 == 0) & (condensed.F1 == 0)
+def branch_test(condensed: Any, root: SolutionPoint) -> LocalBranchTest:
+    """The test at a root of a condensation of a 2D problem; see local_branch_test."""
+    alpha, (F0, F1) = float(root.alpha), condensed.problem.friction
+    frictionless = (F0 == 0) & (F1 == 0)
     active = []
     for without, holds in zip(frictionless, root.active, strict=True):
         codes = {STATUSES.index(status) for status in holds}
         active.append(frozenset(OPEN if code == OPEN else FRICTIONLESS for code in codes) if without else codes)
-    F = condensed.F0 + alpha * condensed.F1
-    return coherent_orientation(condensed.balanced, F, active, root.u_t, alpha, SINGULAR_TOLERANCE)
+    F = F0 + alpha * F1
+    return coherent_orientation(condensed.bordered, F, active, root.u_t, alpha, SINGULAR_TOLERANCE)
 
 
 def coherent_orientation(

@@ -148,7 +148,6 @@ class Root(ContactState):
             The problem is one in 3D.
         """
         self._in_2d("condition")
-        self.problem.check_held("condition")
         return np.inf if self._tangent is None else self._tangent.condition()
 
     @cached_property
@@ -161,8 +160,20 @@ class Root(ContactState):
             The problem is one in 3D.
         """
         self._in_2d("dlambda_dalpha")
-        self.problem.check_held("dlambda_dalpha")
         derivative = None if self._tangent is None else self._tangent.derivative()
+        return None if derivative is None else sealed(derivative)
+
+    @cached_property
+    def du_dalpha(self) -> NDArray[np.float64] | None:
+        """In 2D, derivatives of (u_n, u_t) along the branch, shape (p, 2) [length]; None unless the root is regular.
+
+        Raises
+        ------
+        InvalidArgumentError
+            The problem is one in 3D.
+        """
+        self._in_2d("du_dalpha")
+        derivative = None if self._tangent is None else self._tangent.motion()
         return None if derivative is None else sealed(derivative)
 
     @property
@@ -197,11 +208,12 @@ class Root(ContactState):
         ------
         TooLargeError
             Too many selections hold at the root to examine each of them.
+        NotHeldError
+            Some rigid displacement of a body that nothing holds moves no contact node.
         InvalidArgumentError
             The problem is one in 3D.
         """
         condensed = self._in_2d("local_branch_test")
-        self.problem.check_held("local_branch_test")
         return branch_test(condensed, self)
 
     @property
@@ -335,6 +347,12 @@ class Polytope(Sealed):
     vertices: NDArray[np.float64]
     dimension: int
     rigid_coordinates: NDArray[np.float64] | None = None
+
+    @property
+    def coordinates(self) -> NDArray[np.float64]:
+        """Every vertex in a row, (k, 2p + r): lambda_n and lambda_t node by node, then the rigid displacement."""
+        forces = self.vertices.reshape(len(self.vertices), -1)
+        return forces if self.rigid_coordinates is None else np.hstack([forces, self.rigid_coordinates])
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from helpers.floating_oracle import Oracle, block_on_table, random_body
 from helpers.proof_tools import copied, multipliers, proof_of, records_of, with_multipliers
 from rational_checker import Refused, check_records
@@ -35,6 +36,14 @@ def places(graph):
     return sorted(between | {alpha for alpha in exact if alpha.denominator < 10**9})
 
 
+def difference_of_families(graph, alpha, roots):
+    """What families at vertices are other than those of all solutions at their alpha, or None."""
+    here = [v.family for v in graph.vertices if v.family is not None and v.enclosure == (alpha, alpha)]
+    parts = ([part for family in group for part in family.polytopes] for group in (here, roots.families))
+    kept, whole = ({tuple(row) for part in group for row in np.round(part.coordinates, 9)} for group in parts)
+    return None if not here or whole <= kept else ("corners of families", whole - kept)
+
+
 def difference_from_oracle(problem, interval, arithmetic):
     """What a graph says other than the oracle, or None."""
     graph = enumsol.branch_graph(problem, interval, arithmetic)
@@ -46,6 +55,8 @@ def difference_from_oracle(problem, interval, arithmetic):
         roots = graph.roots_at(alpha)
         if graph.multiplicity_at(alpha) != sum(wanted) or (len(roots), len(roots.families)) != wanted:
             return alpha, graph.multiplicity_at(alpha), len(roots), len(roots.families), wanted
+        if (said := difference_of_families(graph, alpha, roots)) is not None:
+            return alpha, said
         found = [np.concatenate([root.lambda_n, root.lambda_t, root.u]) for root in roots]
         for row in np.hstack(oracle.forces):
             if min(np.max(np.abs(one - row)) for one in found) > 1e-7 * (1 + np.max(np.abs(row))):
@@ -206,3 +217,41 @@ def test_forged_leaves_are_refused():
     records = copied(RECORDS)
     del records[survivors[0]]
     assert "do not cover" in refusal(records)
+
+
+def test_samples_are_linked_where_the_graph_has_a_branch():
+    problem = pushed(cells=1)
+    graph = enumsol.branch_graph(problem, (-1.25, 1.25))
+    sampled = enumsol.link_samples(problem, [-1.25, -0.75, 0, 0.75, 1.25])
+    assert {roots.arithmetic for roots in sampled.root_sets} == {"verified"}
+    assert [len(roots) for roots in sampled.root_sets] == [0, 1, 1, 1, 0]
+    assert len(sampled.branches) == 1
+    assert not sampled.ambiguous
+    missed = sampled.missed(graph)
+    assert (missed.branches, missed.families) == ((), 2)
+
+
+def test_local_branches_at_vertices_are_those_on_weak_springs():
+    problem = pushed(cells=1)
+    A = sp.csc_array(problem.A + 1e-6 * sp.eye_array(problem.n))
+    held = enumsol.ContactProblem(
+        A, problem.Bn, problem.Bt, problem.f, friction=problem.friction, load_slope=problem.load_slope
+    )
+    free, weak = (enumsol.branch_graph(body, (-0.98, 0.98)) for body in (problem, held))
+    for one, two in zip(free.vertices, weak.vertices, strict=True):
+        assert one.active == two.active
+        tests = [enumsol.local_branch_test(graph.problem, v) for graph, v in ((free, one), (weak, two))]
+        assert tests[0] == tests[1]
+        assert tests[0].exists == (one.kind in ("transition", "end"))
+
+
+def test_a_family_at_a_vertex_keeps_parts_that_differ_only_in_how_far_the_body_moved():
+    """At the end the body slides, and then flies off without any force: its open part has one point of forces."""
+    problem = varying(162)
+    graph = enumsol.branch_graph(problem, (0, 2))
+    (vertex,) = (v for v in graph.vertices if v.family is not None)
+    parts = {part.statuses[0].value: part for part in vertex.family.polytopes}
+    assert parts.keys() == {"slip+", "open"}
+    assert np.allclose(sorted(parts["open"].rigid_coordinates.ravel()), [1 / 3, 8])
+    assert not np.any(parts["open"].vertices)
+    assert enumsol.follow_all(problem, (0, 2), graph=graph).complete

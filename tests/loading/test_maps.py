@@ -5,6 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from helpers.floating_oracle import Oracle, block_on_table
 
 import enumsol
 from enumsol import Interrupted, InvalidArgumentError, MultiplicityMap, enumerate_roots, multiplicity_map
@@ -218,3 +219,20 @@ def test_boxes_are_rounded_inward(ends, monkeypatch):
     for box, (_, values) in zip(boxes, strips.map_strip(str, ends, [], 1, None).boxes, strict=True):
         shares = [(Fraction(value) - low) / (high - low) for value in values]
         assert box.shares[0] <= shares[0] < shares[1] <= box.shares[1]
+
+
+def test_a_map_of_a_body_that_nothing_holds_against_rationals():
+    rest, push = (block_on_table(1, push=value, max_rigid_displacement=4.0) for value in (0.0, 1.0))
+    problem = rest.replace(load_slope=push.f - rest.f)
+    found = enumsol.multiplicity_map(problem, (0, 3), {"friction": [0.125, 0.5]})
+    assert found.complete
+    assert not found.strips
+    for value in found.values:
+        for alpha in (0, Fraction(1, 2), 1, 2, 3):
+            oracle = Oracle(problem.replace(friction=value), alpha)
+            assert found.multiplicity_at(value, alpha) == len(oracle.points) + oracle.families
+    assert [row.within for row in found.rows] == [4.0] * 2
+    assert "within rigid displacements of 4; says nothing about those between" in repr(found)
+    reaches = [problem, problem.replace(max_rigid_displacement=8.0)]
+    several = enumsol.multiplicity_map(None, (0, 0.5), (lambda value: reaches[int(value)], [0, 1]))
+    assert "within rigid displacements of 4 to 8" in several.completeness()

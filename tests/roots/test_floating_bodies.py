@@ -4,6 +4,7 @@ import dataclasses
 import itertools
 import pickle
 from concurrent.futures import ThreadPoolExecutor
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -244,14 +245,8 @@ def test_modes_that_cannot_be_used(change, words):
 @pytest.mark.parametrize(
     "call",
     [
-        lambda problem: enumsol.link_samples(problem, [0, 1]),
-        lambda problem: enumsol.follow_all(problem, (0, 1)),
-        lambda problem: enumsol.multiplicity_map(problem, (0, 1), {"friction": [1, 2]}),
         lambda problem: enumsol.solve_tresca(problem, 0, 1),
         lambda problem: enumsol.successive_approximations(problem, 0),
-        lambda problem: enumsol.enumerate_roots(problem, 0)[0].condition,
-        lambda problem: enumsol.enumerate_roots(problem, 0)[0].dlambda_dalpha,
-        lambda problem: enumsol.enumerate_roots(problem, 0)[0].local_branch_test(),
         lambda problem: problem.condensed,
         lambda problem: problem.enclosure,
         lambda problem: problem.factorization,
@@ -276,3 +271,51 @@ def test_a_table_of_roots_over_alpha():
     table = enumsol.multiplicity_table(block_on_table(push=0.5), [0, 1])
     assert table["roots"].tolist() == [1, 1]
     assert table["complete"].all()
+
+
+def solutions(problem, alpha):
+    """All isolated solutions of the oracle, (forces, u), as floats."""
+    return np.hstack(Oracle(problem, alpha).forces)
+
+
+def near(root, rows):
+    """The solution next to a root, or None where there are two."""
+    here = np.concatenate([root.lambda_n, root.lambda_t, root.u])
+    close = [row for row in rows if np.max(np.abs(row - here)) < 1e-3 * (1 + np.max(np.abs(here)))]
+    return close[0] if len(close) == 1 else None
+
+
+def branches_of(seed):
+    """How many regular roots of a random body were compared with the solutions on both sides of their alpha."""
+    problem, step, compared = random_body(seed), Fraction(1, 2**24), 0
+    slope = np.random.default_rng(seed).integers(-1, 2, problem.n).astype(float)
+    problem = problem.replace(load_slope=slope)
+    roots = enumsol.enumerate_roots(problem, 0.5)
+    sides = [solutions(problem, Fraction(1, 2) + way * step) for way in (1, -1)] if len(roots) else []
+    for root in roots:
+        test = root.local_branch_test()
+        if root.regular:
+            assert test.exists
+            assert [sign for _, sign in test.signs] == [root.index]
+            assert 1 <= root.condition < np.inf
+        after, before = (near(root, rows) for rows in sides)
+        if not root.regular or root.margin < 1e-5 or after is None or before is None:
+            continue
+        rate, p = (after - before) / float(2 * step), problem.p
+        moved = np.concatenate([problem.Bn @ rate[2 * p :], problem.Bt @ rate[2 * p :]])
+        assert np.allclose(root.dlambda_dalpha.T.ravel(), rate[: 2 * p], rtol=1e-6, atol=1e-6)
+        assert np.allclose(root.du_dalpha.T.ravel(), moved, rtol=1e-6, atol=1e-6)
+        compared += 1
+    return compared
+
+
+@pytest.mark.parametrize(
+    "seeds",
+    [
+        range(8, 14),
+        pytest.param(range(14, 30), marks=pytest.mark.slow),
+        pytest.param(range(30, 400), marks=pytest.mark.long),
+    ],
+)
+def test_derivatives_and_local_branches_of_regular_roots(seeds):
+    assert sum(branches_of(seed) for seed in seeds) > len(seeds) // 10

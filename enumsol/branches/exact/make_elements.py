@@ -170,7 +170,7 @@ def _family(glued: GluedVertex, index: int | None, *, proven: bool) -> RootFamil
 
 def _without_repetition(parts: Sequence[Polytope]) -> list[Polytope]:
     """Polytopes whose vertices are not among those of another (of equal ones the first)."""
-    sets = [{tuple(v.ravel().tolist()) for v in part.vertices} for part in parts]
+    sets = [set(map(tuple, part.coordinates.tolist())) for part in parts]
     return [
         part
         for k, part in enumerate(parts)
