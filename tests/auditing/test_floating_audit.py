@@ -78,12 +78,12 @@ def test_arcs_are_followed_from_their_vertices():
 
 
 def followed(seed):
-    """A random body's graph and the audit of all its paths; None of what has no arcs or too many free modes."""
+    """All paths of a random body and their audit; None of what has no arcs but sheets, or too many free modes."""
     problem = random_body(seed)
     slope = np.random.default_rng(seed + 10**6).integers(-1, 2, problem.n)
     problem = problem.replace(load_slope=slope.astype(float))
     graph = enumsol.branch_graph(problem, (0, 2)) if problem.modes.r < 5 else None
-    if graph is None or not graph.arcs:
+    if graph is None or all(arc.dimension for arc in graph.arcs):
         return None
     try:
         return enumsol.follow_all(problem, (0, 2), graph=graph)
@@ -92,7 +92,7 @@ def followed(seed):
 
 
 @pytest.mark.parametrize(
-    "seeds", [pytest.param(range(30), marks=pytest.mark.slow), pytest.param(range(100, 300), marks=pytest.mark.long)]
+    "seeds", [pytest.param(range(20), marks=pytest.mark.slow), pytest.param(range(100, 300), marks=pytest.mark.long)]
 )
 def test_all_paths_of_random_bodies_are_on_their_graphs(seeds):
     found = {seed: result for seed in seeds if (result := followed(seed)) is not None}
