@@ -85,7 +85,8 @@ class SelectionTangent(Sealed):
         rhs = np.append((load - system.S @ change)[rows], self._load - G @ change)
         rigid: Array = np.zeros(len(G))
         if len(rhs):
-            found = np.linalg.solve(self._bordered(system.S[rows] @ E, rows, E), rhs)
+            matrix = self._bordered(system.S[rows] @ E, rows, E)
+            found = np.asarray(np.linalg.solve(matrix, rhs), dtype=np.float64)
             change, rigid = change + E @ found[: len(rows)], found[len(rows) :]
         move = (load - system.S @ change + G.T @ rigid) * system.length
         change = change * system.force
