@@ -47,9 +47,9 @@ def audit(
     ----------
     path : Path, sequence of Path, pandas.DataFrame, or file name of a CSV
         Points in the order in which they were computed. Frames and CSV files have the columns alpha, lambda_n_X and
-        lambda_t_X, one X a contact node (others are ignored), and may name several paths in a column ``path``. Of a
-        body that nothing holds they also have rigid_0, rigid_1, ..: the coordinates q of its rigid displacement N q,
-        which equals u at the degrees of freedom ``problem.modes.held``.
+        lambda_t_X (in 3D lambda_t1_X and lambda_t2_X), one X a contact node (others are ignored), and may name several
+        paths in a column ``path``. Of a body that nothing holds they also have rigid_0, rigid_1, ..: the coordinates q
+        of its rigid displacement N q, which equals u at the degrees of freedom ``problem.modes.held``.
     graph : BranchGraph
     tolerance : float
         Distance from the nearest arc or vertex at which a point lies off the graph, above 0 and below 1. For points of

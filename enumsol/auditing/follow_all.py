@@ -16,6 +16,7 @@ from enumsol.continuation.not_converged import AmbiguousStart
 from enumsol.continuation.path import Path
 from enumsol.continuation.path_data import PathStats, PathStatus
 from enumsol.errors import InvalidArgumentError, TooLargeError
+from enumsol.model.contact_body import ContactBody
 from enumsol.model.problem import ContactProblem
 from enumsol.support.arguments import alpha_interval, instance_of, optional_callable, positive_integer, shown
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from enumsol.branches.elements import Arc
     from enumsol.branches.graph import BranchGraph
     from enumsol.continuation.continuation_options import ContinuationOptions
+    from enumsol.model.problem3d import ContactProblem3D
     from enumsol.support.arguments import AlphaLike
 
 #: Where on a missed arc it is started anew, as fractions of its interval; its ends are transition points.
@@ -77,7 +79,7 @@ class FollowAllResult:
 
 
 def follow_all(
-    problem: ContactProblem,
+    problem: ContactProblem | ContactProblem3D,
     interval: tuple[AlphaLike, AlphaLike],
     options: ContinuationOptions | None = None,
     *,
@@ -92,7 +94,7 @@ def follow_all(
 
     Parameters
     ----------
-    problem : ContactProblem
+    problem : ContactProblem or ContactProblem3D
     interval : pair of alphas
     options : ContinuationOptions or None
     graph : BranchGraph or None
@@ -115,7 +117,7 @@ def follow_all(
     >>> enumsol.follow_all(enumsol.gallery.one_node_triangle(), (0, 10)).complete
     True
     """
-    instance_of(problem, ContactProblem, "problem")
+    _check_problem(problem)
     ends = alpha_interval(interval)
     optional_callable(progress, "progress")
     if graph is None:
@@ -123,6 +125,8 @@ def follow_all(
 
         graph = branch_graph(problem, ends)
     chart = GraphMap(checked_graph(graph), POINT_TOLERANCE)
+    if not isinstance(graph.problem, type(problem)):
+        raise InvalidArgumentError("graph is one of a problem in another dimension; expected one of this problem")
     if graph.problem is not problem and graph.problem.p != problem.p:
         raise InvalidArgumentError(f"graph has {graph.problem.p} contact nodes; expected the problem's {problem.p}")
     coverage = _Coverage(problem, (float(ends[0]), float(ends[1])), options, chart, progress)
@@ -135,11 +139,16 @@ def follow_all(
     return FollowAllResult(tuple(coverage.paths), report, tuple(coverage.failures), len(coverage.paths) - seeded, graph)
 
 
+def _check_problem(problem: Any) -> None:
+    if not isinstance(problem, ContactBody):
+        instance_of(problem, ContactProblem, "problem")
+
+
 @dataclass
 class _Coverage:
     """Paths so far, and the arcs that they passed."""
 
-    problem: ContactProblem
+    problem: ContactProblem | ContactProblem3D
     interval: tuple[float, float]
     options: ContinuationOptions | None
     chart: GraphMap
@@ -195,7 +204,7 @@ def _seed(chart: GraphMap, arc: Arc, alpha: float) -> _Seed:
 
 
 def follow_arc(
-    problem: ContactProblem,
+    problem: ContactProblem | ContactProblem3D,
     graph: BranchGraph,
     vertex: int,
     arc: int,
@@ -209,7 +218,7 @@ def follow_arc(
 
     Parameters
     ----------
-    problem : ContactProblem
+    problem : ContactProblem or ContactProblem3D
     graph : BranchGraph
     vertex, arc : int
         Numbers of the vertex and of an arc that ends there.
@@ -222,7 +231,7 @@ def follow_arc(
     InvalidArgumentError
         The arc does not end at the vertex, or is a sheet.
     """
-    instance_of(problem, ContactProblem, "problem")
+    _check_problem(problem)
     chart = GraphMap(graph, POINT_TOLERANCE)
     vertex, arc = positive_integer(vertex, "vertex", 0), positive_integer(arc, "arc", 0)
     chosen = next((item for item in graph.arcs if item.number == arc), None)

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.continuation.condensed_equation import CondensedEquation
-from enumsol.continuation.parameter_path import AffinePath
+from enumsol.continuation.equations import equation_on
 from enumsol.continuation.start import ALPHA_FRACTION
 from enumsol.continuation.transitions import selection_distance
 from enumsol.errors import InvalidArgumentError
-from enumsol.model.problem import ContactProblem
+from enumsol.model.contact_body import ContactBody
 from enumsol.support.arguments import real_or_nan, shown
 from enumsol.support.messages import TextEnum
 
@@ -49,7 +48,7 @@ def checked_graph(graph: Any) -> BranchGraph:
         It is something else.
     """
     lacking = [name for name in _ASKED if not hasattr(graph, name)]
-    if lacking or not isinstance(graph.problem, ContactProblem):
+    if lacking or not isinstance(graph.problem, ContactBody):
         why = f", which has no {lacking[0]}" if lacking else ""
         raise InvalidArgumentError(
             f"graph is a {type(graph).__name__}{why}; expected a BranchGraph, which holds arcs over an interval "
@@ -123,7 +122,7 @@ class GraphMap:
         self.graph, self.tolerance = checked_graph(graph), checked_tolerance(tolerance)
         low, high = (float(end) for end in graph.interval)
         scale = ALPHA_FRACTION * (high - low)
-        self.equation = CondensedEquation(AffinePath(graph.problem), (low, high), low, alpha_scale=scale)
+        self.equation = equation_on(graph.problem, None, low, (low, high), alpha_scale=scale)
         self.arcs: dict[int, Arc] = {arc.number: arc for arc in graph.arcs}
         self.vertices: dict[int, Vertex] = {vertex.number: vertex for vertex in graph.vertices}
         self.curves = [arc for arc in self.arcs.values() if not arc.dimension]
@@ -131,7 +130,7 @@ class GraphMap:
 
     def point(self, alpha: float, lambda_n: Vector, lambda_t: Vector, rigid: Vector | None = None) -> Vector:
         """Scaled point of the condensed equation; ``rigid``: coordinates of the rigid displacement, if there is one."""
-        return self.equation.point(alpha, np.concatenate([lambda_n, lambda_t]), rigid)
+        return self.equation.point(alpha, np.concatenate([lambda_n, lambda_t.ravel(order="F")]), rigid)
 
     # -- distances ---------------------------------------------------------------------------------------------------
 

@@ -6,23 +6,29 @@ import os
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import IO, TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from enumsol.continuation.path import Path
 from enumsol.errors import InvalidArgumentError
+from enumsol.model.problem import ContactProblem
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import NDArray
 
-    from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import ContactProblem3D
+
+    Body = ContactProblem | ContactProblem3D
+
 
 #: How the names of columns tell the contact nodes apart; "auto" takes the one for which all columns are there.
 Columns = Literal["auto", "rows", "labels"]
 _FORCES = ("lambda_n", "lambda_t")
+_FORCES_3D = ("lambda_n", "lambda_t1", "lambda_t2")
 #: Names of columns that an error lists.
 _LISTED = 12
 
@@ -40,7 +46,7 @@ class PointRun:
         one below the names of the columns), or its number in its Path.
     alpha : (m,) array
     forces : (m, 2p) array
-        lambda_n and lambda_t [force].
+        lambda_n and lambda_t [force]; in 3D (m, 3p): lambda_n and both components of lambda_t.
     rigid : (m, r) array
         Of a body that nothing holds, coordinates of its rigid displacement; r is 0 for others.
     """
@@ -53,16 +59,17 @@ class PointRun:
 
 
 def read_points(
-    source: Any, problem: ContactProblem, *, columns: Columns = "auto", name: str | None = None
+    source: Any, problem: Body, *, columns: Columns = "auto", name: str | None = None
 ) -> tuple[PointRun, ...]:
     """The runs of points in a source; none where it holds no point.
 
     Parameters
     ----------
     source : Path, sequence of Path, pandas.DataFrame, file name or open text file of a CSV, or list of PointRun
-        Frames and files have the columns alpha, lambda_n_X and lambda_t_X, one X a contact node, and may name several
-        paths in a column ``path``; of a body that nothing holds rigid_0, rigid_1, .. as well. Others are ignored.
-    problem : ContactProblem
+        Frames and files have the columns alpha, lambda_n_X and lambda_t_X (in 3D lambda_t1_X and lambda_t2_X), one X
+        a contact node, and may name several paths in a column ``path``; of a body that nothing holds rigid_0, rigid_1,
+        .. as well. Others are ignored.
+    problem : ContactProblem or ContactProblem3D
     columns : {"auto", "rows", "labels"}
         Whether X is the node's row number or its label in ``problem.node_ids``. "auto": the one for which all columns
         are there; a source that has all columns for both, and different ones for a node, is refused.
@@ -82,7 +89,7 @@ def read_points(
     if isinstance(source, Sequence) and not isinstance(source, str):
         if all(isinstance(item, PointRun) for item in source):
             for run in source:
-                _check_nodes(run.forces.shape[1] // 2, problem.p)
+                _check_nodes(run.forces.shape[1] // len(_forces(problem)), problem.p)
                 _check_modes(run.rigid.shape[1], problem)
             return tuple(source)
         if all(isinstance(item, Path) for item in source):
@@ -97,11 +104,13 @@ def read_points(
     raise InvalidArgumentError(f"path is a {kind}; expected a Path, several of them, a DataFrame or a CSV file")
 
 
-def _from_path(number: int, path: Path, problem: ContactProblem) -> PointRun:
+def _from_path(number: int, path: Path, problem: Body) -> PointRun:
     _check_nodes(path.lambda_n.shape[1], problem.p)
-    if path.lambda_t.ndim == 3:
-        raise InvalidArgumentError(f"path {number} is one in 3D; expected a path in 2D, as graphs are")
-    forces = np.hstack([path.lambda_n, path.lambda_t])
+    found, wanted = ("3D" if solid else "2D" for solid in (path.lambda_t.ndim == 3, len(_forces(problem)) == 3))
+    if found != wanted:
+        raise InvalidArgumentError(f"path {number} is one in {found}; expected a path in {wanted}, as the graph is")
+    parts = [path.lambda_t] if path.lambda_t.ndim == 2 else [path.lambda_t[:, :, 0], path.lambda_t[:, :, 1]]
+    forces = np.hstack([path.lambda_n, *parts])
     rigid = np.zeros((len(path), 0)) if path.rigid_coordinates is None else path.rigid_coordinates
     _check_modes(rigid.shape[1], problem)
     finite = np.isfinite(path.alpha) & np.all(np.isfinite(np.hstack([forces, rigid])), axis=1)
@@ -112,16 +121,21 @@ def _from_path(number: int, path: Path, problem: ContactProblem) -> PointRun:
     return PointRun(number, np.arange(len(path)), path.alpha, forces, rigid)
 
 
+def _forces(problem: Body) -> tuple[str, ...]:
+    """Names of the forces of a contact node."""
+    return _FORCES if isinstance(problem, ContactProblem) else _FORCES_3D
+
+
 def _check_nodes(found: int, p: int) -> None:
     if found != p:
         raise InvalidArgumentError(f"path has {found} contact nodes; expected the graph's {p}")
 
 
-def _modes(problem: ContactProblem) -> int:
+def _modes(problem: Body) -> int:
     return 0 if problem.modes is None else problem.modes.r
 
 
-def _check_modes(found: int, problem: ContactProblem) -> None:
+def _check_modes(found: int, problem: Body) -> None:
     if found != _modes(problem):
         raise InvalidArgumentError(
             f"path has a rigid displacement of {counted(found, 'coordinate')}; expected the graph's {_modes(problem)}"
@@ -147,7 +161,7 @@ def _read_csv(source: str | os.PathLike[str] | IO[str], name: str) -> pd.DataFra
     return frame
 
 
-def _from_frame(frame: pd.DataFrame, problem: ContactProblem, columns: Columns, name: str) -> tuple[PointRun, ...]:
+def _from_frame(frame: pd.DataFrame, problem: Body, columns: Columns, name: str) -> tuple[PointRun, ...]:
     titles = _titles(frame, problem, columns, name)
     values = np.column_stack([_numbers(frame, title, name) for title in titles])
     rigid = _rigid(frame, problem, name)
@@ -157,7 +171,7 @@ def _from_frame(frame: pd.DataFrame, problem: ContactProblem, columns: Columns, 
     )
 
 
-def _rigid(frame: pd.DataFrame, problem: ContactProblem, name: str) -> NDArray[np.float64]:
+def _rigid(frame: pd.DataFrame, problem: Body, name: str) -> NDArray[np.float64]:
     """Columns with the coordinates of the rigid displacement, (rows, r)."""
     known, titles = list(frame.columns), [f"rigid_{mode}" for mode in range(_modes(problem))]
     for title in titles:
@@ -173,7 +187,7 @@ def _rigid(frame: pd.DataFrame, problem: ContactProblem, name: str) -> NDArray[n
 # -- names of columns --------------------------------------------------------------------------------------------------
 
 
-def _titles(frame: pd.DataFrame, problem: ContactProblem, columns: Columns, name: str) -> list[str]:
+def _titles(frame: pd.DataFrame, problem: Body, columns: Columns, name: str) -> list[str]:
     """Names of the columns with alpha, lambda_n and lambda_t of the nodes in the order of their rows."""
     known = [title if isinstance(title, str) else repr(title) for title in frame.columns]
     ways = _ways(problem, columns, name)
@@ -201,7 +215,7 @@ def _titles(frame: pd.DataFrame, problem: ContactProblem, columns: Columns, name
 _MEANING = {"rows": "row number", "labels": "label"}
 
 
-def _ways(problem: ContactProblem, columns: Columns, name: str) -> dict[str, list[str]]:
+def _ways(problem: Body, columns: Columns, name: str) -> dict[str, list[str]]:
     """The admissible ways to name the nodes, with all names of columns; one where both are the same."""
     rows = [str(row) for row in range(problem.p)]
     labels = [str(label) for label in problem.node_ids]
@@ -211,13 +225,17 @@ def _ways(problem: ContactProblem, columns: Columns, name: str) -> dict[str, lis
     ways = {"rows": rows} if columns != "labels" else {}
     if columns != "rows" and distinct and labels not in ways.values():
         ways["labels"] = labels
-    return {way: ["alpha", *(f"{force}_{node}" for force in _FORCES for node in nodes)] for way, nodes in ways.items()}
+    return {
+        way: ["alpha", *(f"{force}_{node}" for force in _forces(problem) for node in nodes)]
+        for way, nodes in ways.items()
+    }
 
 
 def _span(titles: Sequence[str]) -> str:
     """Names of columns, those between the first and the last node of many left out."""
-    alpha, p = titles[0], (len(titles) - 1) // 2
-    parts = [titles[1 : 1 + p], titles[1 + p :]]
+    alpha = titles[0]
+    parts = [list(part) for _, part in groupby(titles[1:], key=lambda title: title.split("_", 2)[1])]
+    p = len(parts[0])
     return ", ".join([alpha, *(", ".join(part) if p <= 3 else f"{part[0]}, .., {part[-1]}" for part in parts)])
 
 

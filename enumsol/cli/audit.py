@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from enumsol.cli.common import ExitStatus, finish, load_problem, parse_alpha, parse_interval, so_far
+from enumsol.cli.common import ExitStatus, finish, load_any_problem, parse_alpha, parse_interval, so_far
 from enumsol.cli.graph import build, read_graph
 from enumsol.cli.options import Arithmetic, JsonFile, ProblemArgument, Quiet, csv, file, number
 from enumsol.cli.output import check_outputs, deliver
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from enumsol.auditing import AuditReport, PointRun
     from enumsol.branches import BranchGraph
     from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import ContactProblem3D
     from enumsol.support.arguments import Alpha
 
 #: As of ``read_points``, which is not imported for --help.
@@ -64,8 +65,8 @@ def audit(
     another, which arcs in the interval no path visited, and which points could not be compared. Points are named by
     path and row; rows are counted from 0, which is the first one below the names of the columns.
 
-    The X of lambda_n_X is the row number of a contact node or its label, as in --node. A file that fits both is
-    refused unless --columns states which is meant.
+    In 3D lambda_t1_X and lambda_t2_X take the place of lambda_t_X. The X of lambda_n_X is the row number of a contact
+    node or its label, as in --node. A file that fits both is refused unless --columns states which is meant.
 
     Distance: sqrt(e^2 + a^2). e is the energy norm sqrt(d' S d) of the difference d of the contact forces, where S is
     the compliance of the contact nodes, relative to the load, that is to the largest sqrt(g' S^-1 g) in the interval;
@@ -89,7 +90,7 @@ def audit(
     check_outputs(json=json_file, csv=csv_file)
     if graph_file is not None and (first is not None or last is not None):
         raise InvalidArgumentError("--graph and --from or --to are both given; a graph has its own interval")
-    body = load_problem(problem)
+    body = load_any_problem(problem)
     runs = _read_runs(points, body, columns)
     known = None if graph_file is None else read_graph(graph_file, body)
     found, ended = so_far(lambda: known or build(body, _interval(runs, first, last), arithmetic))
@@ -104,7 +105,7 @@ def audit(
     finish(ended, _status(report))
 
 
-def _read_runs(points: str, problem: ContactProblem, columns: Columns) -> Sequence[PointRun]:
+def _read_runs(points: str, problem: ContactProblem | ContactProblem3D, columns: Columns) -> Sequence[PointRun]:
     from enumsol.auditing import read_points
 
     source, name = (sys.stdin, "stdin") if points == "-" else (points, points)

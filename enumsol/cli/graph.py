@@ -135,7 +135,7 @@ def build(
         return branch_graph(problem, interval, arithmetic, progress=progress, executor=executor, **limits)
 
 
-def read_graph(file: str, problem: ContactProblem) -> BranchGraph:
+def read_graph(file: str, problem: ContactProblem | ContactProblem3D) -> BranchGraph:
     """The graph in a file, which must be one of this problem.
 
     Raises
@@ -151,10 +151,15 @@ def read_graph(file: str, problem: ContactProblem) -> BranchGraph:
     return found
 
 
-def _same_problem(a: ContactProblem, b: ContactProblem) -> bool:
-    if (a.n, a.p) != (b.n, b.p) or any((getattr(a, name) != getattr(b, name)).nnz for name in ("A", "Bn", "Bt")):
-        return False
+def _same_problem(a: Any, b: Any) -> bool:
     import numpy as np  # not for --help
+
+    plane = hasattr(a, "Bt")
+    rows = ("A", "Bn", "Bt") if plane else ("A", "Bn", "Bt1", "Bt2")
+    if (a.n, a.p) != (b.n, b.p) or any((getattr(a, name) != getattr(b, name)).nnz for name in rows):
+        return False
+    if not plane and not all(map(np.array_equal, a.friction_slope, b.friction_slope)):
+        return False
 
     pairs = [(getattr(a, name), getattr(b, name)) for name in ("f", "gap", "slip_offset")]
     slopes = [np.zeros(a.n) if item.load_slope is None else item.load_slope for item in (a, b)]
