@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.branches.elements import VertexKind
-from enumsol.branches.figures.curves import QUANTITIES, Curve, curves, side_by_side, state_columns
+from enumsol.branches.figures.curves import QUANTITIES, Curve, curves, side_by_side
 from enumsol.branches.figures.marks import colour_of
 from enumsol.branches.figures.panels import family_states
 from enumsol.model.statuses import STATUSES
@@ -157,11 +157,6 @@ def _beside(graph: BranchGraph, drawn: Mapping[int, Curve]) -> dict[str, dict[st
         if several:
             found[str(column)] = several
     return found
-
-
-def vertex_values(v: Vertex) -> dict[str, float]:
-    """The overviews at a vertex, for tables."""
-    return {name: float(state_columns(item, v)[0]) for name, item in QUANTITIES.items() if not item.by_node}
 
 
 def listed(graph: BranchGraph) -> list[Vertex]:
