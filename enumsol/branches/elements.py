@@ -254,7 +254,7 @@ class Component:
 
 @dataclass(frozen=True, eq=False)
 class Branch:
-    """A path or closed loop of arcs: what is left of a component cut at bifurcations, families and sheets.
+    """A path or closed loop of arcs: a part of a component that is cut at bifurcations, families and sheets.
 
     Attributes
     ----------

@@ -53,7 +53,7 @@ class BranchGraph(GraphData):
         Nodes are the numbers of vertices (attributes alpha, kind, statuses, ..., vertex), edges the arcs, keyed by
         their numbers (attributes statuses, alpha, index, values, ..., arc).
     components, branches : tuples of Component, and of Branch
-        Connected components, and what is left of them cut at bifurcations, families and sheets.
+        Connected components, and the parts of them if they are cut at bifurcations, families and sheets.
     branch_of : mapping
         Number of the branch of every arc, by the arc's number.
     reasons : tuple of str
@@ -139,7 +139,7 @@ class BranchGraph(GraphData):
         Raises
         ------
         InvalidArgumentError
-            alpha is outside the interval, or cannot be told from a vertex of which only bounds are known.
+            alpha is outside the interval, or cannot be distinguished from a vertex of which only bounds are known.
         """
         arcs, _, near = self.located(alpha)
         if not near:

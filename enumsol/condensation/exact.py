@@ -157,7 +157,7 @@ class UncondensedSystem:
     def solved(self, turned: Any, unknown: Any, sign: int) -> tuple[list[Any], list[Any], int] | None:
         """The unknowns y of a selection, u, and the sign of det M; None where M is singular.
 
-        With u the displacements, M y = g_R is what is left when u is eliminated from
+        With u the displacements, M y = g_R is what remains when u is eliminated from
 
             A u + B'E y = f(alpha),      B_R u = o_R       (o: gap and slip offset),
 

@@ -55,7 +55,7 @@ def exact_matrices(problem: ProblemData) -> tuple[Any, Any]:
 
 
 def solved(A: Any, rhs: Any) -> Any:
-    """A^-1 rhs, a few columns after another: no slower than at once, and it can be told and stopped.
+    """A^-1 rhs, a few columns at a time: no slower than all at once, and it can report its progress and be stopped.
 
     Raises
     ------

@@ -279,7 +279,7 @@ class ScaledEquation(ABC):
 
     @abstractmethod
     def statuses(self, codes: Sequence[int], slip: Vector) -> tuple[ContactStatus, ...]:
-        """Names of the statuses; that of a frictionless node in contact is told by its u_t, ``slip`` (m - p,)."""
+        """Names of the statuses; that of a frictionless node in contact follows from its u_t, ``slip`` (m - p,)."""
 
     # -- signs of determinants ---------------------------------------------------------------------------------------
 

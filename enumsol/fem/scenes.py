@@ -174,7 +174,7 @@ class Scene:
         return problem
 
     def _modes(self, more: dict[str, Any]) -> Floats | None:
-        """Rigid motions that nothing holds, if that is asked for; their bound is put to the other arguments."""
+        """Rigid motions that nothing holds, if a bound for them is given; the bound joins the other arguments."""
         largest, about = self.options["max_rigid_displacement"], (self.pieces, self.mesh.points, self.hold)
         if largest is None:
             check_held(*about)

@@ -52,7 +52,7 @@ class History(Immutable):
     reasons : tuple of str
         Why the history is not complete; each names its step.
     refinement : Refinement or None
-        What halving the increments changed, if that was asked for.
+        What halving the increments changed, if it was requested.
 
     Examples
     --------

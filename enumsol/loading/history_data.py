@@ -37,7 +37,7 @@ class Refinement:
     changed_at : tuple of int
         For every halving the first of the given steps up to which the statuses changed; 0 where none did.
     reason : str or None
-        Why they were not halved once more, where that was neither because nothing changed nor the limit.
+        Why they were not halved further, if the reason is neither that nothing changed nor the limit.
     """
 
     halvings: int

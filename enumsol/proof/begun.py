@@ -1,4 +1,4 @@
-"""Proofs that were begun: read as far as they were written, for a search that goes on with them.
+"""Proofs that were begun: read as far as they were written, for a search that resumes from them.
 
 Nothing in such a file is trusted. It may end in the middle of a record; whoever uses a record proves it again.
 """
@@ -115,7 +115,7 @@ class BegunProof:
 
 
 def begun_proof(place: Path, header: dict[str, Any]) -> BegunProof | None:
-    """The proof in a file that a search with this header goes on with; None if there is nothing in it yet.
+    """The proof in a file from which a search with this header resumes; None if there is nothing in it yet.
 
     Raises
     ------

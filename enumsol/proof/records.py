@@ -1,6 +1,6 @@
 """Records of a proof as classes: one for each kind, which writes it and reads it strictly (docs/proof_format.md).
 
-The certifiers write a record by making one. Checkers, and a search that goes on with an earlier proof, read it by the
+The certifiers write a record by making one. Checkers, and a search that resumes from an earlier proof, read it by the
 class that a table gives for its first entry. Reading says whether a record makes sense, never that it is true.
 
 A new kind of leaf begins here and in ``LEAVES``; docs/architecture.md lists the other places that it touches. Leaves of

@@ -98,9 +98,9 @@ def enumerate_roots(
     proof_path : path, optional
         Stream the proof to this file (arithmetic "verified"); by default it is kept, compressed, in memory.
     resume : bool
-        Go on with the proof that an earlier search, stopped or killed, left at ``proof_path``. All that it holds is
-        proven again; limits are about what is searched anew. The file is replaced as soon as the new one holds as much.
-        Without such a file the search begins at its beginning.
+        Resume from the proof that an earlier search, stopped or killed, left at ``proof_path``. All that it holds is
+        proven again; limits apply to what is searched anew. The file is replaced as soon as the new one holds as much.
+        Without such a file the search starts from nothing.
     tolerance : float
         For arithmetic "fast": see enumsol.selections.float_selections.SIGN_TOLERANCE.
     engine : {"active-set", "clarabel"}, optional

@@ -145,7 +145,7 @@ class Enumeration(ABC, Generic[_Solvers]):
         """What was found, in the user's terms."""
 
     def _rigid_bound(self, problem: ContactBody) -> RigidBound | None:
-        """Of a body that nothing holds, within which rigid displacements the solutions are all of them."""
+        """Of a body that nothing holds: the bound of the rigid displacement within which all solutions are listed."""
         if problem.modes is None:
             return None
         return RigidBound(problem.rigid_reach, self.certifier.certified.bounded or self.method != "tree")

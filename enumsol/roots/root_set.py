@@ -44,7 +44,7 @@ class Undecided(Sealed):
     hint : str
         What may help.
     leaves : int
-        Parts of the search tree that this is. In 3D those that touch are one region: the root that it may hold, or the
+        Number of parts of the search tree. In 3D those that touch are one region: the root that it may hold, or the
         continuum of them, may belong to any (theory, section 12.5).
     slip_angle : (p, 2) array or None
         In 3D: bounds of the angles of F u_t that a root in it has, as in Root; nan where it does not slip.
@@ -98,14 +98,14 @@ class SearchStats:
     presolved : int
         Contact nodes proven open or in contact before the search began to branch on alternatives.
     closed : int
-        Partial assignments closed by the only solution that they may hold.
+        Partial assignments fathomed by the only solution that they may hold.
     resumed : int
         Nodes of the tree taken from the proof of an earlier search, and proven again. They are not among ``nodes``, but
-        what they came to is among ``pruned``, ``selections`` and ``closed``.
+        their results are among ``pruned``, ``selections`` and ``closed``.
     held, held_open : int
         Nodes that the file of this proof held, and those of them that were undecided there.
     redone : int
-        Tasks of an executor whose worker died, and which were done again.
+        Tasks of an executor that were done again because their worker died.
 
     Examples
     --------
@@ -184,7 +184,7 @@ class RootSet(Sequence[Root], Immutable):
     mirror_images : MirrorImages or None
         Which roots are mirror images of one another; None unless `mirrored` made it.
     rigid_bound : RigidBound or None
-        Of a body that nothing holds, within which rigid displacements the solutions are all of them.
+        Of a body that nothing holds: the bound of the rigid displacement within which all solutions are listed.
 
     Examples
     --------

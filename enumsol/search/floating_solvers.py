@@ -190,9 +190,9 @@ class Exclusions:
     def record(self, codes: Codes, bound: Bound, *, within: bool) -> tuple[records.Exclusion, bool] | None:
         """A record that excludes a partial assignment, and whether it needs the bound; or None.
 
-        Whether a bound is needed must not hang on the numbers that a relaxation came to. What is excluded with it only
-        is therefore split, down to complete selections, unless ``within``: it is known to be needed (theory, section
-        14.4).
+        Whether the bound is needed must not depend on the numbers that a relaxation arrives at. So an assignment that
+        only the bound excludes is split, down to complete selections, unless ``within``: the bound is known to be
+        needed (theory, section 14.4).
         """
         rows, values = bound.multipliers()
         usable = bound.form is None and len(rows)

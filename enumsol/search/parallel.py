@@ -1,7 +1,7 @@
 """A search of the tree by the workers of a concurrent.futures executor, its proof put together in the tree's order.
 
-A task is a part of the tree. It ends after a number of nodes and gives back the subtrees that it did not come to, which
-are new tasks: so no part is long, however uneven the tree. What a task comes to depends on it alone, and results are
+A task is a part of the tree. It ends after a number of nodes and gives back the subtrees that it did not reach, which
+are new tasks: so no part is long, however uneven the tree. The result of a task depends on it alone, and results are
 taken in the order of the tree: roots and proof depend neither on timing nor on the number of workers.
 """
 

@@ -1,4 +1,4 @@
-"""A search that goes on with the proof of an earlier one, which was stopped or killed.
+"""A search that resumes from the proof of an earlier one, which was stopped or killed.
 
 The records are gone through in order. Each leaf is proven again by the certifier, which trusts nothing in the file, and
 written to the new proof; what cannot be proven again, was left undecided, or is missing is searched.

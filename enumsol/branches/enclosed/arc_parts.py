@@ -125,7 +125,7 @@ def parts_between(
 
 
 def _event_inside(trace: Trace, part: ArcPart, ends: tuple[Fraction, Fraction], zero: Interval) -> Iterator[ArcPart]:
-    """An event, or what the selection does inside where its zero lies outside, or cannot be told from an end."""
+    """An event; or, where its zero lies outside or cannot be told from an end, what the selection does inside."""
     (low, high), (first, last) = ends, zero
     below, above = (ArcPartKind.NONE, ArcPartKind.HOLDS) if part.rising else (ArcPartKind.HOLDS, ArcPartKind.NONE)
     if not (trace.low < low and first <= low) and not (trace.high > high and last >= high):

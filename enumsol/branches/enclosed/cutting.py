@@ -203,7 +203,7 @@ class Cutting:
         return (self._expansion.final and self._tight(low, high, known)) or (self._keep_flat and self._is_flat(known))
 
     def _is_flat(self, known: OverInterval) -> bool:
-        """Whether a condition cannot be told from zero."""
+        """Whether a condition cannot be distinguished from zero."""
         return any(k in self._flat for k in _in_doubt(known))
 
     def _decided(self, low: Number, high: Number, known: OverInterval) -> ArcPart | None:

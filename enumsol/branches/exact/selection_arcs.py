@@ -92,7 +92,7 @@ class SelectionArcs:
     grazing : bool
         A condition vanishes identically: on its cells other selections hold too.
     bounded : bool
-        So does what is left of a bound of the rigid displacement.
+        So does the slack of a bound of the rigid displacement.
     """
 
     codes: Codes

@@ -126,7 +126,7 @@ class _Polygon:
 
 
 class CurvePlace(NamedTuple):
-    """The place of an arc among those that cannot be told from it in a picture: its rank, and how many there are."""
+    """The place of an arc among those that look the same in a picture: its rank, and how many there are."""
 
     rank: int
     among: int

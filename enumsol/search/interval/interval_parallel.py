@@ -1,6 +1,6 @@
 """The trees of a search over an interval run by a concurrent.futures executor.
 
-What a tree comes to depends on its task alone. So the trees are searched ahead in whatever order the workers take them,
+The result of a tree depends on its task alone. So the trees are searched ahead in whatever order the workers take them,
 and the search then goes through its pieces as it does without workers, with their results at hand.
 """
 

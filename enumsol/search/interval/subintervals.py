@@ -111,7 +111,7 @@ class FastIntervalCertifier(IntervalCertifier):
 
 @dataclass(frozen=True)
 class Task:
-    """One tree: what it comes to depends on nothing but this and the problem.
+    """One tree: its result depends on nothing but this and the problem.
 
     Attributes
     ----------
@@ -319,7 +319,7 @@ class IntervalSearch:
         return cut
 
     def _result(self, task: Task, known: TreeResult | None) -> TreeResult | None:
-        """What the tree of a task comes to; None once a limit is reached."""
+        """The result of the tree of a task; None once a limit is reached."""
         rest = None if self.max_nodes is None else self.max_nodes - self.nodes
         # near the limit a tree is smaller than it was without it
         if known is not None and (rest is None or rest >= LARGEST_TREE):

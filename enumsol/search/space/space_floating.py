@@ -95,8 +95,8 @@ class SpaceExclusions:
     ) -> tuple[Exclusion | NoRoot, bool] | None:
         """A record that excludes a partial assignment, and whether it needs the bound; or None.
 
-        ``within``: the bound is known to be needed. Otherwise it serves only where all statuses are told (theory,
-        section 14.4).
+        ``within``: the bound is known to be needed. Otherwise it is used only where all statuses are determined
+        (theory, section 14.4).
         """
         if len(rows) and floating_margin(self.free, codes, rows, values, errors=2.0) > 0:
             return ExcludedInSpace(list(rows), values), False
