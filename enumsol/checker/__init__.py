@@ -46,7 +46,7 @@ What checker and search share
       and the exclusion inequality; ``trusted.space.slip_forms``, forms other than the energy;
       ``trusted.space.leaves`` and ``trusted.space.turning``, what a complete assignment holds and which leaves
       share a root; ``trusted.space.space_uniqueness``, the test that a whole problem has one solution only;
-      ``trusted.space.boxed_solution``, the test that a box of forces holds exactly one, and which of these are
+      ``trusted.space.boxed_solution``, the test that a box holds exactly one, and which of these are
       the same, with the derivatives of ``trusted.space.natural_map``; over an interval of alpha
       ``trusted.space.solution_curve``, the test that a box holds one curve of solutions,
       ``trusted.space.curve_chains``, that boxes hold one whole curve, and ``trusted.space.pieces``, what holds over a
@@ -96,7 +96,7 @@ What counts as one root
     In 3D a root that slips along the common end of two sectors is found in both. Roots of leaves with the same statuses
     are one if the directions of one lie in the box of angles in which the other is proven to be the only one, and two
     if their forces differ for certain. Where neither is proven, one more part counts as undecided. Roots that are the
-    only ones in boxes of forces are one if the box of one surely holds the other; so with roots of leaves. A root that
+    only ones in boxes are one if the box of one surely holds the other; so with roots of leaves. A root that
     closes the whole tree is the only solution, whatever statuses hold there.
 
 Cross-checks

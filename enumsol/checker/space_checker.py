@@ -23,7 +23,7 @@ from enumsol.proof.space_records import (
     ExcludedInSpace,
     OnlyRoot,
 )
-from enumsol.trusted.space.boxed_solution import apart_in_boxes, is_inside, solution_in_box
+from enumsol.trusted.space.boxed_solution import Box, apart_in_boxes, is_inside, solution_in_box
 from enumsol.trusted.space.leaves import Open, distinct_roots, settle
 from enumsol.trusted.space.sector_rows import STICK, UNDECIDED, is_sector_covering, sector_margin
 from enumsol.trusted.space.slip_forms import SlipForm
@@ -140,16 +140,17 @@ class SpaceChecker(TreeChecker):
 
     def _in_box(self, codes: Codes, said: BoxedRoot) -> str | None:
         """The only solution of a box, in which all roots of the leaf lie."""
-        mid, rad = said.box(len(self.system.g))
-        box = Ball(mid / self.system.unit, rad / self.system.unit)
-        key = box.mid.tobytes() + box.rad.tobytes()
+        (mid, rad, rho), unit = said.box(len(self.system.g)), self.system.unit
+        with np.errstate(over="ignore", invalid="ignore"):
+            box = Box.of(self.system, mid / unit, rad / unit, rho / unit**2)
+        key = b"".join(numbers.tobytes() for numbers in box.numbers)
         if key not in self.known:
             self.known[key] = solution_in_box(self.system, box)
         found = self.known[key]
         if found is None:
             return "its box is not proven to hold one solution"
         leaf = settle(self.system, codes)
-        if leaf is not None and (leaf.y is None or not is_inside(leaf.y, box)):
+        if leaf is not None and (leaf.y is None or leaf.w is None or not is_inside(leaf.y, leaf.w, box)):
             return "its roots are not proven to lie in its box"
         self.boxed.append((codes, found))
         self._locate(found.y, ~(found.slip | found.open))

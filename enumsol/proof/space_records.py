@@ -128,33 +128,34 @@ class OnlyRoot(ClosingRecord):
 
 @dataclass(frozen=True, eq=False)
 class BoxedRoot(Solved):
-    """All roots of a leaf lie in a box of forces that holds one solution.
+    """All roots of a leaf lie in a box that holds one solution.
 
     Attributes
     ----------
-    mid, rad : midpoint and radius of the box, read where they are needed
+    mid, rad, rho : centre and radius of the box, and its weights of displacements, read where they are needed
     enclosure : EnclosureRecord
     """
 
-    kind, sizes = "l", (6,)
+    kind, sizes = "l", (7,)
 
     mid: Any
     rad: Any
+    rho: Any
     enclosure: EnclosureRecord
 
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> BoxedRoot:
         """The box and the enclosure."""
         del limits
-        return cls(entries[0], entries[1], EnclosureRecord(*entries[2:]))
+        return cls(*entries[:3], EnclosureRecord(*entries[3:]))
 
-    def box(self, size: int) -> tuple[Array, Array]:
-        """Midpoint and radius of the box; ValueError where they are no ``size`` numbers each."""
-        return numbers_from(self.mid, size), numbers_from(self.rad, size)
+    def box(self, size: int) -> tuple[Array, Array, Array]:
+        """Centre, radius and rho of the box; ValueError where they are no ``size`` numbers each."""
+        return numbers_from(self.mid, size), numbers_from(self.rad, size), numbers_from(self.rho, size)
 
     def entries(self) -> Iterable[Any]:
         """Those of the enclosure after the box."""
-        return self.mid, self.rad, *self.enclosure
+        return self.mid, self.rad, self.rho, *self.enclosure
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,9 @@ from proof_tools import copied, proof_of, records_of
 from trees import by_the_tree
 
 from enumsol import ProofFormatError, enumerate_roots, verify
+from enumsol.search.space.space_setup import SpaceSolvers
 
-_BOX, _BOX_RAD, _MID, _RAD, _INDEX = range(1, 6)
+_BOX, _BOX_RAD, _RHO, _MID, _RAD, _INDEX = range(1, 7)
 SEEDS = (2, 7, 47, 26)
 
 
@@ -75,6 +76,10 @@ def test_changed_leaves_are_refused(seed):
             each(_BOX_RAD, times(-1.0)),
             each(_BOX_RAD, times(1e6)),
             each(_BOX_RAD, times(1e-300)),
+            each(_RHO, times(0.0)),
+            each(_RHO, times(-1.0)),
+            each(_RHO, times(1e300)),
+            each(_RHO, lambda values: [*values, 1.0]),
             each(_BOX, lambda values: values[:-1]),
             each(_BOX_RAD, lambda values: [*values, 1.0]),
             each(_BOX, lambda values: "box"),
@@ -128,12 +133,12 @@ def test_random_changes(part):
     """Accepted, at most, where the box is one of the same root."""
     rng, seed = np.random.default_rng(part), SEEDS[part]
     problem, records, places = proven(seed)
-    known = records[places[0]]
+    known, system = records[places[0]], SpaceSolvers(problem, 0.0, "verified").system
     accepted = 0
     for _ in range(20):
         changed = copied(records)
         record = changed[places[int(rng.integers(len(places)))]]
-        entry = int(rng.integers(1, 5))
+        entry = int(rng.integers(1, 6))
         k = int(rng.integers(len(record[entry])))
         record[entry][k] *= float(rng.choice([-1.0, 0.0, 0.5, 2.0, 100.0, 1 + 1e-9]))
         record[entry][k] += float(rng.choice([0.0, 1e-12, 1e-6, 1e-3, 1.0]))
@@ -144,6 +149,9 @@ def test_random_changes(part):
             assert report.roots == changed[-1]["roots"]
             mid, rad = np.array(record[_MID]), np.array(record[_RAD])
             assert np.all(np.abs(mid - known[_MID]) <= rad + np.array(known[_RAD]))
-            box, reach = np.array(record[_BOX]), np.array(record[_BOX_RAD])
-            assert np.all(np.abs(box - known[_MID]) <= reach + np.array(known[_RAD]))
+            # zeta = (I + rho S) (y - c) of the known root, and what its radius adds
+            S = system.S / np.outer(system.unit, system.unit)
+            map_ = np.eye(len(mid)) + np.array(record[_RHO])[:, None] * S
+            away = np.abs(map_ @ (np.array(known[_MID]) - record[_BOX]))
+            assert np.all(away <= record[_BOX_RAD] + np.abs(map_) @ known[_RAD])
     assert accepted < 20

@@ -66,7 +66,7 @@ def test_a_root_cannot_be_left_out_or_moved():
 
 
 def test_leaves_that_rest_on_a_body_that_is_held():
-    for leaf in (["z"], ["m", [], [], [], [], 1], ["l", [], [], [], [], 1], ["D", [], 0]):
+    for leaf in (["z"], ["m", [], [], [], [], 1], ["l", [], [], [], [], [], 1], ["D", [], 0]):
         records = copied(RECORDS)
         records[leaves_of(RECORDS)[0][0]] = leaf
         assert "unknown kind" in refusal(records)

@@ -89,7 +89,7 @@ SHARED = {
     "trusted.space.resultants": None,
     "trusted.space.turning": {"turned_by"},
     "trusted.space.boxed_solution": {
-        *("BoxedSolution", "apart_in_boxes", "box_around", "is_inside", "solution_in_box")
+        *("Box", "BoxedSolution", "apart_in_boxes", "box_around", "is_inside", "solution_in_box")
     },
     "trusted.space.solution_curve": None,
     "trusted.space.curve_chains": None,

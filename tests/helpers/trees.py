@@ -34,7 +34,7 @@ def closed_in_the_tree():
 
 @contextmanager
 def without_boxes():
-    """In this context no leaf in 3D is settled by a box of forces that holds one solution."""
+    """In this context no leaf in 3D is settled by a box that holds one solution."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(KnownBoxes, "holding", lambda self, leaf: None)
         yield

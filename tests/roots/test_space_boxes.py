@@ -1,4 +1,4 @@
-"""Degenerate roots in 3D that boxes of forces settle: complete results, several roots, resumed and spread searches."""
+"""Degenerate roots in 3D that boxes settle: complete results, several roots, resumed and spread searches."""
 
 import dataclasses
 from concurrent.futures import ThreadPoolExecutor

@@ -1,4 +1,4 @@
-"""In 3D: boxes of forces that hold one solution, for leaves left open near a degenerate one (theory, section 12.7)."""
+"""In 3D: boxes that hold one solution, for leaves that are left open near it (theory, section 12.7)."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import numpy as np
 from enumsol.search.space.space_fathoming import NEAR, Point
 from enumsol.search.space.space_newton import Isotropic
 from enumsol.trusted.space.boxed_solution import BoxedSolution, box_around, is_inside, solution_in_box
+from enumsol.trusted.space.leaves import Open, settle
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
-    from enumsol.trusted.space.leaves import Open
 
     Array = NDArray[np.float64]
 
@@ -50,11 +50,11 @@ class KnownBoxes:
 
     def holding(self, leaf: Open) -> BoxedSolution | None:
         """The one solution that an open leaf can have, if that is proven."""
-        if leaf.y is None:
+        y, w = leaf.y, leaf.w
+        if y is None or w is None:
             return None
-        y = leaf.y
         for known in self._found:
-            if is_inside(y, known.box, _ERRORS):
+            if is_inside(y, w, known.box, _ERRORS):
                 return known
         if leaf.node is not None:
             if not np.max(y.rad) <= _ROUGH * np.max(np.abs(y.mid) + y.rad):
@@ -65,10 +65,10 @@ class KnownBoxes:
         found = self._sought(y.mid, halved=leaf.node is not None)
         self._pause = 2 * self._pause + 1 if found is None else 0
         self._wait = self._pause
-        return found if found is not None and is_inside(y, found.box, _ERRORS) else None
+        return found if found is not None and is_inside(y, w, found.box, _ERRORS) else None
 
     def _sought(self, y: Array, *, halved: bool) -> BoxedSolution | None:
-        """A solution near a point in a box of its own, that was not known; of leaves to be halved a degenerate one."""
+        """A new solution near a point, in a box of its own; near a leaf to be ``halved``, one that no leaf settles."""
         with np.errstate(all="ignore"):
             near = self._problem.near(y, self._system)
             if near is None:
@@ -77,9 +77,10 @@ class KnownBoxes:
             if any(np.max(np.abs(near - other)) <= size for other in self._passed):
                 return None
             point = Point.of(self._system, self._problem, self._problem.by_node(near, self._system))
-            if halved and point.slack > NEAR:
-                return None
             self._passed.append(near)
+            # a regular root is settled by a leaf that is narrow enough, unless rounding hides it
+            if halved and point.slack > NEAR and not isinstance(settle(self._enclosed, point.codes), Open):
+                return None
             box = box_around(self._enclosed, near)
         found = None if box is None else solution_in_box(self._enclosed, box, _ERRORS)
         if found is not None:

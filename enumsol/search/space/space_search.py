@@ -205,8 +205,9 @@ class SpaceCertifier(RecordingCertifier):
         elif isinstance(answer, Open):
             if (boxed := self._boxed(answer)) is not None:
                 self._verified[codes], unit = boxed, self.enclosed.unit
-                box = boxed.box.mid * unit, boxed.box.rad * unit
-                self._leaf(BoxedRoot(*box, self._ball(boxed, wider=_WIDER)))
+                centre, radius, rho = boxed.box.numbers
+                ball = self._ball(boxed, wider=_WIDER)
+                self._leaf(BoxedRoot(centre * unit, radius * unit, rho * unit**2, ball))
                 return boxed
             if answer.node is not None and level_of(codes[answer.node] - SECTORS) < DEEPEST:
                 return Refine(answer.node)

@@ -1,7 +1,8 @@
-"""The trusted test in 3D that a box of forces holds exactly one solution, regular or not (theory, section 12.7).
+"""The trusted test in 3D that a box holds exactly one solution, regular or not (theory, section 12.7).
 
 Krawczyk's operator is applied to the natural map y - P(y + rho w), whose zeros are the solutions. P has corners where a
-status changes; what counts is a set of matrices that holds all its derivatives in the box.
+status changes; what counts is a set of matrices that holds all its derivatives in the box. Boxes bound forces
+and displacements at once, by y - rho w.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import Ball, determinant_sign
+from enumsol.arithmetic.ball_arrays import Ball, determinant_sign, smaller, solution
 from enumsol.arithmetic.balls import SAFE, TINY, upper_sum
 from enumsol.trusted.space.natural_map import MARGIN, Discs, Step, middle_inverse
 from enumsol.trusted.space.space_uniqueness import LARGEST_UNIT, LooseSolution
@@ -31,42 +32,103 @@ _STEPS, _HALVINGS = 8, 24
 #: Size of the box that is tried first, relative to the forces that would hold one node alone; and how often a set
 #: around a box is made larger.
 _FIRST, _WIDENINGS = 1.0, 6
+#: Where rho is tried between compliance and stiffness, as an exponent of the latter.
+_SHARES = 0.5, 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """The y with |(y - c) - rho (w - w_c)| <= r, component by component; scaled.
+
+    Attributes
+    ----------
+    centre, radius, rho : (m,) arrays
+    w : Ball of shape (m,)
+        The displacements w_c of the centre.
+    """
+
+    centre: Array
+    radius: Array
+    rho: Array
+    w: Ball
+
+    @classmethod
+    def of(cls, system: EnclosedSpace, centre: Array, radius: Array, rho: Array) -> Box:
+        """The box of one problem."""
+        return cls(centre, radius, rho, _displacements(system, Ball.exact(centre)))
+
+    @property
+    def numbers(self) -> tuple[Array, Array, Array]:
+        """Centre, radius and rho."""
+        return self.centre, self.radius, self.rho
 
 
 @dataclass(frozen=True)
 class BoxedSolution(LooseSolution):
-    """The one solution in a box of forces, of shape (m,); its index is +1 or -1."""
+    """The one solution in a box; its index is +1 or -1."""
 
-    box: Ball
+    box: Box
 
 
-def solution_in_box(system: EnclosedSpace, box: Ball, errors: float = 1.0) -> BoxedSolution | None:
-    """The only solution in a box of scaled forces, or None where that is not proven.
+def solution_in_box(system: EnclosedSpace, box: Box, errors: float = 1.0) -> BoxedSolution | None:
+    """The only solution in a box, or None where that is not proven.
 
     Parameters
     ----------
     system : EnclosedSpace
-    box : Ball of shape (m,), with positive radii
+        S is proven positive definite.
+    box : Box
+        Its radius and rho are positive.
     errors : 1 proves; a writer of proofs takes more, so that a checker comes to the same answer
     """
-    if not _moderate(system) or not np.all(np.isfinite(box.mid)) or not np.all(box.rad > 0):
+    finite = all(np.all(np.isfinite(numbers)) for numbers in box.numbers)
+    if not _moderate(system) or not finite or not np.all(box.radius > 0) or not np.all(box.rho > 0):
         return None
     with np.errstate(all="ignore"):
-        return _NaturalMap(system).solution(box, errors)
+        found = _NaturalMap.of(system, box.rho)
+        return None if found is None else found.solution(box, errors)
 
 
-def box_around(system: EnclosedSpace, y: Array) -> Ball | None:
-    """A box of scaled forces, as large as is found, that seems to hold one solution, near y; no claim."""
+def box_around(system: EnclosedSpace, y: Array) -> Box | None:
+    """A box, as large as is found, that seems to hold one solution, near scaled forces y; no claim."""
     if not _moderate(system) or not np.all(np.isfinite(y)):
         return None
     with np.errstate(all="ignore"):
-        return _NaturalMap(system).proposed(y)
+        for rho in _proposed_rho(system):
+            found = _NaturalMap.of(system, rho)
+            box = None if found is None else found.proposed(y)
+            if box is not None:
+                return box
+    return None
 
 
-def is_inside(y: Ball, box: Ball, errors: float = 1.0) -> bool:
-    """Whether all of a ball lies in a box (for ``errors`` see ``solution_in_box``)."""
-    share = 1.0 - (errors - 1.0) * MARGIN
-    return bool(np.all((np.abs(y.mid - box.mid) + y.rad) * SAFE <= share * box.rad))
+def is_inside(y: Ball, w: Ball, box: Box, errors: float = 1.0) -> bool:
+    """Whether all solutions with such forces and displacements lie in a box (``errors``: see ``solution_in_box``)."""
+    with np.errstate(all="ignore"):
+        away = (y - Ball.exact(box.centre)) - Ball.exact(box.rho) * (w - box.w)
+        share = 1.0 - (errors - 1.0) * MARGIN
+        return bool(np.all(away.size * SAFE <= share * box.radius))
+
+
+def _displacements(system: EnclosedSpace, y: Ball) -> Ball:
+    S, g = Ball(system.S, system.S_rad), Ball(system.g, system.g_rad)
+    return g - (S @ y[:, None])[:, 0]
+
+
+def _proposed_rho(system: EnclosedSpace) -> list[Array]:
+    """rho, one for lambda_n and one for tau of every node, scaled: between 1 / S_ii and the stiffness S^-1_ii."""
+    soft = system.unit**2 / np.diagonal(system.S)
+    try:
+        stiff = np.diagonal(np.linalg.inv(system.S)) * system.unit**2
+    except np.linalg.LinAlgError:
+        return []
+    found = []
+    for share in _SHARES:
+        rho = soft ** (1.0 - share) * stiff**share
+        for t in system.tau:
+            rho[t[t >= 0]] = np.min(rho[t[t >= 0]], initial=np.inf)
+        found.append(rho / system.unit**2)
+    return found
 
 
 def apart_in_boxes(
@@ -93,7 +155,8 @@ def _same(one: SpaceRoot | BoxedSolution, other: BoxedSolution) -> bool | None:
     """Whether two solutions are the same; None where that is open."""
     if np.any(np.abs(one.y.mid - other.y.mid) > (one.y.rad + other.y.rad) * SAFE):
         return False
-    inside = is_inside(one.y, other.box) or (isinstance(one, BoxedSolution) and is_inside(other.y, one.box))
+    inside = is_inside(one.y, one.w, other.box)
+    inside = inside or (isinstance(one, BoxedSolution) and is_inside(other.y, other.w, one.box))
     return True if inside else None
 
 
@@ -101,55 +164,72 @@ def _moderate(system: EnclosedSpace) -> bool:
     return bool(np.max(np.maximum(system.unit, 1.0 / system.unit)) <= LARGEST_UNIT)
 
 
+@dataclass(frozen=True, eq=False)
 class _NaturalMap:
-    """N(y) = y - P(y + rho w) in (lambda_n, tau) without units (theory, (12.10)).
+    """N(y) = y - P(y + rho w) in (lambda_n, tau) without units (theory, (12.10)), y = c + T zeta, T = (I + rho S)^-1.
 
     rho is one number for lambda_n and one for tau of every node: which ones does not matter for what is proven.
+
+    Attributes
+    ----------
+    S, g, T : Balls
+    rho : (m,) array
+    free : Ball
+        2 T - I, by which y + rho w changes with zeta.
     """
 
-    def __init__(self, system: EnclosedSpace) -> None:
-        self.system = system
-        self.unit = system.unit
+    system: EnclosedSpace
+    S: Ball
+    g: Ball
+    rho: Array
+    T: Ball
+    free: Ball
+    discs: Discs
+
+    @classmethod
+    def of(cls, system: EnclosedSpace, rho: Array) -> _NaturalMap | None:
+        """With these rho, scaled; None where T is not enclosed."""
         # powers of two: what is rounded is less than TINY
-        pair = np.outer(self.unit, self.unit)
-        self.S = Ball(system.S / pair, system.S_rad / pair * SAFE + TINY)
-        self.g = Ball(system.g / self.unit, system.g_rad / self.unit * SAFE + TINY)
-        self.tau = [places[places >= 0] for places in system.tau]
-        rho = 1.0 / np.diagonal(self.S.mid)
-        for t in self.tau:
-            rho[t] = np.min(rho[t], initial=np.inf)
-        self.rho = rho
-        moved = self.S * Ball.exact(rho[:, None])
-        self.free = Ball.exact(np.eye(len(rho))) - moved
-        self._discs = Discs(self.tau, Ball.exact(np.ones(len(self.tau))))
+        pair = np.outer(system.unit, system.unit)
+        S = Ball(system.S / pair, system.S_rad / pair * SAFE + TINY)
+        g = Ball(system.g / system.unit, system.g_rad / system.unit * SAFE + TINY)
+        rho = rho * system.unit**2
+        whole = Ball.exact(np.eye(len(rho)))
+        T = solution(whole + S * Ball.exact(rho[:, None]), whole)
+        if T is None or not T.finite:
+            return None
+        tau = [places[places >= 0] for places in system.tau]
+        return cls(system, S, g, rho, T, T + T - whole, Discs(tau, Ball.exact(np.ones(len(tau)))))
 
     # -- boxes -----------------------------------------------------------------------------------------------------
 
-    def solution(self, box: Ball, errors: float) -> BoxedSolution | None:
-        centre, radius = box.mid * self.unit, box.rad * self.unit
-        found = self._mapped(centre, radius, errors)
+    def solution(self, box: Box, errors: float) -> BoxedSolution | None:
+        unit = self.system.unit
+        centre = box.centre * unit
+        found = self._mapped(centre, box.radius * unit, errors)
+        # det T is positive, as S is positive definite
         index = 0 if found is None else determinant_sign(Ball.exact(found[0].Y))
-        y = self._closer(centre) if index else None
-        if y is None or not is_inside(y, Ball(centre, radius)):
+        near = self._closer(centre) if index else None
+        if near is None:
             return None
-        y = Ball(y.mid / self.unit, y.rad / self.unit * SAFE + TINY)
-        gone = self._surely_open(self._displacements(y))
+        y, w = near
+        y, w = Ball(y.mid / unit, y.rad / unit * SAFE + TINY), Ball(w.mid * unit, w.rad * unit * SAFE + TINY)
+        if not is_inside(y, w, box):
+            return None
+        gone = self._surely_open(w)
         y.mid[gone] = y.rad[gone] = 0.0
-        return BoxedSolution.of(self.system, y, self._displacements(y), index, box=box)
+        return BoxedSolution.of(self.system, y, smaller(w, _displacements(self.system, y)), index, box=box)
 
-    def _displacements(self, y: Ball) -> Ball:
-        S, g = Ball(self.system.S, self.system.S_rad), Ball(self.system.g, self.system.g_rad)
-        return g - (S @ y[:, None])[:, 0]
-
-    def proposed(self, y: Array) -> Ball | None:
+    def proposed(self, y: Array) -> Box | None:
         """A large box that holds one solution, around a point that is as near to it as floats can be."""
-        centre = self._zero(y * self.unit)
+        unit = self.system.unit
+        centre = self._zero(y * unit)
         if centre is None:
             return None
-        radius = np.full(len(y), _FIRST * float(np.max(np.abs(self.g.mid) * self.rho)))
+        radius = np.full(len(y), _FIRST * float(np.max(np.abs(self.g.mid) / np.diagonal(self.S.mid))))
         for _ in range(_HALVINGS):
             if self._mapped(centre, radius, 2.0) is not None:
-                return Ball(centre / self.unit, radius / self.unit)
+                return Box.of(self.system, centre / unit, radius / unit, self.rho / unit**2)
             radius *= 0.5
         return None
 
@@ -159,11 +239,11 @@ class _NaturalMap:
             step = self._step(point, np.zeros(len(point)))
             if step is None:
                 return None
-            point = point + step.move.mid
+            point = point + self.T.mid @ step.move.mid
         return point
 
     def _mapped(self, centre: Array, radius: Array, errors: float) -> tuple[Step, Array] | None:
-        """The step around a box, and shares, with which it maps a set that holds the box into its interior."""
+        """The step around a box, and a reach of zeta, with which it maps a set that holds the box into its interior."""
         reach = radius
         for _ in range(_WIDENINGS):
             step = self._step(centre, reach)
@@ -176,8 +256,8 @@ class _NaturalMap:
             reach = np.maximum(reach, needed) * (1.0 + MARGIN)
         return None
 
-    def _closer(self, centre: Array) -> Ball | None:
-        """Bounds of a solution near a point, as narrow as floats can give; None where none is proven to be there."""
+    def _closer(self, centre: Array) -> tuple[Ball, Ball] | None:
+        """Bounds of y and w of a solution near a point, as narrow as floats can give; None where none is proven."""
         point = self._zero(centre)
         near = None if point is None else self._step(point, np.zeros(len(centre)))
         if point is None or near is None:
@@ -186,34 +266,43 @@ class _NaturalMap:
         for _ in range(_STEPS):
             found = self._mapped(point, radius, 1.0)
             if found is not None:
-                return Ball(point, found[1])
+                return self._placed(point, found[1])
             radius *= 4.0
         return None
 
+    def _placed(self, centre: Array, reach: Array) -> tuple[Ball, Ball]:
+        """y and w where |zeta| <= reach: w = w_c - S T zeta, and rho S T = I - T."""
+        y, w = self._forces_and_displacements(centre)
+        moved = Ball.exact(np.eye(len(centre))) - self.T
+        slips = upper_sum(moved.size * reach, axis=1) / self.rho * SAFE
+        return Ball(y.mid, upper_sum(self.T.size * reach, axis=1) * SAFE), Ball(w.mid, (w.rad + slips) * SAFE)
+
+    def _forces_and_displacements(self, centre: Array) -> tuple[Ball, Ball]:
+        point = Ball.exact(centre)
+        return point, self.g - (self.S @ point[:, None])[:, 0]
+
     def _surely_open(self, w: Ball) -> NDArray[np.intp]:
         """Places of the forces of nodes that are open at every solution with such displacements."""
-        gone = [i for i in range(len(self.tau)) if w.mid[i] + w.rad[i] < 0]
-        return np.array([k for i in gone for k in (i, *self.tau[i])], dtype=np.intp)
+        tau = self.discs.tau
+        gone = [i for i in range(len(tau)) if w.mid[i] + w.rad[i] < 0]
+        return np.array([k for i in gone for k in (i, *tau[i])], dtype=np.intp)
 
     # -- the operator ----------------------------------------------------------------------------------------------
 
     def _step(self, centre: Array, radius: Array) -> Step | None:
-        """Krawczyk's operator in a box; None where its middle matrix is singular."""
-        m = len(centre)
-        point = Ball.exact(centre)
-        w = self.g - (self.S @ point[:, None])[:, 0]
+        """Krawczyk's operator for |zeta| <= radius; None where its middle matrix is singular."""
+        point, w = self._forces_and_displacements(centre)
         z = point + Ball.exact(self.rho) * w
         wide = Ball(z.mid, (z.rad + upper_sum(self.free.size * radius, axis=1)) * SAFE)
-        corners = self._discs.corners(wide)
+        corners = self.discs.corners(wide)
         if corners is None:
             return None
-        M = Ball.exact(np.eye(m)) - corners.core @ self.free
-        found = middle_inverse(M)
+        found = middle_inverse(self.T - corners.core @ self.free)
         if found is None:
             return None
         Y, E = found
         inverse = Ball.exact(Y)
-        move = (inverse @ (self._discs.projected(z) - point)[:, None])[:, 0]
+        move = (inverse @ (self.discs.projected(z) - point)[:, None])[:, 0]
         G, V = inverse @ Ball.exact(corners.u), Ball.exact(corners.v.T) @ self.free
         nothing = np.zeros(len(V.mid))
-        return Step(move, E, G, V, Y, np.zeros(m), nothing, nothing)
+        return Step(move, E, G, V, Y, np.zeros(len(centre)), nothing, nothing)

@@ -1,6 +1,6 @@
 """The natural map of a problem in 3D, y - P(y + rho w), in balls: P, its derivatives, and Krawczyk's operator on sets.
 
-What a box of forces (theory, section 12.7) and a box of a curve of solutions (theory, section 12.8) have in common.
+What boxes with one solution (theory, section 12.7) and boxes of curves of solutions (theory, section 12.8) share.
 """
 
 from __future__ import annotations
