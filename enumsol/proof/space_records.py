@@ -147,7 +147,8 @@ class BoxedRoot(Solved):
     def of(cls, entries: list[Any], limits: Limits) -> BoxedRoot:
         """The box and the enclosure."""
         del limits
-        return cls(*entries[:3], EnclosureRecord(*entries[3:]))
+        mid, rad, rho, *enclosure = entries
+        return cls(mid, rad, rho, EnclosureRecord(*enclosure))
 
     def box(self, size: int) -> tuple[Array, Array, Array]:
         """Centre, radius and rho of the box; ValueError where they are no ``size`` numbers each."""

@@ -8,7 +8,7 @@ assignment the matrix has to be definite on the subspace of its equations (theor
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -59,7 +59,7 @@ class LooseSolution:
     index: int
 
     @classmethod
-    def of(cls, system: EnclosedSpace, y: Ball, w: Ball, index: int, **more: Ball) -> Self:
+    def of(cls, system: EnclosedSpace, y: Ball, w: Ball, index: int, **more: Any) -> Self:
         """By the statuses that may hold within balls; what vanishes by those that hold for certain is put to 0."""
         p = len(system.tau)
         touch = w.mid[:p] + w.rad[:p] >= 0
