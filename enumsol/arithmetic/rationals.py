@@ -9,7 +9,7 @@ import numpy as np
 from flint import fmpq, fmpq_mat
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -37,10 +37,15 @@ def as_objects(values: Sequence[Any]) -> NDArray[Any]:
     return np.fromiter(values, object, len(values))  # polynomials are sequences, which np.array would unpack
 
 
-def is_positive_definite(matrix: Any) -> bool:
-    """Whether all pivots of a symmetric rational matrix, eliminated in order, are positive."""
+def is_positive_definite(matrix: Any, tell: Callable[[int, int], object] | None = None) -> bool:
+    """Whether all pivots of a symmetric rational matrix, eliminated in order, are positive.
+
+    ``tell`` is called with the number of pivots found so far, and of all.
+    """
     rows = matrix.tolist()
     for k, row in enumerate(rows):
+        if tell is not None:
+            tell(k, len(rows))
         if not row[k] > 0:
             return False
         for other in rows[k + 1 :]:

@@ -16,6 +16,7 @@ from enumsol.branches.elements import VertexKind
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.arguments import alpha_value
 from enumsol.support.immutable import Immutable
+from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -130,7 +131,7 @@ class GraphData(Immutable):
     def completeness(self) -> str:
         """The closing line of the printed summary: whether the graph is complete, and of what, or why not."""
         if self.reasons:
-            more = f" and {len(self.reasons) - 1} more" if len(self.reasons) > 1 else ""
+            more = f"; {counted(len(self.reasons) - 1, 'more reason')}" if len(self.reasons) > 1 else ""
             return f"complete: no ({self.reasons[0]}{more})"
         if not self.complete:
             return "complete: not proven (degrees balance at every vertex)"

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 import typer
 
+from enumsol.cli.progress import Display
 from enumsol.cli.quiet import is_quiet
 from enumsol.errors import EnumsolError, Interrupted, InvalidArgumentError, OutputError
 
@@ -100,6 +101,11 @@ def load_any_problem(name: str) -> ContactProblem | ContactProblem3D:
     InvalidProblemError, InvalidArgumentError
         It cannot be read, or there is none of that name; the message gives names that are close.
     """
+    with Display("reading the problem"):
+        return _any_problem(name)
+
+
+def _any_problem(name: str) -> ContactProblem | ContactProblem3D:
     if name.startswith(COLLECTION):
         from enumsol import collection  # numpy and scipy: not for --help
 

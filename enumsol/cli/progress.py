@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from threading import Lock, Timer
 from typing import TYPE_CHECKING, Any, Self
 
 from enumsol.cli.quiet import is_quiet
@@ -23,7 +24,7 @@ _LEAST_SHARE = 0.02
 
 
 class Display:
-    """A progress bar on stderr, shown on a terminal when the work lasts.
+    """A progress bar on stderr, shown on a terminal when the work lasts, also if nothing is told of it.
 
     Inside, it hears what long calls tell of themselves (``support.telling``), and says it behind the bar.
 
@@ -43,10 +44,15 @@ class Display:
         self._progress: Progress | None = None
         self._task: TaskID | None = None
         self._shown = sys.stderr.isatty() and not is_quiet()
+        # the bar may appear while the work goes on
+        self._drawing, self._timer = Lock(), Timer(_PROGRESS_DELAY, self._draw)
+        self._timer.daemon = True
 
     def __enter__(self) -> Self:
         """Nothing is shown yet."""
         self._hearing.__enter__()
+        if self._shown:
+            self._timer.start()
         return self
 
     def show(self, share: float, note: str, step: tuple[str, float, float] = ("", 0.0, 1.0)) -> None:
@@ -75,12 +81,13 @@ class Display:
 
     def _draw(self) -> None:
         now = time.perf_counter()
-        if not self._shown or (self._progress is None and now - self._started < _PROGRESS_DELAY):
-            return
-        if self._progress is None or self._task is None:
-            self._progress, self._task = _progress_bar(self._title, self.counts)
-        self._progress.update(self._task, completed=self._completed)
-        self._progress.start()
+        with self._drawing:
+            if not self._shown or (self._progress is None and now - self._started < _PROGRESS_DELAY):
+                return
+            if self._progress is None or self._task is None:
+                self._progress, self._task = _progress_bar(self._title, self.counts)
+            self._progress.update(self._task, completed=self._completed)
+            self._progress.start()
 
     def counts(self) -> str:
         """What stands behind the bar, as of now: also while nothing new is told, the time goes on."""
@@ -97,8 +104,11 @@ class Display:
     def __exit__(self, *error: Any) -> None:
         """Take the bar away."""
         self._hearing.__exit__(*error)
-        if self._progress is not None:
-            self._progress.stop()
+        self._timer.cancel()
+        with self._drawing:
+            self._shown = False
+            if self._progress is not None:
+                self._progress.stop()
 
 
 def remaining(seconds: float, share: float, since: float = 0.0) -> str:

@@ -10,6 +10,7 @@ import typer
 from enumsol.cli.common import GALLERY, TOML, note, parse_alpha, refuse_misspelt
 from enumsol.cli.options import LIMITS, OUTPUT, Quiet, file, with_options
 from enumsol.cli.output import check_plot, deliver, write_figure
+from enumsol.cli.progress import Display
 from enumsol.cli.roots import Search
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 
@@ -281,7 +282,8 @@ def solve(
     search.check()
     value = None if alpha is None else parse_alpha(alpha)
     check_plot(plot)
-    scene = _scene(mesh, given)
+    with Display("reading the mesh"):
+        scene = _scene(mesh, given)
     if dry_run:
         deliver(
             (plot, lambda path: write_figure(path, scene.plot())),
@@ -291,7 +293,8 @@ def solve(
         )
     elif plot is not None:
         write_figure(plot, scene.plot())
-    problem = _problem(mesh, scene)
+    with Display("assembling"):
+        problem = _problem(mesh, scene)
     if output is not None:
         _write(problem, output)
     if dry_run:

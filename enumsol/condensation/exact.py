@@ -15,6 +15,7 @@ from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.free_displacements import solved
 from enumsol.condensation.unloaded import vanishing_alpha
 from enumsol.errors import InvalidProblemError, TooLargeError
+from enumsol.support.deadlines import look
 from enumsol.support.telling import tell
 
 if TYPE_CHECKING:
@@ -36,8 +37,15 @@ def check_definite(S: Any) -> None:
     ------
     InvalidProblemError
         It is not.
+    TimeOverError
+        The deadline that holds here has passed.
     """
-    if not is_positive_definite(S):
+
+    def at(done: int, of: int) -> None:
+        look()
+        tell("pivots of S in rationals", done, of)
+
+    if not is_positive_definite(S, at):
         raise InvalidProblemError(
             "the condensed compliance S = B A^-1 B' is not positive definite, in rational arithmetic; expected A "
             "positive definite and contact rows [Bn; Bt] that are independent (is a contact node listed twice?)"
@@ -450,5 +458,6 @@ def _check_size(problem: ProblemData) -> None:
     if problem.n > EXACT_DOF_LIMIT:
         raise TooLargeError(
             f'arithmetic="exact" condenses at most n = {EXACT_DOF_LIMIT} degrees of freedom in rationals and the '
-            f"problem has n = {problem.n}; use another arithmetic, or condense the body to its contact nodes first"
+            f"problem has n = {problem.n}; use another arithmetic, or problem.at_contact_nodes(), the same body up to "
+            "rounding"
         )

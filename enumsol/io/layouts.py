@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from enumsol.errors import InvalidProblemError
-from enumsol.support.messages import shortened
+from enumsol.support.messages import listed, shortened
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Iterator, Mapping
@@ -145,14 +145,14 @@ def check_names(found: Collection[str], layout: Layout, suffix: str = "") -> Non
         meant = {name: _closest(name, strangers, layout) for name in missing}
         hints = "".join(f"; is {other}{suffix} meant as {name}{suffix}?" for name, other in meant.items() if other)
         raise InvalidProblemError(
-            f"{_listing(missing, suffix)} {'is' if len(missing) == 1 else 'are'} missing "
-            f"(found {_listing(found, suffix) or 'nothing'}{hints}); expected {_listing(layout.required, suffix)}"
+            f"{listed(missing, suffix)} {'is' if len(missing) == 1 else 'are'} missing "
+            f"(found {listed(found, suffix) or 'nothing'}{hints}); expected {listed(layout.required, suffix)}"
         )
     if strangers:
         close = _closest_known(strangers[0], layout)
         hint = f" (is {close}{suffix} meant?)" if close else ""
         raise InvalidProblemError(
-            f"{strangers[0]}{suffix} is not known{hint}; expected {_listing(layout.known)}, "
+            f"{strangers[0]}{suffix} is not known{hint}; expected {listed(layout.known)}, "
             "or a name that begins with an underscore for what enumsol should ignore"
         )
     kinds = [kind for kind in layout.frictions if any(name in found for name in kind)]
@@ -162,13 +162,6 @@ def check_names(found: Collection[str], layout: Layout, suffix: str = "") -> Non
         raise InvalidProblemError(
             f"{kinds[0][0]}{suffix} is given together with {given}; expected coefficients {choice}, not several"
         )
-
-
-def _listing(names: Iterable[str], suffix: str = "") -> str:
-    texts = [name + suffix for name in names]
-    if len(texts) > 14:
-        texts = [*texts[:12], f"{len(texts) - 12} more"]
-    return " and ".join([", ".join(texts[:-1]), texts[-1]] if len(texts) > 1 else texts)
 
 
 def _plain(name: str) -> str:

@@ -131,6 +131,53 @@ class ContactProblem(ContactBody):
 
         return CondensedProblem.from_problem(self)
 
+    def at_contact_nodes(self) -> ContactProblem:
+        """The same body with the displacements of its contact nodes as the only unknowns, n = 2p.
+
+        A is the inverse of the condensed compliance S, so that the solutions are those of this problem up to rounding
+        (theory, section 4.1). Exact arithmetic takes at most 250 degrees of freedom: it can decide here what it cannot
+        take as given. What is decided is about the rounded matrices. Where two conditions vanish together in this
+        problem, as by symmetry, they may do so a little apart in the other.
+
+        Raises
+        ------
+        InvalidProblemError
+            The contact rows are not independent beyond rounding.
+        NotHeldError
+            Nothing but contact holds the body.
+
+        Examples
+        --------
+        >>> import enumsol
+        >>> problem = enumsol.gallery.dovetail()
+        >>> small = problem.at_contact_nodes()
+        >>> small.n == 2 * problem.p
+        True
+        >>> (given,), (same,) = (enumsol.enumerate_roots(body, alpha=0.2) for body in (problem, small))
+        >>> round(float(same.lambda_n.sum() / given.lambda_n.sum()), 9)
+        1.0
+        """
+        from enumsol.condensation.condensed import cholesky_factor  # as above
+
+        condensed = self.condensed
+        cholesky_factor(condensed.balanced)
+        scale = condensed.node_scale
+        A = np.linalg.inv(condensed.balanced) / scale[:, None] / scale
+        offset = np.concatenate([self.gap, self.slip_offset])
+        rows = np.eye(2 * self.p)
+        return ContactProblem(
+            0.5 * (A + A.T),
+            rows[: self.p],
+            rows[self.p :],
+            A @ (condensed.g0 + offset),
+            gap=self.gap,
+            friction=self.friction,
+            load_slope=None if self.load_slope is None else A @ condensed.g1,
+            slip_offset=self.slip_offset,
+            node_ids=self.node_ids,
+            coordinates=self.coordinates,
+        )
+
     def friction_at(self, alpha: AlphaLike) -> Floats:
         """Coefficients F(alpha) = F0 + alpha F1, shape (p,).
 

@@ -50,7 +50,7 @@ function arcTrace(arc) {
   const head = `branch ${arc.branch}, arc ${arc.number}, index ${signed(arc.index)}`;
   return {
     x: arc.a, y: values, customdata: values, mode: "lines", type: "scatter", meta: arc.number, showlegend: false,
-    line: { color: branches.get(arc.branch).colour, dash, width: chosen && state.branch !== null ? 3 : 2 },
+    line: { color: onPage(branches.get(arc.branch).colour), dash, width: chosen && state.branch !== null ? 3 : 2 },
     opacity: chosen ? 1 : 0.2,
     hovertemplate: `${head}<br>alpha %{x:.8g}<br>${axisName()} %{customdata:.6g}<br>${runs(arc.statuses)}<extra></extra>`,
   };

@@ -37,6 +37,9 @@ if TYPE_CHECKING:
     from enumsol.branches.elements import Vertex
     from enumsol.fem import Scene
 
+#: Powers of four that are written out, and that floats can hold.
+_EXACTLY, _AS_FLOAT = 10, 500
+
 
 def write_report(
     solutions: BranchGraph | RootSet | History,
@@ -168,8 +171,8 @@ def _facts(graph: BranchGraph, units: tuple[str, str] | None) -> str:
     facts = (
         ("contact nodes", str(problem.p)),
         ("degrees of freedom", f"{problem.n:,}"),
-        ("combinations of statuses", f"4^{problem.p}" + (f" = {4**problem.p:.3g}" if problem.p < 500 else "")),
-        ("friction", f"F0 + alpha F1, F0 {span_words(F0)}, F1 {span_words(F1)}"),
+        ("combinations of statuses", _power_of_four(problem.p)),
+        ("friction", f"F0 + alpha F1, F0 = {span_words(F0)}, F1 = {span_words(F1)}"),
         ("load", with_unit(f"{load}, max |f| = {np.max(np.abs(problem.f)):.4g}", units, 1, 0)),
         ("gap", with_unit(span_words(problem.gap), units, 0, 1)),
         ("alpha", f"from {a:.10g} to {b:.10g}"),
@@ -178,6 +181,13 @@ def _facts(graph: BranchGraph, units: tuple[str, str] | None) -> str:
                   f"{counted(len(graph.folds), 'fold')}"),
     )  # fmt: skip
     return fact_list(facts)
+
+
+def _power_of_four(p: int) -> str:
+    """4^p and its value, rounded where it is long."""
+    if p <= _EXACTLY:
+        return f"4^{p} = {4**p:,}"
+    return f"4^{p}, about {4**p:.3g}" if p < _AS_FLOAT else f"4^{p}"
 
 
 def _branches(graph: BranchGraph) -> str:

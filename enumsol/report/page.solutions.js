@@ -12,7 +12,7 @@ function solutionsAt(alpha) {
   const found = [];
   for (const arc of data.arcs) {
     if (!(data.vertices[arc.tail].alpha < alpha && alpha < data.vertices[arc.head].alpha)) continue;
-    const name = `branch ${arc.branch}`, colour = branches.get(arc.branch).colour;
+    const name = `branch ${arc.branch}`, colour = onPage(branches.get(arc.branch).colour);
     if (arc.dimension > 0) found.push({ name, colour, words: `a sheet: a continuum of dimension ${arc.dimension}` });
     else found.push({ name, key: `arc ${arc.number}`, colour, words: `arc ${arc.number}, index ${signed(arc.index)}`, statuses: arc.statuses, several: [], ...between(arc, alpha) });
   }
@@ -21,7 +21,7 @@ function solutionsAt(alpha) {
     const arc = data.arcs.find((other) => other.tail === v.number || other.head === v.number);
     const words = v.family !== null ? `a continuum of dimension ${v.family.dimension}; one point of it is shown` : v.kind === "end" ? "at the end of the interval" : v.kind;
     found.push({
-      name: arc ? `branch ${arc.branch}` : "no branch", colour: arc ? branches.get(arc.branch).colour : "var(--ink)",
+      name: arc ? `branch ${arc.branch}` : "no branch", colour: arc ? onPage(branches.get(arc.branch).colour) : "var(--ink)",
       key: `vertex ${v.number}`, words, statuses: v.statuses, several: v.several, f: v.f, w: v.w,
     });
   }

@@ -21,6 +21,9 @@ window.addEventListener("afterprint", () => {
 // width and height that Plotly is given: on the screen those of its place, on paper fixed ones, as nothing measures it
 const paperSize = (width, height) => (theme.printing ? { width, height } : { autosize: true });
 
+// a branch's colour (#rrggbb) as a line on the page: in the dark halfway to white
+const onPage = (colour) => (isDark() ? `#${colour.slice(1).match(/../g).map((part) => ((parseInt(part, 16) + 255) >> 1).toString(16)).join("")}` : colour);
+
 // a colour of the style sheet, as scripts need it that know no variables
 function ink(name) {
   const probe = document.createElement("span");

@@ -213,7 +213,7 @@ def _floating_solvers() -> type[Solvers]:
 
 
 def _in_doubt(core: Codes) -> UndecidedPart:
-    hint = "perturb the load, or condense the body to its contact nodes"
+    hint = "perturb the load, or take problem.at_contact_nodes() of a body that is held"
     return UndecidedPart(core, "a root in it may be the same as another one", hint, examined=True)
 
 

@@ -22,6 +22,14 @@ def counted(number: int, singular: str, plural: str | None = None) -> str:
     return f"{number} {singular if number == 1 else plural or singular + 's'}"
 
 
+def listed(names: Iterable[object], suffix: str = "") -> str:
+    """Names in a sentence, as in "a, b and c"; of many the first ones."""
+    texts = [f"{name}{suffix}" for name in names]
+    if len(texts) > 14:
+        texts = [*texts[:12], f"{len(texts) - 12} more"]
+    return " and ".join([", ".join(texts[:-1]), texts[-1]] if len(texts) > 1 else texts)
+
+
 def html_lines(lines: Iterable[str]) -> str:
     """Lines of text as HTML, a paragraph each."""
     return "".join(f"<p style='margin:2px 0'>{escape(line)}</p>" for line in lines)

@@ -169,7 +169,9 @@ def test_exact_algebra_that_would_take_too_long_is_not_begun(monkeypatch):
     monkeypatch.setattr(ways, "LARGEST_EXACT_WORK", 0)
     graph = branch_graph(problem, (0.0, 6.0))
     assert not graph.complete
-    assert any("is not decided" in reason for reason in graph.reasons)
+    told = [reason for reason in graph.reasons if "is not decided: " in reason]
+    assert told
+    assert all(reason.endswith('; arithmetic="exact" decides it, which may take long') for reason in told)
     left = [v.enclosure for v in graph.vertices if v.kind == "unsettled"]
     assert any(low <= 3 <= high for low, high in left)
     # what is said elsewhere is the same

@@ -215,6 +215,31 @@ def test_what_a_long_call_tells_stands_behind_the_bar_until_the_next_report(monk
     ]
 
 
+def test_a_bar_appears_although_nothing_is_told(monkeypatch):
+    shown = []
+
+    class Bar:
+        def update(self, _, completed):
+            shown.append(completed)
+
+        start = stop = lambda self: None
+
+    class Now:
+        """A timer whose time is over at once."""
+
+        def __init__(self, _, call):
+            self.start, self.cancel = call, lambda: None
+
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    monkeypatch.setattr("enumsol.cli.progress._PROGRESS_DELAY", 0.0)
+    monkeypatch.setattr("enumsol.cli.progress.Timer", Now)
+    monkeypatch.setattr("enumsol.cli.progress._progress_bar", lambda *_: (Bar(), 0))
+    with Display("assembling") as display:
+        assert shown == [0.0]
+    display._draw()  # by a timer that was late
+    assert shown == [0.0]
+
+
 @pytest.mark.slow
 def test_the_bar_of_a_graph_never_falls_back_nor_is_full_before_the_end(monkeypatch):
     done, stages = [], []

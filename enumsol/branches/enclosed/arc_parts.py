@@ -27,6 +27,23 @@ class ArcPartKind(enum.StrEnum):
     OPEN = "u"
 
 
+class OpenCause(enum.Enum):
+    """Why a part is left open (theory, section 7.14); what is said of a place is the first that it has."""
+
+    #: The selection was cut into as many boxes as are tried.
+    BOXES = enum.auto()
+    #: An event cannot be told from an end of the interval.
+    END = enum.auto()
+    #: The determinant may vanish.
+    SINGULAR = enum.auto()
+    #: Several conditions may vanish.
+    TOGETHER = enum.auto()
+    #: A condition may vanish together with its slope.
+    FLAT = enum.auto()
+    #: The neighbour of an event was not identified.
+    PARTNER = enum.auto()
+
+
 @dataclass(frozen=True, eq=False)
 class ArcPart:
     """A part [low, high] of a box; another part with the same content is not the same.
@@ -45,6 +62,8 @@ class ArcPart:
         Sign of the determinant where the selection holds, or at an event; 0 elsewhere.
     doubtful : frozenset of int
         At an open part the nodes whose conditions may vanish there.
+    cause : OpenCause or None
+        At an open part why it is left open.
     """
 
     kind: ArcPartKind
@@ -55,6 +74,7 @@ class ArcPart:
     rising: bool = False
     index: int = 0
     doubtful: frozenset[int] = frozenset()
+    cause: OpenCause | None = None
 
 
 @dataclass(frozen=True)
@@ -138,8 +158,8 @@ def _event_inside(trace: Trace, part: ArcPart, ends: tuple[Fraction, Fraction], 
         doubtful = frozenset((trace.selection.rows.conditions[part.condition][0],))
         if first > low:
             yield replace(part, kind=below, high=first)
-            yield ArcPart(ArcPartKind.OPEN, first, part.high, doubtful=doubtful)
+            yield ArcPart(ArcPartKind.OPEN, first, part.high, doubtful=doubtful, cause=OpenCause.END)
         else:
-            yield ArcPart(ArcPartKind.OPEN, part.low, last, doubtful=doubtful)
+            yield ArcPart(ArcPartKind.OPEN, part.low, last, doubtful=doubtful, cause=OpenCause.END)
             if last < min(part.high, high):
                 yield replace(part, kind=above, low=last)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.branches.enclosed.arc_parts import AlphaBox, ArcPart, ArcPartKind, Interval, Number
+from enumsol.branches.enclosed.arc_parts import AlphaBox, ArcPart, ArcPartKind, Interval, Number, OpenCause
 
 if TYPE_CHECKING:
     from collections.abc import Generator
@@ -162,7 +162,7 @@ class Cutting:
         if first is last or (known and not (known[0].none or (known[0].holds and known[0].index == first.index))):
             return run
         doubtful = frozenset(node for part in run for node in part.doubtful)
-        return [ArcPart(first.kind, first.low, last.high, index=first.index, doubtful=doubtful)]
+        return [replace(first, high=last.high, doubtful=doubtful)]
 
     def _rest(self, low: Number, high: Number) -> list[Interval]:
         """What is left when a part cannot be decided: the part and what lies behind it, or two halves."""
@@ -223,10 +223,11 @@ class Cutting:
         return ArcPart(ArcPartKind.EVENT, low, high, condition, (low, high), slope > 0, known.index)
 
     def _open(self, low: Number, high: Number, known: OverInterval) -> ArcPart:
-        nodes = frozenset(range(len(self._rows.codes)))
+        nodes, cause = frozenset(range(len(self._rows.codes))), OpenCause.SINGULAR
         if known.regular:
             nodes = frozenset(self._rows.conditions[k][0] for k in known.doubtful)
-        return ArcPart(ArcPartKind.OPEN, low, high, doubtful=nodes)
+            cause = OpenCause.TOGETHER if len(known.doubtful) > 1 else OpenCause.FLAT
+        return ArcPart(ArcPartKind.OPEN, low, high, doubtful=nodes, cause=cause)
 
 
 def _in_doubt(known: OverInterval) -> list[int]:

@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from enumsol.branches.enclosed.arc_parts import OpenCause
 from enumsol.branches.enclosed.joining import Joined, join
+from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.support.deadlines import Deadline, TimeOverError, within
-from enumsol.support.messages import counted
+from enumsol.support.messages import counted, listed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -18,7 +20,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.branches.enclosed.arc_parts import Trace
+    from enumsol.branches.enclosed.joining import EventPlace
     from enumsol.branches.enclosed.traced import TracedProblem
+    from enumsol.model.problem import ContactProblem
     from enumsol.search.interval.subintervals import SearchedPiece
     from enumsol.selections.solution import Codes
     from enumsol.support.deadlines import Limited
@@ -42,10 +46,15 @@ class Followed:
         Units in which they were followed.
     stopped : Stop or None
         How far it got, if Ctrl-C was pressed or the time was over.
+    cut_short : bool
+        The search was stopped before, so that selections may be missing.
+    problem : ContactProblem
     """
 
+    problem: ContactProblem
     force: NDArray[np.float64]
     length: NDArray[np.float64]
+    cut_short: bool = False
     traces: list[Trace] = field(default_factory=list)
     joined: Joined = field(default_factory=Joined)
     stopped: Stop | None = None
@@ -53,12 +62,48 @@ class Followed:
     @property
     def reasons(self) -> list[str]:
         """What was left open or contradicts completeness."""
-        found = list(self.joined.reasons)
-        for place in self.joined.open:
-            count = len(place.members)
-            does = f"{counted(count, 'selection')} {'does' if count == 1 else 'do'}"
-            found.append(f"what {does} for alpha in [{float(place.low):.17g}, {float(place.high):.17g}] is not decided")
-        return found
+        found = [(place.low, _undecided(place, self.problem), place.cause) for place in self.joined.open]
+        ends = [(place.low, place.high) for place in self.joined.open if place.cause is OpenCause.END]
+        for alpha in self.joined.unordered:
+            line = f"the order of two critical alphas near {float(alpha):.17g} is not known"
+            at_end = any(low <= alpha <= high for low, high in ends)
+            found.append((alpha, line, OpenCause.END if at_end else OpenCause.TOGETHER))
+        found.sort(key=lambda entry: entry[:2])
+        # a search that was cut short has a remedy of its own
+        missing = self.cut_short or self.stopped is not None
+        lines = [line if missing else f"{line}; {_remedy(cause, self.problem)}" for _, line, cause in found]
+        return list(dict.fromkeys([*self.joined.reasons, *lines]))
+
+
+def _undecided(place: EventPlace, problem: ContactProblem) -> str:
+    """What is not decided at a place, and why not."""
+    count = len(place.members)
+    does = f"{counted(count, 'selection')} {'does' if count == 1 else 'do'}"
+    where = f"[{float(place.low):.17g}, {float(place.high):.17g}]"
+    nodes = [problem.node_ids[i] for i in sorted(place.nodes)]
+    of = f"of contact nodes {listed(nodes)}" if len(nodes) > 1 else "of several contact nodes"
+    why = {
+        OpenCause.BOXES: "one of them was cut into as many boxes as are tried",
+        OpenCause.END: "an end of the interval is too close to tell",
+        OpenCause.SINGULAR: "the determinant of one of them may vanish there",
+        OpenCause.TOGETHER: f"conditions {of} vanish there, too close together to be told apart",
+        OpenCause.FLAT: f"a condition of contact node {listed(nodes)} may vanish there together with its slope",
+        OpenCause.PARTNER: "where one of them ends, the one that goes on was not identified",
+    }[place.cause]
+    return f"what {does} for alpha in {where} is not decided: {why}"
+
+
+def _remedy(cause: OpenCause, problem: ContactProblem) -> str:
+    """What decides such a place."""
+    if cause is OpenCause.END:
+        return "an interval that ends elsewhere decides it"
+    if problem.n <= EXACT_DOF_LIMIT:
+        return 'arithmetic="exact" decides it, which may take long'
+    if 2 * problem.p <= EXACT_DOF_LIMIT:
+        return "the graph of problem.at_contact_nodes(), the same body up to rounding, is made by exact algebra"
+    if cause is OpenCause.BOXES:
+        return "a graph over a short interval around it may decide it"
+    return "data that differ by a little may tell it apart"
 
 
 def follow_selections(
@@ -89,7 +134,7 @@ def follow_selections(
     for found in pieces:
         for codes in found.selections:
             where.setdefault(codes, []).append((found.piece.a, found.piece.b))
-    followed = Followed(traced.force, traced.length)
+    followed = Followed(traced.problem, traced.force, traced.length, cut_short=cut_short)
     if not cut_short:
         followed.traces += _taken_over(traced, where, known)
     waiting = sorted(where)

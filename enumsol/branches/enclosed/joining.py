@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 from networkx.utils import UnionFind
 
-from enumsol.branches.enclosed.arc_parts import ArcPartKind, parts_between
+from enumsol.branches.enclosed.arc_parts import ArcPartKind, OpenCause, parts_between
 from enumsol.model.statuses import ACROSS
 
 if TYPE_CHECKING:
@@ -25,6 +25,9 @@ if TYPE_CHECKING:
     from enumsol.selections.solution import Codes
 
     Bounds = tuple[Fraction, Fraction]
+
+#: What was left open at an end of the interval and is shorter, beside it, would be decided if it were not at the end.
+_AT_END = Fraction(1, 2**30)
 
 
 class EventPlaceKind(enum.StrEnum):
@@ -55,6 +58,10 @@ class EventPlace:
         At an event the node whose status changes.
     whole : bool
         Every selection that holds there was examined (which open places leave undecided).
+    cause : OpenCause
+        At an open place why it was left open.
+    nodes : frozenset of int
+        At an open place the nodes whose conditions may vanish, as far as they are known.
     """
 
     kind: EventPlaceKind
@@ -63,6 +70,8 @@ class EventPlace:
     members: list[Codes]
     node: int = -1
     whole: bool = True
+    cause: OpenCause = OpenCause.PARTNER
+    nodes: frozenset[int] = frozenset()
 
 
 @dataclass
@@ -103,14 +112,19 @@ class Joined:
     arcs : list of JoinedArc
     reasons : list of str
         What contradicts completeness.
-    ordered : bool
-        The order of all places is known.
+    unordered : list of Fraction
+        Where the order of two places is not known.
     """
 
     places: list[EventPlace] = field(default_factory=list)
     arcs: list[JoinedArc] = field(default_factory=list)
     reasons: list[str] = field(default_factory=list)
-    ordered: bool = True
+    unordered: list[Fraction] = field(default_factory=list)
+
+    @property
+    def ordered(self) -> bool:
+        """Whether the order of all places is known."""
+        return not self.unordered
 
     @property
     def open(self) -> list[EventPlace]:
@@ -284,7 +298,15 @@ class _Joining:
         for group in groups.values():
             members = sorted({found.codes for found in group})
             low, high = min(found.low for found in group), max(found.high for found in group)
-            place = EventPlace(EventPlaceKind.OPEN, low, high, members)
+            causes = {found.part.cause for found in group}
+            cause = next((cause for cause in OpenCause if cause in causes), OpenCause.PARTNER)
+            if high - low <= _AT_END * (self._interval[1] - self._interval[0]) and any(
+                low <= end <= high for end in self._interval
+            ):
+                cause = OpenCause.END
+            some = [found.doubtful for found in group if len(found.doubtful) < len(found.codes)]
+            nodes: frozenset[int] = frozenset().union(*some)
+            place = EventPlace(EventPlaceKind.OPEN, low, high, members, cause=cause, nodes=nodes)
             for found in group:
                 found.place = place
             self._joined.places.append(place)
@@ -307,9 +329,7 @@ class _Joining:
         last = None
         for place in places:
             if last is not None and place.low <= last.high and not place.low == place.high == last.low == last.high:
-                alpha = float(place.low)
-                self._joined.ordered = False
-                self._complain(f"the order of two critical alphas near {alpha:.17g} is not known")
+                self._joined.unordered.append(place.low)
             if last is None or place.high > last.high:
                 last = place
 

@@ -115,7 +115,8 @@ def _stretches(proposals: Sequence[_Proposed]) -> list[list[_Proposed]]:
 
 def _is_chain(joined: Joined) -> bool:
     """Whether the arcs follow each other from one end to the other."""
-    if joined.reasons or joined.open or not joined.arcs or len(joined.places) != len(joined.arcs) + 1:
+    doubtful = joined.reasons or joined.unordered or joined.open
+    if doubtful or not joined.arcs or len(joined.places) != len(joined.arcs) + 1:
         return False
     ends = joined.arcs[0].tail.kind, joined.arcs[-1].head.kind
     inner = (one.head is other.tail and one.head.kind is EventPlaceKind.EVENT for one, other in pairwise(joined.arcs))

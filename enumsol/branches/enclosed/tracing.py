@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.branches.enclosed.arc_parts import AlphaBox, ArcPart, ArcPartKind, Trace
+from enumsol.branches.enclosed.arc_parts import AlphaBox, ArcPart, ArcPartKind, OpenCause, Trace
 from enumsol.branches.enclosed.cutting import Cutting, between
 from enumsol.support.deadlines import TimeOverError, look
 from enumsol.trusted.arcs.over_parts import Expansion, expansions, over_parts
@@ -166,7 +166,8 @@ class _Tracing:
             return rest
         if whole or tiny:
             everywhere = frozenset(range(len(self._selection.rows.codes)))
-            part = ArcPart(ArcPartKind.OPEN, first, last, doubtful=everywhere)
+            cause = OpenCause.BOXES if exhausted else OpenCause.SINGULAR
+            part = ArcPart(ArcPartKind.OPEN, first, last, doubtful=everywhere, cause=cause)
             fine = not isinstance(first, float) or not isinstance(last, float)
             self._found.boxes.append(AlphaBox(first, last, (part,), fine))
             return []

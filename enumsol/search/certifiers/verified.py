@@ -339,7 +339,10 @@ def _fraction(value: Any) -> str:
 
 def _reason(codes: Codes, ball: VerifiedSelection | None, node_ids: Sequence[Any]) -> tuple[str, str]:
     """Why a selection could not be decided, and what may help."""
-    hint = "the problem is too large for exact arithmetic; perturb the load, or condense the body to its contact nodes"
+    hint = (
+        "the problem is too large for exact arithmetic; perturb the load, or take problem.at_contact_nodes() of a body "
+        "that is held"
+    )
     if ball is None:
         return "the matrix of a selection may be singular", hint
     if not ball.slack.finite:
