@@ -3,6 +3,7 @@
 import json
 import re
 import sys
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -387,3 +388,15 @@ def test_commands_tell_what_a_toml_file_gave(tmp_path, capsys, monkeypatch):
     capsys.readouterr()
     assert main(["roots", "block.toml", "--alpha", "0", "--units", "kN"]) == 2
     assert "--units is kN; expected units of force and length" in capsys.readouterr().err
+
+
+def test_no_outline_is_as_wide_as_a_body_is_long():
+    """One unit of a picture is one of length: outlines are measured in pixels, or by their shape."""
+    rules = dict(
+        re.findall(r"^svg ([^{]+) \{ (.*) \}$", files("enumsol.report").joinpath("page.css").read_text(), re.M)
+    )
+    drawn = {names: rule for names, rule in rules.items() if re.search(r"stroke: var", rule)}
+    assert {".before", ".after", ".held", ".wall"} <= rules.keys()
+    measured = " ".join(names for names, rule in rules.items() if "non-scaling-stroke" in rule)
+    # the width of .stands is set where it is drawn, that of .axis is one of a diagram
+    assert {names for names in drawn if names not in measured} == {".axis", ".stands"}
