@@ -8,7 +8,7 @@ from branches.test_degenerate import pair
 from path_problems import generic_problem
 
 from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery
-from enumsol.branches import construction
+from enumsol.branches import ways
 from enumsol.branches.enclosed import following, tracing
 from enumsol.errors import IncompleteGraphError
 
@@ -53,8 +53,8 @@ def test_at_contact_nodes_is_the_same_body():
 @pytest.fixture
 def by_balls_alone(monkeypatch):
     """Nothing is left to exact algebra."""
-    monkeypatch.setattr(construction, "FAST_EXACT_DOF", 0)
-    monkeypatch.setattr(construction, "LARGEST_EXACT_WORK", 0)
+    monkeypatch.setattr(ways, "FAST_EXACT_DOF", 0)
+    monkeypatch.setattr(ways, "LARGEST_EXACT_WORK", 0)
 
 
 @pytest.mark.usefixtures("by_balls_alone")
