@@ -192,7 +192,7 @@ def _check_floating(problem: ContactProblem, arithmetic: Arithmetic) -> None:
     if problem.n > EXACT_DOF_LIMIT:
         raise TooLargeError(
             f"branch_graph follows a body that nothing holds in rationals, up to n = {EXACT_DOF_LIMIT} degrees of "
-            f"freedom, and the problem has n = {problem.n}; condense the body to its contact nodes first, or use "
+            f"freedom, and the problem has n = {problem.n}; use "
             "multiplicity_table"
         )
 
