@@ -346,9 +346,7 @@ def test_bad_arguments_of_problems_in_3d_are_named(build, message):
 def test_functions_for_2d_say_what_takes_problems_in_3d():
     problem = gallery.block3d(1, 1, 1)
     calls = [
-        lambda: enumsol.branch_graph(problem, (0.0, 1.0)),
         lambda: enumsol.link_samples(problem, [0.0, 1.0]),
-        lambda: enumsol.follow_all(problem, (0.0, 1.0)),
         lambda: enumsol.local_branch_test(problem, [0.0] * 5),
         lambda: enumsol.PiecewiseSmoothEquation(problem),
     ]

@@ -216,8 +216,8 @@ def test_jobs_in_3d(capsys, tmp_path):
 @pytest.mark.parametrize(
     "arguments",
     [
-        ("graph", "gallery:block3d-4", "--from", 0, "--to", 1),
-        ("audit", "gallery:one-node-3d", "some.csv"),
+        ("report", "gallery:block3d-4", "--from", 0, "--to", 1),
+        ("report", "gallery:one-node-3d", "--from", 0, "--to", 1),
     ],
 )
 def test_commands_for_2d_refuse_a_problem_in_3d(capsys, arguments):
