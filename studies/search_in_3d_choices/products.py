@@ -23,11 +23,15 @@ from enumsol.relaxation.imposed_rows import EQUALITY
 from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation, imposed
 from enumsol.search.certifiers.protocol import Unrecorded
 from enumsol.search.outcome import SearchLimits
+from enumsol.search.space.space_fathoming import Point
+from enumsol.search.space.space_newton import Isotropic
 from enumsol.search.space.space_search import SpaceCertifier, SpaceSplitting
 from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.search.splitting import ImposedRows
 from enumsol.search.tree import TreeSearch
 from enumsol.trusted.space.leaves import distinct_roots
 from enumsol.trusted.space.sector_rows import sector_row_terms
+from search_in_3d.feet import FRICTION, SPRINGS, foot
 
 if TYPE_CHECKING:
     from shared.results import Run
@@ -42,10 +46,21 @@ WEDGES = {
     for F in coefficients
 }
 SMOKE, SMOKE_NODES = {"1x1x2, F = 2": ((1, 1, 2), 2.0)}, 20
+#: Products of table ``around``, besides those of the work and of lambda_n c . v.
+AROUND = {
+    "none": (),
+    "discs": ("disc",),
+    "slips across the ends": ("slips",),
+    "slips and forces across the ends": ("slips", "across", "forces"),
+    "slips across the ends, discs": ("slips", "disc"),
+    "all": None,
+}
+#: Levels of the sectors around the root, 0 standing for contact.
+LEVELS, SMOKE_LEVELS = (0, 2, 3, 4), (3,)
 
 
-def products(system, codes):
-    """Products of rows at a partial assignment, and what their multipliers may be.
+def products(system, codes, kinds=None):
+    """Products of rows at a partial assignment, and what their multipliers may be; of some kinds only, or of all.
 
     Matrices (m + 1, m + 1) of quadratic functions of y; which of them are at least zero, others being zero; and triples
     whose first multiplier is at least the length of the other two.
@@ -54,7 +69,9 @@ def products(system, codes):
     y, w = np.eye(size + 1), np.vstack([np.hstack([-system.S, system.g[:, None]]), np.eye(size + 1)[-1:]])
     found, signed, cones = [], [], []
 
-    def add(matrix, sign):
+    def add(matrix, sign, kind=None):
+        if kinds is not None and kind not in (None, *kinds):
+            return None
         found.append(matrix)
         signed.append(sign)
         return len(found) - 1
@@ -69,23 +86,24 @@ def products(system, codes):
             for force in (n, *tau):
                 add(_times(force, w[i]), False)
         if code == STICK:
-            add(disc, True)
+            add(disc, True, "disc")
             continue
         work = _times(tau[0], v[0]) + _times(tau[1], v[1])
-        add(_times(tau[0], v[1]) - _times(tau[1], v[0]), False)
+        add(_times(tau[0], v[1]) - _times(tau[1], v[0]), False, "turn")
         cones.append([add(work, True), *(add(-_times(n, slip), False) for slip in v)])
-        add(disc, code <= SECTORS)
+        add(disc, code <= SECTORS, "disc")
         if code > SECTORS:
             a, b = (np.array(direction(number)) for number in (code - SECTORS, end_number(code - SECTORS)))
             middle = (a + b) / np.linalg.norm(a + b)
             cosine = float(middle @ a)
             inner = np.array([[-a[1], a[0]], [b[1], -b[0]]])
             chord = middle @ tau - cosine * n
-            pairs = [(inner[0] @ tau, inner[1] @ v), (inner[0] @ tau, inner[1] @ tau), (inner[0] @ v, inner[1] @ v)]
-            pairs += [(n, normal @ x) for normal in inner for x in (tau, v)] + [(n, chord), (chord, middle @ v)]
+            for kind, one, other in (("across", tau, v), ("forces", tau, tau), ("slips", v, v)):
+                add(_times(inner[0] @ one, inner[1] @ other), True, kind)
+            pairs = [(n, normal @ x) for normal in inner for x in (tau, v)] + [(n, chord), (chord, middle @ v)]
             for pair in pairs:
-                add(_times(*pair), True)
-            add(_times(n, middle @ v) - cosine * work, True)
+                add(_times(*pair), True, "with lambda_n")
+            add(_times(n, middle @ v) - cosine * work, True, "work")
     return np.array(found), np.array(signed), cones
 
 
@@ -104,12 +122,12 @@ def rows_of(system, codes):
     return (np.array(part).reshape(-1, size + 1) for part in rows)
 
 
-def best_form(system, codes):
+def best_form(system, codes, kinds=None):
     """H, h and k of the form y'Hy - h'y + k with the largest minimum, its mean curvature being one; None: none found.
 
     Equations of the assignment are added with a weight that makes it convex.
     """
-    matrices, signed, cones = products(system, codes)
+    matrices, signed, cones = products(system, codes, kinds)
     size = len(system.g)
     inequalities, equations = rows_of(system, codes)
     a, b = equations[:, :size], -equations[:, size]
@@ -306,6 +324,30 @@ def forms(run: Run, most: int) -> None:
         row["complete"] = outcome.stopped is None and not outcome.undecided
         rows.append({**row, "s": seconds, "of which for forms": search.seconds})
     run.table("forms", rows, *notes(rows))
+
+
+def around(run: Run) -> None:
+    """The table of gaps that the best form leaves around the root of an angle plate that the search leaves open."""
+    system = SpaceSolvers(foot("angle-14", SPRINGS[0], FRICTION[1]), 0.0, "verified").system
+    problem, engine, rows = Isotropic.of(system), SpaceEngine(system), []
+    point, imposing = Point.of(system, problem, problem.solution()), ImposedRows(SpaceSplitting(engine), system.p)
+    for level in SMOKE_LEVELS if run.smoke else LEVELS:
+        codes = tuple(_wider(code, level) for code in point.codes)
+        there = imposing.over(codes, range(system.p))
+        row = {"sectors": f"{360 / 2**level:g} degrees" if level else "contact", "energy": -engine.root(*there).bound}
+        for name, kinds in list(AROUND.items())[: 1 if run.smoke else None]:
+            form = best_form(system, codes, kinds)
+            row[name] = None if form is None else -FormEngine(engine, codes, *form).root(*there).bound
+        rows.append(row)
+    run.table("around", rows)
+
+
+def _wider(code, level):
+    """The sector of a level around a narrow one; contact for level 0."""
+    if code <= SECTORS:
+        return code
+    number = code - SECTORS
+    return SECTORS + (number >> (number.bit_length() - 1 - level)) if level else CONTACT
 
 
 def notes(rows):

@@ -18,14 +18,18 @@ statuses are final, below level 8 only where maximum dissipation is violated), o
 there (from level 8, and when nothing else is left to do): no slices at all, halves only, eighths, too; leaves last, or
 from level 6; slices at every node of the tree.
 
-The results of ``slices`` are those of the three smallest wedges. All other tables but ``forms`` are of a version
-that cut no slices. They have one choice that is gone, "no contraction": leaves tested without halving sectors that are
-wider than others and have an excluded half.
+The results of ``early`` and ``below`` are of a version that cut no slices. One choice is gone since, "no
+contraction": leaves tested without halving sectors that are wider than others and have an excluded half.
 
 ``forms`` has wedges whose relaxations bound by another quadratic form than the energy: the one with the largest minimum
 at a node of the tree, which a semidefinite program finds among all sums of products of two rows of one contact node.
 Its children inherit it. It is made at the root of the tree, and anew wherever six or three decisions (contact or not,
 what a node in contact does, two halvings of a sector) were made since the last one. These bounds are in floats.
+
+``around`` has the gap that the best form leaves around the root of a body that the search leaves open (angle-14 of
+study ``search_in_3d`` on the weakest springs, F = 0.5): below its assignment of statuses, and in sectors around its
+directions of slip; with all products and with some kinds only: lambda_n^2 - |tau|^2 ("discs"), and in sectors the
+products of slips, of forces, or of one of each, across both ends.
 
 ``bounds`` tells how many of the children that the programs exclude are excluded by less: by the disc around the
 minimiser's slip or force in which the energy bound holds all solutions, without regard to other rows, and by one dual
@@ -69,7 +73,7 @@ from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space.leaves import distinct_roots
 from enumsol.trusted.space.sector_rows import LEFT, RIGHT, SLIP, sector_row_terms
 from search_in_3d_choices.early import early
-from search_in_3d_choices.products import forms
+from search_in_3d_choices.products import around, forms
 from search_in_3d_choices.slices import slices
 
 if TYPE_CHECKING:
@@ -330,6 +334,7 @@ def main(run: Run) -> None:
     report(run, rows)
     slices(run, Solvers, SMOKE_SLICES if run.smoke else MOST_SLICES)
     forms(run, MOST_SLICES)
+    around(run)
     others = bodies if run.smoke else bodies | MORE
     bounds(run, others)
     turns(run, others)

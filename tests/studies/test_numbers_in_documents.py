@@ -112,6 +112,12 @@ def forms_in_3d(choice, digits=2):
     return rounded(numbers(found[choice]) / numbers(found["energy"]), digits)
 
 
+def gaps_around(sectors, *choices):
+    """What forms leave around a root, to one digit."""
+    found = (where("search_in_3d_choices/around", choice, sectors=sectors).item() for choice in choices)
+    return tuple(float(f"{gap:.1g}") for gap in found)
+
+
 def slices_in_3d():
     return (
         *where("search_in_3d/wedges", "nodes", wedge="1x1x2", F="1"),
@@ -230,6 +236,16 @@ CLAIMS = [
         slices_in_3d,
     ),
     ("theory", r"table `forms`, take ([\d.]+) to ([\d.]+) times", lambda: forms_in_3d("at the root", 3)),
+    (
+        "theory",
+        r"\(([\d.e-]+) without it, ([\d.e-]+) with it and no other\)",
+        lambda: gaps_around("45 degrees", "none", "slips across the ends"),
+    ),
+    (
+        "theory",
+        r"\(([\d.e-]+) with both; `studies/search_in_3d_choices`",
+        lambda: gaps_around("45 degrees", "slips across the ends, discs"),
+    ),
     ("theory", r"every six decisions they take ([\d.]+) to ([\d.]+) times", lambda: forms_in_3d("every 6")),
     ("theory", r"after every three ([\d.]+) to ([\d.]+) times", lambda: forms_in_3d("every 3")),
 ]
