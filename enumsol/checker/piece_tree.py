@@ -3,7 +3,8 @@
 A tree is given by its records in the order of a walk: ``["a", alpha]`` (the piece is cut there), ``["b", node, codes]``
 (a status is split), ``["x", rows, multipliers]`` (no solution over the piece), ``["n"]`` (the same, by the equations of
 a leaf), ``["k", box]`` (all solutions of a leaf lie in the box), ``["r", box]`` (the roots of a leaf, one at every
-alpha, are an arc, which is in the box at the middle) and ``["u", reason]`` (open: a gap).
+alpha, are an arc, which is in the box at the middle), ``["m", numbers, leaf, wider, normal]`` (there is one
+solution at every alpha of the piece) and ``["u", reason]`` (open: a gap).
 """
 
 from __future__ import annotations
@@ -16,7 +17,14 @@ import numpy as np
 from enumsol.condensation.affine import exactly_at
 from enumsol.proof.reading import RefusedError, quoted
 from enumsol.proof.records import Branching, Limits, NoRoot, RecordError, UndecidedRecord, kind_of
-from enumsol.proof.space_records import PIECE_LEAVES, CutPiece, ExcludedInSpace, InCurveBox, ThroughCurveBox
+from enumsol.proof.space_records import (
+    PIECE_LEAVES,
+    CutPiece,
+    ExcludedInSpace,
+    InCurveBox,
+    OnlyOverPiece,
+    ThroughCurveBox,
+)
 from enumsol.trusted.space.pieces import AlphaPiece
 from enumsol.trusted.space.sector_rows import UNDECIDED, is_sector_covering
 from enumsol.trusted.space.space_uniqueness import is_complete
@@ -45,7 +53,8 @@ class PieceTreeChecker:
     boxes : sequence of CurveBox
         Each is proven to hold one curve.
     fail : called with what a leaf does not prove
-    leaves : int
+    leaves, single : int
+        All, and those that are pieces with one solution at every alpha.
     gaps : list of (low, high)
         Pieces of open leaves.
     """
@@ -55,6 +64,7 @@ class PieceTreeChecker:
     boxes: Sequence[CurveBox]
     fail: Callable[[str], object]
     leaves: int = 0
+    single: int = 0
     gaps: list[tuple[Fraction, Fraction]] = field(default_factory=list)
 
     def run(self, low: Fraction, high: Fraction, records: Iterator[Any]) -> None:
@@ -96,7 +106,8 @@ class PieceTreeChecker:
         known = kind_of(record, PIECE_LEAVES)
         if known is None:
             raise RecordError(f"unknown kind of record {quoted(kind)}")
-        leaf = known.read(record, Limits(codes, boxes=len(self.boxes)))
+        components = len(codes) + sum(self._tangents)
+        leaf = known.read(record, Limits(codes, boxes=len(self.boxes), components=components))
         self.leaves += 1
         if isinstance(leaf, UndecidedRecord):
             self.gaps.append((piece.low, piece.high))
@@ -111,6 +122,10 @@ class PieceTreeChecker:
         """What a leaf does not prove; None if all is proven."""
         if isinstance(leaf, ExcludedInSpace):
             return None if piece.margin(codes, leaf.rows, leaf.values) > 0 else "its multipliers do not exclude it"
+        if isinstance(leaf, OnlyOverPiece):
+            self.single += 1
+            alone = piece.has_one(leaf.numbers, leaf.leaf, leaf.wider, leaf.normal)
+            return None if alone else "it is not proven that there is one solution at every alpha"
         if not is_complete(piece.whole, codes):
             return "its statuses are not final"
         if isinstance(leaf, NoRoot):

@@ -7,7 +7,7 @@ share (see ``trusted.space.curve_chains``); ``{"tree": true}`` and the records o
 whose boxes are numbered in the order of the curves, points left out; at the end ``{"curves", "leaves", "gaps"}``.
 
 What is checked: every curve is one, and leaves the interval at both ends or is closed; no two are the same; the leaves
-of the tree cover all solutions, and those of a leaf lie on one of the curves.
+of the tree cover all solutions, and those of a leaf lie on one of the curves or are alone at their alphas.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class SpaceGraphChecker:
         self.interval: tuple[Fraction, Fraction] | None = None
         self.curves: list[CurveChain] = []
         self.boxes: list[CurveBox] = []
-        self.leaves = 0
+        self.leaves = self.single = 0
         self.gaps: list[tuple[Fraction, Fraction]] = []
 
     def run(self, records: Iterator[Any]) -> GraphVerificationReport:
@@ -79,6 +79,7 @@ class SpaceGraphChecker:
             "problem",
             open=len(self.gaps),
             curves=len(self.curves),
+            single=self.single,
         )
 
     def _fail(self, message: str) -> None:
@@ -100,7 +101,7 @@ class SpaceGraphChecker:
         assert self.interval is not None
         tree = PieceTreeChecker(enclosure, units, self.boxes, self._fail)
         tree.run(*self.interval, records)
-        self.leaves, self.gaps = tree.leaves, tree.gaps
+        self.leaves, self.single, self.gaps = tree.leaves, tree.single, tree.gaps
         if self.progress is not None:
             self.progress(self.leaves)
         claim = {"curves": len(self.curves), "leaves": self.leaves, "gaps": len(self.gaps)}

@@ -202,6 +202,21 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
         return Ball.exact(np.ones(len(self.F)))
 
     @property
+    def end_discs(self) -> tuple[Ball, ...]:
+        """``discs`` at both ends of the piece, between which they are affine in alpha; once where there is no piece."""
+        return (self.discs,)
+
+    @cached_property
+    def smallest_discs(self) -> Vector:
+        """Lower bounds of ``discs``, at least 0."""
+        return np.maximum(np.where(self.discs.rad > 0, self.discs.low / SAFE, self.discs.mid), 0.0)
+
+    @cached_property
+    def largest_discs(self) -> Vector:
+        """Upper bounds of ``discs``."""
+        return np.where(self.discs.rad > 0, self.discs.size, self.discs.mid)
+
+    @property
     def turn(self) -> PieceTurn | None:
         """How g and discs change along a piece of alpha; None at one alpha."""
         return None
@@ -287,6 +302,13 @@ class PieceSpace(EnclosedSpace):
     def discs(self) -> Ball:
         """F(alpha) over F for all alpha of the piece, shape (p,)."""
         return Ball(self.disc, self.disc_rad)
+
+    @property
+    def end_discs(self) -> tuple[Ball, ...]:
+        """``discs`` at both ends."""
+        if self.along is None:
+            return (self.discs,)
+        return self.along.disc - self.along.disc_turn, self.along.disc + self.along.disc_turn
 
     @classmethod
     def over(

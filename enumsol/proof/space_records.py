@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+#: By how much of an angle sectors of a leaf may be wider.
+WIDEST = 0.5
 #: Numbers of directions and sectors in rows are less; directions of tangents are less than RUN.
 _NUMBERS = RUN << DEEPEST
 
@@ -238,6 +240,44 @@ class ThroughCurveBox(_Boxed):
     kind = "r"
 
 
+@dataclass(frozen=True, eq=False)
+class OnlyOverPiece(Record):
+    """There is exactly one solution at every alpha of the piece.
+
+    Attributes
+    ----------
+    numbers : of the form, as ``trusted.space.space_uniqueness.SpaceWeights.of`` takes them
+    leaf : codes of a leaf that holds the solutions, or none
+    wider : by how much of an angle the sectors of that leaf are wider, on both sides
+    normal : lambda_n near the solutions, scaled, (p,) array; used without a leaf only
+    """
+
+    kind, sizes = "m", (5,)
+
+    numbers: Array
+    leaf: tuple[int, ...]
+    wider: float
+    normal: Array
+
+    @classmethod
+    def of(cls, entries: list[Any], limits: Limits) -> OnlyOverPiece:
+        """The numbers; RecordError below an assignment, or where there are not as many as there must be."""
+        if any(code != UNDECIDED for code in limits.codes):
+            raise RecordError("one solution is claimed where statuses are assigned")
+        values, leaf, wider, normal = entries
+        if not isinstance(leaf, list) or not all(type(code) is int for code in leaf):
+            raise RecordError("its leaf is not a list of codes")
+        try:
+            numbers = numbers_from(values, limits.p + 2 * limits.components)
+            (angle,) = numbers_from([wider], 1)
+            found = cls(numbers, tuple(leaf), float(angle), numbers_from(normal, limits.p))
+        except ValueError as error:
+            raise RecordError(f"a form over a piece cannot be read: {error}") from None
+        if not 0 <= found.wider <= WIDEST:
+            raise RecordError(f"sectors are wider by {quoted(wider)}")
+        return found
+
+
 #: All kinds of leaves in 3D.
 LEAVES = table_of(
     ExcludedInSpace, ExcludedBySlipForm, NoRoot, RegularRoot, BoxedRoot, OnlyRoot, Unloaded, UndecidedRecord
@@ -245,7 +285,7 @@ LEAVES = table_of(
 #: The same of a body that nothing holds; others rest on a stiffness that is positive definite.
 FLOATING_LEAVES = table_of(ExcludedInSpace, Unbalanced, NoRoot, RegularRoot, UndecidedRecord)
 #: Of a tree over alpha, too.
-PIECE_LEAVES = table_of(ExcludedInSpace, NoRoot, InCurveBox, ThroughCurveBox, UndecidedRecord)
+PIECE_LEAVES = table_of(ExcludedInSpace, NoRoot, InCurveBox, ThroughCurveBox, OnlyOverPiece, UndecidedRecord)
 
 
 def _row(row: Any, p: int) -> Row:

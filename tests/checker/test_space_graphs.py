@@ -9,7 +9,7 @@ import pytest
 from problems3d import random_over_alpha
 from proof_tools import proof_of, records_of
 
-from enumsol import enumerate_roots, verify
+from enumsol import enumerate_roots, gallery, verify
 from enumsol.arithmetic.ball_arrays import Ball
 from enumsol.branches.space.cover import SpaceCover
 from enumsol.trusted.space.solution_curve import lies_in
@@ -46,6 +46,43 @@ def test_a_proof_says_that_all_solutions_lie_on_its_curves(p, seed):
         for root in roots:
             x = np.concatenate([root.lambda_n, *root.lambda_t.T, [alpha]])
             assert any(lies_in(box, Ball(x, 1e-12 * np.abs(x) + 1e-13)) for box in boxes)
+
+
+@functools.cache
+def alone_at_every_alpha():
+    cover = SpaceCover(gallery.block3d(1, 1, 1), (Fraction(1, 2), Fraction(1)), alone=True)
+    cover.search(max_nodes=100)
+    return cover
+
+
+def test_one_solution_at_every_alpha_of_a_piece_needs_no_curve():
+    cover = alone_at_every_alpha()
+    report = verify(cover.problem, cover.proof())
+    assert (cover.chains, cover.gaps, report.complete) == ([], [], True)
+    assert [low for low, _ in cover.single[1:]] == [high for _, high in cover.single[:-1]]
+    assert f"is the only one at its alpha, by {len(cover.single)} certificate" in repr(report)
+    assert all(len(enumerate_roots(cover.problem, alpha)) == 1 for alpha in (0.5, 0.75, 1))
+
+
+@pytest.mark.parametrize("way", ["numbers", "wider", "leaf", "piece", "below", "none"])
+def test_forged_certificates_over_a_piece_are_refused(way):
+    cover = alone_at_every_alpha()
+    records = records_of(cover.proof())
+    k, first = next((k, record) for k, record in enumerate(records) if isinstance(record, list) and record[0] == "m")
+    if way == "numbers":
+        first[1][0] *= -1.0
+    elif way == "wider":
+        first[3] = 1.0
+    elif way == "leaf":
+        first[2][0] = 0 if first[2][0] else 1
+    elif way == "piece":
+        # the same said of a hundred times as much
+        records[0]["interval"] = ["1/1000", "50"]
+    elif way == "below":
+        records[k : k + 1] = [["b", 0, [5, 0]], first, first]
+    else:
+        del records[k]
+    assert not verify(cover.problem, proof_of(records)).ok
 
 
 def mutants(records, rng, count):

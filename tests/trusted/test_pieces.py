@@ -8,6 +8,7 @@ from space_proofs import random_problem
 
 from enumsol import enumerate_roots
 from enumsol.arithmetic.ball_arrays import Ball
+from enumsol.branches.space.cover import SpaceCover
 from enumsol.model.sectors import SECTORS, nearest, start_of
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space.leaves import Open, SpaceRoot
@@ -184,3 +185,19 @@ def test_what_is_not_proven_over_a_piece_is_left_open():
     piece = piece_of(problem, Fraction(0), Fraction(64))
     codes = (SECTORS + 4,)
     assert isinstance(piece.held(codes), Open | None)
+
+
+@pytest.mark.few(2, 6)
+@pytest.mark.parametrize("seed", range(40))
+def test_a_piece_with_one_solution_has_one_at_every_alpha(seed):
+    # most of these problems have one solution, some have three
+    low = Fraction(1, 4)
+    for exponent in (2, 4, 6):
+        problem = changing_problem(2, seed, isotropic=True)
+        high = low + Fraction(1, 2**exponent)
+        cover = SpaceCover(problem, (low, high), alone=True)
+        cover.search(max_nodes=1)
+        if cover.single == [(low, high)]:
+            alphas = (low, low + (high - low) / 3, high)
+            assert [len(enumerate_roots(problem, alpha)) for alpha in alphas] == [1, 1, 1]
+            return

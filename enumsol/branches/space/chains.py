@@ -15,13 +15,7 @@ from enumsol.continuation.path_data import PathStatus
 from enumsol.errors import EnumsolError
 from enumsol.support.deadlines import look
 from enumsol.trusted.space.curve_chains import CurveChain, CurveLink, goes_on, link_between
-from enumsol.trusted.space.solution_curve import (
-    ERRORS,
-    CurveBox,
-    box_around,
-    curve_point,
-    only_curve,
-)
+from enumsol.trusted.space.solution_curve import curve_around, curve_point
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.trusted.space.solution_curve import AlphaProblem, SolutionCurve
+    from enumsol.trusted.space.solution_curve import AlphaProblem, CurveBox, SolutionCurve
 
     Array = NDArray[np.float64]
 
@@ -178,20 +172,23 @@ class ChainBuilder:
 
         ``closed``: that place is the first joint.
         """
-        way = 1.0
+        way, failed = 1.0, False
         while place < last:
             look()
-            further = min(place + way, last)
+            # no link is left that is too short
+            further = place + way if last - place - way > _SHORTEST else last
             end = joints[0] if closed and further == last else None
             found = self._link(line, place, further, joints[-1], links[-1] if links else None, end)
             if found is None:
-                way = 0.5 * (further - place)
+                way, failed = 0.5 * (further - place), True
                 if way < _SHORTEST:
                     return False
                 continue
             links.append(found[0])
             joints.append(found[1])
-            place, way = further, _GROWTH * (further - place)
+            # what was too long a moment ago is not tried again at once
+            way = (further - place) * (1.0 if failed else _GROWTH)
+            place, failed = further, False
         return True
 
     def joint(self, x: Array, direction: Array) -> SolutionCurve | None:
@@ -200,8 +197,7 @@ class ChainBuilder:
         near = curve_point(self.problem, x, border)
         if near is None:
             return None
-        box = box_around(self.problem, near.x, near.direction, border, 0.0, roomy=False)
-        found = None if box is None else only_curve(self.problem, box, ERRORS)
+        found = curve_around(self.problem, near.x, near.direction, border, 0.0, roomy=False)
         return None if found is None or None in found.statuses else found
 
     def across(self, direction: Array) -> Array:
@@ -236,8 +232,7 @@ class ChainBuilder:
         direction = chord / length
         before, after = joint.statuses, following.statuses
         changing = [i for i in range(self.problem.p) if before[i] != after[i]]
-        box = box_around(self.problem, start + 0.5 * chord, direction, border, 0.5 * _LONGER * length, changing)
-        curve = None if box is None else only_curve(self.problem, box, ERRORS)
+        curve = curve_around(self.problem, start + 0.5 * chord, direction, border, 0.5 * _LONGER * length, changing)
         if curve is None:
             return None
         link = link_between(curve, joint, following)

@@ -49,8 +49,12 @@ class SpaceCover:
     ----------
     problem : ContactProblem3D
     interval : first and last alpha
+    alone : bool
+        Whether pieces of alpha with one solution at every alpha are sought, by one certificate each.
     chains : list of Chain
         Whole curves.
+    single : list of (low, high)
+        Such pieces: their solutions lie on no curve unless other pieces asked for it.
     records : list
         Of the tree, in the order of a walk; open leaves among them.
     failed : int
@@ -62,7 +66,9 @@ class SpaceCover:
 
     problem: ContactProblem3D
     interval: tuple[Fraction, Fraction]
+    alone: bool = False
     chains: list[Chain] = field(default_factory=list)
+    single: list[tuple[Fraction, Fraction]] = field(default_factory=list)
     records: list[Any] = field(default_factory=list)
     failed: int = 0
     nodes: int = 0
@@ -107,10 +113,16 @@ class SpaceCover:
             return chain.boxes
 
         tree = PieceTree(
-            self.problem.enclosure, self.interval, self._units(), more=more, max_nodes=max_nodes, tick=tick
+            self.problem.enclosure,
+            self.interval,
+            self._units(),
+            more=more,
+            max_nodes=max_nodes,
+            tick=tick,
+            alone=self.alone,
         )
         self.records = tree.run()
-        self.nodes, self.stopped = tree.nodes, tree.stopped
+        self.single, self.nodes, self.stopped = tree.single, tree.nodes, tree.stopped
 
     def _is_new(self, chain: Chain) -> bool:
         """Whether a chain is proven to be whole, and none that is known."""

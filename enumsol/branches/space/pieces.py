@@ -15,7 +15,7 @@ import numpy as np
 
 from enumsol.support.deadlines import look
 from enumsol.trusted.space.curve_events import CurveMotion
-from enumsol.trusted.space.solution_curve import box_around, curve_point, lies_in, only_curve, parameter_in
+from enumsol.trusted.space.solution_curve import curve_around, curve_point, lies_in, only_curve, parameter_in
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -286,8 +286,7 @@ class LinkCutter:
         near = self._near(start, end, share)
         if near is None:
             return None
-        box = box_around(self.problem, near.x, near.direction, self.border, 0.0, roomy=False)
-        point = None if box is None else only_curve(self.problem, box)
+        point = curve_around(self.problem, near.x, near.direction, self.border, 0.0, roomy=False)
         if point is None or None in point.statuses or not lies_in(self.curve.box, point.at(0.0)):
             return None
         return self._place(point)
@@ -330,11 +329,12 @@ class LinkCutter:
             return None
         changing = [i for i, pair in enumerate(zip(start.codes, end.codes, strict=True)) if pair[0] != pair[1]]
         middle, half = start.x + 0.5 * chord, 0.5 * _LONGER * length
-        box = box_around(self.problem, middle, chord / length, self.border, half, changing, roomy=False)
-        if box is None:
+        curve = curve_around(self.problem, middle, chord / length, self.border, half, changing, roomy=False)
+        if curve is None:
             return None
         least = _ROUNDED * np.maximum(start.point.spread, end.point.spread)
-        curve = only_curve(self.problem, replace(box, radius=np.maximum(box.radius, least)))
+        if np.any(curve.box.radius < least):
+            curve = only_curve(self.problem, replace(curve.box, radius=np.maximum(curve.box.radius, least)))
         if curve is None or not all(lies_in(curve.box, place.point.at(0.0)) for place in (start, end)):
             return None
         return curve

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import OrderedDict
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,10 +14,12 @@ from enumsol.condensation.space_condensed import SpaceSystem
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of, width_level
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.proof.records import Branching, NoRoot
-from enumsol.proof.space_records import CutPiece, ExcludedInSpace, InCurveBox, ThroughCurveBox
+from enumsol.proof.space_records import CutPiece, ExcludedInSpace, InCurveBox, OnlyOverPiece, ThroughCurveBox
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.outcome import StopReason
+from enumsol.search.space.space_fathoming import Point
+from enumsol.search.space.space_newton import Isotropic
 from enumsol.search.space.space_search import SpaceSplitting
 from enumsol.search.splitting import ImposedRows
 from enumsol.support.deadlines import TimeOverError, look
@@ -37,6 +40,12 @@ if TYPE_CHECKING:
 
 #: Pieces whose engines are kept.
 _KEPT = 32
+#: Pieces down to this share of the interval are tried for one solution.
+_ALONE = 2.0**-16
+#: By how much wider the sectors are that hold the slip directions of such a piece.
+_WIDER = 0.1
+#: Smallest eigenvalue relative to S from which a form counts as definite, and nodes from which better ones are sought.
+_DEFINITE, _MANY = 1e-9, 8
 #: Leaves are tested from this level of their sectors on.
 _TRIED = 3
 
@@ -72,6 +81,18 @@ class _Examined:
         self.splitting = SpaceSplitting(self.engine)
         self.rows = ImposedRows(self.splitting, self.system.p)
 
+    @cached_property
+    def certificate(self) -> tuple[Array, Codes, Array] | None:
+        """Numbers of a form, a leaf and lambda_n at the middle, by which that solution may be the only one."""
+        with np.errstate(all="ignore"):
+            problem = Isotropic.of(self.system)
+            y = problem.solution()
+            point = None if y is None else Point.of(self.system, problem, y)
+            if point is None:
+                return None
+            numbers = point.numbers(_DEFINITE, better=self.system.p >= _MANY)
+            return None if numbers is None else (numbers, point.codes if point.slack > 0 else (), point.n)
+
     def root(self, codes: Codes) -> SpaceRelaxation:
         return self.engine.root(*self.rows.over(codes, range(self.system.p)))
 
@@ -92,11 +113,14 @@ class PieceTree:
     max_nodes : int, optional
     tick : callable, optional
         Called with the share of the tree that is done, every child of a node being as large as the others.
+    alone : whether pieces with one solution at every alpha are sought, which need no box
     smallest : pieces are cut down to this share of the interval
 
     Attributes
     ----------
     boxes : list of CurveBox
+    single : list of (low, high)
+        Pieces with one solution at every alpha.
     nodes : int
     stopped : StopReason or None
     """
@@ -111,15 +135,18 @@ class PieceTree:
         max_nodes: int | None = None,
         tick: Callable[[float], object] | None = None,
         smallest: float = 2.0**-30,
+        *,
+        alone: bool = False,
     ) -> None:
         self._enclosure, self._units, self.interval = enclosure, units, interval
-        self._more, self._most, self._tick = more, max_nodes, tick
+        self._more, self._most, self._tick, self._seeks = more, max_nodes, tick, alone
         self._least = Fraction(smallest) * (interval[1] - interval[0])
         self._pieces: OrderedDict[tuple[Fraction, Fraction], _Examined] = OrderedDict()
         self.nodes = 0
         #: Why the search ended early, if it did.
         self.stopped: StopReason | None = None
         self.boxes: list[CurveBox] = []
+        self.single: list[tuple[Fraction, Fraction]] = []
         self._take(boxes)
 
     def _take(self, boxes: Sequence[CurveBox]) -> None:
@@ -176,6 +203,8 @@ class PieceTree:
         self, low: Fraction, high: Fraction, codes: Codes, parent: Any, changed: int, last: bool
     ) -> tuple[Any, list[Any]]:
         at = self._examined(low, high) if parent is None else parent[0]
+        if self._seeks and set(codes) == {UNDECIDED} and (done := self._alone(at, codes)) is not None:
+            return done
         final = not {CONTACT, UNDECIDED} & set(codes)
         if final and parent is None:
             done = self._leaf(at, codes)
@@ -234,6 +263,20 @@ class PieceTree:
             self._take(self._more(np.append(piece.forces(root.y).mid, float(piece.middle))))
             number = self._box(piece, root)
         return number
+
+    def _alone(self, at: _Examined, codes: Codes) -> tuple[Any, list[Any]] | None:
+        """A piece with one solution at every alpha, or one that is cut since its middle has only one; or None."""
+        piece = at.piece
+        small = piece.high - piece.low <= Fraction(_ALONE) * (self.interval[1] - self.interval[0])
+        found = None if small else at.certificate
+        if found is None:
+            return None
+        numbers, leaf, normal = found
+        for held in (leaf, ()) if leaf else ((),):
+            if piece.has_one(numbers, held, _WIDER, normal, 2.0):
+                self.single.append((piece.low, piece.high))
+                return OnlyOverPiece(numbers, held, _WIDER, normal), []
+        return self._halved(at, codes) if piece.point.has_one(numbers, (), 0.0, normal, 2.0) else None
 
     def _leaf(self, at: _Examined, codes: Codes) -> tuple[Any, list[Any]] | None:
         """A leaf that is decided, or halved; None where statuses are to be split further."""

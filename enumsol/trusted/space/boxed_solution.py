@@ -198,8 +198,7 @@ class _NaturalMap:
         T = solution(whole + S * Ball.exact(rho[:, None]), whole)
         if T is None or not T.finite:
             return None
-        tau = [places[places >= 0] for places in system.tau]
-        return cls(system, S, g, rho, T, T + T - whole, Discs(tau, Ball.exact(np.ones(len(tau)))))
+        return cls(system, S, g, rho, T, T + T - whole, Discs(system.tau, Ball.exact(np.ones(len(system.tau)))))
 
     # -- boxes -----------------------------------------------------------------------------------------------------
 

@@ -123,10 +123,13 @@ class Open:
     mode: int | None = None
 
 
-def settle(system: EnclosedSpace, codes: Sequence[int]) -> SpaceRoot | Open | None:
-    """What a leaf holds: exactly one root in its box, no root (None), or it is not settled."""
+def settle(system: EnclosedSpace, codes: Sequence[int], wider: float = 0.0) -> SpaceRoot | Open | None:
+    """What a leaf holds: exactly one root in its box, no root (None), or it is not settled.
+
+    ``wider``: by how much of an angle its sectors are wider, on both sides.
+    """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        return _Leaf(system, codes).settle()
+        return _Leaf(system, codes, wider).settle()
 
 
 def unsettled(system: EnclosedSpace, codes: Sequence[int]) -> Open:
@@ -159,7 +162,7 @@ class _Leaf:
     beside psi, and their rows of equilibrium are zeros beside G (theory, section 14.6).
     """
 
-    def __init__(self, system: EnclosedSpace, codes: Sequence[int]) -> None:
+    def __init__(self, system: EnclosedSpace, codes: Sequence[int], wider: float = 0.0) -> None:
         self.system = system
         tau = system.tau
         self.open = [i for i, code in enumerate(codes) if code == OPEN]
@@ -189,6 +192,7 @@ class _Leaf:
             E[along, self.closed.index(i)] = sign / system.unit[along]
         self.E = E
         self.centre, self.half = self._boxes()
+        self.half = self.half + wider
         self._last: tuple[bytes, Turning | None] | None = None
 
     def _free_modes(self) -> list[int]:

@@ -15,7 +15,7 @@ from enumsol.arithmetic.ball_arrays import Ball
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, upper_norm, upper_sum
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from typing import Self
 
     from numpy.typing import NDArray
 
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 #: What a writer of proofs asks for beyond what a checker does.
 MARGIN = 2.0**-10
+#: Places of the unit matrix in blocks of both components of tau.
+_BOTH = [[1], [2]], [[1], [2]]
 
 
 @dataclass(frozen=True)
@@ -42,166 +44,236 @@ class Discs:
 
     Attributes
     ----------
-    tau : places of the tau of every node in y, none, one or two
+    tau : (p, 2) array of int
+        Places of the tau of every node in y, -1 where there is none.
     F : Ball of shape (p,)
         All that occur.
     slope : Ball of shape (p,), or None
         The derivative of F with respect to the last argument; None where there is no such argument.
     """
 
-    tau: Sequence[NDArray[np.intp]]
+    tau: NDArray[np.intp]
     F: Ball
     slope: Ball | None = None
 
     def projected(self, z: Ball) -> Ball:
         """P of a ball of arguments."""
         out = Ball(np.zeros_like(z.mid), np.zeros_like(z.rad))
-        p = len(self.tau)
-        out.mid[:p], out.rad[:p] = np.maximum(z.mid[:p], 0.0), z.rad[:p]
-        for i, t in enumerate(self.tau):
-            if len(t):
-                F, F_rad = float(self.F.mid[i]), float(self.F.rad[i])
-                most = F * float(out.mid[i])
-                length = float(np.linalg.norm(z.mid[t]))
-                share = 1.0 if length <= most else most / length
-                out.mid[t] = share * z.mid[t]
-                # |P(z) - P(z')| <= |z_t - z_t'| + |r - r'| for discs of the radii r and r'
-                more = (abs(F) + F_rad) * (float(out.mid[i]) + z.rad[i]) - abs(F) * float(out.mid[i])
-                rounded = 16 * UNIT * (abs(most) + length)
-                away = float(upper_norm(z.rad[t]))
-                if F - F_rad < 0:
-                    # r e with a negative r: |e - e'| <= 2 |z_t - z_t'| / |z_t|
-                    reach = (abs(F) + F_rad) * (float(out.mid[i]) + z.rad[i])
-                    turned = 4.0 * away * reach / (length - away) if length > away else np.inf
-                    away = away + (turned if away > 0 else 0.0)
-                out.rad[t] = (away + more + rounded) * SAFE + TINY
+        p, has = len(self.tau), self.tau >= 0
+        n, n_rad, tangent = np.maximum(z.mid[:p], 0.0), z.rad[:p], self.tangents(z)
+        out.mid[:p], out.rad[:p] = n, n_rad
+        F, F_size = np.abs(self.F.mid), np.abs(self.F.mid) + self.F.rad
+        most, length = self.F.mid * n, np.linalg.norm(tangent.mid, axis=1)
+        share = np.where(length <= most, 1.0, most / length)
+        # |P(z) - P(z')| <= |z_t - z_t'| + |r - r'| for discs of the radii r and r'
+        reach, rounded = F_size * (n + n_rad), 16 * UNIT * (np.abs(most) + length)
+        away = upper_norm(tangent.rad, axis=1)
+        # r e with a negative r: |e - e'| <= 2 |z_t - z_t'| / |z_t|
+        turned = np.where(length > away, 4.0 * away * reach / (length - away), np.inf)
+        off = away + np.where((self.F.mid - self.F.rad < 0) & np.any(tangent.rad > 0, axis=1), turned, 0.0)
+        off = (off + (reach - F * n) + rounded) * SAFE + TINY
+        places = self.tau[has]
+        out.mid[places] = (share[:, None] * tangent.mid)[has]
+        out.rad[places] = np.broadcast_to(off[:, None], has.shape)[has]
         return out
+
+    def tangents(self, z: Ball) -> Ball:
+        """tau of every node, (p, 2); 0 where there is none."""
+        has = self.tau >= 0
+        return Ball(np.where(has, z.mid[self.tau], 0.0), np.where(has, z.rad[self.tau], 0.0))
 
     def corners(self, z: Ball) -> Corners | None:
         """All derivatives of P at points of a box, and their convex hull; None where there is no bound.
 
         ``core`` has a column more than rows, for the derivative with respect to the argument of F, if there is one.
         """
-        m = len(z.mid)
-        width = m if self.slope is None else m + 1
+        if not z.finite:
+            return None
+        m, width = len(z.mid), len(z.mid) + (self.slope is not None)
         core = Ball(np.zeros((m, width)), np.zeros((m, width)))
-        pairs: list[tuple[Array, Array]] = []
-        for i, t in enumerate(self.tau):
-            found = self._corner(core, z, i, t)
-            if found is None:
-                return None
-            pairs += found
-        u = np.array([pair[0] for pair in pairs]).reshape(-1, m).T
-        v = np.array([pair[1] for pair in pairs]).reshape(-1, width).T
-        for a, b in pairs:
-            half = 0.5 * np.outer(a, b)
-            core.mid[...] += half
-            core.rad[...] += 2 * UNIT * np.abs(core.mid) * (half != 0)
-        return Corners(core, u, v)
+        found = _Blocks.of(self, z)
+        if found is None:
+            return None
+        block, u, v = found.middle, found.u, found.v
+        rows = np.column_stack([np.arange(len(self.tau)), self.tau])
+        columns = rows if self.slope is None else np.column_stack([rows, np.full(len(rows), m)])
+        there = (rows >= 0)[:, :, None] & (columns >= 0)[:, None, :]
+        to = tuple(np.broadcast_to(x, there.shape)[there] for x in (rows[:, :, None], columns[:, None, :]))
+        core.mid[to], core.rad[to] = block.mid[there], block.rad[there]
+        k = np.flatnonzero(found.paired)
+        U, V = np.zeros((m, len(k))), np.zeros((width, len(k)))
+        for matrix, places, vectors in ((U, rows[k], u[k]), (V, columns[k], v[k])):
+            number, part = np.nonzero(places >= 0)
+            matrix[places[number, part], number] = vectors[number, part]
+        return Corners(core, U, V)
 
-    def _corner(self, core: Ball, z: Ball, i: int, t: NDArray[np.intp]) -> list[tuple[Array, Array]] | None:
-        """Put a node's derivatives into the core; u and v if there is a term t u v' with t from 0 to 1."""
-        low, high = _outwards(float(z.mid[i]), float(z.rad[i]))
-        u, v = np.zeros(core.shape[0]), np.zeros(core.shape[1])
-        if high < 0:
-            return []
-        loose = low <= 0
-        v[i] = 1.0
-        if not len(t):
-            core.mid[i, i], u[i] = (0.0, 1.0) if loose else (1.0, 0.0)
-            return [(u, v)] if loose else []
-        F, F_rad = float(self.F.mid[i]), float(self.F.rad[i])
-        F_low, F_high = _outwards(F, F_rad)
-        F_size = max(abs(F_low), abs(F_high))
+
+@dataclass(frozen=True)
+class _Blocks:
+    """Derivatives of P of every node, by (n, t1, t2) and the argument of F if there is one.
+
+    To those that are ``paired``, t u v' with |t| <= 1/2 is to be added.
+
+    Attributes
+    ----------
+    mid, rad : (p, 3, 3 or 4) arrays
+    u, v : (p, 3) and (p, 3 or 4) arrays
+    paired : (p,) bool array
+    """
+
+    mid: Array
+    rad: Array
+    u: Array
+    v: Array
+    paired: NDArray[np.bool_]
+
+    @property
+    def middle(self) -> Ball:
+        """With u v' / 2 in the middle of its t."""
+        added = 0.5 * (self.u[:, :, None] * self.v[:, None, :]) * self.paired[:, None, None]
+        mid = self.mid + added
+        return Ball(mid, self.rad + 2 * UNIT * np.abs(mid) * (added != 0))
+
+    @classmethod
+    def of(cls, discs: Discs, z: Ball) -> Self | None:
+        """Of all points of a box; None where there is no bound."""
+        p, width = len(discs.tau), 3 if discs.slope is None else 4
+        low, high = _outwards(z.mid[:p], z.rad[:p])
+        F_low, F_high = _outwards(discs.F.mid, discs.F.rad)
         # of the discs' radii
-        least_disc = F_low * (max(low, 0.0) if F_low >= 0 else high) - TINY
-        most_disc = max(F_high, 0.0) * high * SAFE + TINY
-        least_disc = least_disc / SAFE if least_disc > 0 else least_disc * SAFE
-        length, away = float(np.linalg.norm(z.mid[t])), float(upper_norm(z.rad[t]))
-        least, most = (length - away) / SAFE - 8 * UNIT * length - TINY, (length + away) * SAFE + 8 * UNIT * length
-        sticks, slips = least <= most_disc, most >= least_disc
-        if not slips:
-            core.mid[i, i] = core.mid[t, t] = 1.0
-            return []
-        block = np.ix_(t, t)
-        if not least > 0 or (loose and sticks):
-            if F_low < 0:
-                return None
+        least = F_low * np.where(F_low >= 0, np.maximum(low, 0.0), high) - TINY
+        least, most = np.where(least > 0, least / SAFE, least * SAFE), np.maximum(F_high, 0.0) * high * SAFE + TINY
+        at = _Directions.of(discs.tangents(z))
+        touches, loose, sticks, slips = high >= 0, low <= 0, at.least <= most, at.most >= least
+        rubs = np.any(discs.tau >= 0, axis=1) & touches
+        unknown = rubs & slips & (~(at.least > 0) | (loose & sticks))
+        if np.any(unknown & (F_low < 0)):
+            return None
+        sliding = rubs & slips & ~unknown
+        blocks = cls(
+            np.zeros((p, 3, width)),
+            np.zeros((p, 3, width)),
+            np.zeros((p, 3)),
+            np.zeros((p, width)),
+            (touches & loose & ~unknown) | (sliding & sticks),
+        )
+        blocks.mid[:, 0, 0] = touches & ~loose
+        blocks.mid[rubs & ~slips, *_BOTH] = 1.0
+        blocks.u[:, 0], blocks.v[:, 0] = touches & loose, 1.0
+        F_size = np.maximum(np.abs(F_low), np.abs(F_high))
+        change = Ball.exact(np.zeros(p)) if discs.slope is None else discs.slope
+        widest = (change.size * high * SAFE)[:, None]
+        if np.any(unknown):
             # any mixture of 0, of the unit matrix and of slips in any direction
-            core.mid[i, i], core.rad[i, i] = (0.5, 0.5) if loose else (1.0, 0.0)
-            core.rad[t, i] = F_size
-            core.rad[block] = 0.5
-            core.mid[t, t] = 0.5
-            if self.slope is not None:
-                core.rad[t, -1] = float(self.slope[i].size) * high * SAFE
-            return []
-        disc = least_disc, most_disc, least, most
-        return self._sliding(core, z, i, length, away, disc, sticks=sticks)
+            blocks.mid[unknown & loose, 0, 0] = blocks.rad[unknown & loose, 0, 0] = 0.5
+            blocks.rad[unknown, 1:, 0] = F_size[unknown, None]
+            blocks.rad[unknown, 1:, 1:3] = 0.5
+            blocks.rad[unknown, 1:, 3:] = widest[unknown, None]
+            blocks.mid[unknown, *_BOTH] = 0.5
+        if not np.any(sliding):
+            return blocks
+        # times the direction, by lambda_n and by the argument of F where the node slips
+        normal, normal_rad = 0.5 * (np.maximum(low, 0.0) + high), 0.5 * (high - np.maximum(low, 0.0)) * SAFE
+        pushed = change * Ball(normal, normal_rad + 4 * UNIT * normal)
+        along = (F_size[:, None] * at.turn + (discs.F.rad + 4 * UNIT * F_size)[:, None]) * SAFE
+        also = (pushed.size[:, None] * at.turn + (pushed.rad + 4 * UNIT * pushed.size)[:, None]) * SAFE
+        blocks.rad[sliding, 1:, 0] = along[sliding]
+        blocks.rad[sliding, 1:, 3:] = np.where(loose[:, None], widest, also)[sliding, :, None]
+        ratio_low = np.where(least >= 0, least / at.most / SAFE, least / at.least * SAFE)
+        ratio_high = np.minimum(1.0, most / at.least * SAFE)
+        blocks.slide(at, (ratio_low, ratio_high), (discs.F.mid, pushed.mid), sliding, sticks, loose)
+        return blocks
 
-    def _sliding(
+    def slide(
         self,
-        core: Ball,
-        z: Ball,
-        i: int,
-        length: float,
-        away: float,
-        disc: tuple[float, float, float, float],
-        *,
-        sticks: bool,
-    ) -> list[tuple[Array, Array]]:
-        """Those of a node whose tau has a direction, and that slips at some points of the box.
+        at: _Directions,
+        ratios: tuple[Array, Array],
+        factors: tuple[Array, Array],
+        sliding: NDArray[np.bool_],
+        sticks: NDArray[np.bool_],
+        loose: NDArray[np.bool_],
+    ) -> None:
+        """Fill in nodes whose tau has a direction and that slip at some points of the box.
 
-        ``length`` and ``away``: of the middle of its tau, and by how much that may be off; ``disc``: the least and the
-        largest radius of its disc, and the least and the largest length of its tau; ``sticks``: it may stick, too.
+        Parameters
+        ----------
+        ratios : bounds of that of the disc's radius and |tau| where they slip
+        factors : what the direction is multiplied by where they slip, by lambda_n and by the argument of F
+        sticks, loose : nodes that may stick, or be open, too
         """
-        t, least_disc, most_disc, least, most = self.tau[i], *disc
-        low, high = _outwards(float(z.mid[i]), float(z.rad[i]))
-        loose = low <= 0
-        F, F_rad = float(self.F.mid[i]), float(self.F.rad[i])
-        F_size = max(map(abs, _outwards(F, F_rad)))
-        u, v = np.zeros(core.shape[0]), np.zeros(core.shape[1])
-        v[i] = 1.0
-        block = np.ix_(t, t)
-        # with respect to the argument of F: e times this where the node slips
-        change = Ball.exact(np.zeros(())) if self.slope is None else self.slope[i]
-        e = z.mid[t] / length
-        # directions of the box are no farther from e
-        turn = (2.0 * away / length if len(t) > 1 else 0.0) * SAFE + 8 * UNIT
-        across = np.eye(len(t)) - np.outer(e, e) if len(t) > 1 else np.zeros((1, 1))
-        # of e e' and of 1 - e e'
-        bent = 3.0 * turn if len(t) > 1 else 0.0
-        ratio_low, ratio_high = _quotient(least_disc, least, most), min(1.0, _quotient(most_disc, most, least, up=True))
-        normal, normal_rad = 0.5 * (max(low, 0.0) + high), 0.5 * (high - max(low, 0.0)) * SAFE
-        pushed = change * Ball(np.array(normal), np.array(normal_rad + 4 * UNIT * normal))
-        core.rad[t, i] = (F_size * turn + F_rad + 4 * UNIT * F_size) * SAFE
-        if self.slope is not None:
-            core.rad[t, -1] = (float(pushed.size) * turn + float(pushed.rad) + 4 * UNIT * float(pushed.size)) * SAFE
-        if sticks:
-            # 1 - t (e e' + (1 - ratio) (1 - e e')), and t F e for lambda_n
-            core.mid[i, i] = core.mid[t, t] = 1.0
-            core.rad[block] = (bent + (1.0 - ratio_low) * (len(t) > 1) + 8 * UNIT) * SAFE
-            u[t], v[t] = e, -e
-            v[i] = F
-            if self.slope is not None:
-                v[-1] = float(pushed.mid)
-            return [(u, v)]
-        size = max(abs(ratio_low), abs(ratio_high))
-        if loose:
-            # t times those of slip
-            core.mid[block] = 0.5 * ratio_high * across
-            spread = 0.5 * abs(ratio_high) + max(-ratio_low, 0.0)
-            core.rad[block] = (spread * np.abs(across) + size * bent + 8 * UNIT) * SAFE
-            if self.slope is not None:
-                core.rad[t, -1] = float(change.size) * high * SAFE
-            u[i], u[t] = 1.0, F * e
-            return [(u, v)]
-        core.mid[i, i], core.mid[t, i] = 1.0, F * e
-        if self.slope is not None:
-            core.mid[t, -1] = float(pushed.mid) * e
-        middle, half = 0.5 * (ratio_low + ratio_high), 0.5 * (ratio_high - ratio_low) * SAFE + 4 * UNIT * size
-        core.mid[block] = middle * across
-        core.rad[block] = (half * np.abs(across) + size * bent + 8 * UNIT * max(size, 1.0)) * SAFE
-        return []
+        low, high = (ratio[:, None, None] for ratio in ratios)
+        across, size = np.abs(at.across), np.maximum(np.abs(low), np.abs(high))
+        rounded = 16 * UNIT * (1.0 + size)
+        F, pushed = factors
+        # or stick: 1 - t (e e' + (1 - ratio) (1 - e e')), and t F e for lambda_n
+        limit = sliding & sticks
+        if np.any(limit):
+            self.mid[limit, *_BOTH] = 1.0
+            lost = (at.bent + (1.0 - low) * (across + at.bent) + rounded) * SAFE
+            self.rad[limit, 1:, 1:3] = lost[limit]
+            self.u[limit, 1:], self.v[limit, 1:3], self.v[limit, 0] = at.e[limit], -at.e[limit], F[limit]
+            self.v[limit, 3:] = pushed[limit, None]
+        # or open: t times those of slip
+        graze = sliding & loose
+        if np.any(graze):
+            spread = 0.5 * np.abs(high) + np.maximum(-low, 0.0)
+            self.mid[graze, 1:, 1:3] = (0.5 * high * at.across)[graze]
+            self.rad[graze, 1:, 1:3] = ((spread * across + size * at.bent + rounded) * SAFE)[graze]
+            self.u[graze, 1:] = (F[:, None] * at.e)[graze]
+        # or nothing else
+        only = sliding & ~sticks & ~loose
+        self.mid[only, 1:, 0] = F[only, None] * at.e[only]
+        self.mid[only, 1:, 3:] = (pushed[only, None] * at.e[only])[:, :, None]
+        self.mid[only, 1:, 1:3] = (0.5 * (low + high) * at.across)[only]
+        half = 0.5 * (high - low) * SAFE + 4 * UNIT * size
+        self.rad[only, 1:, 1:3] = ((half * across + size * at.bent + rounded) * SAFE)[only]
+
+
+@dataclass(frozen=True)
+class _Directions:
+    """Directions e = x / |x| of points x in rectangles, one or none for every node.
+
+    Attributes
+    ----------
+    least, most : (p,) arrays
+        Bounds of |x|. Nothing else is said where ``least`` is not positive.
+    e : (p, 2) array
+        That of the middle.
+    turn : (p, 2) array
+        How far any other one is from it, component by component.
+    across, bent : (p, 2, 2) arrays
+        1 - e e' of the middle, and how far any other one is from it; so for e e'.
+    """
+
+    least: Array
+    most: Array
+    e: Array
+    turn: Array
+    across: Array
+    bent: Array
+
+    @classmethod
+    def of(cls, x: Ball) -> _Directions:
+        """Of points in balls of shape (p, 2); where a component is 0 without radius, e has one component."""
+        length = np.linalg.norm(x.mid, axis=1)
+        e = x.mid / np.where(length > 0, length, 1.0)[:, None]
+        side = np.column_stack([-e[:, 1], e[:, 0]])
+        # along the middle's direction, and beside it
+        along, beside = (upper_sum(np.abs(one) * x.rad, axis=1) * (1.0 + 16 * UNIT) for one in (e, side))
+        rounded = 8 * UNIT * length
+        least = (length - along) / SAFE - rounded - TINY
+        ahead = length + along
+        most = np.sqrt(ahead * ahead + beside * beside) * SAFE * SAFE + rounded
+        # the sine of the angle, by its tangent or by a disc around the middle
+        sine = np.minimum(beside / least, upper_norm(x.rad, axis=1) / length * (1.0 + 8 * UNIT)) * SAFE
+        sine = np.where(np.any((x.mid == 0) & (x.rad == 0), axis=1), 0.0, sine)[:, None]
+        a, b = np.abs(e), np.abs(side)
+        # e' = e cos + side sin, and 1 - cos <= sin^2
+        turn = (sine * sine * a + sine * b) * SAFE + 8 * UNIT
+        one, other = sine[:, :, None], a[:, :, None] * b[:, None, :]
+        straight = a[:, :, None] * a[:, None, :] + b[:, :, None] * b[:, None, :]
+        bent = (one * one * straight + one * (other + np.swapaxes(other, 1, 2))) * SAFE
+        return cls(least, most, e, turn, side[:, :, None] * side[:, None, :], bent)
 
 
 def middle_inverse(M: Ball) -> tuple[Array, Array] | None:
@@ -308,13 +380,6 @@ def upper_product(matrix: Array, vector: Array) -> Array:
     return np.asarray(upper_sum(matrix * vector, axis=1))
 
 
-def _outwards(middle: float, radius: float) -> tuple[float, float]:
+def _outwards(middle: Array, radius: Array) -> tuple[Array, Array]:
     low, high = middle - radius, middle + radius
-    return low - 2 * UNIT * abs(low) - TINY, high + 2 * UNIT * abs(high) + TINY
-
-
-def _quotient(disc: float, near: float, far: float, *, up: bool = False) -> float:
-    """A bound of a disc's radius over a length between ``near`` and ``far``, which are positive."""
-    if up:
-        return disc / far * SAFE if disc >= 0 else disc / near / SAFE
-    return disc / far / SAFE if disc >= 0 else disc / near * SAFE
+    return low - 2 * UNIT * np.abs(low) - TINY, high + 2 * UNIT * np.abs(high) + TINY

@@ -14,6 +14,7 @@ from enumsol.arithmetic.balls import SAFE, TINY, UNIT
 from enumsol.condensation.space_condensed import PieceSpace
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
 from enumsol.trusted.space.sector_rows import sector_margin
+from enumsol.trusted.space.space_uniqueness import only_root, only_solution_in_space
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -92,6 +93,20 @@ class AlphaPiece:
     def held(self, codes: Sequence[int]) -> SpaceRoot | Open | None:
         """What a leaf holds at every alpha of the piece: exactly one root, none (None), or it is not settled."""
         return settle(self.whole, codes)
+
+    def has_one(self, numbers: Array, leaf: Sequence[int], wider: float, normal: Array, errors: float = 1.0) -> bool:
+        """Whether there is exactly one solution at every alpha of the piece.
+
+        Parameters
+        ----------
+        numbers : of the form (see ``SpaceWeights.of``)
+        leaf : codes of a leaf that holds the solutions, or none: then they are near ``normal``
+        wider : by how much of an angle its sectors are wider, on both sides
+        normal : (p,) array, lambda_n, scaled
+        """
+        if leaf:
+            return only_root(self.whole, numbers, leaf, errors, wider) is not None
+        return only_solution_in_space(self.whole, numbers, normal, errors) is not None
 
     @cached_property
     def point(self) -> AlphaPiece:

@@ -33,12 +33,15 @@ if TYPE_CHECKING:
 #: Slip in any direction, as in continuation.
 SLIP = SECTORS + 1
 #: How often a set around a box is made larger, its image taken again.
-_WIDENINGS, _IMAGES = 6, 3
+_WIDENINGS, _IMAGES = 6, 2
 #: What a writer of proofs asks for.
 ERRORS = 2.0
 #: What is proposed: how much more room the radii have than the curve seems to need, in the hope that this suffices for
 #: what the room itself adds; the least radius relative to the largest; and steps of Newton's method.
 _ROOMS, _LEAST, _STEPS = (1.2, 1.3, 1.5, 1.5, 1.5, 1.5, 1.5), 1e-3, 8
+#: Radii that are as large as they may be are sought between those that are needed and the box's length: shares of the
+#: logarithm.
+_SHARES = (1.0, 0.5, 0.25, 0.0)
 #: Factors of the steps of the natural map at a node that changes its status.
 _FACTORS = (1.0, 4.0, 16.0, 64.0, 256.0, 0.25, 0.0625, 0.015625)
 
@@ -141,9 +144,19 @@ class AlphaProblem:
         return rho
 
     @cached_property
+    def places(self) -> NDArray[np.intp]:
+        """Places of the tau of every node, (p, 2), -1 where there is none."""
+        return np.array([[*t, -1, -1][:2] for t in self.tau], dtype=np.intp)
+
+    @cached_property
     def part(self) -> Ball:
         """The derivative of y / q, (3p, 3p)."""
         return Ball(np.diag(self.inverse.mid), np.diag(self.inverse.rad))
+
+    @cached_property
+    def plain_moves(self) -> Array:
+        """Middle of ``moves`` for the steps of the natural map as they are."""
+        return self.moves(self.rho).mid
 
     def moves(self, rho: Array) -> Ball:
         """The derivative of (z, alpha) with respect to (y, alpha), (3p + 1, 3p + 1)."""
@@ -157,6 +170,23 @@ class AlphaProblem:
         """Coefficients for all alpha of a ball, (p,)."""
         return Ball.exact(self.F0) + alpha * Ball.exact(self.F1)
 
+    def status(self, z: Ball, i: int) -> int | None:
+        """The status that a node has strictly at all arguments (z, alpha) of P, if it has one."""
+        t, F = self.tau[i], self.friction(z[-1])[i]
+        low, high = float(z.mid[i] - z.rad[i] * SAFE), float(z.mid[i] + z.rad[i] * SAFE)
+        if high < 0:
+            return OPEN
+        if low <= 0:
+            return None
+        if not len(t):
+            return FRICTIONLESS
+        length, away = float(np.linalg.norm(z.mid[t])), float(upper_norm(z.rad[t]))
+        least, most = (length - away) / SAFE - 8 * UNIT * length, (length + away) * SAFE + 8 * UNIT * length
+        F_low, F_high = float(F.mid - F.rad) / SAFE, float(F.mid + F.rad) * SAFE
+        if F_low > 0 and most < F_low * low / SAFE:
+            return STICK
+        return SLIP if least > max(F_high, 0.0) * high * SAFE else None
+
 
 @dataclass(frozen=True, eq=False)
 class SolutionCurve:
@@ -167,19 +197,27 @@ class SolutionCurve:
     box : CurveBox
     sign : int
         Of the bordered determinant: alpha increases with t where a root's index is this, and decreases otherwise.
-    spread : (3p + 1,) array
-        The solution at t is no farther from centre + t direction.
-    slope : Ball of shape (3p + 1,)
-        Holds all (x(t) - x(t')) / (t - t'); without bounds where none are known.
-    statuses : tuple of p codes or None
-        OPEN, STICK, SLIP or FRICTIONLESS where it holds strictly along all of the curve.
+    found : what was proven, in the units of the nodes
     """
 
     box: CurveBox
     sign: int
-    spread: Array
-    slope: Ball
-    statuses: tuple[int | None, ...]
+    found: _Proven
+
+    @cached_property
+    def spread(self) -> Array:
+        """The solution at t is no farther from centre + t direction, (3p + 1,)."""
+        return np.asarray(self.found.spread[0] * self.found.near.unit)
+
+    @cached_property
+    def slope(self) -> Ball:
+        """A ball, (3p + 1,), of all (x(t) - x(t')) / (t - t'); without bounds where none are known."""
+        return Ball(self.box.direction.copy(), self.found.slope * self.found.near.unit)
+
+    @cached_property
+    def statuses(self) -> tuple[int | None, ...]:
+        """p codes: OPEN, STICK, SLIP or FRICTIONLESS where it holds strictly along all of the curve."""
+        return self.found.statuses
 
     def at(self, t: float | Ball) -> Ball:
         """Bounds of the solution at t, or of those at all t of a ball."""
@@ -240,10 +278,12 @@ def only_curve(problem: AlphaProblem, box: CurveBox, errors: float = 1.0) -> Sol
     if box.rho.shape != (3 * problem.p,) or not np.all(box.rho > 0) or not np.all(np.isfinite(box.rho)):
         return None
     with np.errstate(all="ignore"):
-        return _CurveMap(problem, box.centre, box.direction, box.border, box.half, box.rho).curve(box, errors)
+        near = _CurveMap(problem, box.centre, box.direction, box.border, box.half, box.rho)
+        found = near.mapped(box.radius / near.unit, errors)
+        return None if found is None else found.curve(box)
 
 
-def box_around(
+def curve_around(
     problem: AlphaProblem,
     x: Array,
     direction: Array,
@@ -252,8 +292,8 @@ def box_around(
     changing: Sequence[int] = (),
     *,
     roomy: bool = True,
-) -> CurveBox | None:
-    """A box that seems to hold one curve only, which runs near x; no claim.
+) -> SolutionCurve | None:
+    """The curve that runs near x, in a box that is proposed; as ``only_curve`` proves it with ``ERRORS``.
 
     Parameters
     ----------
@@ -273,6 +313,21 @@ def box_around(
         return _CurveMap(problem, x, direction, border, half, rho).proposed(roomy=roomy)
 
 
+def box_around(
+    problem: AlphaProblem,
+    x: Array,
+    direction: Array,
+    border: Array,
+    half: float,
+    changing: Sequence[int] = (),
+    *,
+    roomy: bool = True,
+) -> CurveBox | None:
+    """The box of ``curve_around``, whose parameters these are."""
+    found = curve_around(problem, x, direction, border, half, changing, roomy=roomy)
+    return None if found is None else found.box
+
+
 @dataclass(frozen=True, eq=False)
 class CurvePoint:
     """A solution x as floats have it, the direction of its curve, and statuses by the signs of their conditions."""
@@ -287,20 +342,86 @@ def curve_point(problem: AlphaProblem, x: Array, border: Array) -> CurvePoint | 
 
     Its direction has the product 1 with the border; at a change of statuses it is that of one side.
     """
-    rho, step = np.ones(3 * problem.p), None
+    m, unit = 3 * problem.p, np.append(problem.force, 1.0)
+    x, row, asked = x / unit, border * unit, np.zeros((3 * problem.p + 1, 2))
+    asked[m, 1] = 1.0
     with np.errstate(all="ignore"):
         for _ in range(_STEPS):
-            near = _CurveMap(problem, x, np.zeros_like(x), border, 0.0, rho)
-            step = near.step(np.zeros_like(x))
-            if step is None:
+            y, alpha = problem.inverse.mid * x[:m], Ball.exact(x[m])
+            z = Ball.exact(y + problem.rho * (problem.g0.mid + x[m] * problem.g1.mid - problem.S.mid @ x[:m]))
+            discs = Discs(problem.places, Ball.exact(problem.friction(alpha).mid), Ball.exact(problem.F1))
+            corners = discs.corners(z)
+            if corners is None:
                 return None
-            moved = (step.move.mid + step.G.mid @ step.first) * near.unit
-            x = x + moved
-            if np.all(np.abs(moved) <= 4 * UNIT * np.max(np.abs(x))):
+            M = problem.plain_moves
+            asked[:m, 0] = discs.projected(z).mid - y
+            B = np.vstack([np.eye(m, m + 1) * np.append(problem.inverse.mid, 1.0) - corners.core.mid @ M, row])
+            try:
+                found = np.linalg.solve(B, asked)
+            except np.linalg.LinAlgError:
+                return None
+            x = x + found[:, 0]
+            if np.all(np.abs(found[:, 0]) <= 4 * UNIT * np.max(np.abs(x))):
                 break
-        z = Ball.exact(np.append(near.z.mid, near.alpha.mid))
-        statuses = tuple(near.status(z, i) for i in range(problem.p))
-        return None if step is None else CurvePoint(x, step.Y[:, -1] * near.unit, statuses)
+        along = Ball.joined(z, alpha[None])
+        statuses = tuple(problem.status(along, i) for i in range(problem.p))
+    return CurvePoint(x * unit, found[:, 1] * unit, statuses) if np.all(np.isfinite(found)) else None
+
+
+@dataclass(frozen=True, eq=False)
+class _Proven:
+    """Krawczyk's operator around a box, in the units of the nodes, and shares with which it contracts."""
+
+    near: _CurveMap
+    radius: Array
+    step: Step
+    shares: Array
+
+    def curve(self, box: CurveBox) -> SolutionCurve | None:
+        """The curve in the box; None where the sign of the determinant is not proven."""
+        sign = determinant_sign(Ball.exact(self.step.Y))
+        return SolutionCurve(box, sign, self) if sign else None
+
+    @cached_property
+    def spread(self) -> tuple[Array, Array, Step]:
+        """Bounds of the distances from c + t d of all solutions, of (z, alpha) there, and the operator for those."""
+        with np.errstate(all="ignore"):
+            near, half, step, shares, radius = self.near, self.near.half, self.step, self.shares, self.radius
+            wide = near.width(step, radius, shares)
+            for _ in range(_IMAGES):
+                for _ in range(_IMAGES):
+                    radius, shares = step.left(radius, shares, half), step.xi(radius, shares, half)
+                wide = np.minimum(wide, near.width(step, radius, shares))
+                # the same solutions, whatever the shares are
+                radius = step.reach(radius, shares)
+                closer = near.step(wide)
+                found = None if closer is None else closer.shares(radius, half)
+                if closer is None or found is None:
+                    return radius, wide, step
+                step, shares = closer, np.zeros(len(closer.along))
+            return radius, wide, step
+
+    @cached_property
+    def statuses(self) -> tuple[int | None, ...]:
+        """Codes where a status holds strictly along all of the curve."""
+        with np.errstate(all="ignore"):
+            z = self.near.along(self.spread[1])
+            return tuple(self.near.problem.status(z, i) for i in range(self.near.problem.p))
+
+    @cached_property
+    def slope(self) -> Array:
+        """How far differences over t are from d at most; infinite where that is not known."""
+        with np.errstate(all="ignore"):
+            step = self.spread[2]
+            radius = step.balanced(1.0, 0.0, 1.1)
+            if radius is not None:
+                radius = np.maximum(radius, UNIT * np.max(radius)) + TINY
+                shares = step.shares(radius, 1.0, 0.0)
+                if shares is not None and step.contracts(radius, shares, 1.0, 1.0, 0.0):
+                    for _ in range(_IMAGES):
+                        radius, shares = step.left(radius, shares, 1.0, 0.0), step.xi(radius, shares, 1.0, 0.0)
+                    return step.reach(radius, shares)
+            return np.full(len(self.near.d), np.inf)
 
 
 class _CurveMap:
@@ -324,103 +445,71 @@ class _CurveMap:
 
     # -- boxes -----------------------------------------------------------------------------------------------------
 
-    def curve(self, box: CurveBox, errors: float) -> SolutionCurve | None:
-        radius = box.radius / self.unit
-        found = self._mapped(radius, errors)
-        sign = 0 if found is None else determinant_sign(Ball.exact(found[0].Y))
-        if found is None or sign == 0:
-            return None
-        spread, wide, step = self._spread(*found, radius)
-        z = self._along(wide)
-        statuses = tuple(self.status(z, i) for i in range(self.problem.p))
-        off = self._slope(step)
-        slope = Ball(box.direction.copy(), off * self.unit)
-        return SolutionCurve(box, sign, spread * self.unit, slope, statuses)
-
     def turned(self) -> float:
         """How far corners are from being too wide for the test: less than 1 where they are not."""
         step = self.step(self.zd.size * self.half)
         return np.inf if step is None else float(np.max(step.slopes, initial=0.0))
 
-    def proposed(self, *, roomy: bool) -> CurveBox | None:
-        """A box with radii of about what the curve needs, or as large as they may be."""
-        wide = self.zd.size * self.half
+    def proposed(self, *, roomy: bool) -> SolutionCurve | None:
+        """The curve in a box with radii of about what it needs, or as large as they may be."""
+        step = self.step(self.zd.size * self.half)
         for room in _ROOMS:
-            step = self.step(wide)
-            found = None if step is None else step.balanced(self.half, 1.0, room)
-            if step is None or found is None:
+            radius = None if step is None else step.balanced(self.half, 1.0, room)
+            if step is None or radius is None:
                 return None
-            found = np.maximum(found, _LEAST * np.max(found)) + TINY
-            shares = step.shares(found, self.half)
+            radius = np.maximum(radius, _LEAST * np.max(radius)) + TINY
+            shares = step.shares(radius, self.half)
             if shares is None:
                 return None
-            wide = self._width(step, found, shares)
-            if self._mapped(found, ERRORS) is not None:
+            wide = self.width(step, radius, shares)
+            found = self.mapped(radius, ERRORS, wide)
+            if found is not None:
                 break
+            step = self.step(wide)
         else:
             return None
-        radius = found
         if roomy:
             # parts of the curve are to have room beside it
-            radius = 2.0 * radius
-            if self._mapped(radius, ERRORS) is None:
-                return None
-            size = float(np.max(np.abs(self.d))) * self.half
-            while np.max(radius) < size and self._mapped(2.0 * radius, ERRORS) is not None:
-                radius = 2.0 * radius
+            most = float(np.max(np.abs(self.d))) * self.half / float(np.max(radius))
+            larger = (self.mapped(max(2.0, most**share) * radius, ERRORS) for share in _SHARES)
+            found = next((one for one in larger if one is not None), None)
+        if found is None:
+            return None
         unit = self.unit
-        return CurveBox(self.c * unit, self.d * unit, self.e / unit, self.half, radius * unit, self.rho)
+        return found.curve(
+            CurveBox(self.c * unit, self.d * unit, self.e / unit, self.half, found.radius * unit, self.rho)
+        )
 
-    def _mapped(self, radius: Array, errors: float) -> tuple[Step, Array] | None:
-        """The operator around a box, and shares, with which it maps sets that hold the box into their interiors."""
-        wide = self.zd.size * self.half + upper_product(self.Z.size, radius)
+    def mapped(self, radius: Array, errors: float, wide: Array | None = None) -> _Proven | None:
+        """The operator around a box, if it maps sets that hold the box into their interiors.
+
+        ``wide``: bounds of what (z, alpha) are away there from those of c, if they are known.
+        """
+        least = (self.zd.size * self.half + upper_product(self.Z.size, radius)) * SAFE
+        wide = least if wide is None else np.maximum(least, wide)
         for _ in range(_WIDENINGS):
             step = self.step(wide)
             shares = None if step is None else step.shares(radius, self.half)
             if step is None or shares is None:
                 return None
-            needed = self._width(step, radius, shares)
+            needed = self.width(step, radius, shares)
             if np.all(needed <= wide):
-                return (step, shares) if step.contracts(radius, shares, errors, self.half) else None
+                proven = step.contracts(radius, shares, errors, self.half)
+                return _Proven(self, radius, step, shares) if proven else None
             wide = np.maximum(wide, needed) * (1.0 + MARGIN)
         return None
 
-    def _width(self, step: Step, radius: Array, shares: Array) -> Array:
+    def width(self, step: Step, radius: Array, shares: Array) -> Array:
         """Bounds of what (z, alpha) are away from those of c, for x = c + t d + G s + b."""
-        turned = (self.Z @ Ball.exact(step.G.mid)).size
-        return (self.zd.size * self.half + upper_product(self.Z.size, radius) + upper_product(turned, shares)) * SAFE
-
-    def _spread(self, step: Step, shares: Array, radius: Array) -> tuple[Array, Array, Step]:
-        """Bounds of the distances from c + t d of all solutions, of (z, alpha) there, and the operator for those."""
-        wide = self._width(step, radius, shares)
-        for _ in range(_IMAGES):
-            for _ in range(_IMAGES):
-                radius, shares = step.left(radius, shares, self.half), step.xi(radius, shares, self.half)
-            wide = np.minimum(wide, self._width(step, radius, shares))
-            # the same solutions, whatever the shares are
-            radius = step.reach(radius, shares)
-            closer = self.step(wide)
-            found = None if closer is None else closer.shares(radius, self.half)
-            if closer is None or found is None:
-                return radius, wide, step
-            step, shares = closer, np.zeros(len(closer.along))
-        return radius, wide, step
-
-    def _slope(self, step: Step) -> Array:
-        """How far differences over t are from d at most; infinite where that is not known."""
-        radius = step.balanced(1.0, 0.0, 1.1)
-        if radius is not None:
-            radius = np.maximum(radius, UNIT * np.max(radius)) + TINY
-            shares = step.shares(radius, 1.0, 0.0)
-            if shares is not None and step.contracts(radius, shares, 1.0, 1.0, 0.0):
-                for _ in range(_IMAGES):
-                    radius, shares = step.left(radius, shares, 1.0, 0.0), step.xi(radius, shares, 1.0, 0.0)
-                return step.reach(radius, shares)
-        return np.full(len(self.d), np.inf)
+        out = self.zd.size * self.half + upper_product(self.Z.size, radius)
+        if len(shares):
+            turned = (self.Z @ Ball.exact(step.G.mid)).size
+            out = out + upper_product(turned, shares)
+        return np.asarray(out * SAFE)
 
     # -- the operator ----------------------------------------------------------------------------------------------
 
-    def _along(self, wide: Array) -> Ball:
+    def along(self, wide: Array) -> Ball:
         """(z, alpha) at all points that are no farther from that of c."""
         z = Ball.joined(self.z, self.alpha[None])
         return Ball(z.mid, (z.rad + wide) * SAFE)
@@ -431,9 +520,9 @@ class _CurveMap:
         None where its middle matrix is singular or there is no bound of derivatives.
         """
         m = len(self.c) - 1
-        near = self._along(wide)
+        near = self.along(wide)
         F1 = Ball.exact(self.problem.F1)
-        corners = Discs(self.problem.tau, self.problem.friction(near[m]), F1).corners(near[:m])
+        corners = Discs(self.problem.places, self.problem.friction(near[m]), F1).corners(near[:m])
         if corners is None:
             return None
         B = self._bordered(corners)
@@ -442,7 +531,7 @@ class _CurveMap:
             return None
         Y, E = found
         inverse = Ball.exact(Y)
-        at = Discs(self.problem.tau, self.problem.friction(self.alpha), F1).projected(self.z)
+        at = Discs(self.problem.places, self.problem.friction(self.alpha), F1).projected(self.z)
         move = (inverse[:, :m] @ (at - self.y)[:, None])[:, 0]
         d = Ball.exact(self.d)[:, None]
         drift = (inverse @ (B @ d - Ball.exact(np.eye(m + 1)[:, m:])))[:, 0]
@@ -459,20 +548,3 @@ class _CurveMap:
         M[:, :m] = self.problem.part
         M = M - corners.core @ self.Z
         return Ball.joined(M, Ball.exact(self.e[None]))
-
-    def status(self, z: Ball, i: int) -> int | None:
-        """The status that a node has strictly at all arguments, if it has one."""
-        t, F = self.problem.tau[i], self.problem.friction(z[-1])[i]
-        low, high = float(z.mid[i] - z.rad[i] * SAFE), float(z.mid[i] + z.rad[i] * SAFE)
-        if high < 0:
-            return OPEN
-        if low <= 0:
-            return None
-        if not len(t):
-            return FRICTIONLESS
-        length, away = float(np.linalg.norm(z.mid[t])), float(upper_norm(z.rad[t]))
-        least, most = (length - away) / SAFE - 8 * UNIT * length, (length + away) * SAFE + 8 * UNIT * length
-        F_low, F_high = float(F.mid - F.rad) / SAFE, float(F.mid + F.rad) * SAFE
-        if F_low > 0 and most < F_low * low / SAFE:
-            return STICK
-        return SLIP if least > max(F_high, 0.0) * high * SAFE else None

@@ -2,12 +2,13 @@
 
 A solution that is known well enough is the only one where a matrix is positive definite. That there is one follows from
 the degree. It is enclosed by a leaf, where it is regular, or by a point near it, whatever statuses hold there. Below an
-assignment the matrix has to be definite on the subspace of its equations (theory, section 12.6).
+assignment the matrix has to be definite on the subspace of its equations (theory, section 12.6). All this may be about
+one alpha, or about every alpha of a piece (theory, section 12.9).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -72,7 +73,7 @@ class LooseSolution:
                 continue
             scale = system.unit[t] * system.disc_scale[i]
             tau = upper_norm((np.abs(y.mid[t]) + y.rad[t]) * scale * SAFE + TINY)
-            if tau < (y.mid[i] - y.rad[i]) * system.disc_scale[i] / SAFE:
+            if tau < (y.mid[i] - y.rad[i]) * system.disc_scale[i] * system.smallest_discs[i] / SAFE:
                 slip[i] = False
                 w.mid[t], w.rad[t] = 0.0, 0.0
             stick[i] &= bool(np.all(np.abs(w.mid[t]) <= w.rad[t]))
@@ -106,16 +107,19 @@ def only_solution_in_space(
         return None if form is None else form.enclosed(normal, errors)
 
 
-def only_root(system: EnclosedSpace, numbers: Array, codes: Sequence[int], errors: float = 1.0) -> SpaceRoot | None:
+def only_root(
+    system: EnclosedSpace, numbers: Array, codes: Sequence[int], errors: float = 1.0, wider: float = 0.0
+) -> SpaceRoot | None:
     """The regular root of a leaf, if it is proven that it has one and that there is no other solution at all.
 
-    Parameters and errors as for ``only_solution_in_space``; ``codes`` are those of the leaf.
+    Parameters and errors as for ``only_solution_in_space``; ``codes`` are those of the leaf, ``wider`` as for
+    ``settle``.
     """
     if not is_complete(system, codes):
         return None
     with np.errstate(all="ignore"):
         form = _Form.of(system, numbers)
-        root = None if form is None else settle(system, codes)
+        root = None if form is None else settle(system, codes, wider)
         # the degree of a problem is +1
         if form is None or not isinstance(root, SpaceRoot) or root.index != 1:
             return None
@@ -218,7 +222,8 @@ class SpaceWeights:
     def of(cls, system: EnclosedSpace, numbers: Array) -> SpaceWeights | None:
         """From one array: mu, kappa and wide of all nodes, then nu and theta of all tau, in the order of y.
 
-        mu and kappa are positive, wide is not negative, |nu| <= mu, |theta| <= 1, and theta = 0 where wide is positive.
+        mu and kappa are positive, wide is not negative, |nu| <= mu over the radius of the disc, |theta| <= 1, and
+        theta = 0 where wide is positive.
         None where this is not so.
         """
         p, m = len(system.tau), len(system.g)
@@ -229,7 +234,7 @@ class SpaceWeights:
         nu, theta = (np.append(pair, 0.0)[place] for pair in pairs)
         square = np.sum(theta * theta, axis=1)
         whole = np.abs(square - 1.0) < _UNIT_LENGTH
-        wrong = (mu <= 0) | (kappa <= 0) | (wide < 0) | (upper_norm(nu, axis=1) > mu)
+        wrong = (mu <= 0) | (kappa <= 0) | (wide < 0) | (upper_norm(nu, axis=1) * system.largest_discs > mu)
         wrong |= ~whole & (square > 1.0 - _UNIT_LENGTH)
         wrong |= (wide > 0) & (np.any(theta != 0, axis=1) | np.all(system.tau < 0, axis=1))
         # | |theta| - 1 | <= | |theta|^2 - 1 |
@@ -247,14 +252,21 @@ class _Form:
         Positive lower bound of the eigenvalues of Q, for every theta that ``numbers`` stand for.
     turn : Ball of shape (p, 2)
         theta over the unit of the tau.
+    reach : Ball of shape (p, 2)
+        The same times the radius of the disc.
     push : (p, 2) array
         nu times that unit.
+    ends : ``reach`` at both ends of a piece of alpha
+    held : rows that are held at zero
     """
 
     system: EnclosedSpace
     numbers: SpaceWeights
     turn: Ball
+    reach: Ball
     push: Array
+    ends: Sequence[Ball]
+    held: Ball | None
     least: float
 
     @classmethod
@@ -270,8 +282,21 @@ class _Form:
         turn = Ball(numbers.theta / unit, numbers.off[:, None] / unit * SAFE + TINY)
         turn = Ball(turn.mid, np.where(system.tau >= 0, turn.rad, 0.0))
         push = numbers.nu * unit
-        least = _least(system, numbers, turn, push, unit, held)
-        return cls(system, numbers, turn, push, least) if least > 0 else None
+        ends = [_times(turn, discs, system.tau) for discs in system.end_discs]
+        reach = ends[0] if len(ends) == 1 else _times(turn, system.discs, system.tau)
+        form = cls(system, numbers, turn, reach, push, ends, held, 0.0)
+        least = form.smallest(np.zeros(len(unit)), np.zeros(len(unit)))
+        return replace(form, least=least) if least > 0 else None
+
+    def smallest(self, off: Array, lost: Array) -> float:
+        """Lower bound of the eigenvalues of Q less what is lost where theta is off, at most 0 where none is positive.
+
+        Where theta is not off ``lost`` is 0; elsewhere any positive numbers are right. Q is affine in the radii of the
+        discs, and these in alpha.
+        """
+        unit = np.where(self.system.tau >= 0, self.system.unit[self.system.tau], 1.0)
+        rest = off, lost
+        return min(_least(self.system, self.numbers, end, self.push, unit, self.held, rest) for end in self.ends)
 
     # -- enclosure -------------------------------------------------------------------------------------------------
 
@@ -285,7 +310,7 @@ class _Form:
         y.mid[:p] = n
         for k in range(2):
             has = (tau[:, k] >= 0) & (n > 0)
-            part = Ball.exact(n[has]) * self.turn[has, k]
+            part = Ball.exact(n[has]) * self.reach[has, k]
             y.mid[tau[has, k]], y.rad[tau[has, k]] = part.mid, part.rad
         reach = self._moved(self._change(n, self._displacements(y))) / self.least * SAFE
         if not np.isfinite(reach):
@@ -330,7 +355,7 @@ class _Form:
         v = Ball(w.mid[t] / unit, w.rad[t] / unit * SAFE + TINY)
         slip = float(upper_norm(v.size)) - float(theta @ v.mid) + float(np.abs(theta) @ v.rad)
         slip += 32 * UNIT * float(np.sum(v.size)) + float(numbers.off[i] * np.sum(v.size))
-        room = (numbers.mu[i] - float(upper_norm(numbers.nu[i]))) / SAFE
+        room = (numbers.mu[i] / self.system.largest_discs[i] - float(upper_norm(numbers.nu[i])) * SAFE) / SAFE
         return bool(room * gap / SAFE >= numbers.kappa[i] * slip * SAFE * SAFE + TINY)
 
     def _moved(self, change: Array) -> float:
@@ -341,7 +366,7 @@ class _Form:
         for k in range(2):
             has = tau[:, k] >= 0
             t, kappa = tau[has, k], numbers.kappa[has]
-            moved[:p][has] += kappa * self.turn.size[has, k] * change[t]
+            moved[:p][has] += kappa * self.reach.size[has, k] * change[t]
             moved[t] = np.abs(self.push[has, k]) * change[:p][has] + kappa * change[t]
         return float(upper_norm(moved * SAFE + TINY) * SAFE)
 
@@ -357,8 +382,14 @@ class _Form:
             has = system.tau[:, k] >= 0
             t = system.tau[has, k]
             slopes[has, k] = upper_norm(size[t], axis=1) / system.unit[t] * SAFE
-        lost = numbers.kappa * off * upper_norm(slopes, axis=1)
-        return bool(self.least > errors * upper_norm(lost * SAFE + TINY) * SAFE)
+        lost = numbers.kappa * off * system.largest_discs * upper_norm(slopes, axis=1)
+        if not np.all(np.isfinite(lost)):
+            return False
+        if self.least > errors * upper_norm(lost * SAFE + TINY) * SAFE:
+            return True
+        # node by node
+        apart = off > 0
+        return self.smallest(np.where(apart, errors * off * SAFE, 0.0), np.where(apart, lost + TINY, 0.0)) > 0
 
     def _off(self, i: int, y: Ball, w: Ball) -> float:
         """How far theta is at most from one that serves a solution within a node's balls; infinite if that is open."""
@@ -378,16 +409,30 @@ class _Form:
             off = float(apart * SAFE + 32 * UNIT)
         low = float(y.mid[i] - y.rad[i]) / SAFE
         if low > 0:
-            # |tau / lambda_n - theta| = |tau - theta lambda_n| / lambda_n
+            # |tau / (r lambda_n) - theta| = |tau - theta r lambda_n| / (r lambda_n)
             scale, most = unit * system.disc_scale[i], system.disc_scale[i]
             tau, n = Ball(y.mid[t] * scale, y.rad[t] * scale * SAFE + TINY), Ball(y.mid[i] * most, y.rad[i] * most)
-            apart = upper_norm((tau - Ball.exact(theta) * n).size + TINY) / (low * most) * SAFE
+            n = n * system.discs[i]
+            apart = upper_norm((tau - Ball.exact(theta) * n).size + TINY) / (low * most * system.smallest_discs[i])
+            apart = apart * SAFE * SAFE
             off = min(off, float(apart))
         return off
 
 
+def _times(turn: Ball, discs: Ball, tau: NDArray[np.intp]) -> Ball:
+    """Directions times radii of discs; 0 where there is no tau."""
+    reach = turn * discs[:, None]
+    return Ball(reach.mid, np.where(tau >= 0, reach.rad, 0.0))
+
+
 def _least(
-    system: EnclosedSpace, numbers: SpaceWeights, turn: Ball, push: Array, unit: Array, held: Ball | None
+    system: EnclosedSpace,
+    numbers: SpaceWeights,
+    reach: Ball,
+    push: Array,
+    unit: Array,
+    held: Ball | None,
+    rest: tuple[Array, Array],
 ) -> float:
     """Lower bound of the smallest eigenvalue of Q + held'held, at most 0 where none positive is proven."""
     tau, p = system.tau, len(system.tau)
@@ -396,24 +441,27 @@ def _least(
     along = S[:p] * Ball.exact(numbers.mu[:, None])
     form.mid[:p], form.rad[:p] = along.mid, along.rad
     spread = Ball.exact(np.zeros_like(S.mid))
+    off, lost = rest
+    wide, off = np.where(numbers.wide > 0, numbers.wide, lost), np.where(numbers.wide > 0, 1.0, off)
     for k in range(2):
         has = np.flatnonzero(tau[:, k] >= 0)
         t, kappa = tau[has, k], numbers.kappa[has]
-        turned = form[has] - S[t] * (turn[has, k] * Ball.exact(kappa))[:, None]
+        turned = form[has] - S[t] * (reach[has, k] * Ball.exact(kappa))[:, None]
         pushed = S[t] * Ball.exact(kappa[:, None]) + S[has] * Ball(push[has, k], np.full(len(has), TINY))[:, None]
         for rows, part in ((has, turned), (t, pushed)):
             form.mid[rows], form.rad[rows] = part.mid, part.rad
-        used = np.flatnonzero(numbers.wide[has] > 0)
-        # weights at least kappa / sqrt(wide), for any rounding
-        weight = kappa[used] / np.sqrt(numbers.wide[has[used]]) / unit[has[used], k] * SAFE + TINY
+        used = np.flatnonzero(wide[has] > 0)
+        # weights at least r kappa rho / sqrt(s), for any rounding
+        weight = kappa[used] * off[has[used]] / np.sqrt(wide[has[used]]) / unit[has[used], k]
+        weight = weight * system.largest_discs[has[used]] * SAFE + TINY
         rows = S[t[used]] * Ball.exact(weight[:, None])
         spread = spread + Ball(rows.mid.T, rows.rad.T) @ rows
     Q = form - Ball(0.5 * spread.mid, 0.5 * spread.rad)
     if held is not None:
         Q = Q + Ball(held.mid.T, held.rad.T) @ held
     normal = np.arange(p)
-    Q.mid[normal, normal] -= 0.5 * numbers.wide
-    Q.rad[normal, normal] += 2 * UNIT * (np.abs(Q.mid[normal, normal]) + numbers.wide)
+    Q.mid[normal, normal] -= 0.5 * wide
+    Q.rad[normal, normal] += 2 * UNIT * (np.abs(Q.mid[normal, normal]) + wide)
     mid = 0.5 * (Q.mid + Q.mid.T)
     # the symmetric part of the form lies in the mean of both triangles
     rad = (np.maximum(Q.rad, Q.rad.T) + 4 * UNIT * np.abs(mid)) * SAFE
