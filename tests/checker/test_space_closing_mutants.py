@@ -158,10 +158,10 @@ def test_signs_and_sizes_of_numbers(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_theta_that_does_not_serve(name):
-    """At a loaded node theta is known: no other one is accepted."""
+    """At a loaded node theta is known: another one is accepted only where Q has more to spare than it is off."""
     judge, (problem, records) = LeafJudge(name), proven(name)
     p, m = problem.p, judge.m
-    tried = 0
+    refusals, right = 0, []
     for i in range(p):
         t = judge.parts(i)
         size = np.linalg.norm(judge.w[t]) if len(t) else 0.0
@@ -175,10 +175,11 @@ def test_theta_that_does_not_serve(name):
                 continue
             expected = judge.right([*records[1][:1], values, *records[1][2:]])
             report = verify(problem, proof_of([records[0], ["m", values, *records[1][2:]], records[-1]]))
-            # where Q has much to spare, a theta that is a little off may do
             assert not report.ok or expected
-            tried += not report.ok
-    assert tried > 0
+            refusals += not report.ok
+            right.append(expected)
+    assert right
+    assert refusals > 0 or all(right)
 
 
 @pytest.mark.few(0, 1)

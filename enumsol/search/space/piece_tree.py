@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 #: Pieces whose engines are kept.
 _KEPT = 32
 #: Pieces down to this share of the interval are tried for one solution.
-_ALONE = 2.0**-16
+_ALONE = 2.0**-26
 #: By how much wider the sectors are that hold the slip directions of such a piece.
 _WIDER = 0.1
 #: Smallest eigenvalue relative to S from which a form counts as definite, and nodes from which better ones are sought.
