@@ -131,3 +131,14 @@ def test_what_mutants_say_is_refused_or_true(seed, count):
             assert report.interval == INTERVAL
             assert report.curves == len(cover.chains) or report.open
     assert refused > count // 2
+
+
+@pytest.mark.long
+def test_a_block_has_one_solution_at_every_friction_up_to_two():
+    problem = gallery.get("block3d-9").build()
+    cover = SpaceCover(problem, (Fraction(0), Fraction(2)), alone=True)
+    cover.search(max_nodes=1000)
+    assert (cover.chains, cover.gaps, cover.stopped) == ([], [], None)
+    report = verify(problem, cover.proof())
+    assert report.complete
+    assert report.single == len(cover.single)

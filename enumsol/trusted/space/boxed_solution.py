@@ -284,7 +284,7 @@ class _NaturalMap:
         """Places of the forces of nodes that are open at every solution with such displacements."""
         tau = self.discs.tau
         gone = [i for i in range(len(tau)) if w.mid[i] + w.rad[i] < 0]
-        return np.array([k for i in gone for k in (i, *tau[i])], dtype=np.intp)
+        return np.array([k for i in gone for k in (i, *tau[i]) if k >= 0], dtype=np.intp)
 
     # -- the operator ----------------------------------------------------------------------------------------------
 
