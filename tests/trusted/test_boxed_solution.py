@@ -71,7 +71,8 @@ def natural(problem, y):
     S, g, rho = problem.S.mid, problem.g.mid, problem.rho
     z = y + rho * (g - S @ y)
     out = z.copy()
-    for i, t in enumerate(problem.discs.tau):
+    for i, places in enumerate(problem.discs.tau):
+        t = places[places >= 0]
         out[i] = max(z[i], 0.0)
         length = np.linalg.norm(z[t])
         if length > out[i]:
@@ -88,7 +89,7 @@ def test_steps_stay_within_their_bounds(part):
         solvers, y, _, _, _ = boxed(seed)
         problem = _NaturalMap.of(solvers.enclosed, _proposed_rho(solvers.enclosed)[seed % 2])
         assert problem.T.mid @ (np.eye(len(y)) + problem.rho[:, None] * problem.S.mid) == pytest.approx(np.eye(len(y)))
-        centre = y * problem.unit + rng.normal(size=len(y)) * rng.choice([0.0, 1e-3, 0.1])
+        centre = y * problem.system.unit + rng.normal(size=len(y)) * rng.choice([0.0, 1e-3, 0.1])
         reach = np.full(len(y), 10.0 ** rng.uniform(-4, 0))
         step = problem._step(centre, reach)
         if step is None:

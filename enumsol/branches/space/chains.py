@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 _LONGER, _SHORTEST, _GROWTH = 1.05, 1e-7, 2.0
 #: The longest way from a corner to the ends of its box, likewise, and by how much it shrinks.
 _WIDEST, _NARROWER = 0.4, 0.3
+#: Joints this near to a point of the skeleton are put by this share of the way before it.
+_BESIDE, _ASIDE = 1e-3, 0.1
 #: How far a skeleton is prolonged beyond the interval, relative to its last step.
 _BEYOND = 0.05
 
@@ -177,6 +179,9 @@ class ChainBuilder:
             look()
             # no link is left that is too short
             further = place + way if last - place - way > _SHORTEST else last
+            if further != last and abs(further - round(further)) < _BESIDE:
+                # points of the skeleton are perhaps folds, at which no side of a joint is that of a rising alpha
+                further -= _ASIDE * (further - place)
             end = joints[0] if closed and further == last else None
             found = self._link(line, place, further, joints[-1], links[-1] if links else None, end)
             if found is None:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 #: How often a part is halved; of bisections in floats; how far from what they find the points beside it are put first,
 #: relative to the part, by what factor farther then, and how often.
-_HALVINGS, _BISECTIONS = 10, 60
+_HALVINGS, _BISECTIONS = 12, 60
 _BESIDE, _FARTHER, _TRIALS = 2.0**-44, 8.0, 12
 #: The same beside a smooth fold, where alpha is a square of the distance.
 _BESIDE_FOLD = 2.0**-24

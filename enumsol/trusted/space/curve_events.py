@@ -12,7 +12,7 @@ import numpy as np
 
 from enumsol.arithmetic.ball_arrays import Ball, solution
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, upper_norm
-from enumsol.trusted.space.natural_map import upper_product
+from enumsol.trusted.space.natural_map import Directions, upper_product
 from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, STICK
 from enumsol.trusted.space.solution_curve import SLIP
 
@@ -147,8 +147,8 @@ class CurveMotion:
         inverse = Ball(np.array(middle), np.array((half + 4 * UNIT * middle) * SAFE))
         if len(t) == 1:
             return Ball.exact(np.sign(self.z.mid[t])), Ball.exact(np.zeros((1, 1))), inverse
-        e = self.z[t] * inverse
-        return e, Ball.exact(np.eye(2)) - e[:, None] * e[None, :], inverse
+        at = Directions.of(self.z[t][None])
+        return Ball(at.e[0], at.turn[0]), Ball(at.across[0], at.bent[0] + 16 * UNIT), inverse
 
     # -- conditions ------------------------------------------------------------------------------------------------
 

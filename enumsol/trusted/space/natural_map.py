@@ -143,7 +143,7 @@ class _Blocks:
         # of the discs' radii
         least = F_low * np.where(F_low >= 0, np.maximum(low, 0.0), high) - TINY
         least, most = np.where(least > 0, least / SAFE, least * SAFE), np.maximum(F_high, 0.0) * high * SAFE + TINY
-        at = _Directions.of(discs.tangents(z))
+        at = Directions.of(discs.tangents(z))
         touches, loose, sticks, slips = high >= 0, low <= 0, at.least <= most, at.most >= least
         rubs = np.any(discs.tau >= 0, axis=1) & touches
         unknown = rubs & slips & (~(at.least > 0) | (loose & sticks))
@@ -186,7 +186,7 @@ class _Blocks:
 
     def slide(
         self,
-        at: _Directions,
+        at: Directions,
         ratios: tuple[Array, Array],
         factors: tuple[Array, Array],
         sliding: NDArray[np.bool_],
@@ -230,7 +230,7 @@ class _Blocks:
 
 
 @dataclass(frozen=True)
-class _Directions:
+class Directions:
     """Directions e = x / |x| of points x in rectangles, one or none for every node.
 
     Attributes
@@ -242,7 +242,7 @@ class _Directions:
     turn : (p, 2) array
         How far any other one is from it, component by component.
     across, bent : (p, 2, 2) arrays
-        1 - e e' of the middle, and how far any other one is from it; so for e e'.
+        1 - e e' of the middle, and how far any other one is from it up to rounding; so for e e'.
     """
 
     least: Array
@@ -253,7 +253,7 @@ class _Directions:
     bent: Array
 
     @classmethod
-    def of(cls, x: Ball) -> _Directions:
+    def of(cls, x: Ball) -> Directions:
         """Of points in balls of shape (p, 2); where a component is 0 without radius, e has one component."""
         length = np.linalg.norm(x.mid, axis=1)
         e = x.mid / np.where(length > 0, length, 1.0)[:, None]
