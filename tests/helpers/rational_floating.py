@@ -155,8 +155,10 @@ class FloatingForms(Forms):
         """[6.6] Whether the multipliers exclude a leaf for all alpha between this one and another."""
         little = fmpq(1, 2**40)
         z = [form.best(terms) or form.best(terms, little) for form in (self, other)]
-        middle = [(x + y) / 2 for x, y in zip(*z, strict=True)]
-        if any(min(form.margin(terms, one) for form in (self, other)) > 0 for one in (middle, *z)):
+        # multipliers far along z may help at one end and do harm at the other: others that are nearer
+        near = [form.best(terms, fmpq(1, 2**12)) for form in (self, other)]
+        middle = [[(x + y) / 2 for x, y in zip(*two, strict=True)] for two in (z, near)]
+        if any(min(form.margin(terms, one) for form in (self, other)) > 0 for one in (*middle, *z, *near)):
             return True
         turned = [form._balanced(terms) for form in (self, other)]
         if [] in turned:
