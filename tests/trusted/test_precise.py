@@ -13,7 +13,7 @@ from enumsol.condensation.exact import ExactCondensed
 from enumsol.gallery import wedge
 from enumsol.trusted.arcs import refined
 from enumsol.trusted.arcs.many_digits import PRECISION, ball_of, precision, taylor_around, upper
-from enumsol.trusted.arcs.precise import PreciseSelection, PreciseSystem
+from enumsol.trusted.arcs.precise import NowhereHeld, PreciseSelection, PreciseSystem
 from enumsol.trusted.status_rows import FRICTIONLESS
 
 
@@ -71,6 +71,27 @@ def check_claims(count, start=0):
                     assert a <= first < last <= b
                     assert truth.signs(truth.conditions[k], first, last) == {-1, 0, 1}
     return made
+
+
+def test_a_selection_that_holds_nowhere_is_told_at_zeros_of_its_determinant():
+    told = 0
+    for rng, selection, truth in selections(150, start=5000):
+        low, high = (Fraction(end) for end in interval_at(rng, truth))
+        for _ in range(60):
+            # bisected to where the determinant changes its sign
+            middle = (low + high) / 2
+            if truth.signs(truth.det, low, middle) >= {-1, 1}:
+                high = middle
+            elif truth.signs(truth.det, middle, high) >= {-1, 1}:
+                low = middle
+            else:
+                break
+        expansion = selection.expansion(low, high)
+        if isinstance(expansion, NowhereHeld):
+            told += truth.signs(truth.det, low, high) >= {-1, 1}
+            for a, b in ((low, high), (low, low), (low, (low + high) / 2)):
+                assert truth.is_true(expansion.over(a, b), a, b)
+    assert told > 3, told
 
 
 @pytest.mark.slow

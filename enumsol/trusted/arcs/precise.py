@@ -187,8 +187,11 @@ class PreciseSelection:
         solved = self.solve(a, algorithm)
         return None if solved is None else signs_of(self.values(a, solved[0]))
 
-    def expansion(self, low: Number, high: Number) -> PreciseExpansion | None:
-        """The conditions over [low, high]; None where the interval is too long."""
+    def expansion(self, low: Number, high: Number) -> PreciseExpansion | NowhereHeld | None:
+        """The conditions over [low, high]; None where the interval is too long.
+
+        Where the matrix may be singular, all that is told is that the selection has no root, if that is proven.
+        """
         first, last = Fraction(low), Fraction(high)
         with precision():
             middle, radius = ball_of((first + last) / 2), ball_of((last - first) / 2)
@@ -197,7 +200,47 @@ class PreciseSelection:
                 values = constant + slope * ball_of(first).union(ball_of(last))
                 near = constant + slope * middle
                 return PreciseExpansion(self, first, last, values, slope * radius, self._constant_index, near)
-            return self._expansion(first, last, middle, radius)
+            return self._expansion(first, last, middle, radius) or self._nowhere(first, last, middle, radius)
+
+    def _nowhere(self, first: Fraction, last: Fraction, middle: Any, radius: Any) -> NowhereHeld | None:
+        """Whether the selection has no root, by the bordered system, which is regular where det M has a simple zero.
+
+        See theory, section 7.14: conditions, or one and t, of opposite signs.
+        """
+        M, M1 = self._M[0] + self._M[1] * middle, self._M[1] * radius
+        g, g1 = self._g[0] + self._g[1] * middle, self._g[1] * radius
+        size = M.nrows()
+        border = _kernel(M, g)
+        if border is None:
+            return None
+        rows = [[*(M[i, j] for j in range(size)), -g[i, 0]] for i in range(size)]
+        change = [[*(M1[i, j] for j in range(size)), -g1[i, 0]] for i in range(size)]
+        nothing = [arb(0)] * (size + 1)
+        try:
+            X = matrix([*rows, border]).solve(
+                matrix([[arb(int(i == size)), *line] for i, line in enumerate([*change, nothing])])
+            )
+        except ZeroDivisionError:
+            return None
+        P = matrix([[X[i, j + 1] for j in range(size + 1)] for i in range(size + 1)])
+        z = column([X[i, 0] for i in range(size + 1)])
+        rise = -(P * z)
+        found = taylor_around(rise, P)
+        if found is None:
+            return None
+        bend, left, _ = found
+        # the rows of all conditions, and of t
+        C, C1 = (
+            matrix([*([*held, constant] for held, (constant,) in zip(part.tolist(), free.tolist(), strict=True)), last])
+            for part, free, last in (
+                (self._C[0] + self._C[1] * middle, self._c[0] + self._c[1] * middle, [*nothing[1:], arb(1)]),
+                (self._C[1] * radius, self._c[1] * radius, nothing),
+            )
+        )
+        unit = arb(0, 1)
+        values = C * z + (C1 * z + C * rise) * unit + (C1 * rise - C * bend) * arb(0.5, 0.5) - C1 * bend * unit
+        signs = signs_of(values + (C + C1 * unit) * left)
+        return NowhereHeld(first, last, signs[:-1]) if np.any(signs > 0) and np.any(signs < 0) else None
 
     def _expansion(self, first: Fraction, last: Fraction, middle: Any, radius: Any) -> PreciseExpansion | None:
         """The conditions by the powers of tau, with what is left of the unknowns (theory, (7.17))."""
@@ -401,6 +444,42 @@ class PreciseExpansion:
         """Bounds of the only zero of a condition in a part, at whose ends it has opposite signs."""
         part = Fraction(low), Fraction(high)
         return self._selection.enclosed(condition, *part) or part
+
+
+@dataclass(frozen=True, eq=False)
+class NowhereHeld:
+    """A short interval in which a selection has no root, although its matrix may be singular there.
+
+    Attributes
+    ----------
+    low, high : Fraction
+    signs : int8 array
+        Of the conditions, all multiplied by one number.
+    """
+
+    low: Fraction
+    high: Fraction
+    signs: Signs
+    rough = False
+    final = True
+
+    def over(self, low: Number, high: Number) -> OverInterval:
+        """What is known over a part of the interval."""
+        unknown = np.zeros_like(self.signs)
+        return OverInterval(self.signs, regular=False, none=True, index=0, ends=(unknown, unknown), slopes=unknown)
+
+
+def _kernel(M: Any, g: Any) -> list[Any] | None:
+    """About the direction of the solutions z of [M, -g] z = 0, as floats; no claim rests on it."""
+    table = np.array(
+        [[*(float(x.mid()) for x in row), -float(b[0].mid())] for row, b in zip(M.tolist(), g.tolist(), strict=True)]
+    )
+    if not table.size or not np.all(np.isfinite(table)):
+        return None
+    scale = np.max(np.abs(table), axis=1, keepdims=True)
+    if np.any(scale == 0):
+        return None
+    return [arb(float(x)) for x in np.linalg.svd(table / scale)[2][-1]]
 
 
 def _opposite(signs: Sequence[Any], condition: int) -> bool:
