@@ -137,8 +137,8 @@ class ContactProblem(ContactBody):
         A is the inverse of the condensed compliance S, so that the solutions are those of this problem up to rounding
         (theory, section 4.1). Exact arithmetic takes at most 250 degrees of freedom: it can decide here what it cannot
         take as given. What is decided is about the rounded matrices. Where two conditions vanish together in this
-        problem, as by symmetry, they may do so a little apart in the other. On weak springs rounding counts for more: it
-        may move a critical alpha in the sixth digit.
+        problem, as by symmetry, they may do so a little apart in the other. On weak springs rounding counts for
+        more: it may move a critical alpha in the sixth digit.
 
         Raises
         ------
