@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from collections.abc import Generator
 
     from enumsol.trusted.arcs.over_parts import Expansion, OverInterval
-    from enumsol.trusted.arcs.precise import PreciseExpansion
+    from enumsol.trusted.arcs.precise import NowhereHeld, PreciseExpansion
     from enumsol.trusted.selection import Selection
 
     #: Conditions of a selection over an interval, in double arithmetic or in many digits.
-    AlphaExpansion = Expansion | PreciseExpansion
+    AlphaExpansion = Expansion | PreciseExpansion | NowhereHeld
     Result = tuple[AlphaBox, list[Interval]]
     Shared = frozenset[Any]
 
