@@ -64,7 +64,6 @@ def test_every_branch_is_named_beside_its_curve_or_in_the_note(graphs, name):
         assert str(branch.number) in named or "side by side" in note
 
 
-@pytest.mark.slow
 def test_branches_that_coincide_are_drawn_apart_and_said_to(graphs):
     figure = graphs["square"].plot("lambda_n")
     figure.draw_without_rendering()
@@ -180,7 +179,6 @@ def test_chords_are_near_at_ten_times_finer_points_in_all_quantities_at_once(gra
                 assert np.max(off) < 1.5 * tolerance
 
 
-@pytest.mark.slow
 def test_the_legend_names_every_mark(graphs):
     for quantity in (None, "lambda_n"):
         graph = graphs["oblique"]

@@ -114,6 +114,22 @@ def test_a_search_that_is_cut_short_is_not_complete():
         graph.multiplicity_at(1.8)
 
 
+def test_what_was_found_is_kept_when_the_time_is_over_or_somebody_interrupts():
+    graph = enumsol.branch_graph(SLIDING, (1.78, 1.82), time_limit=1e-9)
+    assert not graph.complete
+    assert "time limit" in graph.reasons[0]
+    assert graph.at_least(1.8) in (0, 1)
+
+    def stop(step, share):
+        if step == "arcs" or share > 0.5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(enumsol.Interrupted, match="kept") as caught:
+        enumsol.branch_graph(SLIDING, (1.78, 1.82), max_nodes=60, progress=stop)
+    assert not caught.value.partial.complete
+    assert caught.value.partial.proof is None
+
+
 def test_what_is_refused():
     with pytest.raises(enumsol.InvalidArgumentError, match='arithmetic is "fast" for a problem in 3D'):
         enumsol.branch_graph(SLIDING, (1, 2), "fast")
@@ -182,7 +198,6 @@ def test_vertices_of_the_same_bounds_are_not_in_an_order(graph):
     assert len(unordered([fold, vertex, fold])) == 1
 
 
-@pytest.mark.slow
 def test_counts_along_random_graphs_are_those_of_searches():
     problem = random_over_alpha(2, 2)
     graph = enumsol.branch_graph(problem, (0, 1))
@@ -207,7 +222,6 @@ def test_runs_and_turns_alternate(sliding):
 # -- folds -------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1])
 def test_folds_of_one_node_are_those_of_the_closed_form(seed):
     node = OneNode(seed, load=True)

@@ -135,7 +135,6 @@ def test_step_limit_is_status_3(capsys):
     assert "the limit of 3 steps was reached" in out
 
 
-@pytest.mark.slow
 def test_degenerate_starts(capsys):
     example = ("follow", "gallery:one-node-6.1", "--from", 0, "--to", 20, "--start", "8/3")
     # the fold itself: one tangent of each orientation, on both arcs
@@ -200,7 +199,6 @@ def test_audit_names_a_missed_branch(capsys, points, tmp_path):
     assert "arc 0 of branch 0, alpha from 0 to 20: open" in out
 
 
-@pytest.mark.slow
 def test_audit_reads_stdin(capsys, points, monkeypatch):
     monkeypatch.setattr("sys.stdin", io.StringIO(points.read_text()))
     status, out, err = run(capsys, "audit", "gallery:one-node-6.1", "-")
@@ -215,7 +213,6 @@ def test_audit_reads_points_before_it_searches(capsys, tmp_path, monkeypatch):
     assert_refused(*run(capsys, "audit", "gallery:one-node-6.1", file), "no column 'lambda_t_0'")
 
 
-@pytest.mark.slow
 def test_ctrl_c_audits_what_was_found(capsys, points, monkeypatch):
     body = gallery.get("one-node-6.1").build()
     partial = branch_graph(body, (0.0, 20.0), max_nodes=3)
@@ -267,7 +264,6 @@ def test_bad_starts(capsys, alpha, name, part):
     assert_refused(*run(capsys, "follow", f"gallery:{name}", "--from", 0, "--to", 20, "--start", alpha), part)
 
 
-@pytest.mark.slow
 def test_bad_points_get_one_sentence(capsys, tmp_path, points, graph):
     audit = ("audit", "gallery:one-node-6.1")
     file = tmp_path / "bad.csv"

@@ -298,7 +298,7 @@ def test_printed_algorithm_passes_the_fold_with_short_steps():
     assert on_solutions(problem, path) < 1e-5
 
 
-@pytest.mark.few(0, 1)
+@pytest.mark.few(1, 0)
 @pytest.mark.parametrize("name", ["two-node-6.4", "two-node-6.7-minus"])
 def test_printed_algorithm_passes_folds_that_its_corrections_overstepped(name):
     problem = gallery.get(name).build()

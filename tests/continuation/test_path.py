@@ -106,7 +106,6 @@ def test_plot(path):
         path.plot(node=3)
 
 
-@pytest.mark.slow
 def test_plot_over_a_graph(problem, path, tmp_path):
     from enumsol import branches
 

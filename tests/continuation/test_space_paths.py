@@ -115,7 +115,6 @@ def folds_met(load, most):
     return met
 
 
-@pytest.mark.slow
 def test_a_fold_of_one_node_is_that_of_the_closed_form():
     assert folds_met(False, 1) == 1
 

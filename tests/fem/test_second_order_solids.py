@@ -241,7 +241,6 @@ def test_files(kind, name, facet, suffix, tmp_path):
     assert one.fingerprint == two.fingerprint
 
 
-@pytest.mark.slow
 def test_hexahedra_of_20_nodes_are_completed():
     few, all_nodes = solid((2, 1, 1), 20, shake=0.1), solid((2, 1, 1), 27, shake=0.1)
     corner = few.nodes("left")

@@ -57,9 +57,11 @@ def space_graph(
     except KeyboardInterrupt:
         stop = Stop(StopReason.INTERRUPTED, cover.nodes)
     searched = time.perf_counter()
-    reasons += [] if stop is None else [str(stop)]
     with within(limits.extended(started)):
-        vertices, arcs, open_parts = _elements(cover, interval, progress)
+        vertices, arcs, open_parts, whole = _elements(cover, interval, progress)
+    if not whole:
+        stop = Stop(StopReason.INTERRUPTED, cover.nodes)
+    reasons += [] if stop is None else [str(stop)]
     graph = BranchGraph(
         problem=problem,
         exact=None,
@@ -84,23 +86,27 @@ def space_graph(
 
 def _elements(
     cover: SpaceCover, interval: tuple[Fraction, Fraction], progress: Callable[[str, float], object] | None
-) -> tuple[Sequence[Vertex], Sequence[Arc], Sequence[str]]:
-    """Vertices and arcs of the curves, and what stayed open about them."""
+) -> tuple[Sequence[Vertex], Sequence[Arc], Sequence[str], bool]:
+    """Vertices and arcs of the curves, what stayed open about them, and whether nobody interrupted."""
     if not cover.chains:
-        return (), (), ()
+        return (), (), (), True
     given = AlphaProblem.of(cover.problem.enclosure)
     made = CurvedGraph(cover.problem, given, interval)
-    for k, chain in enumerate(cover.chains):
+    whole = True
+    try:
+        for k, chain in enumerate(cover.chains):
+            if progress is not None:
+                progress("arcs", k / len(cover.chains))
+            try:
+                made.add(runs_and_turns(given, chain))
+            except TimeOverError:
+                made.reasons.append(f"the time was over before curve {k + 1} of {len(cover.chains)} was cut into arcs")
         if progress is not None:
-            progress("arcs", k / len(cover.chains))
-        try:
-            made.add(runs_and_turns(given, chain))
-        except TimeOverError:
-            made.reasons.append(f"the time was over before curve {k + 1} of {len(cover.chains)} was cut into arcs")
-    if progress is not None:
-        progress("arcs", 1.0)
+            progress("arcs", 1.0)
+    except KeyboardInterrupt:
+        whole = False
     vertices, arcs = made.made()
-    return vertices, arcs, made.reasons
+    return vertices, arcs, made.reasons, whole
 
 
 def _gaps(cover: SpaceCover) -> list[str]:
