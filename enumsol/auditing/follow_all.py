@@ -16,9 +16,8 @@ from enumsol.continuation.not_converged import AmbiguousStart
 from enumsol.continuation.path import Path
 from enumsol.continuation.path_data import PathStats, PathStatus
 from enumsol.errors import InvalidArgumentError, TooLargeError
-from enumsol.model.contact_body import ContactBody
-from enumsol.model.problem import ContactProblem
-from enumsol.support.arguments import alpha_interval, instance_of, optional_callable, positive_integer, shown
+from enumsol.model.problem import ContactProblem, check_is_problem
+from enumsol.support.arguments import alpha_interval, optional_callable, positive_integer, shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -117,7 +116,7 @@ def follow_all(
     >>> enumsol.follow_all(enumsol.gallery.one_node_triangle(), (0, 10)).complete
     True
     """
-    _check_problem(problem)
+    check_is_problem(problem)
     ends = alpha_interval(interval)
     optional_callable(progress, "progress")
     if graph is None:
@@ -137,11 +136,6 @@ def follow_all(
         coverage.start(seed)
     report = audit_on(chart, read_points(coverage.paths, graph.problem), DETOUR)
     return FollowAllResult(tuple(coverage.paths), report, tuple(coverage.failures), len(coverage.paths) - seeded, graph)
-
-
-def _check_problem(problem: Any) -> None:
-    if not isinstance(problem, ContactBody):
-        instance_of(problem, ContactProblem, "problem")
 
 
 @dataclass
@@ -231,7 +225,7 @@ def follow_arc(
     InvalidArgumentError
         The arc does not end at the vertex, or is a sheet.
     """
-    _check_problem(problem)
+    check_is_problem(problem)
     chart = GraphMap(graph, POINT_TOLERANCE)
     vertex, arc = positive_integer(vertex, "vertex", 0), positive_integer(arc, "arc", 0)
     chosen = next((item for item in graph.arcs if item.number == arc), None)

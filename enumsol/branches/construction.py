@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from enumsol.branches.graph import BranchGraph
 from enumsol.branches.graph_data import GraphStats
@@ -12,12 +12,10 @@ from enumsol.branches.ways import way_of
 from enumsol.condensation.affine import exactly_at
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.errors import Interrupted, InvalidArgumentError, TooLargeError
-from enumsol.model.contact_body import ContactBody
-from enumsol.model.problem import ContactProblem
+from enumsol.model.problem import ContactProblem, check_is_problem
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.support.arguments import (
     alpha_interval,
-    instance_of,
     one_of,
     optional_callable,
     optional_count,
@@ -112,9 +110,7 @@ def branch_graph(
     ...
     complete: yes (proven)
     """
-    given: Any = problem
-    if not isinstance(given, ContactBody):
-        instance_of(given, ContactProblem, "problem")
+    check_is_problem(problem)
     a, b = (Fraction(end) for end in alpha_interval(interval))
     one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
     optional_callable(progress, "progress")

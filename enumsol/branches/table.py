@@ -7,11 +7,10 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from enumsol.errors import Interrupted
-from enumsol.model.contact_body import ContactBody
-from enumsol.model.problem import ContactProblem
+from enumsol.model.problem import ContactProblem, check_is_problem
 from enumsol.model.statuses import STATUSES, ContactStatus
 from enumsol.roots.enumerate import enumerate_roots
-from enumsol.support.arguments import alpha_list, instance_of, optional_callable, optional_executor
+from enumsol.support.arguments import alpha_list, optional_callable, optional_executor
 from enumsol.support.workers import Crew
 
 if TYPE_CHECKING:
@@ -81,8 +80,7 @@ def multiplicity_table(
     ([1, 2, 3], True)
     """
     given: Any = problem
-    if not isinstance(given, ContactBody):
-        instance_of(given, ContactProblem, "problem")
+    check_is_problem(given)
     optional_executor(executor)
     optional_callable(progress, "progress")
     chosen = alpha_list(alphas)

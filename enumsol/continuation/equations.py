@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 from enumsol.continuation.condensed_equation import CondensedEquation
 from enumsol.continuation.parameter_path import AffinePath, CallablePath, SmoothPath
 from enumsol.continuation.space_equation import SpaceEquation
-from enumsol.model.contact_body import ContactBody
-from enumsol.model.problem import ContactProblem
+from enumsol.model.problem import ContactProblem, check_is_problem
 from enumsol.support.arguments import instance_of
 
 if TYPE_CHECKING:
@@ -24,8 +23,7 @@ def check_problem(problem: Any, smooth_path: SmoothPath | None) -> None:
     InvalidArgumentError
         The problem is none, or the smooth path is none.
     """
-    if not isinstance(problem, ContactBody):
-        instance_of(problem, ContactProblem, "problem")
+    check_is_problem(problem)
     if smooth_path is not None:
         instance_of(smooth_path, SmoothPath, "smooth_path")
 

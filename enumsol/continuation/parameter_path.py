@@ -11,9 +11,8 @@ import numpy as np
 
 from enumsol.condensation.condensed import RHS_BLOCK, FloatingCondensation, condensation_of
 from enumsol.errors import InvalidArgumentError
-from enumsol.model.contact_body import ContactBody
-from enumsol.model.problem import ContactProblem
-from enumsol.support.arguments import alpha_value, instance_of, optional_callable
+from enumsol.model.problem import ContactProblem, check_is_problem
+from enumsol.support.arguments import alpha_value, optional_callable
 from enumsol.support.array_arguments import real_array
 
 if TYPE_CHECKING:
@@ -76,8 +75,7 @@ class SmoothPath:
 
     def problem_at(self, problem: Body, alpha: AlphaLike) -> Body:
         """The problem, in 2D or 3D, with friction and load frozen at alpha, to enumerate roots on the path."""
-        if not isinstance(problem, ContactBody):
-            instance_of(problem, ContactProblem, "problem")
+        check_is_problem(problem)
         exact = alpha_value(alpha)
         value, shape = float(exact), affine_friction(problem)[0].shape
         F = problem.friction_at(exact) if self.F is None else _coefficients(self.F, value, "F", shape)

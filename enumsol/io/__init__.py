@@ -53,9 +53,8 @@ from typing import TYPE_CHECKING, Any
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.io import fclib, matrix_market, npz
-from enumsol.model.contact_body import ContactBody
-from enumsol.model.problem import ContactProblem
-from enumsol.support.arguments import file_path, instance_of
+from enumsol.model.problem import ContactProblem, check_is_problem
+from enumsol.support.arguments import file_path
 from enumsol.support.files import writing
 
 if TYPE_CHECKING:
@@ -140,8 +139,7 @@ def write_problem(problem: ContactProblem | ContactProblem3D, path: str | os.Pat
     ['A.mtx', 'Bn.mtx', ..., 'slip_offset.mtx']
     """
     given: Any = problem
-    if not isinstance(given, ContactBody):
-        instance_of(given, ContactProblem, "problem")
+    check_is_problem(given)
     place = file_path(path, "path", _A_PLACE)
     with writing(place, "path"):
         try:

@@ -17,8 +17,7 @@ from enumsol.loading.history_data import HistoryData
 from enumsol.loading.refinement import refined
 from enumsol.loading.stages import Rounding, Stage, case_of, contact_displacements, start_after
 from enumsol.loading.steps import LoadStep, steps_of, way_to
-from enumsol.model.contact_body import ContactBody
-from enumsol.model.problem import ContactProblem
+from enumsol.model.problem import ContactProblem, check_is_problem
 from enumsol.model.restart import SlipStart, restarted
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.roots.root import Root
@@ -174,8 +173,7 @@ def histories(
     complete: yes (proven), unique until step 3
     """
     given: Any = problem
-    if not isinstance(given, ContactBody):
-        instance_of(given, ContactProblem, "problem")
+    check_is_problem(given)
     one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
     if problem.modes is not None and (arithmetic != "exact" or not isinstance(given, ContactProblem)):
         raise NotHeldError(

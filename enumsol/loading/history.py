@@ -11,10 +11,9 @@ from enumsol.loading.history_data import START
 from enumsol.loading.history_files import load_history, save_history
 from enumsol.loading.history_proof import history_proof
 from enumsol.loading.history_text import history_html, history_text
-from enumsol.model.contact_body import ContactBody
-from enumsol.model.problem import ContactProblem
+from enumsol.model.problem import ContactProblem, check_is_problem
 from enumsol.roots.root import summary
-from enumsol.support.arguments import file_path, instance_of, positive_integer, shown
+from enumsol.support.arguments import file_path, positive_integer, shown
 from enumsol.support.files import writing
 from enumsol.support.immutable import Immutable
 
@@ -247,8 +246,7 @@ class History(Immutable):
             The file cannot be read, holds something else, or a history of another problem.
         """
         given: Any = problem
-        if not isinstance(given, ContactBody):
-            instance_of(given, ContactProblem, "problem")
+        check_is_problem(given)
         return cls(load_history(file, problem))
 
     def completeness(self) -> str:

@@ -228,3 +228,15 @@ def _friction(value: Any, p: int) -> tuple[Floats, Floats]:
         node = int(np.argmin(F0))
         raise InvalidProblemError(f"friction is {F0[node]:g} at contact node {node}; expected F >= 0")
     return F0, F1
+
+
+def check_is_problem(problem: object) -> None:
+    """Refuse what is no problem, in 2D or in 3D.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is something else.
+    """
+    if not isinstance(problem, ContactBody):
+        instance_of(problem, ContactProblem, "problem")

@@ -11,7 +11,7 @@ import enumsol
 from enumsol.arithmetic.ball_arrays import Ball
 from enumsol.trusted.space.solution_curve import (
     AlphaProblem,
-    box_around,
+    curve_around,
     curve_point,
     lies_in,
     only_curve,
@@ -23,7 +23,8 @@ def box_of(given, x, half, roomy=True):
     border = np.eye(len(x))[-1]
     point = curve_point(given, x, border)
     border = point.direction / (point.direction @ point.direction)
-    return box_around(given, point.x, point.direction, border, half, roomy=roomy)
+    curve = curve_around(given, point.x, point.direction, border, half, roomy=roomy)
+    return None if curve is None else curve.box
 
 
 def test_the_curve_is_that_of_the_closed_form():
@@ -112,7 +113,7 @@ def test_a_fold_lies_in_a_box():
     border = (ahead + behind) / np.linalg.norm(ahead + behind)
     chord = after - before
     length = float(border @ chord)
-    box = box_around(given, before + 0.5 * chord, chord / length, border, 0.6 * length, [0])
+    box = curve_around(given, before + 0.5 * chord, chord / length, border, 0.6 * length, [0]).box
     curve = only_curve(given, box)
     assert (curve.rises, curve.statuses) == (0, (None,))
     side = 0.5 * min(before[-1] - fold.alpha, after[-1] - fold.alpha, key=abs)

@@ -313,21 +313,6 @@ def curve_around(
         return _CurveMap(problem, x, direction, border, half, rho).proposed(roomy=roomy)
 
 
-def box_around(
-    problem: AlphaProblem,
-    x: Array,
-    direction: Array,
-    border: Array,
-    half: float,
-    changing: Sequence[int] = (),
-    *,
-    roomy: bool = True,
-) -> CurveBox | None:
-    """The box of ``curve_around``, whose parameters these are."""
-    found = curve_around(problem, x, direction, border, half, changing, roomy=roomy)
-    return None if found is None else found.box
-
-
 @dataclass(frozen=True, eq=False)
 class CurvePoint:
     """A solution x as floats have it, the direction of its curve, and statuses by the signs of their conditions."""
