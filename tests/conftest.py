@@ -7,6 +7,7 @@ from collections import defaultdict
 # two workers on two cores, each with a thread for every core, would wait for each other; read when numpy is loaded
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
+import effort
 import numpy as np
 import pytest
 from trees import by_the_tree, without_boxes
@@ -15,6 +16,10 @@ from enumsol.condensation.enclosure import CondensedEnclosure
 
 # a suite started in the background inherits an ignored SIGINT, and so would the programs whose Ctrl-C is tested
 signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_configure(config):
+    effort.thorough = "not long" not in config.option.markexpr
 
 
 @pytest.fixture

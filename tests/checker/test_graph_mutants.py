@@ -7,6 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from effort import some
 from generators import through_the_unloaded_state
 from graph_proofs import forms_at_once, without_arcs
 from oracles import exact_solutions
@@ -77,7 +78,7 @@ def recount(records):
 def test_accepted_mutants_name_every_selection_that_holds(name):
     problem, original, holding = case(name)
     rng, accepted = np.random.default_rng([3, len(name)]), 0
-    for _ in range(60):
+    for _ in range(some(25, of=60)):
         records = copied(original)
         for _ in range(int(rng.integers(1, 4))):
             with suppress(ValueError, TypeError, struct.error):  # it does not apply to what is left
@@ -98,14 +99,14 @@ def test_accepted_mutants_name_every_selection_that_holds(name):
     assert accepted
 
 
-@pytest.mark.slow
-def test_the_originals_name_every_selection_that_holds():
-    for name in (*PATHS, *BY_FORMS):
-        problem, records, holding = case(name)
-        report = verify(problem, proof_of(records))
-        assert report.ok
-        assert set().union(*holding.values()) <= report.selections
-        # and there is something to lose: selections that hold at some alphas only
-        assert len({frozenset(codes) for codes in holding.values()}) > 1
-        by_forms = sum(isinstance(record, list) and record[0] == "f" for record in records)
-        assert (by_forms > 0) == (name in BY_FORMS)
+@pytest.mark.few(0, 2)
+@pytest.mark.parametrize("name", [*PATHS, *BY_FORMS])
+def test_the_originals_name_every_selection_that_holds(name):
+    problem, records, holding = case(name)
+    report = verify(problem, proof_of(records))
+    assert report.ok
+    assert set().union(*holding.values()) <= report.selections
+    # and there is something to lose: selections that hold at some alphas only
+    assert len({frozenset(codes) for codes in holding.values()}) > 1
+    by_forms = sum(isinstance(record, list) and record[0] == "f" for record in records)
+    assert (by_forms > 0) == (name in BY_FORMS)

@@ -6,6 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from compare import differences
+from effort import some
 from generators import integer_problem
 from proof_tools import bytes_of, records_of
 
@@ -197,3 +198,15 @@ def test_rational_leaves_may_be_long(monkeypatch):
     long = Fraction(-(3**20000), 7**9000)
     numerator, denominator = fraction_text(*long.as_integer_ratio()).split("/")
     assert Fraction(int(numerator, 16), int(denominator, 16)) == long
+
+
+@pytest.mark.slow
+def test_leaves_checked_together_are_judged_as_one_by_one():
+    p = some(6, of=7)
+    problem = gallery.chain(p, 0.05)
+    roots = enumerate_roots(problem, 5.0)
+    assert len(roots) == 3**p
+    assert roots.complete
+    report = verify(problem, roots.proof)
+    assert report.complete, report
+    assert report.roots == 3**p

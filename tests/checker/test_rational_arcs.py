@@ -5,6 +5,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from effort import some
 from flint import fmpq, fmpq_poly
 from generators import integer_problem, random_problem, singular_problem
 from graph_proofs import GRAPHS, accepted, graph, of_kind, refused, replaced
@@ -70,7 +71,7 @@ def test_forged_parts_that_hold_nothing(name):
 @pytest.mark.parametrize("name", EVENTFUL)
 def test_forged_events(name):
     problem, records, _ = graph(name)
-    found = spread(parts_of(records, "e"))
+    found = spread(parts_of(records, "e"), some(3, of=10))
     assert found
     conditions = 3 * problem.p
     for k, i, begin, part in found:
@@ -94,7 +95,7 @@ def test_forged_events(name):
             assert refused(problem, with_part(records, k, i, other)), other
 
 
-@pytest.mark.few(0, 2)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("name", GRAPHS)
 def test_parts_by_themselves(name):
     """Nothing but what a part says stands, whatever comes before and after it."""
@@ -129,7 +130,7 @@ def standing(selection, x, y, index, bounds):
     return found
 
 
-@pytest.mark.few(0, 2)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("name", EVENTFUL)
 def test_shifted_ends(name):
     """The end of a part beside an event is moved to the other side of it."""
@@ -182,7 +183,7 @@ def test_parts_left_open(name):
 def test_forged_traces_and_boxes(name):
     problem, records, _ = graph(name)
     traces = of_kind(records, "t")
-    for k in spread(traces, 4):
+    for k in spread(traces, some(2, of=4)):
         _, codes, low, high, side = records[k]
         end = next((j for j in traces if j > k), len(records) - 1)
         inside = (float(Fraction(low)) + float(Fraction(high))) / 2
@@ -304,7 +305,7 @@ def test_the_sign_at_an_irrational_zero():
     assert [zero.sign_of(fmpq_poly([-fmpq(k, 100), 1])) for k in (141, 142)] == [1, -1]
 
 
-@pytest.mark.few(5)
+@pytest.mark.few(2, 2)
 @pytest.mark.parametrize("seed", range(6))
 def test_empty_selections_at_single_alphas_and_between(seed):
     """Against vertices at samples, singular selections among them."""

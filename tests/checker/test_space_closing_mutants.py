@@ -4,6 +4,7 @@ import functools
 
 import numpy as np
 import pytest
+from effort import some
 from problems3d import exactly, from_compliance
 from proof_tools import copied, proof_of, records_of
 from space_proofs import case, random_problem
@@ -237,7 +238,7 @@ def test_a_root_among_several_is_never_the_only_one(name):
     known = [record for record in records if isinstance(record, list) and record[0] == "r"]
     assert known
     for record in known:
-        for _ in range(15):
+        for _ in range(some(5, of=15)):
             theta = np.array(record[1][p:]).reshape(p, 2)
             theta /= np.maximum(np.linalg.norm(theta, axis=1, keepdims=True), 1e-9)
             numbers = [*np.exp(rng.normal(size=2 * p)), *[0.0] * p, *[0.0] * (m - p), *theta.ravel()]
@@ -246,12 +247,12 @@ def test_a_root_among_several_is_never_the_only_one(name):
             assert "not proven to be the only one" in " ".join(report.failures)
 
 
-@pytest.mark.few(0, 2)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("name", NAMES)
 def test_random_mutants_are_refused_or_true(name):
     rng, (problem, records), judge = np.random.default_rng(9), proven(name), LeafJudge(name)
     accepted = 0
-    for _ in range(50):
+    for _ in range(count := some(20, of=50)):
         changed = copied(records)
         for _ in range(int(rng.integers(1, 4))):
             entry = int(rng.choice([_NUMBERS, _NUMBERS, _MID, _RAD]))
@@ -265,7 +266,7 @@ def test_random_mutants_are_refused_or_true(name):
             assert report.complete
             assert report.roots == 1
             assert judge.right(changed[1])
-    assert 0 < accepted < 40
+    assert 0 < accepted < 0.8 * count
 
 
 def test_the_leaf_of_another_problem():

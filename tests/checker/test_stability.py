@@ -4,6 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from effort import some
 from generators import fe_compliance, from_condensed, planted_load, random_load
 from oracles import exact_condense
 from proof_tools import copied, proof_of, records_of
@@ -39,7 +40,7 @@ def condensed(problem):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("p", "count"), [(1, 12), (2, 8), (3, 4)])
+@pytest.mark.parametrize(("p", "count"), [(1, some(6, of=12)), (2, some(4, of=8)), (3, some(2, of=4))])
 def test_perturbed_problems_have_the_same_roots(p, count):
     rng = np.random.default_rng([1, p])
     useful = several = 0

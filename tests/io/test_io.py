@@ -1,3 +1,6 @@
+"""Problems in files: round trips bit by bit, names, parts that are missing or damaged, what no file can hold."""
+
+import functools
 import os
 import re
 import shutil
@@ -8,10 +11,15 @@ import scipy.io
 import scipy.sparse as sp
 
 from enumsol import (
+    BodyMesh,
     ContactProblem,
+    ContactProblem3D,
+    FrictionTable,
     InvalidArgumentError,
     InvalidProblemError,
+    SlipMean,
     enumerate_roots,
+    fem,
     gallery,
     read_problem,
     write_problem,
@@ -19,6 +27,12 @@ from enumsol import (
 
 A = np.array([[2.0, -0.5, 0.0, 0.0], [-0.5, 2.0, -0.5, 0.0], [0.0, -0.5, 2.0, -0.5], [0.0, 0.0, -0.5, 2.0]])
 DENSE = {"A": A, "Bn": np.eye(4)[[0, 2]], "Bt": np.eye(4)[[1, 3]], "f": np.array([1.0, -2.0, 0.5, 1.0])}
+ROWS_3D = {"Bn": np.eye(6)[[0, 3]], "Bt1": np.eye(6)[[1, 4]], "Bt2": np.eye(6)[[2, 5]]}
+DENSE_3D = {"A": 2 * np.eye(6), **ROWS_3D, "f": np.array([1.0, -2.0, 0.5, 1.0, 3.0, -1.0])}
+MESH_PARTS = ("points", "cells", "facets", "rows", "offset")
+PLACES = ["problem.npz", "directory"]
+#: First lines of MatrixMarket files.
+ARRAY, SPARSE = (f"%%MatrixMarket matrix {kind} real general\n" for kind in ("array", "coordinate"))
 
 
 def awkward_problem(node_ids=None):
@@ -44,48 +58,128 @@ def awkward_problem(node_ids=None):
     )
 
 
+def awkward_problem_3d(friction, p=5):
+    """Floats of all sizes without a short decimal form, and every optional array."""
+    rng = np.random.default_rng(0)
+    n, q = 24, 7
+    X = sp.random_array((n, n), density=0.2, rng=rng).toarray() + np.eye(n)
+    A = X @ X.T
+    weights = rng.random((p, q)) * (rng.random((p, q)) < 0.5) + 0.01 * np.eye(p, q)
+    return ContactProblem3D(
+        sp.csc_array(0.5 * (A + A.T)),
+        *(rng.normal(size=(p, n)) for _ in range(3)),
+        rng.normal(size=n) * 10.0 ** rng.integers(-300, 300, size=n),
+        gap=rng.normal(size=p) / 3,
+        friction=friction,
+        friction_slope=(rng.random(p), rng.random(p) * 1e-17),
+        load_slope=rng.normal(size=n),
+        slip_offset=rng.normal(size=(p, 2)),
+        node_ids=[f"node {k}" for k in range(p)],
+        coordinates=rng.normal(size=(p, 3)),
+        areas=rng.random(p) + 0.1,
+        mesh=BodyMesh.of_dofs(
+            rng.normal(size=(9, 3)),
+            np.array([[0, 1, 2, 3], [5, 6, 7, 8]]),
+            np.arange(27)[3:],
+            facets=np.array([[5, 6, 7]]),
+            rows=np.array([-1]),
+        ),
+        slip_mean=SlipMean(
+            sp.csr_array(rng.normal(size=(q, n)) * (rng.random((q, n)) < 0.3)),
+            sp.csr_array(rng.normal(size=(q, n)) * (rng.random((q, n)) < 0.3)),
+            rng.normal(size=(q, 2)),
+            sp.csr_array(weights / weights.sum(axis=1)[:, None]),
+        ),
+    )
+
+
+def same_matrix(one, two):
+    first, second = (sp.csr_array(matrix) for matrix in (one, two))
+    first.sort_indices()
+    second.sort_indices()
+    parts = ("indptr", "indices", "data")
+    return first.shape == second.shape and all(np.array_equal(getattr(first, k), getattr(second, k)) for k in parts)
+
+
+def same_array(one, two):
+    if one is None or two is None:
+        return one is two
+    return one.dtype == two.dtype and one.shape == two.shape and one.tobytes() == two.tobytes()
+
+
 def assert_same(one, two):
     """Every number the same, bit by bit."""
-    for name in ("A", "Bn", "Bt"):
-        first, second = sp.csc_array(getattr(one, name)), sp.csc_array(getattr(two, name))
-        first.sort_indices()
-        second.sort_indices()
-        assert first.shape == second.shape
-        for part in ("indptr", "indices", "data"):
-            assert np.array_equal(getattr(first, part), getattr(second, part))
-    for name in ("f", "gap", "slip_offset", "load_slope", "coordinates"):
-        first, second = getattr(one, name), getattr(two, name)
-        assert (first is None) == (second is None)
-        if first is not None:
-            assert first.tobytes() == second.tobytes()
-    for first, second in zip(one.friction, two.friction, strict=True):
-        assert first.tobytes() == second.tobytes()
+    assert type(one) is type(two)
+    space = isinstance(one, ContactProblem3D)
+    table = space and isinstance(two.law, FrictionTable)
+    for name in ("A", "Bn", *(("Bt1", "Bt2") if space else ("Bt",))):
+        assert same_matrix(getattr(one, name), getattr(two, name))
+    for name in ("f", "gap", "slip_offset", "load_slope", "coordinates", *(("areas",) if space else ())):
+        assert same_array(getattr(one, name), getattr(two, name)), name
+    assert not space or all(map(same_array, one.friction_slope, two.friction_slope))
+    if table:
+        assert all(same_array(getattr(one.law, name), getattr(two.law, name)) for name in ("slip", "F1", "F2"))
+    else:
+        assert all(map(same_array, one.friction, two.friction))
+        assert one.fingerprint == two.fingerprint
     assert one.node_ids == two.node_ids
     assert [type(label) for label in one.node_ids] == [type(label) for label in two.node_ids]
+    assert (one.mesh is None) == (two.mesh is None)
+    if one.mesh is not None:
+        assert same_matrix(one.mesh.motion, two.mesh.motion)
+        assert all(same_array(getattr(one.mesh, name), getattr(two.mesh, name)) for name in MESH_PARTS)
+    if space:
+        (mean, other), parts = (one.slip_mean, two.slip_mean), ("T1", "T2", "weights")
+        assert (mean is None) == (other is None)
+        assert mean is None or all(same_matrix(getattr(mean, name), getattr(other, name)) for name in parts)
+        assert mean is None or same_array(mean.offset, other.offset)
 
 
-@pytest.mark.parametrize("place", ["problem.npz", "directory"])
-@pytest.mark.parametrize(
-    "labels", [None, [4, 8, 15, 16, 23], ["a", "b", "ü 1", "1", ""], [0.1, 0.2, 0.3, 1e300, 5e-324]]
-)
-def test_round_trip_is_exact(tmp_path, place, labels):
-    problem = awkward_problem(labels)
+LABELS = (None, [4, 8, 15, 16, 23], ["a", "b", "ü 1", "1", ""], [0.1, 0.2, 0.3, 1e300, 5e-324])
+FRICTIONS = {
+    "constants": (np.linspace(0.1, 0.7, 5) / 3, np.full(5, 1 / 7)),
+    "table": FrictionTable([0.0, 1 / 3, 2.0], [0.5, 1 / 3, 0.2]),
+    "a table a node": FrictionTable([0.0, 1.0], np.random.default_rng(1).random((5, 2)), [0.1, 0.3]),
+}
+AWKWARD = {
+    **{f"labels {k}": functools.partial(awkward_problem, labels) for k, labels in enumerate(LABELS)},
+    **{name: functools.partial(awkward_problem_3d, friction) for name, friction in FRICTIONS.items()},
+    # tables of one row or column keep their shapes
+    "one node": lambda: awkward_problem_3d(FrictionTable([0.0, 1.0], [[0.5, 0.25]]), p=1),
+}
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("name", AWKWARD)
+def test_round_trip_is_exact(tmp_path, place, name):
+    problem = AWKWARD[name]()
     write_problem(problem, tmp_path / place)
     assert_same(read_problem(tmp_path / place), problem)
     write_problem(problem, tmp_path / place)  # replaces itself
     assert_same(read_problem(str(tmp_path / place)), problem)
 
 
-@pytest.mark.parametrize("place", ["problem.npz", "directory"])
-@pytest.mark.parametrize("name", ["one-node-6.1", "two-node-6.7-minus", "clamped-block-8", "wedge-8-5", "chain-4"])
+PATCHES = {"multipliers": "elements", "ratio": 2, "friction": FrictionTable([0, 1], [0.5, 0.3])}
+GALLERY = {
+    **{name: gallery.get(name).build for name in ("one-node-6.1", "two-node-6.7-minus", "clamped-block-8", "chain-4")},
+    **{"wedge-8-5": gallery.get("wedge-8-5").build, "node": gallery.one_node_3d},
+    "tetrahedra": lambda: gallery.block3d(3, 2, 2, cells="tetrahedra"),
+    "patches": lambda: gallery.block3d(4, 4, 2, **PATCHES),
+}
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("name", GALLERY)
 def test_the_gallery_round_trips(tmp_path, place, name):
-    entry = gallery.get(name)
-    problem = entry.build()
+    problem = GALLERY[name]()
     write_problem(problem, tmp_path / place)
     copy = read_problem(tmp_path / place)
     assert_same(copy, problem)
-    before, after = enumerate_roots(problem, entry.alpha), enumerate_roots(copy, entry.alpha)
-    assert [root.statuses for root in before] == [root.statuses for root in after]
+    if isinstance(problem, ContactProblem):
+        before, after = (enumerate_roots(one, gallery.get(name).alpha) for one in (problem, copy))
+        assert [root.statuses for root in before] == [root.statuses for root in after]
+    elif problem.mesh is not None:
+        assert np.array_equal(fem.h1_norms(copy).dual, fem.h1_norms(problem).dual)
 
 
 def test_dense_arrays_and_numpy_savez(tmp_path):
@@ -114,6 +208,20 @@ def test_friction_in_files(tmp_path, stored, meant):
     assert_same(read_problem(tmp_path), ContactProblem(**DENSE, friction=meant))
 
 
+def test_dense_arrays_and_numbers_for_all_nodes_in_3d(tmp_path):
+    np.savez(tmp_path / "p.npz", **DENSE_3D)
+    assert_same(read_problem(tmp_path / "p.npz"), ContactProblem3D(**DENSE_3D))
+    more = {"gap": 0.125, "friction_1": 0.5, "friction_2": [0.25, 0.125], "friction_slope_2": 0.5}
+    np.savez(tmp_path / "p.npz", **DENSE_3D, **more, _note="mine")
+    meant = ContactProblem3D(**DENSE_3D, gap=0.125, friction=(0.5, [0.25, 0.125]), friction_slope=(0.0, 0.5))
+    assert_same(read_problem(tmp_path / "p.npz"), meant)
+    for name, array in (DENSE_3D | more).items():
+        scipy.io.mmwrite(tmp_path / f"{name}.mtx", np.atleast_2d(np.asarray(array, dtype=float).T).T)
+    assert_same(read_problem(tmp_path), meant)
+    np.savez(tmp_path / "p.npz", **DENSE_3D, friction=0.3)
+    assert_same(read_problem(tmp_path / "p.npz"), ContactProblem3D(**DENSE_3D, friction=0.3))
+
+
 def test_sparse_parts_by_hand(tmp_path):
     parts = {}
     for name, kind in (("A", sp.csr_array), ("Bn", sp.csc_array), ("Bt", sp.csr_array)):
@@ -131,9 +239,9 @@ def test_matrix_market_of_other_programs(tmp_path):
     )
     (tmp_path / "Bn.mtx").write_text("%%MatrixMarket matrix coordinate integer general\n2 4 2\n1 1 1\n2 3 1\n")
     (tmp_path / "Bt.mtx").write_text("%%MatrixMarket matrix coordinate pattern general\n2 4 2\n1 2\n2 4\n")
-    (tmp_path / "f.mtx").write_text("%%MatrixMarket matrix array real general\n1 4\n1\n-2\n0.5\n1\n")
-    (tmp_path / "gap.mtx").write_text("%%MatrixMarket matrix array real general\n1 1\n0.25\n")
-    (tmp_path / "slip_offset.mtx").write_text("%%MatrixMarket matrix coordinate real general\n2 1 1\n2 1 0.5\n")
+    (tmp_path / "f.mtx").write_text(ARRAY + "1 4\n1\n-2\n0.5\n1\n")
+    (tmp_path / "gap.mtx").write_text(ARRAY + "1 1\n0.25\n")
+    (tmp_path / "slip_offset.mtx").write_text(SPARSE + "2 1 1\n2 1 0.5\n")
     (tmp_path / "_mesh.mtx").write_text("not for enumsol")
     (tmp_path / "README").write_text("nor this")
     assert_same(read_problem(tmp_path), ContactProblem(**DENSE, gap=0.25, slip_offset=[0.0, 0.5]))
@@ -153,12 +261,27 @@ def test_a_directory_is_replaced_without_leftovers(tmp_path):
     assert (place / "mass.mtx").exists()
 
 
+def test_a_directory_changes_hands(tmp_path):
+    """2D and 3D, with mesh and without: files of the problem before are gone."""
+    plain = ContactProblem3D(**DENSE_3D)
+    for problem in (awkward_problem_3d(0.5), plain, gallery.one_node_triangle(), awkward_problem_3d(0.25), plain):
+        write_problem(problem, tmp_path)
+        copy = read_problem(tmp_path)
+        assert copy.fingerprint == problem.fingerprint
+        assert getattr(copy, "areas", None) is None or copy.p == 5
+
+
 # -- what is refused -------------------------------------------------------------------------------------------------
 
 
-def without(*names):
-    return {name: array for name, array in DENSE.items() if name not in names}
+def without(*names, arrays=DENSE):
+    return {name: array for name, array in arrays.items() if name not in names}
 
+
+MESH = {"mesh_points": np.zeros((2, 3)), "mesh_cells": np.array([[0, 1, 0, 1]]), "mesh_dofs": np.arange(6)}
+MEAN = {"slip_mean_T1": np.eye(6), "slip_mean_T2": np.eye(6), "slip_mean_offset": np.zeros((6, 2))}
+MEAN |= {"slip_mean_weights": np.full((2, 6), 1 / 6)}
+TABLE = {"friction_table_slip": [0.0, 1.0], "friction_table_1": [0.5, 0.3], "friction_table_2": [0.5, 0.3]}
 
 BAD_ARRAYS = {
     "missing": (without("Bt"), r"Bt is missing \(found A, Bn and f\); expected A, Bn, Bt and f"),
@@ -189,11 +312,53 @@ BAD_ARRAYS = {
     "both forms": (DENSE | {"A_data": A}, "A is given as a matrix and in sparse parts; expected only one of them"),
     "parts missing": (without("A") | {"A_data": A, "A_shape": (4, 4)}, "A_indices, A_indptr, A_format is missing"),
 }
+BAD_ARRAYS_3D = [
+    (without("Bt2", arrays=DENSE_3D), r"Bt2 is missing .*expected A, Bn, Bt1, Bt2 and f"),
+    (without("Bt2", arrays=DENSE_3D) | {"T2": DENSE_3D["Bt2"]}, r"is T2 meant as Bt2\?"),
+    (without("Bt1", "Bt2", arrays=DENSE_3D) | {"t1": DENSE_3D["Bt1"], "t2": DENSE_3D["Bt2"]}, r"is t1 meant as Bt1\?"),
+    (DENSE_3D | {"Bt": DENSE_3D["Bt1"]}, r"Bt is not known"),
+    (DENSE_3D | {"frction_1": 0.1}, r"frction_1 is not known \(is friction_1 meant\?\)"),
+    (DENSE_3D | {"mu2": 0.1}, r"mu2 is not known \(is friction_2 meant\?\)"),
+    (DENSE_3D | {"friction0": 0.1}, "friction0 is not known"),
+    (DENSE_3D | {"friction": 0.1, "friction_2": 0.1}, "friction is given together with friction_1 or friction_2"),
+    (DENSE_3D | {"friction_1": 0.1} | TABLE, "friction_1 is given together with friction_table_slip or"),
+    (DENSE_3D | {"friction_1": 0.1}, "friction_1 stands alone; expected friction_1 and friction_2, or friction"),
+    (DENSE_3D | {"friction": [0.1, 0.2]}, "friction is an array of shape .*, which is ambiguous"),
+    (DENSE_3D | without("friction_table_2", arrays=TABLE), "friction_table_2 is missing; expected .* all or none"),
+    (DENSE_3D | without("mesh_dofs", arrays=MESH), "mesh_motion is missing .*; expected .* all or none"),
+    (
+        DENSE_3D | without("slip_mean_T1", "slip_mean_weights", arrays=MEAN),
+        "slip_mean_T1, slip_mean_weights is missing",
+    ),
+    (DENSE_3D | MESH | {"mesh_points": np.zeros((2, 4))}, r"mesh_points has shape \(2, 4\); expected \(N, 2\) or"),
+    (DENSE_3D | MESH | {"mesh_points": np.zeros((3, 2)), "mesh_cells": [[0, 1, 2]]}, r"expected \(N, 3\)"),
+    (DENSE_3D | MESH | {"mesh_motion": np.eye(6)}, "mesh_dofs is given together with mesh_motion"),
+    (DENSE_3D | MESH | {"mesh_cells": [[0, 1, 2, 3]]}, r"mesh_cells holds other numbers than 0 \.\. 1"),
+    (DENSE_3D | MESH | {"mesh_cells": [[0, 1, 0, 0.5]]}, "mesh_cells holds other numbers than"),
+    (
+        DENSE_3D | MESH | {"mesh_cells": [[0, 1]]},
+        r"mesh_cells has shape \(1, 2\); expected \(k, m\) with m among 4, 8",
+    ),
+    (DENSE_3D | MESH | {"mesh_dofs": [0, 1, 2, 3, 4, 4]}, "repeats a number"),
+    (DENSE_3D | {"mesh_rows": [0, 1]}, "mesh_points, mesh_cells, mesh_motion is missing .found mesh_rows"),
+    (DENSE_3D | MESH | {"mesh_facets": [[0, 1]]}, r"mesh_facets has shape \(1, 2\); expected \(k, m\) with m"),
+    (
+        DENSE_3D | MESH | {"mesh_facets": [[0, 1, 0]], "mesh_rows": [2]},
+        r"mesh_rows holds other numbers than -1 \.\. 1",
+    ),
+    (DENSE_3D | MESH | {"mesh_facets": [[0, 1, 0]], "mesh_rows": [0, 1]}, r"mesh_rows has shape \(2,\); expected"),
+    (DENSE_3D | MESH | {"mesh_rows": [0]}, r"mesh_rows has shape \(1,\); expected \(k,\), one for each"),
+    (DENSE_3D | MESH | {"mesh_dofs": [0, 1]}, "mesh moves by 2 degrees of freedom; expected n = 6"),
+    (DENSE_3D | MEAN | {"slip_mean_weights": -np.eye(2, 6)}, "slip_mean has a negative weight"),
+    (DENSE_3D | MEAN | {"slip_mean_T1": np.eye(5)}, "slip_mean has T1, T2, offset, weights of shapes"),
+    (DENSE_3D | MEAN | {"slip_mean_T1": np.full((6, 6), np.nan)}, "slip_mean_T1 has the value nan"),
+    (DENSE_3D | {"slip_offset": [1.0, 2.0]}, r"slip_offset has shape \(2,\); expected \(p, 2\) = \(2, 2\)"),
+    (DENSE_3D | {"areas": [1.0, 0.0]}, "areas has the value 0; expected areas > 0"),
+]
 
 
-@pytest.mark.parametrize("case", BAD_ARRAYS)
-def test_bad_arrays_get_one_sentence(tmp_path, case):
-    arrays, pattern = BAD_ARRAYS[case]
+@pytest.mark.parametrize(("arrays", "pattern"), [*BAD_ARRAYS.values(), *BAD_ARRAYS_3D])
+def test_bad_arrays_get_one_sentence(tmp_path, arrays, pattern):
     place = tmp_path / "bad.npz"
     np.savez(place, **arrays)
     with pytest.raises(InvalidProblemError, match=pattern) as caught:
@@ -300,40 +465,40 @@ def test_wrong_places(tmp_path, name, pattern):
         ("A.mtx", None, r"A\.mtx is missing \(found Bn\.mtx, .*\); expected A\.mtx, Bn\.mtx, Bt\.mtx and f\.mtx"),
         ("A.mtx", "", r"A\.mtx is not a readable MatrixMarket file"),
         ("A.mtx", "hello", r"A\.mtx is not a readable MatrixMarket file"),
-        ("A.mtx", "%%MatrixMarket matrix coordinate real general\n4 4 3\n1 1 2\n", r"A\.mtx is not a readable"),
-        ("A.mtx", "%%MatrixMarket matrix coordinate real general\n4 4 1\n9 9 2\n", r"A\.mtx is not a readable"),
+        ("A.mtx", SPARSE + "4 4 3\n1 1 2\n", r"A\.mtx is not a readable"),
+        ("A.mtx", SPARSE + "4 4 1\n9 9 2\n", r"A\.mtx is not a readable"),
         ("A.mtx", "%%MatrixMarket matrix coordinate complex general\n4 4 1\n1 1 2 3\n", "A has complex entries"),
         (
             "f.mtx",
-            "%%MatrixMarket matrix array real general\n2 2\n1\n2\n3\n4\n",
+            ARRAY + "2 2\n1\n2\n3\n4\n",
             r"f\.mtx holds a 2 x 2 matrix; expected a vec",
         ),
         # the first three crash the reader of scipy 1.17
         (
             "gap.mtx",
-            "%%MatrixMarket matrix array real general\n%\n2 1\n0.0=000000000000000e+",
+            ARRAY + "%\n2 1\n0.0=000000000000000e+",
             r"gap\.mtx is not a readable",
         ),
-        ("gap.mtx", "%%MatrixMarket matrix array real general\n%\n2 1\n0.0\n0.x0\n", "a word in it is not a number"),
+        ("gap.mtx", ARRAY + "%\n2 1\n0.0\n0.x0\n", "a word in it is not a number"),
         (
             "A.mtx",
-            "%%MatrixMarket matrix coordinate real general\n4 4 2\n1 1 2.0\n2 2 1.0e",
+            SPARSE + "4 4 2\n1 1 2.0\n2 2 1.0e",
             r"A\.mtx is not a readable",
         ),
         (
             "A.mtx",
-            "%%MatrixMarket matrix coordinate real general\n4 4 99999999999\n1 1 2\n",
+            SPARSE + "4 4 99999999999\n1 1 2\n",
             "cannot hold 4 x 4 entries",
         ),
         (
             "f.mtx",
-            "%%MatrixMarket matrix array real general\n99999999999 1\n1\n",
+            ARRAY + "99999999999 1\n1\n",
             "cannot hold 99999999999 x 1 entries",
         ),
-        ("f.mtx", "%%MatrixMarket matrix array real general\n3 1\n1\n2\n3\n", r"f has shape \(3,\); expected \(4,\)"),
-        ("f.mtx", "%%MatrixMarket matrix array real general\n4 1\n1\nnan\n3\n4\n", "f has the value nan"),
+        ("f.mtx", ARRAY + "3 1\n1\n2\n3\n", r"f has shape \(3,\); expected \(4,\)"),
+        ("f.mtx", ARRAY + "4 1\n1\nnan\n3\n4\n", "f has the value nan"),
         ("gaps.mtx", "x", r"gaps\.mtx is not known \(is gap\.mtx meant\?\)"),
-        ("friction.mtx", "%%MatrixMarket matrix array real general\n2 1\n1\n2\n", "friction is an array of shape"),
+        ("friction.mtx", ARRAY + "2 1\n1\n2\n", "friction is an array of shape"),
         ("node_ids.json", "[1,", r"node_ids\.json is not JSON"),
         ("node_ids.json", '{"a": 1}', r"node_ids\.json holds something else; expected a list"),
         ("node_ids.json", "[1, 2, 3]", "node_ids has 3 entries"),
@@ -365,6 +530,17 @@ def test_labels_that_a_format_cannot_keep(tmp_path):
     assert not (tmp_path / "q").exists()
 
 
+@pytest.mark.parametrize("place", PLACES)
+def test_a_callable_cannot_be_written(tmp_path, place):
+    def friction(node, slip):
+        return 0.5 / (1.0 + slip)
+
+    problem = ContactProblem3D(**DENSE_3D, friction=friction)
+    with pytest.raises(InvalidProblemError, match=r"friction is friction\(node, \|u_t\|\), which no file can hold"):
+        write_problem(problem, tmp_path / place)
+    assert not (tmp_path / place).exists()
+
+
 def test_places_that_cannot_be_written(tmp_path):
     problem = ContactProblem(**DENSE)
     with pytest.raises(InvalidArgumentError, match=r"its name ends in '\.txt'; expected a \.npz file"):
@@ -372,8 +548,11 @@ def test_places_that_cannot_be_written(tmp_path):
     for place in (tmp_path / "no" / "p.npz", tmp_path / "no" / "p"):
         with pytest.raises(InvalidArgumentError, match=re.escape(f"path {place} cannot be written (No such file")):
             write_problem(problem, place)
-    with pytest.raises(InvalidArgumentError, match="problem is a int; expected a ContactProblem"):
-        write_problem(3, tmp_path / "p.npz")
+    for what in (3, DENSE):
+        with pytest.raises(
+            InvalidArgumentError, match=f"problem is a {type(what).__name__}; expected a ContactProblem"
+        ):
+            write_problem(what, tmp_path / "p.npz")
     with pytest.raises(InvalidArgumentError, match="path is a int; expected the name of a file or directory"):
         read_problem(3)
 

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from branches.test_lower_bounds import KINDS
+from effort import some
 from flint import fmpq
 from path_problems import generic_problem, integer_problem, without_friction_somewhere
 from rational_arcs import Selection
@@ -162,7 +163,7 @@ def test_forms_are_definite_where_the_kernel_says_so():
     assert judged > 60
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_many_forms_are_definite_where_the_kernel_says_so():
     yes, bordered, judged, several = compared(range(1015, 1035), most=3, bisections=45)
     assert yes > 16
@@ -212,10 +213,10 @@ def moved_to_the_border(seeds, bisections):
 
 @pytest.mark.slow
 def test_theta_follows_many_solutions():
-    yes, bordered, judged = moved_to_the_border(range(100, 140), 50)
-    assert yes > 8
-    assert bordered > 6
-    assert judged > 200
+    yes, bordered, judged = moved_to_the_border(range(100, some(110, of=140)), 50)
+    assert yes > some(2, of=8)
+    assert bordered > some(1, of=6)
+    assert judged > some(40, of=200)
 
 
 @pytest.mark.parametrize(("share", "alone"), [(1.25, True), (1.9, False)])

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import oracles3d
 import pytest
+from effort import some
 from problems3d import degenerate_integers, exactly, from_compliance, random_coupled
 from space_proofs import RANDOM, random_problem
 
@@ -42,11 +43,10 @@ def boxed(seed):
     return solvers, y, None if box is None else solution_in_box(solvers.enclosed, box, 2.0), kinds, F
 
 
-@pytest.mark.few(0, 1)
-@pytest.mark.parametrize("part", range(3))
-def test_known_solutions_lie_in_their_boxes(part):
+@pytest.mark.slow
+def test_known_solutions_lie_in_their_boxes():
     found = 0
-    for seed in range(40 * part, 40 * part + 40):
+    for seed in range(some(15, of=120)):
         solvers, y, one, kinds, F = boxed(seed)
         if one is None:
             continue
@@ -63,7 +63,7 @@ def test_known_solutions_lie_in_their_boxes(part):
                 assert held[0] == (kind in ("open", "graze"))
         # a checker asks for less
         assert solution_in_box(solvers.enclosed, one.box) is not None
-    assert found > 10
+    assert found > some(3, of=30)
 
 
 def natural(problem, y):
@@ -80,12 +80,11 @@ def natural(problem, y):
     return y - out
 
 
-@pytest.mark.few(0, 1)
-@pytest.mark.parametrize("part", range(2))
-def test_steps_stay_within_their_bounds(part):
+@pytest.mark.slow
+def test_steps_stay_within_their_bounds():
     """zeta - Y N(y) is what (12.13b) says, and contracts, at random points of sets of all sizes."""
-    rng, tried = np.random.default_rng(part), 0
-    for seed in range(30 * part, 30 * part + 30):
+    rng, tried = np.random.default_rng(0), 0
+    for seed in range(some(12, of=60)):
         solvers, y, _, _, _ = boxed(seed)
         problem = _NaturalMap.of(solvers.enclosed, _proposed_rho(solvers.enclosed)[seed % 2])
         assert problem.T.mid @ (np.eye(len(y)) + problem.rho[:, None] * problem.S.mid) == pytest.approx(np.eye(len(y)))
@@ -100,7 +99,7 @@ def test_steps_stay_within_their_bounds(part):
             moved = zeta - step.Y @ natural(problem, centre + problem.T.mid @ zeta) - step.move.mid
             bound = step.E @ np.abs(zeta) + 0.5 * np.abs(step.G.mid) @ np.abs(step.V.mid @ zeta)
             assert np.all(np.abs(moved) <= bound * (1 + 1e-9) + 1e-10 * (1 + np.abs(step.Y).max()))
-    assert tried > 20
+    assert tried > some(7, of=40)
 
 
 def offset(system, box, y):

@@ -79,7 +79,7 @@ def exact_floats(problem):
     return np.array([float(x) for x in exact_condense(problem, 0)[1]])
 
 
-@pytest.mark.few(8)
+@pytest.mark.few(5, 0)
 @pytest.mark.parametrize("seed", range(20))
 def test_every_point_of_a_box_has_one_solution(seed):
     pair = Pair(seed)

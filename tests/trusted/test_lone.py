@@ -4,6 +4,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from effort import some
 from generators import fe_compliance, from_condensed, integer_problem, planted_load, random_load, random_problem
 from rational_closings import Closings, Lone
 from rational_forms import Data, Forms, Refused, exact
@@ -98,10 +99,9 @@ def cases(seeds):
                     yield rng, case, codes, root[0], given
 
 
-SEEDS = [range(6), *(pytest.param(range(45 * k, 45 * k + 45), marks=pytest.mark.slow) for k in range(2))]
+SEEDS = [range(6), pytest.param(range(some(18, of=90)), marks=pytest.mark.slow)]
 
 
-@pytest.mark.few(1, 1)
 @pytest.mark.parametrize("seeds", SEEDS)
 def test_what_is_proven_is_so(seeds):
     proven = squares = several = 0
@@ -115,8 +115,8 @@ def test_what_is_proven_is_so(seeds):
         several += len(case.roots) > 1
         assert case.judged(codes, selection, *given) is None
     assert proven > len(seeds) // 3
-    assert squares >= 5 * (len(seeds) // 45)
-    assert several >= 5 * (len(seeds) // 45)
+    assert squares >= len(seeds) // 9 - 1
+    assert several >= len(seeds) // 9 - 1
 
 
 def changed(rng, case, codes, given):
@@ -140,11 +140,10 @@ def changed(rng, case, codes, given):
     return tuple(codes), [weights, strengths, rows, values]
 
 
-@pytest.mark.few(0, 1)
-@pytest.mark.parametrize("part", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 2))])
-def test_what_is_changed_is_refused_or_true(part):
+@pytest.mark.slow
+def test_what_is_changed_is_refused_or_true():
     refused = accepted = 0
-    for rng, case, codes, selection, given in cases(range(45 * part, 45 * part + 45)):
+    for rng, case, codes, selection, given in cases(range(some(15, of=90))):
         for _ in range(3):
             others = changed(rng, case, codes, given)
             if lone_root(case.system, others[0], selection, *others[1]) is None:
@@ -152,8 +151,8 @@ def test_what_is_changed_is_refused_or_true(part):
                 continue
             accepted += 1
             assert case.judged(others[0], selection, *others[1]) is None
-    assert refused > 15
-    assert accepted > 15
+    assert refused > some(5, of=30)
+    assert accepted > some(5, of=30)
 
 
 @pytest.mark.few(0, 1)
@@ -165,7 +164,7 @@ def test_a_wrong_test_is_seen(wrong, monkeypatch):
     else:
         monkeypatch.setattr(lone, "_allowed", lambda *_: True)
     false = 0
-    for _, case, codes, selection, given in cases(range(60)):
+    for _, case, codes, selection, given in cases(range(some(20, of=60))):
         strengths = given[1].copy()
         free = [i for i in range(case.p) if codes[i] > 5 and selection[i] != 0]
         strengths[0, free] = 1e3 if wrong != "narrow gaps" else 50.0 * strengths[0, free]
@@ -173,10 +172,10 @@ def test_a_wrong_test_is_seen(wrong, monkeypatch):
         if lone_root(case.system, codes, selection, *given) is not None:
             reason = case.judged(codes, selection, *given)
             false += reason is not None
-    assert false > 2
+    assert false > some(0, of=2)
 
 
-@pytest.mark.parametrize("count", [6, pytest.param(60, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [6, pytest.param(60, marks=pytest.mark.long)])
 def test_gaps_hold_at_all_roots(count):
     for _, case, codes, _selection, (_, _, rows, values) in cases(range(count)):
         bounds = gaps(case.system, codes, rows, values)

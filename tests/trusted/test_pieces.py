@@ -108,10 +108,14 @@ def test_multipliers_prove_the_least_minimum_over_a_piece(seed):
         assert (piece.margin(codes, rows, values) > 0) == (min(ends) > 0)
 
 
-@pytest.mark.parametrize(
-    ("p", "seed"),
-    [(1, 0), (1, 22), *(pytest.param(*case, marks=pytest.mark.slow) for case in [(2, 0), (2, 5), (3, 4)])],
-)
+#: Nodes and seeds.
+LARGER = [
+    pytest.param(2, 0, marks=pytest.mark.slow),
+    *(pytest.param(*n, marks=pytest.mark.long) for n in [(2, 5), (3, 4)]),
+]
+
+
+@pytest.mark.parametrize(("p", "seed"), [(1, 0), (1, 22), *LARGER])
 def test_no_root_over_a_piece_is_missed(p, seed):
     """Leaves that hold a root at some alpha of a piece are not empty, and bounds of their forces hold it."""
     problem = changing_problem(p, seed)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from effort import some
 from problems3d import from_compliance, random_compliance
 
 from enumsol.search.space.space_fathoming import SpaceCloser
@@ -65,7 +66,7 @@ def a_member(enclosed, rng):
 @pytest.mark.parametrize("degenerate", [False, True])
 def test_solutions_for_all_data_lie_in_the_balls(degenerate):
     rng, concluded, nearest = np.random.default_rng(4), {SpaceRoot: 0, OnlySolution: 0}, 0.0
-    for _ in range(60):
+    for _ in range(some(20, of=60)):
         solvers = random_solvers(rng, degenerate)
         width = 10.0 ** rng.uniform(-9, -3.5)
         S, g = solvers.enclosed.S, solvers.enclosed.g
@@ -91,8 +92,8 @@ def test_solutions_for_all_data_lie_in_the_balls(degenerate):
                 assert np.all(np.abs(slips - found.w.mid) <= found.w.rad + 1e-8)
                 if isinstance(found, OnlySolution):
                     statuses(found, y, w, taus)
-    assert concluded[OnlySolution] > 20
-    assert degenerate or concluded[SpaceRoot] > 20
+    assert concluded[OnlySolution] > some(5, of=20)
+    assert degenerate or concluded[SpaceRoot] > some(5, of=20)
     # balls are not so wide that this would not tell
     assert nearest > 0.02
 
@@ -114,7 +115,7 @@ def statuses(found, y, w, taus):
 @pytest.mark.slow
 def test_the_form_is_definite_for_all_data_and_theta():
     rng, least = np.random.default_rng(8), []
-    for _ in range(80):
+    for _ in range(some(25, of=80)):
         solvers = random_solvers(rng, degenerate=rng.random() < 0.5)
         S, g = solvers.enclosed.S, solvers.enclosed.g
         enclosed = replace(solvers.enclosed, S_rad=np.full_like(S, 10.0 ** rng.uniform(-6, -2.5)), g_rad=0 * g)
@@ -127,7 +128,7 @@ def test_the_form_is_definite_for_all_data_and_theta():
                 sizes = np.linalg.eigvalsh(Q)
                 assert sizes[0] >= form.least
                 least.append(form.least / sizes[0])
-    assert len(least) > 100
+    assert len(least) > some(30, of=100)
     assert max(least) > 0.5
 
 
