@@ -30,13 +30,23 @@ if TYPE_CHECKING:
     from enumsol.support.arguments import Alpha
 
 
+#: What a body that nothing holds has beside forces and displacements of its contact nodes.
+_RIGID = ("rigid_coordinates", "rigid_displacement", "free_motion")
+
+
 def fixed_point(
     problem: ProblemArgument,
     alpha: Annotated[
         str | None,
         number("--alpha", "Parameter value: a number or a fraction; may be omitted if nothing depends on it."),
     ] = None,
-    start: Annotated[float, typer.Option(metavar="FORCE", help="Initial slip bound of every node.")] = 0.0,
+    start: Annotated[
+        float | None,
+        typer.Option(
+            metavar="FORCE",
+            help="Initial slip bound of every node, by default 0; of a body that nothing holds all nodes stick then.",
+        ),
+    ] = None,
     tolerance: Annotated[
         float, typer.Option(help="Size of a step, relative to the load, at which the iteration has converged.")
     ] = 1e-10,
@@ -55,7 +65,8 @@ def fixed_point(
     """Find one solution of PROBLEM at one ALPHA, as the limit of contact problems with given slip bounds.
 
     The iteration converges for small friction. If it converges, its limit is a solution; there may be others: enumsol
-    roots finds all of them, if the coefficients of friction do not depend on the slip.
+    roots finds all of them, if the coefficients of friction do not depend on the slip. For a body that nothing holds it
+    may come to slip bounds within which no forces hold the body, and then ends without one.
 
     Exit status: 0 if the iteration converged (with --starts: from every start); 3 if not; 2 on bad input; 130 on
     Ctrl-C, after printing the last iterate; 74 if a result could not be written; 141 if the program that read it has
@@ -119,7 +130,7 @@ def _in_2d(body: ContactProblem | ContactProblem3D, name: str) -> ContactProblem
 
 
 def _approximate(
-    body: ContactProblem | ContactProblem3D, alpha: Alpha, start: float, options: dict[str, Any]
+    body: ContactProblem | ContactProblem3D, alpha: Alpha, start: float | None, options: dict[str, Any]
 ) -> FixedPoint:
     from enumsol.fixed_points import successive_approximations  # numpy and scipy: not for --help
 
@@ -145,6 +156,7 @@ def _content(found: FixedPoint, name: str) -> dict[str, Any]:
         "node_ids": list(found.problem.node_ids),
         "statuses": [status.value for status in found.statuses],
         **{name: getattr(found, name) for name in ("coefficients", "lambda_n", "lambda_t", "u_n", "u_t")},
+        **({} if found.rigid_coordinates is None else {name: getattr(found, name) for name in _RIGID}),
         "increments": found.increments,
     }
 
@@ -163,6 +175,11 @@ def _basins(
     from enumsol.roots.enumerate import enumerate_roots
 
     roots = enumerate_roots(body, alpha)
+    if not len(roots):
+        raise InvalidArgumentError(
+            f"--starts is given, but {name} has no isolated solution at alpha = {float(alpha):g}, which a start could "
+            "reach; expected one"
+        )
     table, ended = so_far(lambda: basin_table(body, roots, starts, **options))
     deliver(
         (plot_file, lambda path: write_figure(path, plot_basins(table))),

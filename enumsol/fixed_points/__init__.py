@@ -6,13 +6,15 @@ from enumsol.fixed_points.lipschitz import LipschitzEstimate, lipschitz_estimate
 from enumsol.fixed_points.reference import TrescaReference
 from enumsol.fixed_points.result import FixedPoint, Outcome
 from enumsol.fixed_points.successive import FixedPointProgress, successive_approximations
-from enumsol.fixed_points.tresca import TrescaNotSolved, TrescaSolution, solve_tresca
+from enumsol.fixed_points.tresca import TrescaSolution, solve_tresca
+from enumsol.fixed_points.tresca_newton import TrescaNotFeasible, TrescaNotSolved
 
 __all__ = [
     "FixedPoint",
     "FixedPointProgress",
     "LipschitzEstimate",
     "Outcome",
+    "TrescaNotFeasible",
     "TrescaNotSolved",
     "TrescaReference",
     "TrescaSolution",

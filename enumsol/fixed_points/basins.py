@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.errors import Interrupted, InvalidArgumentError
-from enumsol.fixed_points.state import scaled_forces, slips_of
+from enumsol.fixed_points.state import scaled_unknowns, slips_of
 from enumsol.fixed_points.successive import successive_approximations
 from enumsol.fixed_points.system import ContactSystem, checked_problem
 from enumsol.fixed_points.tresca import node_values, solve_scaled
@@ -54,12 +54,12 @@ def fixed_point_residual(problem: Problem, root: Any) -> float:
             f"root is a {type(root).__name__} without alpha; expected a root of enumerate_roots or a fixed point"
         )
     system = ContactSystem.at(body, root.alpha)
-    forces = scaled_forces(system, root, "root")
+    x = scaled_unknowns(system, root, "root")
     slip = system.scaled(node_values(slips_of(root, body.p, "root"), "slip", body.p), system.length, "slip")
-    corrected, _ = system.corrected(forces)
-    data = TrescaData(corrected, np.maximum(system.split(forces)[0], 0.0), system.coefficients(slip))
-    image, _, _ = solve_scaled(data, forces)
-    return float(np.max(np.abs(image - forces)))
+    corrected, _ = system.corrected(x)
+    data = TrescaData(corrected, np.maximum(system.split(x)[0], 0.0), system.coefficients(slip))
+    image, _, _ = solve_scaled(data, x)
+    return float(np.max(np.abs(image - x)[: system.m]))
 
 
 def is_fixed_point(problem: Problem, root: Any, tolerance: float = 1e-8) -> bool:
@@ -148,7 +148,7 @@ def basin_table(
     alpha = _common_alpha(roots)
     distance = positive_number(distance, "distance")
     system = ContactSystem.at(body, alpha)
-    known = np.array([scaled_forces(system, root, f"root {k}") for k, root in enumerate(roots)])
+    known = np.array([scaled_unknowns(system, root, f"root {k}") for k, root in enumerate(roots)])[:, : system.m]
     bounds = _starts(starts, seed, roots, body.p)
     rows: list[dict[str, Any]] = []
     stopped: KeyboardInterrupt | None = None
@@ -158,7 +158,7 @@ def basin_table(
         except KeyboardInterrupt as error:
             stopped = error
             break
-        away = np.max(np.abs(known - scaled_forces(system, found)), axis=1)
+        away = np.max(np.abs(known - scaled_unknowns(system, found)[: system.m]), axis=1)
         nearest = int(np.argmin(away))
         reached = found.converged and away[nearest] <= distance
         rows.append(

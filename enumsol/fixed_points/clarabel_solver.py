@@ -14,9 +14,10 @@ if TYPE_CHECKING:
 TOLERANCE = 1e-11
 
 
-def interior_point(data: TrescaData) -> Vector | None:
-    """Scaled forces that solve a Tresca problem to about 1e-9, from scratch; None if Clarabel fails.
+def interior_point(data: TrescaData) -> tuple[Vector | None, Vector]:
+    """The x that solves a Tresca problem to about 1e-9, from scratch, None if Clarabel fails; and a rigid displacement.
 
+    If no forces balance the load on a body that nothing holds, they do not along the latter, scaled and of shape (r,).
     Components of lambda_t that do not occur are left out, so that every cone has an interior.
     """
     import clarabel  # takes a while to import
@@ -46,28 +47,34 @@ def interior_point(data: TrescaData) -> Vector | None:
     offset[p:first] = np.tile(bound[node_one] * F, 2)
     offset[first::3] = bound[node_two] * least
     rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
+    limits = sp.csc_matrix((values, (rows, columns)), shape=(size, int(np.sum(free))))
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     settings.direct_solve_method = "faer"  # the Hessian is dense, for which the default is several times slower
     settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
+    settings.tol_infeas_abs = settings.tol_infeas_rel = TOLERANCE
     answer = clarabel.DefaultSolver(
         sp.csc_matrix(np.triu(system.S[np.ix_(free, free)])),
         -system.g[free],
-        sp.csc_matrix((values, (rows, columns)), shape=(size, int(np.sum(free)))),
-        offset,
-        [clarabel.NonnegativeConeT(first), *[clarabel.SecondOrderConeT(3)] * len(node_two)],
+        sp.csc_matrix(sp.vstack([system.G[:, free], limits])),
+        np.append(system.h, offset),
+        [
+            clarabel.ZeroConeT(system.modes),
+            clarabel.NonnegativeConeT(first),
+            *[clarabel.SecondOrderConeT(3)] * len(node_two),
+        ],
         settings,
     ).solve()
-    found = np.array(answer.x)
-    if not np.all(np.isfinite(found)):
-        return None
-    forces = np.zeros(len(system.g))
+    found, rigid = np.array(answer.x), -np.array(answer.z)[: system.modes]
+    if not (np.all(np.isfinite(found)) and np.all(np.isfinite(rigid))):
+        return None, np.zeros(system.modes)
+    forces = np.zeros(system.m)
     forces[free] = found
-    return forces
+    return np.append(forces, rigid), rigid
 
 
 def _reach(data: TrescaData) -> Vector:
-    """Sizes that |tau| cannot exceed, by the energy bound (theory, section 11.3), shape (p,): larger bounds are none.
+    """Sizes that |tau| cannot exceed, by `largest_forces`, shape (p,): larger bounds are none.
 
     With them the solver meets no numbers that are large for no reason.
     """

@@ -154,6 +154,8 @@ def lipschitz_estimate(
     ------
     InvalidArgumentError
         An argument is not of the stated form, or alpha makes a coefficient negative.
+    NotHeldError
+        Nothing holds the body, so that its slips are not bounded by an energy (theory, section 14.10).
 
     Examples
     --------
@@ -163,6 +165,7 @@ def lipschitz_estimate(
     (True, 0.577, 0.866)
     """
     body = checked_problem(problem)
+    body.check_held("lipschitz_estimate", "whose slips no energy bounds")
     p = body.p
     known = body.areas if areas is None and isinstance(body, ContactProblem3D) else areas
     m = np.ones(p) if known is None else _relative(node_values(known, "areas", p))

@@ -9,6 +9,7 @@ import scipy.sparse as sp
 
 from enumsol.errors import MissingDependencyError
 from enumsol.fixed_points.system import checked_problem
+from enumsol.fixed_points.tresca_newton import TrescaNotSolved
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -80,9 +81,16 @@ class TrescaReference:
         lambda_n : (p,) array [force]
         lambda_t : (p, d) array [force]
         u : (n,) array [length]
+
+        Raises
+        ------
+        TrescaNotSolved
+            There is no solution: no forces within the bounds hold a body that nothing else holds.
         """
         self._work.value, self._load.value = bound[:, None] * F, load
         settings: dict[str, Any] = {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11}
         self.program.solve(solver="CLARABEL", **settings)
+        if self._u.value is None:
+            raise TrescaNotSolved(f"CVXPY found no solution of the Tresca problem (status: {self.program.status})")
         tangential = np.stack([constraint.dual_value for constraint in self._tangential], axis=1)
         return np.asarray(self._normal.dual_value), tangential, np.asarray(self._u.value)

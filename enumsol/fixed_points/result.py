@@ -11,7 +11,8 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.fixed_points.state import TrescaState
-from enumsol.fixed_points.system import checked_problem
+from enumsol.fixed_points.system import checked_problem, driven
+from enumsol.model.rigid_modes import modes_of
 from enumsol.support.arguments import alpha_value, file_path, optional_count, positive_integer, positive_number
 from enumsol.support.array_arguments import real_array
 from enumsol.support.files import read_arrays, reading, write_arrays
@@ -28,18 +29,25 @@ if TYPE_CHECKING:
 
 _FORMAT = 1
 _ARRAYS = ("slip_bound", "coefficients", "lambda_n", "lambda_t", "u_n", "u_t", "slip", "increments")
+#: What a body that nothing holds has beside them; the second is empty where it is None.
+_RIGID_ARRAYS = ("rigid_coordinates", "free_motion")
 #: Nodes that a printed result shows, columns of its text, and what is noise beside the largest number of a kind.
 _PRINTED, _WIDTH, _NOISE = 32, 80, 1e-12
 
 
+def _names(body: Problem) -> tuple[str, ...]:
+    return _ARRAYS if body.modes is None else _ARRAYS + _RIGID_ARRAYS
+
+
 def _check_shapes(arrays: dict[str, Vector], body: Problem, path: str) -> None:
-    p = body.p
+    p, modes = body.p, 0 if body.modes is None else body.modes.r
     tangential = body.slip_offset.shape  # (p,) in 2D, (p, 2) in 3D
     shapes = {"coefficients": (p, len(tangential)), "lambda_t": tangential, "u_t": tangential}
     shapes["increments"] = (len(arrays["increments"]), 2) if arrays["increments"].ndim else (0, 2)
+    shapes |= dict.fromkeys(_RIGID_ARRAYS, (modes,))
     for name, array in arrays.items():
         expected = shapes.get(name, (p,))
-        if array.shape != expected:
+        if array.shape != expected and not (name == "free_motion" and array.size == 0):
             raise InvalidArgumentError(
                 f"{path} has {name} of shape {array.shape}; expected {expected}, as the problem has it"
             )
@@ -52,6 +60,8 @@ class Outcome(enum.Enum):
     ROUNDING = "rounding"
     CYCLE = "cycle"
     ITERATION_LIMIT = "iteration limit"
+    NOT_HELD = "not held"
+    NOT_FEASIBLE = "not feasible"
     NOT_SOLVED = "Tresca problem not solved"
     INTERRUPTED = "interrupted"
 
@@ -83,6 +93,12 @@ class FixedPoint(TrescaState):
         section 11.7); nan where none was looked for. Where it is above the tolerance the error may be larger still.
     period : int or None
         Of a cycle.
+    free_motion : (r,) array or None
+        Of a body that nothing holds, coordinates of a rigid displacement. Where the outcome is "not feasible" the load
+        drives the body along it, and no forces within ``slip_bound`` are in balance (the forces kept are those of the
+        iterate before); where it is "not held", no contact forces at all are (those kept are zero). Otherwise the body
+        may move by it and be in equilibrium with the same forces: its rigid displacement is not unique. None if there
+        is no such displacement.
 
     Examples
     --------
@@ -101,6 +117,7 @@ class FixedPoint(TrescaState):
     tolerance: float
     rounding: float = field(default=float("nan"))
     period: int | None = field(default=None)
+    free_motion: Vector | None = field(default=None)
 
     @property
     def converged(self) -> bool:
@@ -139,9 +156,28 @@ class FixedPoint(TrescaState):
         depends = getattr(self.problem, "depends_on_solution", False)
         last = f"last increment {forces:.2e} in forces" + (f", {slips:.2e} in slips" if depends else "")
         solved = counted(self.iterations, "iteration")
+        body: Any = self.problem
+        motion = self.free_motion
         match self.outcome:
-            case Outcome.CONVERGED:
+            case Outcome.CONVERGED if motion is None:
                 return f"converged after {solved} ({last})"
+            case Outcome.CONVERGED:
+                modes = modes_of(body.rigid_modes, motion)
+                return (
+                    f"converged after {solved} ({last}); the body may move on along {modes} with the same forces: its "
+                    "rigid displacement is not unique"
+                )
+            case Outcome.NOT_HELD:
+                return (
+                    "there is no solution: no contact forces hold the body, however large friction is, along "
+                    f"{modes_of(body.rigid_modes, motion)}"
+                )
+            case Outcome.NOT_FEASIBLE:
+                words = driven(body, self.alpha, self.slip_bound, self.coefficients, np.asarray(motion))
+                return (
+                    f"stopped after {solved}: no forces within the slip bounds that it came to hold the body "
+                    f"({words}); there may be a solution all the same, to which another start may lead"
+                )
             case Outcome.ROUNDING:
                 return (
                     f"not converged to the tolerance: after {solved} rounding still changes contact forces by "
@@ -177,7 +213,8 @@ class FixedPoint(TrescaState):
             "node_ids": [str(label) for label in self.problem.node_ids],
             "statuses": [status.value for status in self.statuses],
         }
-        arrays = {name: getattr(self, name) for name in (*_ARRAYS, "u")}
+        arrays = {name: getattr(self, name) for name in (*_names(self.problem), "u")}
+        arrays = {name: np.zeros(0) if array is None else array for name, array in arrays.items()}
         write_arrays(file_path(path, "path"), _FORMAT, report, arrays)
 
     @classmethod
@@ -192,7 +229,7 @@ class FixedPoint(TrescaState):
         body = checked_problem(problem)
         place = file_path(path, "path")
         with reading(place, "a fixed point", "FixedPoint.save"):
-            found, kept = read_arrays(place, _FORMAT, _ARRAYS)
+            found, kept = read_arrays(place, _FORMAT, _names(body))
             arrays = {
                 name: real_array(value, f"{name} in {path}", error=InvalidArgumentError) for name, value in kept.items()
             }
@@ -206,13 +243,18 @@ class FixedPoint(TrescaState):
         if labels != [str(label) for label in body.node_ids]:
             raise InvalidArgumentError(f"{path} is about other contact nodes; expected those of the problem")
         _check_shapes(arrays, body, str(path))
-        return cls(problem=body, alpha=alpha, outcome=outcome, **(report | arrays))
+        motion = arrays.pop("free_motion", np.zeros(0))
+        more = report | arrays | {"free_motion": motion if motion.size else None}
+        return cls(problem=body, alpha=alpha, outcome=outcome, **more)
 
     def __repr__(self) -> str:
         factor = self.contraction_factor
         seen = f"; contraction factor seen {factor:.3g}" if np.isfinite(factor) else ""
         found = ", ".join(f"{name} {value:.1e}" for name, value in self.residuals.items())
         texts = [f"FixedPoint at alpha = {float(self.alpha):g}: {self.why}{seen}", f"residuals {found}"]
+        if self.rigid_coordinates is not None:
+            moved = ", ".join(f"{value:.5g}" for value in self.rigid_coordinates)
+            texts.append(f"rigid displacement, its coordinates: {moved}")
         lines = [line for k, text in enumerate(texts) for line in _wrapped(text, "  " * k)]
         return "\n".join([*lines, *self._table()])
 

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
+from enumsol.condensation.condensed import condensation_of
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.statuses import ContactStatus
 from enumsol.support.array_arguments import real_array
 from enumsol.support.immutable import Sealed, sealed
+from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -48,6 +50,8 @@ class TrescaState(Sealed):
         Tangential contact forces [force].
     u_n, u_t : arrays of the same shapes
         Bn u - gap, and the tangential displacements minus the slip offset [length].
+    rigid_coordinates : (r,) array or None
+        Of a body that nothing holds: q of its rigid displacement N q [length]. Where it is not unique, one of them.
     """
 
     problem: Problem = field(repr=False)
@@ -58,13 +62,13 @@ class TrescaState(Sealed):
     lambda_t: Vector
     u_n: Vector
     u_t: Vector
+    rigid_coordinates: Vector | None = field(default=None, kw_only=True)
 
     @classmethod
-    def of(cls, data: TrescaData, forces: Vector, **more: Any) -> Self:
-        """The state of scaled forces that solve a Tresca problem."""
+    def of(cls, data: TrescaData, x: Vector, **more: Any) -> Self:
+        """The state of an x that solves a Tresca problem."""
         system = data.system
-        w = data.displacements(forces)
-        (normal, tangential), (w_n, w_t) = system.split(forces), system.split(w)
+        (normal, tangential), (w_n, w_t) = system.split(x), system.split(system.moves(x))
         flat = system.tangents == 1
         parts = (tangential * system.force[:, None], w_t * system.length[:, None])
         lambda_t, u_t = (part[:, 0] if flat else part for part in parts)
@@ -77,6 +81,7 @@ class TrescaState(Sealed):
             lambda_t=lambda_t,
             u_n=w_n * system.length,
             u_t=u_t,
+            rigid_coordinates=system.rigid_of(x) if system.modes else None,
             **more,
         )
 
@@ -87,8 +92,15 @@ class TrescaState(Sealed):
 
     @cached_property
     def u(self) -> Vector:
-        """Displacement A^-1 (f(alpha) - B' lambda), shape (n,) [length]."""
-        return sealed(self.problem.condensed.displacement(self.alpha, self.forces))
+        """Displacement of all degrees of freedom, shape (n,) [length]."""
+        u, rigid = condensation_of(self.problem).displacement(self.alpha, self.forces), self.rigid_displacement
+        return sealed(u if rigid is None else u + rigid)
+
+    @property
+    def rigid_displacement(self) -> Vector | None:
+        """Of a body that nothing holds: how it moves as a whole, N q, shape (n,) [length]; None of others."""
+        N, q = self.problem.rigid_modes, self.rigid_coordinates
+        return None if N is None or q is None else np.asarray(N @ q)
 
     @cached_property
     def statuses(self) -> tuple[ContactStatus, ...]:
@@ -126,15 +138,16 @@ class TrescaState(Sealed):
         -lambda_n, as forces and displacements of the contact nodes; ``complementarity`` the sum of |lambda_n u_n|;
         ``cone`` the largest |tau| - lambda_n; ``dissipation`` the sum of |lambda_n |F u_t| - lambda_t . u_t|; where
         friction depends on the slip ``coefficients``, the largest |F(slip) - F| [-], F those it was solved with. Forces
-        are divided by the largest contact force, displacements by the largest displacement of a contact node without
-        contact forces, work by g' S^-1 g.
+        are divided by the largest contact force, but at least 1e-9 of the largest entry of f, displacements by the
+        largest displacement of a contact node without contact forces, work by g' S^-1 g; of a body that nothing holds
+        these are taken as springs hold it (theory, section 14.1).
         """
         p = len(self.lambda_n)
-        condensed = self.problem.condensed
+        condensed = condensation_of(self.problem)
         g = condensed.free_displacements(self.alpha)
         load = self.problem.load_at(self.alpha)
         work = float(np.linalg.solve(condensed.S, g) @ g) or 1.0
-        force = float(np.max(np.abs(self.forces), initial=0.0)) or 1.0
+        force = max(float(np.max(np.abs(self.forces))), STATUS_TOLERANCE * float(np.max(np.abs(load)))) or 1.0
         length = float(np.max(np.abs(g))) or 1.0
         lambda_t, u_t, F = self.lambda_t.reshape(p, -1), self.u_t.reshape(p, -1), self.coefficients
         tau = np.linalg.norm(np.divide(lambda_t, F, out=np.zeros_like(lambda_t), where=F > 0), axis=1)
@@ -179,14 +192,14 @@ class TrescaState(Sealed):
         return pd.DataFrame(columns)
 
 
-def scaled_forces(system: ContactSystem, state: Any, name: str = "start") -> Vector:
-    """Scaled forces of a state or root.
+def scaled_unknowns(system: ContactSystem, state: Any, name: str = "start") -> Vector:
+    """The x of a state or root: its scaled forces and rigid displacement, which is zero if it has none.
 
     Raises
     ------
     InvalidArgumentError
-        It has no lambda_n or lambda_t, or none of these shapes, or they are huge; ``name`` is what it is called in
-        the message.
+        It has no lambda_n or lambda_t, or none of these shapes, or they are huge, or it has a rigid displacement with
+        another number of coordinates; ``name`` is what it is called in the message.
     """
     p, d = system.p, system.tangents
     parts = []
@@ -203,7 +216,17 @@ def scaled_forces(system: ContactSystem, state: Any, name: str = "start") -> Vec
                 "nodes"
             )
         parts.append(values.ravel(order="F"))
-    return system.scaled(np.concatenate(parts), system.force, name)
+    forces, rigid = system.scaled(np.concatenate(parts), system.force, name), np.zeros(system.modes)
+    given = getattr(state, "rigid_coordinates", None)
+    if given is not None and system.modes:
+        given = real_array(given, f"rigid_coordinates of {name}", error=InvalidArgumentError)
+        if given.shape != rigid.shape:
+            raise InvalidArgumentError(
+                f"{name} has rigid_coordinates of shape {given.shape}; expected {rigid.shape}, as the problem has "
+                f"{counted(system.modes, 'rigid mode')}"
+            )
+        rigid = system.scaled_rigid(given)
+    return np.append(forces, rigid)
 
 
 def slips_of(state: Any, p: int, name: str) -> Vector:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,10 +12,10 @@ import numpy as np
 from enumsol.errors import Interrupted, InvalidArgumentError
 from enumsol.fixed_points.anderson import AndersonMixing
 from enumsol.fixed_points.result import FixedPoint, Outcome
-from enumsol.fixed_points.state import scaled_forces, slips_of
+from enumsol.fixed_points.state import scaled_unknowns, slips_of
 from enumsol.fixed_points.system import ContactSystem, checked_problem
-from enumsol.fixed_points.tresca import TrescaNotSolved, node_values, solve_scaled
-from enumsol.fixed_points.tresca_newton import TrescaData
+from enumsol.fixed_points.tresca import node_values, solve_scaled
+from enumsol.fixed_points.tresca_newton import TrescaData, TrescaNotFeasible, TrescaNotSolved
 from enumsol.model.friction import warn_of_jumps
 from enumsol.model.problem3d import ContactProblem3D
 from enumsol.support.arguments import optional_callable, positive_integer, positive_number
@@ -42,6 +42,8 @@ _RATIOS = 5
 _SMALL, _PATIENCE = 1e-6, 20
 #: Longest cycle that is detected; two iterates are the same if they are this much closer than neighbours.
 LONGEST_CYCLE, _SAME = 12, 1e-9
+#: A scaled slip bound that no force reaches.
+_UNBOUNDED = 1e100
 #: Most iterates that Anderson's mixing keeps.
 MOST_DEPTH = 1000
 
@@ -86,7 +88,8 @@ def successive_approximations(
     alpha : float, Fraction or str
         Parameter of friction and load.
     start : None, float, (p,) array_like, pair, or object with lambda_n and u_t
-        Slip bounds to begin with [force]; None is 0, a first iterate without friction. A pair gives slip bounds and
+        Slip bounds to begin with [force]; None is 0, a first iterate without friction, and of a body that nothing holds
+        the normal forces of the body whose nodes stick whatever the forces are. A pair gives slip bounds and
         slips [length]; a root, a FixedPoint or a TrescaSolution gives its own.
     tolerance : float
         Converged when the distance from the limit, estimated by the last increment and the contraction seen (theory,
@@ -102,7 +105,10 @@ def successive_approximations(
     Returns
     -------
     FixedPoint
-        Of the last iterate; ``converged`` and ``why`` say how it ended.
+        Of the last iterate; ``converged`` and ``why`` say how it ended. Of a body that nothing holds it has
+        ``rigid_coordinates`` and ``rigid_displacement``, which may exceed ``max_rigid_displacement``; its outcome may
+        be "not feasible": no forces within the slip bounds that the iteration came to hold the body (theory, section
+        14.10).
 
     Raises
     ------
@@ -110,6 +116,8 @@ def successive_approximations(
         An argument is not of the stated form, or alpha makes a coefficient negative.
     InvalidProblemError
         A friction function returns something else than finite numbers >= 0.
+    NotHeldError
+        Some rigid displacement of a body that nothing holds moves no contact node.
     Interrupted
         Ctrl-C; ``partial`` is the FixedPoint of the last iterate.
 
@@ -158,14 +166,22 @@ class _Iteration:
         self.sizes: list[float] = []
         self.largest_slip = 0.0
         self.rounding = float("nan")
+        self.motion: Vector | None = None
         self.started = time.perf_counter()
 
     def run(self, start: Any, limit: int) -> FixedPoint:
+        system = self.system
         self.bound, self.slip = self._start(start)
-        self.data = TrescaData(self.system, self.bound, self.system.coefficients(self.slip))
-        self.forces = scaled_forces(self.system, start) if hasattr(start, "lambda_t") else np.zeros(len(self.system.g))
+        self.data = TrescaData(system, self.bound, system.coefficients(self.slip))
+        given = hasattr(start, "lambda_t")
+        self.x = scaled_unknowns(system, start) if given else np.zeros(system.m + system.modes)
         outcome, period = Outcome.ROUNDING, None
         try:
+            if start is None and system.modes:
+                outcome = Outcome.NOT_HELD
+                self.x, _, _ = solve_scaled(replace(self.data, bound=np.full(system.p, _UNBOUNDED)), self.x)
+                self.bound, self.slip = self._image()
+                outcome = Outcome.ROUNDING
             for _ in range(MOST_CORRECTIONS + 1):
                 ended, period = self._iterate(limit)
                 better = self._rounding(ended)
@@ -177,6 +193,9 @@ class _Iteration:
                 self.recent.clear()
                 self.sizes.clear()
                 self.mixing = AndersonMixing(self.depth) if self.depth else None
+        except TrescaNotFeasible as error:
+            self.motion = error.motion
+            outcome = Outcome.NOT_HELD if outcome is Outcome.NOT_HELD else Outcome.NOT_FEASIBLE
         except TrescaNotSolved:
             outcome = Outcome.NOT_SOLVED
         except KeyboardInterrupt:
@@ -188,8 +207,8 @@ class _Iteration:
         """How the iteration with this system ends, and the length of a cycle."""
         while len(self.increments) < limit:
             self.data = TrescaData(self.system, self.bound, self.system.coefficients(self.slip))
-            self.forces, _, _ = solve_scaled(self.data, self.forces)
-            image, image_slip = self._image(self.data, self.forces)
+            self.x, _, _ = solve_scaled(self.data, self.x)
+            image, image_slip = self._image()
             if self._increment(self.data, self.slip, image, image_slip) <= 1.0:
                 return Outcome.CONVERGED, None
             if self._stalled():
@@ -202,10 +221,10 @@ class _Iteration:
 
     def _rounding(self, ended: Outcome) -> ContactSystem:
         """The corrected system; ``rounding`` becomes what rounding changes a force by, relative to the largest."""
-        better, change = self.system.corrected(self.forces)
+        better, change = self.system.corrected(self.x)
         unit = np.tile(self.system.force, 1 + self.system.tangents)
-        largest = float(np.max(np.abs(self.forces * unit)))
-        moved = float(np.max(np.maximum(np.abs(change), self.system.noise(self.forces)) * unit))
+        largest = float(np.max(np.abs(self.x[: self.system.m] * unit)))
+        moved = float(np.max(np.maximum(np.abs(change), self.system.noise(self.x)) * unit))
         self.rounding = moved / largest if largest > 0 else 0.0
         if ended is Outcome.ROUNDING:
             self.rounding = max(self.rounding, *self.sizes[-_PATIENCE:])
@@ -229,11 +248,9 @@ class _Iteration:
             system.scaled(node_values(slip, "slips of start", p), system.length, "slips of start"),
         )
 
-    def _image(self, data: TrescaData, forces: Vector) -> tuple[Vector, Vector]:
-        """Psi of the iterate that gave these forces: scaled normal forces and slips."""
-        w = data.displacements(forces)
-        normal = np.maximum(self.system.split(forces)[0], 0.0)
-        return normal, self.system.slip(forces, w)
+    def _image(self) -> tuple[Vector, Vector]:
+        """Psi of the iterate: scaled normal forces and slips."""
+        return np.maximum(self.system.split(self.x)[0], 0.0), self.system.slip(self.x)
 
     def _increment(self, data: TrescaData, slip: Vector, image: Vector, image_slip: Vector) -> float:
         """How far the limit may be, relative to the tolerance: at most 1 has converged."""
@@ -300,15 +317,18 @@ class _Iteration:
         return mixed[:p], mixed[p:]
 
     def _result(self, outcome: Outcome, period: int | None) -> FixedPoint:
-        slip = self.system.slip(self.forces, self.data.displacements(self.forces))
+        motion = self.motion
+        if motion is None and (free := self.data.free_motion(self.x)) is not None:
+            motion = self.system.unit_motion(free)
         return FixedPoint.of(
             self.data,
-            self.forces,
+            self.x,
             outcome=outcome,
             iterations=len(self.increments),
-            slip=slip * self.system.length,
+            slip=self.system.slip(self.x) * self.system.length,
             increments=np.array(self.increments).reshape(-1, 2),
             tolerance=self.tolerance,
             rounding=self.rounding,
             period=period,
+            free_motion=motion,
         )

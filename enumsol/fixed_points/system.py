@@ -1,30 +1,42 @@
-"""A condensed problem in 2D or 3D at one alpha, without units: what Tresca problems are solved on."""
+"""A condensed problem in 2D or 3D at one alpha, without units: what Tresca problems are solved on.
+
+The unknowns x are the scaled contact forces and, of a body that nothing holds, the scaled coordinates q of its rigid
+displacement (theory, section 14.10); of others there are r = 0 of these.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.linalg import cho_solve, solve_triangular
+from scipy.linalg import block_diag, cho_solve, solve_triangular
 
 from enumsol.arithmetic.balls import UNIT
-from enumsol.condensation.condensed import cholesky_factor, load_unit, node_units
+from enumsol.condensation.condensed import (
+    Condensation,
+    FloatingCondensation,
+    cholesky_factor,
+    condensation_of,
+    load_unit,
+    node_units,
+)
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import ContactProblem
 from enumsol.model.problem3d import ContactProblem3D
+from enumsol.model.rigid_modes import modes_of
 from enumsol.support.arguments import Alpha, alpha_value
 
 if TYPE_CHECKING:
-    from typing import Any
-
     from numpy.typing import NDArray
 
     Vector = NDArray[np.float64]
     Matrix = NDArray[np.float64]
     Problem = ContactProblem | ContactProblem3D
 
+#: Forces of a body that nothing holds that are so many times the load are taken for none.
+_MOST_FORCE = 1e6
 #: Most that coefficients may be, and given forces and slips, in units in which those of the load have size 1.
 _LARGEST = 1e100
 
@@ -36,42 +48,51 @@ def checked_problem(value: Any) -> Problem:
     ------
     InvalidArgumentError
         It is neither.
-    NotHeldError
-        Nothing holds the body: its Tresca problems need not have solutions.
     """
     if isinstance(value, (ContactProblem, ContactProblem3D)):
-        # theory, section 14.9
-        value.check_held("a fixed point", "for given bounds of friction may be too small to balance its load")
         return value
     raise InvalidArgumentError(f"problem is a {type(value).__name__}; expected a ContactProblem or a ContactProblem3D")
 
 
 @dataclass(frozen=True)
 class ContactSystem:
-    """w = g - S lambda at one alpha, scaled by powers of two (theory, section 11.2).
+    """w = g - S lambda + G' q with G lambda = h at one alpha, without units (theory, sections 11.2 and 14.10).
 
-    One factor per node makes its compliance of size one, alike in all directions, and one factor for all forces brings
-    the energy of the load, g' S^-1 g, into [1, 4) unless g = 0. Friction coefficients are unchanged.
+    One factor per node, a power of two, makes its compliance of size one, alike in all directions, and one factor for
+    all forces brings the energy of the load, g' S^-1 g + |h|^2, into [1, 4) unless g = 0 and h = 0. Friction
+    coefficients are unchanged. Units of q are such that G S^-1 G' = I.
 
     Attributes
     ----------
     problem : ContactProblem or ContactProblem3D
     alpha : float or Fraction
-    S : ((1 + d) p, (1 + d) p) array, with d = 1 or 2 tangents
-    g : ((1 + d) p,) array
+    condensed : Condensation
+    S : (m, m) array, m = (1 + d) p, with d = 1 or 2 tangents
+    g : (m,) array
+    G : (r, m) array
+    h : (r,) array
     force, length : (p,) arrays
         Factors: a force is ``force`` times its scaled one, a displacement ``length`` times.
+    rigid : (r, r) array
+        Coordinates of the rigid displacement are ``rigid`` times scaled ones.
     cholesky : array of the shape of S
         L with S = L L'.
+    compliance : float
+        Of springs that hold the body: G lambda + compliance q = h.
     """
 
     problem: Problem
     alpha: Alpha
+    condensed: Condensation = field(repr=False)
     S: Matrix = field(repr=False)
     g: Vector = field(repr=False)
+    G: Matrix = field(repr=False)
+    h: Vector = field(repr=False)
     force: Vector = field(repr=False)
     length: Vector = field(repr=False)
+    rigid: Matrix = field(repr=False)
     cholesky: Matrix = field(repr=False)
+    compliance: float = 0.0
 
     @classmethod
     def at(cls, problem: Problem, alpha: Any) -> ContactSystem:
@@ -83,17 +104,29 @@ class ContactSystem:
             alpha is not finite.
         InvalidProblemError
             The compliance is not positive definite within rounding.
+        NotHeldError
+            Some rigid displacement moves no contact node.
         """
         value = alpha_value(alpha)
-        condensed = problem.condensed
+        condensed = condensation_of(problem)
         p = problem.p
         factor = node_units(condensed.S, p)
         everywhere = np.tile(factor, len(condensed.S) // p)
         S = condensed.S * everywhere[:, None] * everywhere[None, :]
         g = condensed.free_displacements(value) * everywhere
         cholesky = cholesky_factor(S)
-        size = load_unit(g, cholesky)
-        return cls(problem, value, S, g / size, factor * size, size / factor, cholesky)
+        r = 0 if problem.modes is None else problem.modes.r
+        G: Matrix = np.zeros((r, len(S)))
+        h: Vector = np.zeros(r)
+        rigid: Matrix = np.zeros((r, r))
+        if isinstance(condensed, FloatingCondensation):
+            still, slope = condensed.h
+            G = solve_triangular(condensed.mixing, condensed.G * everywhere, lower=True, check_finite=False)
+            h = solve_triangular(condensed.mixing, still + float(value) * slope, lower=True, check_finite=False)
+            rigid = np.asarray(np.linalg.inv(condensed.mixing.T))
+        size = load_unit(np.append(g, h), block_diag(cholesky, np.eye(r)))
+        force, length = factor * size, size / factor
+        return cls(problem, value, condensed, S, g / size, G, h / size, force, length, rigid * size, cholesky)
 
     @property
     def p(self) -> int:
@@ -105,14 +138,46 @@ class ContactSystem:
         """Number of tangents, 1 or 2."""
         return len(self.g) // self.p - 1
 
+    @property
+    def m(self) -> int:
+        """Number of contact forces, (1 + d) p."""
+        return len(self.g)
+
+    @property
+    def modes(self) -> int:
+        """Number r of rigid modes of a body that nothing holds; otherwise 0."""
+        return len(self.h)
+
+    @property
+    def loaded(self) -> bool:
+        """Whether g or h is other than zero."""
+        return bool(np.any(self.g) or np.any(self.h))
+
+    def moves(self, x: Vector) -> Vector:
+        """Scaled displacements w of all rows, shape (m,)."""
+        return np.asarray(self.g - self.S @ x[: self.m] + self.G.T @ x[self.m :])
+
+    def imbalance(self, x: Vector) -> Vector:
+        """What contact forces, and springs if there are any, leave of the load on the body as a whole, shape (r,)."""
+        return np.asarray(self.h - self.G @ x[: self.m] - self.compliance * x[self.m :])
+
     @cached_property
     def load_energy(self) -> float:
-        """||g||_(S^-1): no solution has a larger energy norm (theory, section 11.3)."""
-        return float(np.linalg.norm(solve_triangular(self.cholesky, self.g, lower=True, check_finite=False)))
+        """Root of ||g||^2 in the norm of S^-1 plus |h|^2.
+
+        No solution of a body that is held has a larger energy norm (theory, section 11.3).
+        """
+        elastic = solve_triangular(self.cholesky, self.g, lower=True, check_finite=False)
+        return float(np.linalg.norm(np.append(elastic, self.h)))
 
     @cached_property
     def largest_forces(self) -> Vector:
-        """What no force of a solution exceeds, by the energy bound (theory, section 11.3), over all rows."""
+        """What no force of a solution exceeds, shape (m,): by the energy bound (theory, section 11.3).
+
+        Of a body that nothing holds there is no such bound; forces so large are taken for none (theory, section 14.10).
+        """
+        if self.modes:
+            return np.full(self.m, _MOST_FORCE)
         inverse = solve_triangular(self.cholesky, np.eye(len(self.S)), lower=True, check_finite=False)
         return np.asarray(self.load_energy * np.linalg.norm(inverse, axis=0))
 
@@ -137,36 +202,49 @@ class ContactSystem:
             raise InvalidArgumentError(f"friction is {np.max(F):g}; expected at most {_LARGEST:g} here")
         return F
 
-    def slip(self, forces: Vector, w: Vector) -> Vector:
-        """The scaled slip that coefficients depend on, shape (p,), for scaled forces and displacements of all rows."""
+    def slip(self, x: Vector) -> Vector:
+        """The scaled slip that coefficients depend on, shape (p,)."""
         mean = self.problem.slip_mean if isinstance(self.problem, ContactProblem3D) else None
         if mean is None:
-            return np.asarray(np.linalg.norm(self.split(w)[1], axis=1))
-        return np.asarray(mean(self.displacement(forces)) / self.length)
+            return np.asarray(np.linalg.norm(self.split(self.moves(x))[1], axis=1))
+        u, N = self._elastic(x), self.problem.rigid_modes
+        return np.asarray(mean(u if N is None else u + N @ self.rigid_of(x)) / self.length)
 
-    def displacement(self, forces: Vector) -> Vector:
-        """u in the problem's units, shape (n,), for scaled forces of all rows."""
-        scaled = forces * np.tile(self.force, 1 + self.tangents)
-        return self.problem.condensed.displacement(self.alpha, scaled)
+    def rigid_of(self, x: Vector) -> Vector:
+        """Coordinates of the rigid displacement in the problem's units, shape (r,)."""
+        return np.asarray(self.rigid @ x[self.m :])
 
-    def corrected(self, forces: Vector) -> tuple[ContactSystem, Vector]:
+    def unit_motion(self, rigid: Vector) -> Vector:
+        """Coordinates, in the problem's units, of a scaled rigid displacement, whose largest component becomes 1."""
+        given, N = self.rigid @ rigid, self.problem.rigid_modes
+        return given if N is None else np.asarray(given / np.max(np.abs(N @ given)))
+
+    def scaled_rigid(self, coordinates: Vector) -> Vector:
+        """Scaled coordinates of a rigid displacement, shape (r,)."""
+        return np.asarray(np.linalg.solve(self.rigid, coordinates))
+
+    def _elastic(self, x: Vector) -> Vector:
+        """u less the rigid displacement in the problem's units, shape (n,)."""
+        return self.condensed.displacement(self.alpha, x[: self.m] * np.tile(self.force, 1 + self.tangents))
+
+    def corrected(self, x: Vector) -> tuple[ContactSystem, Vector]:
         """The system with w as the body itself has it at scaled forces, and what that changes (theory, section 11.7).
 
         Returns
         -------
-        (ContactSystem, ((1 + d) p,) array)
+        (ContactSystem, (m,) array)
             The change S^-1 dg of the forces, scaled, in which statuses are not looked at.
         """
         problem = self.problem
         offset = np.concatenate([problem.gap, problem.slip_offset.ravel(order="F")])
-        w = (problem.contact_rows @ self.displacement(forces) - offset) / np.tile(self.length, 1 + self.tangents)
-        g = w + self.S @ forces
+        w = (problem.contact_rows @ self._elastic(x) - offset) / np.tile(self.length, 1 + self.tangents)
+        g = w + self.S @ x[: self.m]
         return replace(self, g=g), np.asarray(cho_solve((self.cholesky, True), g - self.g, check_finite=False))
 
-    def noise(self, forces: Vector) -> Vector:
+    def noise(self, x: Vector) -> Vector:
         """What every scaled force changes by, in the mean, where S lambda is rounded (theory, (11.13))."""
         inverse = cho_solve((self.cholesky, True), np.eye(len(self.S)), check_finite=False)
-        return np.asarray(UNIT * np.sqrt(inverse**2 @ (self.S**2 @ forces**2)))
+        return np.asarray(UNIT * np.sqrt(inverse**2 @ (self.S**2 @ x[: self.m] ** 2)))
 
     def scaled(self, values: Vector, unit: Vector, name: str) -> Vector:
         """Forces or displacements of nodes or rows by the factors ``unit``, which are those of one tangent or of all.
@@ -185,10 +263,22 @@ class ContactSystem:
         return np.asarray(scaled)
 
     def split(self, values: Vector) -> tuple[Vector, Matrix]:
-        """Normal part (p,) and tangential part (p, d) of a vector over all rows."""
+        """Normal part (p,) and tangential part (p, d) of a vector over all rows, or of x."""
         p = self.p
-        return values[:p], values[p:].reshape(-1, p).T
+        return values[:p], values[p : self.m].reshape(-1, p).T
 
-    def joined(self, normal: Vector, tangential: Matrix) -> Vector:
-        """The vector over all rows with these parts."""
-        return np.concatenate([normal, tangential.T.ravel()])
+    def joined(self, normal: Vector, tangential: Matrix, rigid: Vector) -> Vector:
+        """The x with these parts."""
+        return np.concatenate([normal, tangential.T.ravel(), rigid])
+
+
+def driven(problem: Any, alpha: Alpha, slip_bound: Vector, coefficients: Matrix, motion: Vector) -> str:
+    """In words: how the load drives the body along a rigid displacement, and how friction resists at given bounds."""
+    moved = problem.rigid_modes @ motion
+    slips = (problem.contact_rows @ moved)[problem.p :].reshape(-1, problem.p).T
+    work = float(problem.load_at(alpha) @ moved)
+    against = float(slip_bound @ np.linalg.norm(coefficients * slips, axis=1))
+    return (
+        f"along {modes_of(problem.rigid_modes, motion)} the load drives it with {work:.4g}, and friction within these "
+        f"bounds resists with at most {against:.4g}"
+    )

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from enumsol.errors import EnumsolError, InvalidArgumentError
-from enumsol.fixed_points.state import TrescaState, scaled_forces
+from enumsol.errors import InvalidArgumentError
+from enumsol.fixed_points.state import TrescaState, scaled_unknowns
 from enumsol.fixed_points.system import ContactSystem, checked_problem
-from enumsol.fixed_points.tresca_newton import ACCEPTED, TrescaData
+from enumsol.fixed_points.tresca_newton import ACCEPTED, TrescaData, TrescaNotFeasible, TrescaNotSolved
 from enumsol.support.arguments import one_of
 from enumsol.support.array_arguments import real_array
 from enumsol.support.messages import counted
@@ -27,10 +27,6 @@ Solver = Literal["newton", "clarabel", "cvxpy"]
 SOLVERS = ("newton", "clarabel", "cvxpy")
 #: Residual of a solution by an interior-point method that is good enough where Newton's method does not improve it.
 _INTERIOR_POINT_ACCEPTED = 1e-7
-
-
-class TrescaNotSolved(EnumsolError, ArithmeticError):  # noqa: N818 (reads as what happened)
-    """No solver came close to the solution of a Tresca problem; the message says how close."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +67,7 @@ def solve_tresca(
     start: Any = None,
     solver: Solver = "newton",
 ) -> TrescaSolution:
-    """The one solution of the contact problem with friction of Tresca's type (theory, section 11.2).
+    """The one solution of the contact problem with friction of Tresca's type (theory, sections 11.2 and 14.10).
 
     ``|tau| <= s`` replaces ``|tau| <= lambda_n``, lambda_t = F(alpha) tau: slip bounds s are given where Coulomb's law
     has the unknown normal force.
@@ -101,6 +97,10 @@ def solve_tresca(
         A bound or slip is negative or has the wrong shape; alpha makes a coefficient negative.
     TrescaNotSolved
         No solver came close.
+    TrescaNotFeasible
+        No forces within these bounds hold a body that nothing else holds (``rigid_modes``).
+    NotHeldError
+        Some rigid displacement of a body that nothing holds moves no contact node.
     MissingDependencyError
         CVXPY is asked for and not installed.
 
@@ -119,9 +119,9 @@ def solve_tresca(
     data = TrescaData(system, bound, system.coefficients(system.scaled(slips, system.length, "slip")))
     if solver == "cvxpy":
         return _by_cvxpy(data)
-    guess = np.zeros(len(system.g)) if start is None else scaled_forces(system, start)
-    forces, residual, used = solve_scaled(data, guess, first="clarabel" if solver == "clarabel" else "newton")
-    return TrescaSolution.of(data, forces, residual=residual, solver=used)
+    guess = np.zeros(system.m + system.modes) if start is None else scaled_unknowns(system, start)
+    x, residual, used = solve_scaled(data, guess, first="clarabel" if solver == "clarabel" else "newton")
+    return TrescaSolution.of(data, x, residual=residual, solver=used)
 
 
 def node_values(value: ArrayLike, name: str, p: int) -> Vector:
@@ -145,36 +145,40 @@ def node_values(value: ArrayLike, name: str, p: int) -> Vector:
 
 
 def solve_scaled(data: TrescaData, start: Vector, first: str = "newton") -> tuple[Vector, float, str]:
-    """Scaled forces that solve a Tresca problem, their residual, and what found them.
+    """The x that solves a Tresca problem, its residual, and what found it.
 
     Raises
     ------
     TrescaNotSolved
         Neither Newton's method nor Clarabel came close.
+    TrescaNotFeasible
+        There is none, for a body that nothing holds.
     """
     from enumsol.fixed_points.clarabel_solver import interior_point  # a fallback
 
-    if not np.any(data.system.g):
+    if not data.system.loaded:
         return np.zeros(len(start)), 0.0, first
     found: list[tuple[float, str, Vector]] = []
     if first == "newton":
-        forces, residual = data.newton(start)
+        x, residual = data.newton(start)
         if residual <= ACCEPTED:
-            return forces, residual, "newton"
-        found.append((residual, "newton", forces))
-    rough = interior_point(data)
+            return x, residual, "newton"
+        found.append((residual, "newton", x))
+    rough, motion = interior_point(data)
+    if (driving := data.unresisted(motion)) is not None:
+        raise TrescaNotFeasible(data, driving)
     if rough is not None:
-        forces, residual = data.newton(rough)
+        x, residual = data.newton(rough)
         if residual > ACCEPTED:
-            forces, residual = data.proximal(forces)
-        found.append((residual, "clarabel", forces))
-    residual, used, forces = min(found, key=lambda item: item[0], default=(np.inf, "", start))
+            x, residual = data.proximal(x)
+        found.append((residual, "clarabel", x))
+    residual, used, x = min(found, key=lambda item: item[0], default=(np.inf, "", start))
     if residual > _INTERIOR_POINT_ACCEPTED:
         raise TrescaNotSolved(
             f"the Tresca problem at alpha = {float(data.system.alpha):g} was not solved: the residual relative to the "
             f"load is {residual:.1e}; expected at most {_INTERIOR_POINT_ACCEPTED:g} (are the data badly scaled?)"
         )
-    return forces, residual, used
+    return x, residual, used
 
 
 def _by_cvxpy(data: TrescaData) -> TrescaSolution:
@@ -182,7 +186,9 @@ def _by_cvxpy(data: TrescaData) -> TrescaSolution:
 
     system = data.system
     reference = TrescaReference(system.problem)
-    normal, tangential, _ = reference.solve(data.bound * system.force, data.F, system.problem.load_at(system.alpha))
-    forces = system.joined(normal / system.force, tangential / system.force[:, None])
-    residual = data.residual(forces, data.displacements(forces))
-    return TrescaSolution.of(data, forces, residual=residual, solver="cvxpy")
+    normal, tangential, u = reference.solve(data.bound * system.force, data.F, system.problem.load_at(system.alpha))
+    # springs at ``held`` would carry nothing (theory, section 14.1)
+    modes = system.problem.modes
+    q = np.zeros(0) if modes is None else np.linalg.solve(modes.N[modes.held], u[modes.held])
+    x = system.joined(normal / system.force, tangential / system.force[:, None], system.scaled_rigid(q))
+    return TrescaSolution.of(data, x, residual=data.residual(x), solver="cvxpy")

@@ -7,9 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
+from scipy.optimize import linprog
+
+from enumsol.errors import EnumsolError
+from enumsol.fixed_points.system import driven
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from enumsol.fixed_points.system import ContactSystem
@@ -26,6 +32,34 @@ ACCEPTED, ROUNDING = 1e-11, 1e-15
 MOST_PROXIMAL, _FIRST_RHO, _LEAST_RHO = 60, 1e-3, 1e-14
 #: Tangential forces that cannot get larger than this [as above] are none: far below rounding, far above underflow.
 _NEGLIGIBLE = 1e-100
+#: Where normals and sticking forces resist a rigid displacement less, relative to all forces, they do not at all.
+_FREE = 1e-10
+#: Forces, displacements and what is left of slip bounds [as above] that count as zero where it is asked how a body may
+#: move on.
+_TIGHT = 1e-8
+#: A load that is in balance but for less than this is; slip bounds above the second number [as above] are seldom
+#: reached; and directions that are this close to a plane may be meant to be in it.
+_BALANCED, _LARGE, _NEARLY = 1e-10, 1e3, (0.1, 1e-3, 0.0)
+
+
+class TrescaNotSolved(EnumsolError, ArithmeticError):  # noqa: N818 (reads as what happened)
+    """No solver came close to the solution of a Tresca problem; the message says how close."""
+
+
+class TrescaNotFeasible(TrescaNotSolved):
+    """No forces within the slip bounds hold a body that nothing else holds: the Tresca problem has no solution.
+
+    Attributes
+    ----------
+    motion : (r,) array
+        Coordinates of a rigid displacement, with 1 as its largest component, along which the load drives the body.
+    """
+
+    def __init__(self, data: TrescaData, motion: Vector) -> None:
+        system = data.system
+        self.motion = system.unit_motion(motion)
+        words = driven(system.problem, system.alpha, data.bound * system.force, data.F, self.motion)
+        super().__init__(f"no forces within the slip bounds hold the body: {words}")
 
 
 @dataclass(frozen=True)
@@ -51,90 +85,176 @@ class TrescaData:
         with np.errstate(over="ignore"):
             return np.asarray(self.F * self.bound[:, None] > _NEGLIGIBLE)
 
-    def displacements(self, forces: Vector) -> Vector:
-        """Scaled w = g - S lambda of all rows."""
-        return np.asarray(self.system.g - self.system.S @ forces)
-
     def steps(self) -> tuple[Vector, Vector]:
         """Factors r of (11.3), by node: for normals and for tangents, each (p,)."""
         normal, tangential = self.system.split(np.diagonal(self.system.S))
         largest = np.max(self.F**2 * tangential, axis=1)
         return 1.0 / normal, 1.0 / np.where(largest > 0, largest, 1.0)
 
-    def residual(self, forces: Vector, w: Vector) -> float:
-        """The largest entry of (11.3) at scaled forces and displacements, in forces."""
-        normal, tangential = self.system.split(forces)
-        w_n, v, tau = self._in_tau(forces, w)
+    def residual(self, x: Vector) -> float:
+        """The largest entry of (11.3) and of the equilibrium of the body as a whole, in forces."""
+        return self._residual(x, self.system.moves(x))
+
+    def _residual(self, x: Vector, w: Vector) -> float:
+        normal, tangential = self.system.split(x)
+        w_n, v, tau = self._in_tau(x, w)
         r_n, r_t = self.steps()
         moved = tau + r_t[:, None] * v
         size = np.linalg.norm(moved, axis=1)
         projected = moved * (self.bound / np.maximum(size, self.bound, where=size > 0, out=np.ones_like(size)))[:, None]
         gap_n = normal - np.maximum(normal + r_n * w_n, 0.0)
         gap_t = np.where(self.occurs, self.F * (tau - projected), tangential)
-        return float(max(np.max(np.abs(gap_n)), np.max(np.abs(gap_t))))
+        rest = np.max(np.abs(self.system.imbalance(x)), initial=0.0)
+        return float(max(np.max(np.abs(gap_n)), np.max(np.abs(gap_t)), rest))
 
     def newton(self, start: Vector) -> tuple[Vector, float]:
-        """The best point of a Newton method from scaled forces, and its residual, which the caller judges."""
-        normal, tangential = self.system.split(start)
-        forces = self.system.joined(normal, np.where(self.occurs, tangential, 0.0))
-        w = self.displacements(forces)
-        best, least, stalled = forces, self.residual(forces, w), 0
+        """The best point of a Newton method from x, and its residual, which the caller judges."""
+        system = self.system
+        normal, tangential = system.split(start)
+        x = system.joined(normal, np.where(self.occurs, tangential, 0.0), start[system.m :])
+        w = system.moves(x)
+        best, least, stalled = x, self._residual(x, w), 0
         for _ in range(MOST_STEPS):
             if least <= ROUNDING or (least <= ACCEPTED and stalled):
                 break
             try:
-                forces = forces + self._step(forces, w)
+                x = x + self._step(x, w)
             except LinAlgError:
                 break
-            w = self.displacements(forces)
-            residual = self.residual(forces, w)
+            w = system.moves(x)
+            residual = self._residual(x, w)
             if not np.isfinite(residual):
                 break
             stalled = stalled + 1 if residual >= 0.5 * least else 0
             if residual < least:
-                best, least = forces, residual
+                best, least = x, residual
         return best, least
 
     def proximal(self, start: Vector) -> tuple[Vector, float]:
-        """The best point of a proximal point method from scaled forces, and its residual: slower than Newton's alone.
+        """The best point of a proximal point method from x, and its residual: slower than Newton's alone.
 
-        The solutions for (S + rho, g + rho lambda) converge to that of the problem from everywhere, and Newton's
-        method finds them where it does not find the solution itself: rho grows until it does, and shrinks after that.
+        The solutions for (S + rho, g + rho lambda), and with springs of the compliance rho that carry no force at q,
+        converge to that of the problem from everywhere, and Newton's method finds them where it does not find the
+        solution itself: rho grows until it does, and shrinks after that.
         """
-        best, least = start, self.residual(start, self.displacements(start))
-        forces, rho = best, _FIRST_RHO
+        system, m = self.system, self.system.m
+        best, least = start, self.residual(start)
+        x, rho = best, _FIRST_RHO
         for _ in range(MOST_PROXIMAL):
             if least <= ACCEPTED:
                 break
-            S = self.system.S + rho * np.eye(len(forces))
-            near = replace(self, system=replace(self.system, S=S, g=self.system.g + rho * forces))
-            found, inner = near.newton(forces)
+            S, g, h = system.S + rho * np.eye(m), system.g + rho * x[:m], system.h + rho * x[m:]
+            near = replace(self, system=replace(system, S=S, g=g, h=h, compliance=rho))
+            found, inner = near.newton(x)
             if inner > ACCEPTED:
                 rho *= 8.0
                 continue
-            forces, rho = found, max(0.125 * rho, _LEAST_RHO)
-            residual = self.residual(forces, self.displacements(forces))
+            x, rho = found, max(0.125 * rho, _LEAST_RHO)
+            residual = self.residual(x)
             if residual < least:
-                best, least = forces, residual
+                best, least = x, residual
         return best, least
 
-    def _in_tau(self, forces: Vector, w: Vector) -> tuple[Vector, Matrix, Matrix]:
+    def free_motion(self, x: Vector) -> Vector | None:
+        """A scaled rigid displacement by which a solution x may move a little and remain one; None if there is none.
+
+        Normals with a force and nodes that stick do not move, and no slip turns. Of the others, nodes that touch must
+        not penetrate, and those that begin to slip must do so along their friction force: one linear program for each
+        direction that is left, and its opposite.
+        """
+        system, modes = self.system, self.system.modes
+        if not modes:
+            return None
+        p, d = system.p, system.tangents
+        normal, _ = system.split(x)
+        w_n, v, tau = self._in_tau(x, system.moves(x))
+        along_n = system.G[:, :p].T
+        along_t = np.where(self.occurs, self.F, 0.0)[:, :, None] * system.G[:, p:].reshape(modes, d, p).T
+        size = np.linalg.norm(tau, axis=1)
+        slides = np.any(self.occurs, axis=1) & (size >= (1.0 - _TIGHT) * self.bound)
+        way = np.divide(tau, size[:, None], out=np.zeros_like(tau), where=slides[:, None])
+        forward = np.einsum("pd,pdr->pr", way, along_t)
+        turning = (along_t - way[:, :, None] * forward[:, None, :]).reshape(-1, modes)
+        held = np.concatenate([along_n[normal > _TIGHT], turning])
+        _, values, rows = np.linalg.svd(np.concatenate([held, np.zeros((modes, modes))]))
+        free = rows[values <= _TIGHT]
+        touching = (normal <= _TIGHT) & (np.abs(w_n) <= _TIGHT)
+        begins = slides & (np.linalg.norm(v, axis=1) <= _TIGHT)
+        limits = np.concatenate([along_n[touching], -forward[begins]]) @ free.T
+        for aim in np.concatenate([np.eye(len(free)), -np.eye(len(free))]):
+            found = linprog(-aim, A_ub=limits, b_ub=np.zeros(len(limits)), bounds=(-1.0, 1.0))
+            if found.success and aim @ found.x > _TIGHT:
+                return np.asarray(free.T @ found.x)
+        return None
+
+    def unresisted(self, motion: Vector) -> Vector | None:
+        """A scaled rigid displacement along which no forces within the bounds withstand the load, near a given one.
+
+        It proves, within rounding, that there are none in balance but beyond `largest_forces` (theory, section 14.10).
+        What moves normals, or nodes of large bounds, hardly at all is left out if that makes no difference. None: no
+        such displacement is found.
+        """
+        system = self.system
+        most = np.minimum(self.bound, system.largest_forces[: system.p])
+        spans = np.concatenate([np.ones((system.p, 1)), self.F * most[:, None]], axis=1).T.ravel() * system.G
+        size = np.linalg.norm(spans, axis=0)
+        large = np.concatenate([np.ones(system.p, dtype=bool), np.tile(most >= _LARGE, system.tangents)]) & (size > 0)
+        spans = spans[:, large] / size[large]
+        z = motion / (np.linalg.norm(motion) or 1.0)
+        for nearly in _NEARLY:
+            tight = spans[:, np.abs(spans.T @ z) <= nearly]
+            candidate = z - tight @ (np.linalg.pinv(tight) @ z)
+            along_n, along_t = system.split(system.G.T @ candidate)
+            work, against = float(system.h @ candidate), float(most @ np.linalg.norm(self.F * along_t, axis=1))
+            lifted = float(np.sum(np.maximum(along_n, 0.0))) * float(system.largest_forces[0])
+            if work - against > max(lifted, _BALANCED * system.load_energy):
+                return np.asarray(candidate)
+        return None
+
+    def _in_tau(self, x: Vector, w: Vector) -> tuple[Vector, Matrix, Matrix]:
         """w_n, v = F w_t and tau at a point; zero where tau does not occur."""
-        (_, lambda_t), (w_n, w_t) = self.system.split(forces), self.system.split(w)
+        (_, lambda_t), (w_n, w_t) = self.system.split(x), self.system.split(w)
         tau = np.divide(lambda_t, self.F, out=np.zeros_like(lambda_t), where=self.occurs)
         return w_n, np.where(self.occurs, self.F * w_t, 0.0), tau
 
-    def _step(self, forces: Vector, w: Vector) -> Vector:
+    def _step(self, x: Vector, w: Vector) -> Vector:
         """One Newton step of (11.3).
 
         Some directions of lambda move by known steps: normals that open, and sliding pairs along z = tau + r v. In the
         others, the columns of Q, the equation is Q' S dlambda + shift = Q' w weight, symmetric positive definite: for
         normals in contact and for sticking tau w vanishes after the step; across z the derivative of the projection
         is delta = s / |z|, which gives the shift (1 - delta) / r and the weight 1 / delta for columns times delta^1/2.
+        A rigid displacement adds -Q' G' dq, by which G dlambda restores the equilibrium of the body as a whole; where
+        no column resists it, it stays as it is.
         """
+        system, m = self.system, self.system.m
+        known, Q, shift, weight = self._directions(x, w)
+        step = np.append(known, np.zeros(system.modes))
+        solve = self._solver(Q, shift)
+        step[:m] += Q @ solve(weight * (Q.T @ w) - Q.T @ (system.S @ known))
+        if system.modes:
+            resisted = (system.G @ Q).T
+            values, vectors = eigh(resisted.T @ solve(resisted))
+            values, rest = values + system.compliance, system.imbalance(x) - system.G @ step[:m]
+            kept = vectors[:, values > _FREE]
+            step[m:] = kept @ (kept.T @ rest / values[values > _FREE])
+            step[:m] += Q @ solve(resisted @ step[m:])
+        return step
+
+    def _solver(self, Q: sp.csc_array, shift: Vector) -> Callable[[Matrix], Matrix]:
+        """Solves with Q' S Q + shift."""
+        matrix = Q.T @ self.system.S @ Q
+        if len(matrix) == 0:
+            return lambda right: right
+        matrix[np.diag_indices_from(matrix)] += shift
+        factor = cho_factor(matrix, lower=True, overwrite_a=True, check_finite=False)
+        return lambda right: np.asarray(cho_solve(factor, right, check_finite=False))
+
+    def _directions(self, x: Vector, w: Vector) -> tuple[Vector, sp.csc_array, Vector, Vector]:
+        """Of a Newton step: the known part of dlambda, Q, and the shift and the weight of its equations."""
         p, d = self.system.p, self.system.tangents
-        normal, _ = self.system.split(forces)
-        w_n, v, tau = self._in_tau(forces, w)
+        normal, _ = self.system.split(x)
+        w_n, v, tau = self._in_tau(x, w)
         r_n, r_t = self.steps()
         moved = tau + r_t[:, None] * v
         size = np.linalg.norm(moved, axis=1)
@@ -169,13 +289,5 @@ class TrescaData:
             shape=((1 + d) * p, counts[-1]),
         )
         ones = np.ones(counts[2])
-        weight = np.concatenate([ones, 1.0 / delta])
         shift = np.concatenate([0.0 * ones, (1.0 - delta) / r_t[node_a]])
-        rows = Q.T @ self.system.S
-        rhs = weight * (Q.T @ w) - rows @ known.ravel()
-        matrix = rows @ Q
-        matrix[np.diag_indices_from(matrix)] += shift
-        if len(matrix) == 0:
-            return known.ravel()
-        factor = cho_factor(matrix, lower=True, overwrite_a=True, check_finite=False)
-        return np.asarray(known.ravel() + Q @ cho_solve(factor, rhs, check_finite=False))
+        return known.ravel(), Q, shift, np.concatenate([ones, 1.0 / delta])

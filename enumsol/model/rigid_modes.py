@@ -13,6 +13,7 @@ from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.support.arguments import positive_number
 from enumsol.support.array_arguments import real_array
 from enumsol.support.immutable import Sealed, sealed
+from enumsol.support.messages import listed
 
 if TYPE_CHECKING:
     from enumsol.support.array_types import Floats
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 MODE_TOLERANCE = 1e-9
 #: Pivots of the modes below this fraction of the largest mean dependent modes.
 INDEPENDENCE_TOLERANCE = 1e-9
+#: Modes that have less than this part of the largest share in a displacement are not named.
+NAMED = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +110,13 @@ def largest_displacement(value: float | None, modes: RigidModes | None) -> float
         return positive_number(value, "max_rigid_displacement")
     except InvalidArgumentError as error:
         raise InvalidProblemError(str(error)) from None
+
+
+def modes_of(N: Floats, coordinates: Any) -> str:
+    """The rigid modes that a rigid displacement consists of, in words: "rigid mode 0", "rigid modes 0 and 2"."""
+    size = np.abs(coordinates) * np.max(np.abs(N), axis=0)
+    names = np.flatnonzero(size > NAMED * np.max(size)).tolist()
+    return f"rigid mode{'s' if len(names) > 1 else ''} {listed(names)}"
 
 
 def _pivots(N: Floats) -> Any:

@@ -7,6 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from command_line import assert_refused
+from helpers.floating_oracle import block_on_table
 
 import enumsol
 from enumsol.fixed_points import FixedPoint, successive
@@ -112,3 +113,18 @@ def test_ctrl_c_prints_the_last_iterate(capsys, monkeypatch):
 )
 def test_bad_input_is_one_sentence(capsys, arguments, message):
     assert_refused(*run(capsys, *arguments), message)
+
+
+def test_a_body_that_nothing_holds(capsys, tmp_path):
+    enumsol.write_problem(block_on_table(push=0.5), tmp_path / "rests.npz")
+    enumsol.write_problem(block_on_table(push=1.1), tmp_path / "slides.npz")
+    status, out, _ = run(capsys, tmp_path / "rests.npz", "--json", "-")
+    assert status == 0
+    assert np.allclose(json.loads(out)["rigid_coordinates"], 0)
+    assert json.loads(out)["free_motion"] is None
+    status, out, _ = run(capsys, tmp_path / "slides.npz")
+    assert status == 3
+    assert "the load drives it with 0.825" in " ".join(out.split())
+    status, _, err = run(capsys, tmp_path / "slides.npz", "--starts", 3)
+    assert status == 2
+    assert "has no isolated solution at alpha = 0" in err

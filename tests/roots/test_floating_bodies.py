@@ -245,8 +245,7 @@ def test_modes_that_cannot_be_used(change, words):
 @pytest.mark.parametrize(
     "call",
     [
-        lambda problem: enumsol.solve_tresca(problem, 0, 1),
-        lambda problem: enumsol.successive_approximations(problem, 0),
+        lambda problem: enumsol.lipschitz_estimate(problem, 0),
         lambda problem: problem.condensed,
         lambda problem: problem.enclosure,
         lambda problem: problem.factorization,

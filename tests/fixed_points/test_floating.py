@@ -1,0 +1,249 @@
+"""Fixed points of bodies that nothing holds: against enumeration in rationals, and the conditions as they are."""
+
+import numpy as np
+import pytest
+from helpers.floating_oracle import Oracle, block_on_table, random_body
+from helpers.floating_space import known_body, on_weak_springs
+from scipy.optimize import linprog
+
+import enumsol
+from enumsol.fixed_points import FixedPoint, Outcome, TrescaNotFeasible, fixed_point_residual
+
+ALPHAS = (0, 0.25, 0.5)
+
+
+def violation(problem, alpha, u, lambda_n, lambda_t, F=None, bound=None):
+    """How far displacements and forces are from solving the problem, from A, B and f as they are."""
+    p = problem.p
+    forces = np.concatenate([lambda_n, np.asarray(lambda_t).ravel(order="F")])
+    w = problem.contact_rows @ u
+    u_n, u_t = w[:p] - problem.gap, w[p:].reshape(-1, p).T - problem.slip_offset.reshape(p, -1)
+    F = problem.friction_at(alpha).reshape(p, -1) if F is None else F
+    bound = lambda_n if bound is None else bound
+    force = np.asarray(lambda_t).reshape(u_t.shape)
+    share = np.linalg.norm(np.divide(force, F, out=np.zeros_like(force), where=F > 0), axis=1)
+    power = np.sum(force * u_t, axis=1) - np.linalg.norm(F * u_t, axis=1) * bound
+    rest = problem.A @ u + problem.contact_rows.T @ forces - problem.load_at(alpha)
+    found = rest, np.maximum(u_n, 0), np.minimum(lambda_n, 0), u_n * lambda_n, power, np.where(F > 0, 0, force)
+    return max(*(np.max(np.abs(part)) for part in found), np.max(share - bound))
+
+
+def checked(problem, alpha, found):
+    """A limit that satisfies the conditions, and still does where the body is said to move on."""
+    data = found.lambda_n, found.lambda_t, found.coefficients
+    size = 1 + np.max(np.abs(found.u)) + np.max(np.abs(found.forces))
+    assert violation(problem, alpha, found.u, *data) < 1e-8 * size**2
+    if found.free_motion is not None:
+        moved = found.u + 1e-5 * problem.rigid_modes @ found.free_motion
+        assert violation(problem, alpha, moved, *data) < 1e-8 * size**2
+
+
+class Known:
+    """A solution known otherwise."""
+
+    def __init__(self, alpha, lambda_n, lambda_t, u_t):
+        self.alpha, self.lambda_n, self.lambda_t, self.u_t = alpha, lambda_n, lambda_t, u_t
+
+
+def kept_of(seed):
+    """What became of a random body in the plane, beside all its solutions in rationals."""
+    problem, alpha = random_body(seed), ALPHAS[seed % 3]
+    oracle = Oracle(problem, alpha)
+    try:
+        found = enumsol.successive_approximations(problem, alpha, max_iterations=200)
+    except enumsol.NotHeldError:  # a rigid displacement moves no contact node
+        return None
+    forces, u = oracle.forces
+    for row, moved in zip(forces, u, strict=True):
+        slip = problem.Bt @ moved - problem.slip_offset
+        root = Known(alpha, row[: problem.p], row[problem.p :], slip)
+        assert fixed_point_residual(problem, root) < 1e-9
+    if found.converged:
+        checked(problem, alpha, found)
+        if not oracle.families and np.max(np.abs(found.rigid_displacement)) <= problem.rigid_reach:
+            assert found.free_motion is None
+            here = np.concatenate([found.lambda_n, found.lambda_t, found.u])
+            away = np.max(np.abs(np.hstack([forces, u]) - here), axis=1)
+            assert np.min(away) < 1e-6 * (1 + np.max(np.abs(here)))
+    elif found.outcome is Outcome.NOT_HELD:
+        assert not len(forces)
+        assert not oracle.families
+        assert found.why.startswith("there is no solution")
+    else:
+        assert found.outcome in (Outcome.NOT_FEASIBLE, Outcome.CYCLE, Outcome.ITERATION_LIMIT)
+    return found.outcome
+
+
+@pytest.mark.few(0, 8)
+@pytest.mark.parametrize("seed", range(40_000, 40_300))
+def test_limits_are_among_all_solutions_in_rationals(seed):
+    kept_of(seed)
+
+
+@pytest.mark.slow
+def test_every_outcome_is_among_them():
+    found = {kept_of(seed) for seed in (91, 116, 125, 196, 274)}
+    assert {Outcome.CONVERGED, Outcome.NOT_HELD, Outcome.NOT_FEASIBLE} <= found
+
+
+@pytest.mark.few(3, 10)
+@pytest.mark.parametrize("seed", range(300))
+def test_a_known_solution_in_space_is_a_fixed_point(seed):
+    known = known_body(seed)
+    problem, p = known.problem, known.problem.p
+    slip = (problem.contact_rows @ known.u)[p:].reshape(2, p).T - problem.slip_offset
+    assert fixed_point_residual(problem, Known(0, known.lambda_n, known.lambda_t, slip)) < 1e-9
+    found = enumsol.successive_approximations(problem, 0, max_iterations=300)
+    if found.converged:
+        checked(problem, 0, found)
+    else:
+        assert found.outcome in (Outcome.NOT_FEASIBLE, Outcome.CYCLE, Outcome.ITERATION_LIMIT)
+
+
+def is_feasible(problem, alpha, bound):
+    """Whether some forces within slip bounds hold a body in the plane, by a linear program in other unknowns."""
+    F, N = problem.friction_at(alpha), problem.rigid_modes
+    resultants = (problem.contact_rows @ N).T
+    limits = [(0, None)] * problem.p + [(-s, s) for s in F * bound]
+    return linprog(np.zeros(2 * problem.p), A_eq=resultants, b_eq=N.T @ problem.load_at(alpha), bounds=limits).success
+
+
+@pytest.mark.few(2, 12)
+@pytest.mark.parametrize("seed", range(300))
+def test_bounds_within_which_nothing_holds_the_body_are_told_apart(seed):
+    rng = np.random.default_rng(seed)
+    problem = random_body(seed + 1000)
+    bound = 10.0 ** rng.uniform(-2, 1) * rng.uniform(0, 1, problem.p)
+    try:
+        found = enumsol.solve_tresca(problem, bound, 0)
+    except TrescaNotFeasible as error:
+        assert not is_feasible(problem, 0, bound)
+        moved = problem.rigid_modes @ error.motion
+        rows = problem.contact_rows @ moved
+        assert np.max(np.abs(moved)) == pytest.approx(1.0)
+        # the load does more work along it than all forces that are allowed
+        assert np.max(rows[: problem.p]) < 1e-6
+        assert problem.f @ moved > (bound * problem.friction_at(0)) @ np.abs(rows[problem.p :])
+    except enumsol.NotHeldError:
+        return
+    else:
+        assert is_feasible(problem, 0, bound)
+        size = 1 + np.max(np.abs(found.u)) + np.max(np.abs(found.forces))
+        data = found.lambda_n, found.lambda_t, found.coefficients
+        assert violation(problem, 0, found.u, *data, bound=bound) < 1e-8 * size**2
+
+
+@pytest.mark.parametrize("push", [0.0, 0.5, 0.99])
+def test_a_block_on_a_table(push):
+    problem = block_on_table(push=push)
+    (root,) = enumsol.enumerate_roots(problem, 0)
+    found = enumsol.successive_approximations(problem, 0)
+    assert found.converged
+    assert found.free_motion is None
+    np.testing.assert_allclose(found.u, root.u, atol=1e-9)
+    np.testing.assert_allclose(found.lambda_t, root.lambda_t, atol=1e-9)
+    assert enumsol.is_fixed_point(problem, root)
+    assert enumsol.is_fixed_point(problem, found)
+
+
+def test_a_block_that_slides_or_is_lifted():
+    slides = enumsol.successive_approximations(block_on_table(push=1.0), 0)
+    assert slides.converged
+    assert slides.free_motion == pytest.approx([1.0, 0.0, 0.0], abs=1e-6)
+    assert "the body may move on along rigid mode 0 with the same forces" in slides.why
+
+    gone = enumsol.successive_approximations(block_on_table(push=1.1), 0)
+    assert (gone.outcome, gone.converged) == (Outcome.NOT_FEASIBLE, False)
+    assert gone.free_motion == pytest.approx([1.0, 0.0, 0.0], abs=1e-6)
+    # 3 nodes with 1 each, pushed at all of them by 1.1 times what friction can hold
+    assert "rigid mode 0 the load drives it with 0.825, and friction within these bounds resists with at most 0.75" in (
+        " ".join(gone.why.split())
+    )
+    problem = block_on_table()
+    lifted = enumsol.successive_approximations(problem.replace(f=-problem.f), 0)
+    assert lifted.outcome is Outcome.NOT_HELD
+    assert "however large friction is, along rigid mode 1" in lifted.why
+    assert not np.any(lifted.lambda_n)
+
+
+def test_without_friction_it_may_move_on():
+    found = enumsol.successive_approximations(block_on_table(friction=0.0), 0)
+    assert found.converged
+    assert np.abs(found.free_motion) == pytest.approx([1.0, 0.0, 0.0], abs=1e-6)
+
+
+@pytest.mark.parametrize("make", [lambda: block_on_table(push=0.5), lambda: known_body(1).problem])
+def test_three_solvers_agree(make):
+    problem = make()
+    bound = np.full(problem.p, 2.0)
+    one, two, three = (
+        enumsol.solve_tresca(problem, bound, 0, solver=solver) for solver in ("newton", "clarabel", "cvxpy")
+    )
+    for other in (two, three):
+        np.testing.assert_allclose(other.forces, one.forces, atol=1e-6)
+        np.testing.assert_allclose(other.u, one.u, atol=1e-6)
+        np.testing.assert_allclose(other.rigid_coordinates, one.rigid_coordinates, atol=1e-6)
+
+
+def test_the_reference_finds_nothing_where_there_is_nothing():
+    with pytest.raises(enumsol.fixed_points.TrescaNotSolved, match="CVXPY found no solution"):
+        enumsol.solve_tresca(block_on_table(push=0.5), 0.0, 0, solver="cvxpy")
+
+
+def test_the_basis_of_the_modes_and_units_do_not_matter():
+    problem = block_on_table(push=0.5)
+    N = problem.rigid_modes @ np.array([[1, 2, 0], [0, 1, -1], [1, 0, 4]])
+    one = enumsol.successive_approximations(problem, 0)
+    two = enumsol.successive_approximations(problem.replace(rigid_modes=N), 0)
+    three = enumsol.successive_approximations(problem.replace(f=1e-9 * problem.f), 0)
+    np.testing.assert_allclose(two.u, one.u, atol=1e-10)
+    np.testing.assert_allclose(1e9 * three.u, one.u, atol=1e-10)
+
+
+def test_weak_springs_tend_to_it():
+    problem = known_body(5).problem
+    free = enumsol.successive_approximations(problem, 0)
+    far = [
+        np.max(np.abs(enumsol.successive_approximations(on_weak_springs(problem, k), 0, free).u - free.u))
+        for k in (1e-3, 1e-5)
+    ]
+    assert far[0] < 0.1
+    assert far[1] < 0.02 * far[0]
+
+
+def test_friction_that_depends_on_the_slip():
+    problem = known_body(5).problem.replace(friction=lambda node, slip: (0.3 + 0.1 * np.exp(-slip), 0.4))
+    found = enumsol.successive_approximations(problem, 0)
+    assert found.converged
+    checked(problem, 0, found)
+    expected = problem.coefficients(0, np.linalg.norm(found.u_t, axis=1))
+    np.testing.assert_allclose(found.coefficients, expected, atol=1e-9)
+
+
+def test_which_starts_reach_the_root():
+    problem = block_on_table(push=0.5)
+    roots = enumsol.enumerate_roots(problem, 0)
+    table = enumsol.basin_table(problem, roots, starts=[[0, 0, 0], [1, 1, 1], [9, 0, 0]])
+    assert table["outcome"].tolist() == ["not feasible", "converged", "converged"]
+    assert table["root"].tolist()[1:] == [0, 0]
+
+
+@pytest.mark.parametrize("push", [0.5, 1.0, 1.1])
+def test_saved_and_loaded(tmp_path, push):
+    problem = block_on_table(push=push)
+    found = enumsol.successive_approximations(problem, 0)
+    found.save(tmp_path / "found.npz")
+    again = FixedPoint.load(tmp_path / "found.npz", problem)
+    assert repr(again) == repr(found)
+    assert np.array_equal(again.u, found.u)
+    held = enumsol.ContactProblem(np.eye(12), problem.Bn, problem.Bt, problem.f)
+    assert FixedPoint.load(tmp_path / "found.npz", held).rigid_coordinates is None
+    other = problem.replace(rigid_modes=problem.rigid_modes)
+    with pytest.raises(enumsol.InvalidArgumentError, match="rigid_coordinates of shape"):
+        enumsol.successive_approximations(other, 0, _with(found, rigid_coordinates=np.zeros(2)))
+
+
+def _with(found, **values):
+    copy = Known(found.alpha, found.lambda_n, found.lambda_t, found.u_t)
+    copy.__dict__.update(values)
+    return copy
