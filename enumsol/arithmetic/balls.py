@@ -13,6 +13,8 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
@@ -43,33 +45,56 @@ def upper_norm(values: Array, axis: int | None = None) -> Any:
     return np.sqrt(upper_sum(values * values, axis=axis)) * SAFE
 
 
-def residual(A: sp.csr_array, X: Array, K: Array) -> tuple[Array, Array]:
-    """K - A X as a ball, in about half as much again as the working precision.
+class SlicedMatrix:
+    """A sparse matrix, cut for residuals in about twice the working precision.
 
-    The leading bits of A and X, multiples of one unit in every row of A and column of X and few enough that A1 X1 is
-    summed without any rounding, are split off (Ozaki and others 2012); what is left is small.
+    A and X are cut into three slices, A1 + A2 + A3 and X1 + X2 + X3: the leading bits, those that follow, both as
+    multiples of one unit in every row of A and column of X and few enough that A1 X1, A1 X2 and A2 X1 are summed
+    without any rounding (Ozaki and others 2012), and what is left, which is small.
     """
-    longest = int(np.max(np.diff(A.indptr), initial=0))
-    bits = (52 - longest.bit_length()) // 2
-    rows = np.repeat(np.arange(A.shape[0]), np.diff(A.indptr))
-    data = sp.csr_array((np.abs(A.data), A.indices, A.indptr), shape=A.shape)
-    largest = data.max(axis=1).toarray().ravel()
-    high_data = _leading(A.data, largest[rows], bits)
-    high = sp.csr_array((high_data, A.indices, A.indptr), shape=A.shape)
-    low = sp.csr_array((A.data - high_data, A.indices, A.indptr), shape=A.shape)
-    X_size = np.max(np.abs(X), axis=0, initial=0.0)
-    X_high = _leading(X, X_size, bits)
-    X_low = X - X_high
-    exact = high @ X_high
-    summed, lost = _two_sum(K, -exact)
-    rest = high @ X_low + low @ X
-    correction = lost - rest
-    value = summed + correction
-    k = gamma(longest + 3)
-    size = np.outer(upper_sum_of_rows(high), np.max(np.abs(X_low), axis=0, initial=0.0))
-    size += np.outer(upper_sum_of_rows(low), X_size)
-    radius = 2.0 * UNIT * (np.abs(value) + np.abs(correction)) + k * size * (1.0 + k) + (4 * longest + 4) * TINY
-    return value, radius * SAFE
+
+    def __init__(self, A: sp.csr_array) -> None:
+        longest = int(np.max(np.diff(A.indptr), initial=0))
+        rows = np.repeat(np.arange(A.shape[0]), np.diff(A.indptr))
+
+        def of_rows(data: Array) -> sp.csr_array:
+            return sp.csr_array((data, A.indices, A.indptr), shape=A.shape)
+
+        def largest(data: Array) -> Array:
+            return np.asarray(of_rows(np.abs(data)).max(axis=1).toarray().ravel()[rows])
+
+        self._bits = (52 - longest.bit_length()) // 2
+        self._longest = longest
+        self._slices = [of_rows(data) for data in _slices(A.data, largest, self._bits)]
+        self._sums = [upper_sum_of_rows(part) for part in self._slices]
+
+    def residual(self, X: Array, K: Array) -> tuple[Array, Array]:
+        """K - A X as a ball."""
+        A1, A2, A3 = self._slices
+        X1, X2, X3 = _slices(X, _largest_of_columns, self._bits)
+        value, correction, lost = K, np.zeros_like(K), np.zeros_like(K)
+        for exact in (A1 @ X1, A1 @ X2, A2 @ X1):
+            value, error = _two_sum(value, -exact)
+            correction, lost = correction + error, lost + np.abs(error)
+        later = X2 + X3
+        rest = A1 @ X3 + A2 @ later + A3 @ X
+        value = value + (correction - rest)
+        size = sum(map(np.outer, self._sums, map(_largest_of_columns, (X3, later, X))))
+        k = gamma(self._longest + 5)
+        radius = 2.0 * UNIT * np.abs(value) + 4.0 * UNIT * (lost + np.abs(rest)) + k * size * (1.0 + k)
+        return value, (radius + (8 * self._longest + 8) * TINY) * SAFE
+
+
+def _slices(values: Array, largest: Callable[[Array], Array], bits: int) -> tuple[Array, Array, Array]:
+    """Values as a sum without rounding: of leading bits, of as many that follow, and of the rest."""
+    first = _leading(values, largest(values), bits)
+    rest = values - first
+    second = _leading(rest, largest(rest), bits)
+    return first, second, rest - second
+
+
+def _largest_of_columns(values: Array) -> Array:
+    return np.asarray(np.max(np.abs(values), axis=0, initial=0.0))
 
 
 def _leading(values: Array, size: Array, bits: int) -> Array:

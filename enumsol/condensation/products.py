@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, gamma, residual, upper_norm
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, SlicedMatrix, gamma, upper_norm
 from enumsol.condensation.data import CondensableData
 from enumsol.support.deadlines import look
 from enumsol.support.immutable import Sealed
@@ -105,7 +105,7 @@ class Products(Sealed):
                 return np.asarray(problem.factorization.solve(columns / scale[:, None], refined=False) / scale[:, None])
 
             k = gamma(int(np.max(np.diff(B.indptr))) + 1)
-            few, B_size, A_size = gamma(int(np.max(np.diff(A.indptr))) + 3), abs(B), abs(A)
+            B_size, sliced = abs(B), SlicedMatrix(A)
             mid, rounded = np.empty((B.shape[0], K.shape[1])), np.empty((B.shape[0], K.shape[1]))
             lengths, left = np.empty(K.shape[1]), np.empty(K.shape[1])
             for start in range(0, K.shape[1], _COLUMNS):
@@ -114,12 +114,11 @@ class Products(Sealed):
                 part = slice(start, min(start + _COLUMNS, K.shape[1]))
                 given = K[:, part].toarray()
                 X = solve(given)
-                R, R_rad = residual(A, X, given)
+                R, R_rad = sliced.residual(X, given)
                 Y = solve(R)
                 mid[:, part] = B @ X + B @ Y
-                # what Y leaves of R, with the rounding of this
-                R_rad += few * (np.abs(R) + A_size @ np.abs(Y)) * (1 + few) * SAFE
-                left[part] = upper_norm(np.abs(R - A @ Y) + R_rad, axis=0) * SAFE
+                rest, rest_rad = sliced.residual(Y, R)
+                left[part] = upper_norm((np.abs(rest) + rest_rad + R_rad) * SAFE, axis=0) * SAFE
                 sizes = np.abs(X) + np.abs(Y)
                 rounded[:, part] = (k * (B_size @ sizes) * (1 + 2 * k) + 2 * UNIT * np.abs(mid[:, part])) * SAFE
                 lengths[part] = upper_norm(sizes, axis=0) * SAFE

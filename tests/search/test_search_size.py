@@ -40,6 +40,15 @@ def test_a_hundred_nodes_with_high_friction():
     assert roots.stats.nodes < 8_000
 
 
+def test_a_soft_body_is_excluded_by_its_bounds():
+    # where balls of S were 1e5 ulps wide two bounds in five proved nothing, and the tree was unfinished at 20,000 nodes
+    roots = enumsol.enumerate_roots(gallery.clip(12, 1), 1.0)
+    assert roots.complete
+    assert (len(roots), roots.index_sum) == (3, 1)
+    assert roots.stats.nodes < 2_000
+    assert roots.stats.escalations.refined < 10
+
+
 @pytest.mark.few(2)
 @pytest.mark.parametrize("p", [8, 14, 20, 32])
 def test_wedges(p):
