@@ -1,16 +1,26 @@
 """What a graph leaves open is told with the reason and with a remedy, and the remedy helps."""
 
 import re
+from functools import partial
 
 import numpy as np
 import pytest
 from branches.test_degenerate import pair
 from path_problems import generic_problem
+from problems3d import SLIDING
 
 from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery
+from enumsol.arithmetic.rationals import rational
 from enumsol.branches import ways
 from enumsol.branches.enclosed import following, tracing
+from enumsol.branches.exact import known_selections
+from enumsol.branches.exact.gluing import glue
+from enumsol.branches.exact.known_selections import KnownSelections, named
+from enumsol.branches.space import cover
+from enumsol.condensation.exact import ExactCondensed
 from enumsol.errors import IncompleteGraphError
+from enumsol.model.statuses import STATUSES
+from enumsol.selections.solution import VertexLimitError
 
 
 def large_pitchfork(n=256):
@@ -86,3 +96,65 @@ def test_an_event_at_an_end_is_told_by_another_end(interval, elsewhere):
     graph = branch_graph(problem, interval)
     assert all("an interval that ends elsewhere decides it" in reason for reason in graph.reasons)
     assert branch_graph(problem, elsewhere).complete
+
+
+def test_a_continuum_with_too_many_vertices_is_named_with_its_statuses(monkeypatch):
+    problem = ContactProblem(np.eye(2), [[1.0, 0.0]], [[0.0, 1.0]], [1.0, 1.0], load_slope=[0.0, 1.0])
+    known = KnownSelections(ExactCondensed.from_problem(problem), rational(0), rational(1), cut_short=False)
+    monkeypatch.setattr(known_selections, "selection_arcs", _refused)
+    known.add((3,))
+    (reason,) = known.reasons
+    assert reason == "the selection slip-: as many as that; data that differ by a little may leave fewer"
+
+
+def _refused(*_):
+    raise VertexLimitError("as many as that")
+
+
+def states(codes):
+    return [STATUSES[code] for code in codes]
+
+
+def test_what_contradicts_a_search_is_told_as_a_defect():
+    problem = gallery.two_node_square()
+    graph = branch_graph(problem, (0.0, 10.0), "exact")
+    assert graph.complete
+    exact = ExactCondensed.from_problem(problem)
+    held = {codes for arc in graph.arcs for codes in arc.selections}
+    inner = [vertex for vertex in graph.vertices if not vertex.border]
+    joined = {
+        codes for codes in held if any(all(s in a for s, a in zip(states(codes), v.active, strict=True)) for v in inner)
+    }
+    assert joined
+    for left_out in sorted(joined):
+        gluing = glue(exact, held - {left_out}, rational(0), rational(10))
+        text = named(left_out)
+        assert any(text in reason and reason.endswith("please report it") for reason in gluing.reasons), left_out
+    assert named((0, 1)) == "the selection 1 open, 1 stick"
+
+
+@pytest.fixture
+def gap_in_space(monkeypatch):
+    """The reason that a graph in 3D gives for its only gap after a change of the search; it is complete otherwise."""
+
+    def told(name, value):
+        monkeypatch.setattr(cover, name, value)
+        graph = branch_graph(SLIDING, (1.78, 1.82), max_nodes=60)
+        assert not graph.complete
+        (reason,) = graph.reasons
+        low, high = (float(end) for end in re.search(r"\[(.*), (.*)\]: ", reason).groups())
+        assert 1.78 <= low < high <= 1.82
+        return reason
+
+    return told
+
+
+def test_a_curve_in_space_that_is_not_whole_is_told(gap_in_space):
+    reason = gap_in_space("_FAILURES", 0)
+    assert ": no curve through a solution there was proven to be whole; another interval, or data" in reason
+
+
+@pytest.mark.slow
+def test_a_piece_in_space_that_is_too_short_is_told(gap_in_space):
+    reason = gap_in_space("PieceTree", partial(cover.PieceTree, smallest=1.0))
+    assert ": pieces of alpha as short as are tried left statuses undecided; a graph over a short interval" in reason

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from enumsol.branches.enclosed.arc_parts import OpenCause
 from enumsol.branches.enclosed.joining import Joined, join
+from enumsol.branches.remedies import END_ELSEWHERE, SHORT_INTERVAL, TOLD_APART
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.support.deadlines import Deadline, TimeOverError, within
@@ -96,14 +97,14 @@ def _undecided(place: EventPlace, problem: ContactProblem) -> str:
 def _remedy(cause: OpenCause, problem: ContactProblem) -> str:
     """What decides such a place."""
     if cause is OpenCause.END:
-        return "an interval that ends elsewhere decides it"
+        return END_ELSEWHERE
     if problem.n <= EXACT_DOF_LIMIT:
         return 'arithmetic="exact" decides it, which may take long'
     if 2 * problem.p <= EXACT_DOF_LIMIT:
         return "the graph of problem.at_contact_nodes(), the same body up to rounding, is made by exact algebra"
     if cause is OpenCause.BOXES:
-        return "a graph over a short interval around it may decide it"
-    return "data that differ by a little may tell it apart"
+        return SHORT_INTERVAL
+    return TOLD_APART
 
 
 def follow_selections(

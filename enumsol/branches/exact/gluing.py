@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 from networkx.utils import UnionFind
 
 from enumsol.arithmetic.algebraic import CriticalAlpha, merge
-from enumsol.branches.exact.known_selections import KnownSelections
+from enumsol.branches.exact.known_selections import KnownSelections, named
+from enumsol.branches.remedies import TOLD_APART
 from enumsol.model.statuses import FINAL, OPEN
 from enumsol.roots.components import connected_components
 from enumsol.search.outcome import Stop, StopReason
@@ -232,7 +233,7 @@ def _join_members(known: KnownSelections, event: SelectionEvent, active: ActiveS
         arcs = known.arcs[codes]
         other, new = arcs.event_at(event.alpha)
         if not other.holds:
-            known.complain(f"selection {codes} should hold at alpha = {float(event.alpha):.17g} and does not")
+            known.contradict(f"{named(codes)} should hold at alpha = {float(event.alpha):.17g} and does not")
             event.settled = False
             continue
         if new:
@@ -329,9 +330,9 @@ def _component(known: KnownSelections, codes: Codes, sample: Any) -> RootCompone
     solver = FiberSelections(known.exact, sample)
     solution = solver.solve(codes)
     if solution is None:
-        known.complain(f"selection {codes} should hold at alpha = {sample} and does not")
+        known.contradict(f"{named(codes)} should hold at alpha = {sample} and does not")
         return None
     component = connected_components([solution], solver)[0]
     if component.index is None and not known.exact.reach:
-        known.complain(f"the degree of a degenerate arc near alpha = {sample} could not be found")
+        known.complain(f"the degree of a degenerate arc near alpha = {sample} could not be found; {TOLD_APART}")
     return component

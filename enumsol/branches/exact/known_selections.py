@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 from enumsol.arithmetic.number_field import exact_value
 from enumsol.branches.exact.selection_arcs import SelectionArcs, SelectionEvent, active_sets, selection_arcs
+from enumsol.branches.remedies import DEFECT, FEWER
 from enumsol.branches.sheets import sheet_arcs
+from enumsol.model.statuses import contact_status
+from enumsol.roots.root import summary
 from enumsol.selections.ordered_field import FiberSelections
 from enumsol.selections.solution import VertexLimitError
 from enumsol.support.deadlines import look
@@ -17,6 +20,11 @@ if TYPE_CHECKING:
     from enumsol.arithmetic.algebraic import CriticalAlpha
     from enumsol.condensation.exact import ExactCondensed
     from enumsol.selections.solution import ActiveSets, Codes
+
+
+def named(codes: Codes) -> str:
+    """A selection as text, with the statuses of its nodes in their order."""
+    return f"the selection {summary([contact_status(code, 0.0) for code in codes])}"
 
 
 class KnownSelections:
@@ -59,6 +67,10 @@ class KnownSelections:
         if reason not in self.reasons:
             self.reasons.append(reason)
 
+    def contradict(self, what: str) -> None:
+        """Add a reason that contradicts what the search has proven."""
+        self.complain(f"{what}; {DEFECT}")
+
     # -- taking in -------------------------------------------------------------------------------------------------
 
     def add(self, codes: Codes) -> None:
@@ -69,7 +81,7 @@ class KnownSelections:
                 arcs = sheet_arcs(self.exact, codes, self.a, self.b)
         except VertexLimitError as error:
             self._refused.add(codes)
-            self.complain(f"selection {codes}: {error}")
+            self.complain(f"{named(codes)}: {error}; {FEWER}")
             return
         if not arcs.empty:
             self.arcs[codes] = arcs
@@ -81,7 +93,7 @@ class KnownSelections:
             if not (event.singular and event.holds) or self.solve(event):
                 continue
             if arcs.beside(event):
-                self.complain(f"an arc of selection {codes} has no limit at alpha = {float(event.alpha):.17g}")
+                self.contradict(f"an arc of {named(codes)} has no limit at alpha = {float(event.alpha):.17g}")
             else:
                 event.holds = False
         if arcs.empty:
@@ -95,7 +107,7 @@ class KnownSelections:
             solution = solver.solve(event.codes)
         except VertexLimitError as error:
             event.settled = False
-            self.complain(f"alpha = {float(event.alpha):.17g}: {error}")
+            self.complain(f"{named(event.codes)} at alpha = {float(event.alpha):.17g}: {error}; {FEWER}")
             return True
         if solution is not None:
             event.polytope = (solver, solution)
@@ -153,8 +165,8 @@ class KnownSelections:
         if codes in self.arcs:
             self.close(codes)
         if codes not in self.arcs:
-            self.complain(f"selection {codes} holds and its own functions say otherwise")
+            self.contradict(f"{named(codes)} holds and its own functions say otherwise")
             return False
-        self.complain(f"the search left out selection {codes}, which holds somewhere")
+        self.contradict(f"the search left out {named(codes)}, which holds somewhere")
         self.waiting += [event for event in self.arcs[codes].events if event.holds]
         return True

@@ -85,6 +85,11 @@ class SpaceCover:
                 found.append((low, high))
         return found
 
+    def unexplained(self, low: Fraction, high: Fraction) -> bool:
+        """Whether a solution was met over a gap through which no whole curve is known."""
+        leaves = (leaf for leaf in self.records if isinstance(leaf, OpenLeaf) and leaf.forces is not None)
+        return any(low <= leaf.low and leaf.high <= high for leaf in leaves)
+
     def _units(self) -> tuple[Array, Array]:
         system = SpaceSolvers(self.problem, sum(self.interval) / 2, "verified").system
         return system.force, system.length

@@ -13,6 +13,7 @@ from enumsol.arithmetic.algebraic import EnclosedAlpha
 from enumsol.arithmetic.rationals import rational
 from enumsol.branches.assembly import make_vertex, sides_of, with_exact_zeros
 from enumsol.branches.elements import Arc, ArcValues, VertexKind, tangential
+from enumsol.branches.remedies import END_ELSEWHERE, TOLD_APART
 from enumsol.branches.space.pieces import Run, Turn
 from enumsol.model.statuses import space_status
 from enumsol.trusted.space.solution_curve import curve_point
@@ -144,7 +145,8 @@ class CurvedGraph:
             if isinstance(part, Turn) and not part.settled and self._side(part.alphas) in (0, None):
                 low, high = (float(end) for end in part.alphas)
                 self.reasons.append(
-                    f"between alpha = {low!r} and {high!r} it stayed open how a curve changes its statuses or turns"
+                    f"between alpha = {low!r} and {high!r} it stayed open how a curve changes its statuses or turns, "
+                    f"for it was not shown that one condition alone changes its sign there; {TOLD_APART}"
                 )
         for k, part in enumerate(parts):
             if isinstance(part, Run):
@@ -180,7 +182,9 @@ class CurvedGraph:
         if begin < end:
             self._pieces.append(_Piece(run, (numbers[0], numbers[1]), inner[0], inner[1]))
         else:
-            self.reasons.append(f"an arc near alpha = {float(begin)!r} is too short to be told")
+            self.reasons.append(
+                f"an arc near alpha = {float(begin)!r} is shorter than its ends are known; {TOLD_APART}"
+            )
 
     def _limits(self, number: int, inner: Fraction | None) -> Fraction:
         return sum(self._places[number].alphas, Fraction(0)) / 2 if inner is None else inner
@@ -210,7 +214,8 @@ class CurvedGraph:
         if not settled and turn.settled:
             low, high = (float(end) for end in turn.alphas)
             self.reasons.append(
-                f"whether a change between alpha = {low!r} and {high!r} lies inside the interval stayed open"
+                f"whether a change between alpha = {low!r} and {high!r} lies inside the interval stayed open; "
+                f"{END_ELSEWHERE}"
             )
         self._places.append(_Place(alphas, turn.x, turn.selections, border=False, settled=settled))
         return len(self._places) - 1
@@ -283,7 +288,8 @@ def unordered(vertices: Sequence[Vertex]) -> list[str]:
     """Vertices at which the number of solutions changes and which bounds of alpha do not put in an order."""
     changing = [v for v in vertices if not v.border and v.kind not in (VertexKind.TRANSITION, VertexKind.UNSETTLED)]
     return [
-        f"which of the vertices {one.number} and {other.number} is at the smaller alpha stayed open, near {one.alpha!r}"
+        f"which of the vertices {one.number} and {other.number} is at the smaller alpha stayed open, near "
+        f"{one.alpha!r}; {TOLD_APART}"
         for k, one in enumerate(changing)
         for other in changing[k + 1 :]
         if one.exact.compare(other.exact) == 0

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from enumsol.branches.graph import BranchGraph
 from enumsol.branches.graph_data import GraphStats
+from enumsol.branches.remedies import ANOTHER_INTERVAL, SHORT_INTERVAL
 from enumsol.branches.space.cover import SpaceCover
 from enumsol.branches.space.make_curved import CurvedGraph
 from enumsol.branches.space.pieces import runs_and_turns
@@ -110,10 +111,12 @@ def _elements(
 
 
 def _gaps(cover: SpaceCover) -> list[str]:
-    """Where solutions may be missing, in words."""
-    found = [
-        f"solutions may be missing for alpha in [{float(low):.8g}, {float(high):.8g}]"
-        for low, high in cover.gaps[:_NAMED]
-    ]
+    """Where solutions may be missing, why, and what may decide it, in words."""
+    found = []
+    for low, high in cover.gaps[:_NAMED]:
+        why, remedy = "pieces of alpha as short as are tried left statuses undecided", SHORT_INTERVAL
+        if cover.unexplained(low, high):
+            why, remedy = "no curve through a solution there was proven to be whole", ANOTHER_INTERVAL
+        found.append(f"solutions may be missing for alpha in [{float(low):.8g}, {float(high):.8g}]: {why}; {remedy}")
     more = len(cover.gaps) - _NAMED
     return [*found, f"and {more} gaps more"] if more > 0 else found

@@ -1,0 +1,11 @@
+"""What decides a place that a graph leaves open: the words of all ways to make a graph."""
+
+from __future__ import annotations
+
+END_ELSEWHERE = "an interval that ends elsewhere decides it"
+ANOTHER_INTERVAL = "another interval, or data that differ by a little, may decide it"
+SHORT_INTERVAL = "a graph over a short interval around it may decide it"
+TOLD_APART = "data that differ by a little may tell it apart"
+FEWER = "data that differ by a little may leave fewer"
+#: Of what contradicts the search.
+DEFECT = 'arithmetic="verified" decides it if the search was "fast"; otherwise this is a defect: please report it'
