@@ -83,10 +83,11 @@ class Crew:
                 job.result = job.function(*job.arguments)
                 return job
             forgotten = [job for job, (_, pool) in self._out.items() if pool <= self._broken]
+            patience = seconds
             if forgotten:
-                seconds = _PATIENCE if seconds is None else min(seconds, _PATIENCE)
+                patience = _PATIENCE if seconds is None else min(seconds, _PATIENCE)
             try:
-                job, future = self._done.get(timeout=seconds)
+                job, future = self._done.get(timeout=patience)
             except Empty:
                 if not forgotten or seconds == 0:
                     return None

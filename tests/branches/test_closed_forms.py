@@ -4,6 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from effort import some
 from path_problems import assert_balanced, one_node
 
 from enumsol.branches import branch_graph
@@ -106,7 +107,7 @@ def closed_form(lame, f):
 @pytest.mark.slow
 def test_random_one_node_problems_equal_the_closed_form(rng):
     folds = 0
-    for _ in range(120):
+    for _ in range(some(50, of=120)):
         lame = tuple((rng.integers(1, 32, size=2) / 8).tolist())
         f = tuple((rng.integers(-64, 65, size=2) / 16).tolist())
         if f[0] + (lame[0] + lame[1]) / (lame[0] + 3 * lame[1]) * f[1] == 0 or f[1] == 0:
@@ -128,7 +129,7 @@ def test_random_one_node_problems_equal_the_closed_form(rng):
                 expected = (f[0] + k * f[1]) / (1 + sign * k * alpha)
                 assert arc.values(alpha)[0][0] == pytest.approx(expected, rel=1e-13)
                 assert arc.values(alpha)[1][0] == pytest.approx(sign * alpha * expected, rel=1e-13)
-    assert folds > 10
+    assert folds > some(3, of=10)
 
 
 def test_the_bifurcation_of_case_jjj_lies_where_the_paper_puts_it():

@@ -26,7 +26,7 @@ def _problem(rng, seed):
     return make(rng, int(rng.integers(1, 4)), KINDS[seed % 3])
 
 
-@pytest.mark.few(6, 6)
+@pytest.mark.few(4, 3)
 @pytest.mark.parametrize("seed", range(40))
 def test_a_graph_cut_short_at_random_claims_nothing_false(seed, tmp_path):
     rng = np.random.default_rng(7000 + seed)
@@ -141,7 +141,7 @@ def _body(rng, seed):
     return (random_problem, integer_data, singular_problem)[seed % 3](rng, p)
 
 
-@pytest.mark.few(11, 6)
+@pytest.mark.few(5, 3)
 @pytest.mark.parametrize("seed", range(60))
 def test_a_search_cut_short_at_random_claims_nothing_false(seed):
     rng = np.random.default_rng(8000 + seed)

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from effort import some
 from path_problems import assert_balanced, integer_problem
 
 import enumsol
@@ -82,7 +83,7 @@ def test_pushed_to_the_other_side_both_statuses_hold():
 def test_no_complete_graph_has_a_vertex_that_is_broken(block):
     """Small numbers full of coincidences: folds, corners, sheets and arcs of degree 0."""
     kinds, degrees, compared = Counter(), Counter(), 0
-    for seed in range(18):
+    for seed in range(some(9, of=18)):
         rng = np.random.default_rng([77, block, seed])
         problem = beside_grazing(rng) if seed % 3 else integer_problem(rng, 2, "friction")
         graph = branch_graph(problem, (0, 5))
@@ -98,7 +99,7 @@ def test_no_complete_graph_has_a_vertex_that_is_broken(block):
     assert kinds["broken"] == 0
     assert kinds["terminal"] > 0
     assert degrees[0] > 0
-    assert compared >= 12
+    assert compared >= some(6, of=12)
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from math import inf, nextafter
 import numpy as np
 import pytest
 from branches.test_degenerate import uncoupled
+from effort import some
 from path_problems import (
     generic_problem,
     grazing_problem,
@@ -210,22 +211,14 @@ def check(seeds, count):
 
 
 def test_claims_are_true():
-    graphs, cut, asked, sharp = check((100, 107), 20)
-    assert (graphs, cut > 6) == (12, True)
+    graphs, cut, asked, sharp = check([100, 107, *range(110, 116), 201][: some(2, of=9)], some(20, of=50))
+    assert graphs >= some(12, of=50)
+    assert cut > some(6, of=28)
     assert sharp > 0.8 * asked
 
 
-@pytest.mark.long
-def test_many_claims_are_true():
-    graphs, cut, asked, sharp = check([*range(110, 116), 201], 50)
-    assert graphs > 40
-    assert cut > 22
-    assert sharp > 0.8 * asked
-
-
-@pytest.mark.slow
 def test_the_enumeration_of_roots_agrees():
-    full, graph, _ = next(graphs_of(3))
+    full, graph, _ = next(graphs_of(2))
     for alpha in alphas_to_test(full, graph, np.random.default_rng(3), 8):
         roots = enumerate_roots(full.problem, alpha, "exact")
         assert roots.complete

@@ -30,7 +30,7 @@ def ends_of_pieces(graph):
     return {Fraction(end) for piece in pieces for end in piece}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_example_of_the_report():
     A = [[3, 1, -1], [1, 3, 1], [-1, 1, 3]]
     data = {"slip_offset": 1.0, "friction": 0.0, "load_slope": [1, 1, -1]}
@@ -40,7 +40,7 @@ def test_the_example_of_the_report():
     assert (report.pieces, report.data) == (2, "problem")
 
 
-@pytest.mark.few(0, 4)
+@pytest.mark.few(0, 3)
 @pytest.mark.parametrize("zero", ZEROS, ids=str)
 @pytest.mark.parametrize("friction", [0.0, 1.0, (0.0, 1.0)], ids=str)
 @pytest.mark.parametrize("p", [1, 2])

@@ -1,6 +1,7 @@
 """Problems with grazing and unloaded contact nodes, at whose roots very many selections hold."""
 
 import numpy as np
+from generators import fe_compliance, from_condensed, integer_problem, planted_load, random_load, random_problem
 
 from enumsol import ContactProblem
 
@@ -64,3 +65,12 @@ def row_of_discs(count, *, weights=(2.0,), pull=3.0, friction=0.9, stiffness=64.
     f[0] = -pull
     B = np.hstack([np.zeros((2 * p, bodies)), np.eye(2 * p)])
     return ContactProblem(A, B[:p], B[p:], f, friction=(friction, 0.0))
+
+
+def problem_of_any_kind(rng, p, kind, friction, *, planted=True):
+    """Integers full of coincidences, nodes that touch, generic problems, and bodies; some with a planted root."""
+    if kind < 3:
+        return (integer_problem, touching_problem, random_problem)[kind](rng, p)
+    S, F = fe_compliance(rng, p), rng.uniform(*friction, size=p)
+    g = planted_load(rng, S, F) if planted else None
+    return from_condensed(S, random_load(rng, p) if g is None else g, F)

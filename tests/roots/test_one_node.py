@@ -5,6 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from compare import METHODS
+from effort import some
 
 import enumsol
 from enumsol import ContactProblem, gallery
@@ -61,7 +62,7 @@ def test_the_fold_of_example_6_1_is_one_root(method):
 def test_random_data_against_the_closed_form(seed):
     rng = np.random.default_rng(seed)
     counts = set()
-    for _ in range(60):
+    for _ in range(some(25, of=60)):
         lame, f = tuple(rng.uniform(0.1, 3.0, size=2)), (rng.uniform(-0.5, 1.5), rng.normal(scale=3.0))
         alpha = float(np.exp(rng.uniform(np.log(0.05), np.log(50))))
         want = closed_form(lame, f, alpha)
@@ -80,7 +81,7 @@ def test_criterion_for_the_number_of_branches(seed):
     # (j) one root for every alpha; (jj) one below |f_t| / f_n and three above
     rng = np.random.default_rng(seed)
     seen = {"j": 0, "jj": 0}
-    for _ in range(40):
+    for _ in range(some(20, of=40)):
         lam, mu = rng.uniform(0.1, 3.0, size=2)
         f = np.array([rng.uniform(-0.5, 1.5), rng.normal(scale=3.0)])
         problem = gallery.one_node_triangle(tuple(f), (lam, mu))

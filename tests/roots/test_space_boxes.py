@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import oracles3d
 import pytest
+from effort import some
 from problems3d import bounds, degenerate_integers, forces, from_compliance, unmatched
 from space_proofs import random_problem
 from trees import by_the_tree
@@ -25,11 +26,11 @@ def settled(problem):
     return roots if roots.complete else None
 
 
-@pytest.mark.few(1, 1)
+@pytest.mark.few(1, 0)
 @pytest.mark.parametrize("part", range(3))
 def test_degenerate_problems_are_complete(part):
     rng, complete = np.random.default_rng(part), 0
-    for seed in range(10 * part, 10 * part + 10):
+    for seed in range(10 * part, 10 * part + some(5, of=10)):
         problem, lam, _, F, _ = degenerate_integers(seed)
         roots = settled(problem)
         if roots is None:
@@ -43,7 +44,7 @@ def test_degenerate_problems_are_complete(part):
         assert roots.index_sum == 1
         S, g = problem.condensed.S, problem.condensed.free_displacements(0)
         assert unmatched(roots, oracles3d.newton_set(S, g, F, 20, rng))[0] == []
-    assert complete > 2
+    assert complete > some(0, of=2)
 
 
 def test_several_roots_are_degenerate():

@@ -3,6 +3,7 @@
 import numpy as np
 import oracles3d
 import pytest
+from effort import some
 from problems3d import from_compliance, random_coupled, unmatched
 from proof_tools import copied, leaves_of, proof_of, records_of
 from space_proofs import RANDOM, of_kind, random_problem
@@ -23,7 +24,7 @@ def coupled(seed, p):
 @pytest.mark.slow
 def test_the_same_roots_as_by_the_tree_and_by_newton():
     used = several = 0
-    for seed in range(24):
+    for seed in range(some(8, of=24)):
         data, problem = coupled(seed, 2 + seed % 2)
         with by_the_tree():
             plain = enumerate_roots(problem, 0)
@@ -40,8 +41,8 @@ def test_the_same_roots_as_by_the_tree_and_by_newton():
         lone = of_kind(records_of(roots.proof), "m")
         used += bool(lone)
         several += bool(lone) and len(roots) > 1
-    assert used > 12
-    assert several > 0
+    assert used > some(3, of=12)
+    assert several >= some(0, of=1)
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +90,7 @@ def test_a_search_goes_on_from_a_lone_root(with_lone_root, tmp_path):
     assert verify(problem, again.proof).complete
 
 
-@pytest.mark.few(1, 3)
+@pytest.mark.few(1, 1)
 @pytest.mark.parametrize("name", [name for name, roots in RANDOM.items() if roots > 1], ids=str)
 def test_no_numbers_close_an_assignment_with_two_roots(name):
     """Whatever is proposed for any of its roots, the right theta among it; and equations hold for their difference."""

@@ -3,6 +3,7 @@
 import numpy as np
 import oracles3d
 import pytest
+from effort import some
 from problems3d import bounds, forces, from_compliance, random_compliance, random_one_node, unmatched
 
 import enumsol
@@ -20,7 +21,7 @@ def solutions(S, g, F):
 def test_random_data_against_the_closed_form(seed):
     rng = np.random.default_rng(seed)
     counts, undecided = set(), 0
-    for k in range(50):
+    for k in range(some(25, of=50)):
         S, g, F = random_one_node(rng)
         found, wanted, near = solutions(S, g, F)
         assert near > 1e-9, k
@@ -102,7 +103,7 @@ def test_degenerate_data_are_undecided_or_right(name):
 def test_degenerate_integer_data():
     rng = np.random.default_rng(7)
     border = 0
-    for k in range(60):
+    for k in range(some(25, of=60)):
         X = rng.integers(-2, 3, size=(3, 3))
         matrix, f = X @ X.T + np.eye(3), rng.integers(-2, 3, size=3)
         F = rng.choice([0.0, 0.5, 1.0, 2.0], size=2)
@@ -117,14 +118,14 @@ def test_degenerate_integer_data():
         for root in roots:
             assert oracles3d.violation(S, S @ f, F[None], forces(root)) < 1e-6, k
         assert not roots.complete or not np.any(f) or roots.index_sum == 1, k
-    assert border > 5
+    assert border > some(1, of=5)
 
 
 def test_the_limits_of_successive_approximations_are_roots():
     # of three roots of one node two attract: open and the one with the largest force; the root between them never
     rng = np.random.default_rng(1)
     never = []
-    for _ in range(80):
+    for _ in range(some(40, of=80)):
         S, g, F = random_compliance(rng, 1), rng.normal(size=3), np.full((1, 2), 10 ** rng.uniform(0, 1.5))
         if len(solutions(S, g, F)[1]) < 3:
             continue
@@ -136,5 +137,5 @@ def test_the_limits_of_successive_approximations_are_roots():
         missed, unreached = unmatched(roots, reached)
         assert not missed
         never.append([roots[k].index for k in unreached])
-    assert len(never) >= 3
+    assert len(never) >= some(1, of=3)
     assert all(-1 in indices for indices in never)

@@ -143,7 +143,7 @@ def any_side(monkeypatch):
     monkeypatch.setattr(closing.Closer, "__init__", made)
 
 
-@pytest.mark.few(18)
+@pytest.mark.few(6, 4)
 @pytest.mark.parametrize("seed", range(30))
 def test_splits_by_sides_find_the_same(any_side, tree_only, seed):
     rng = np.random.default_rng(seed)
@@ -157,7 +157,7 @@ def test_splits_by_sides_find_the_same(any_side, tree_only, seed):
     assert [root.active for root in enumerate_roots(problem, 0, "exact")] == [root.active for root in exact]
 
 
-@pytest.mark.few(28)
+@pytest.mark.few(10, 4)
 @pytest.mark.parametrize("seed", range(40))
 def test_the_roots_are_those_of_all_selections(every_node, seed):
     rng = np.random.default_rng(seed)

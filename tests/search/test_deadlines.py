@@ -287,7 +287,7 @@ def test_no_exact_algebra_is_begun_after_the_limit(clock, takes, monkeypatch):
     assert "time limit" in graph.reasons[0]
 
 
-@pytest.mark.few(1)
+@pytest.mark.few(1, 1)
 @pytest.mark.parametrize("name", ["chain", "continua", "corners", "balls"])
 def test_wherever_the_time_is_over_nothing_false_is_claimed(name, monkeypatch):
     """Every look at the clock takes a second."""

@@ -4,6 +4,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from effort import some
 from flint import fmpq, fmpq_mat
 from generators import fe_compliance, from_condensed, integer_problem, random_problem
 from proof_tools import copied, proof_of, records_of
@@ -41,11 +42,10 @@ def kinds_of(proof):
     return [record[0] for record in records_of(proof) if isinstance(record, list)]
 
 
-@pytest.mark.few(0, 1)
-@pytest.mark.parametrize(("first", "last"), [(0, 18), pytest.param(18, 60, marks=pytest.mark.slow)])
-def test_the_roots_are_the_same(first, last, eager, monkeypatch):
-    used = 0
-    for seed in range(first, last):
+@pytest.mark.slow
+def test_the_roots_are_the_same(eager, monkeypatch):
+    used, count = 0, some(12, of=60)
+    for seed in range(count):
         rng = np.random.default_rng(seed)
         make = (random_problem, integer_problem, lambda _, p, seed=seed: slipping(seed, p))[seed % 3]
         problem = make(rng, int(rng.integers(2, 5)))
@@ -62,7 +62,7 @@ def test_the_roots_are_the_same(first, last, eager, monkeypatch):
         assert counts["roots"] == len(found)
         fast = enumerate_roots(problem, 1.0, arithmetic="fast")
         assert len(fast) == len(plain), seed
-    assert used > last - first
+    assert used > count
 
 
 def test_a_long_search_is_shorter_with_forms(monkeypatch):
@@ -94,6 +94,7 @@ def test_wedges_go_on_with_the_energy(monkeypatch):
     assert records_of(found.proof) == records_of(plain.proof)
 
 
+@pytest.mark.few(10, 0)
 @pytest.mark.parametrize("seed", range(30))
 def test_forms_are_at_most_zero_at_every_solution(seed):
     rng = np.random.default_rng(seed)
@@ -121,6 +122,7 @@ def _times(H, point):
     return [sum((a * x for a, x in zip(row, point, strict=True)), fmpq(0)) for row in H.tolist()]
 
 
+@pytest.mark.few(12, 0)
 @pytest.mark.parametrize("seed", range(40))
 def test_enclosed_forms_hold_the_exact_ones(seed):
     rng = np.random.default_rng(seed)
@@ -282,6 +284,7 @@ def test_an_indefinite_form_excludes_nothing():
     assert exclusion_margin(form, (6, 6, 6), np.array([0]), np.array([1e6])) == -np.inf
 
 
+@pytest.mark.few(4, 0)
 @pytest.mark.parametrize("seed", range(12))
 def test_compiled_bounds_are_below_the_exact_one_and_that_of_the_checker(seed):
     margins = pytest.importorskip("enumsol.search.certifiers._margin").FormMargins

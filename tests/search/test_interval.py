@@ -202,7 +202,7 @@ def test_after_an_interrupted_search_not_all_is_followed(boxes, followed, tree_o
     assert caught.value.partial.arcs
 
 
-@pytest.mark.few(0, 7)
+@pytest.mark.few(0, 3)
 @pytest.mark.parametrize("nodes", [20, 60, 150, 300, 600])
 @pytest.mark.parametrize("name", ["chain-4", "chain-4-coupled", "two-node-6.4"])
 def test_a_graph_cut_short_says_what_it_found_and_no_more(name, nodes):
@@ -219,8 +219,7 @@ def test_a_graph_cut_short_says_what_it_found_and_no_more(name, nodes):
                 getattr(graph, question)
 
 
-@pytest.mark.slow
-@pytest.mark.few(2)
+@pytest.mark.few(0, 2)
 @pytest.mark.parametrize("name", ["two-node-6.4", "chain-4", "one-node-6.3"])
 def test_a_selection_that_the_search_left_out_is_taken_in_and_told(name):
     problem = gallery.get(name).build()

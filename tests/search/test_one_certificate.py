@@ -5,10 +5,11 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 from compare import differences
-from generators import fe_compliance, from_condensed, integer_problem, planted_load, random_load, random_problem
+from effort import some
+from generators import fe_compliance
 from proof_tools import copied, proof_of, records_of
 from rational_checker import check_records
-from touching import touching_problem
+from touching import problem_of_any_kind
 from trees import by_the_tree
 
 from enumsol import InvalidArgumentError, enumerate_roots, gallery, is_unique, verify
@@ -46,16 +47,7 @@ def test_blocks_take_one_node(nx, traction):
 
 def problems(seed):
     rng = np.random.default_rng([9, seed])
-    p = int(rng.integers(1, 5))
-    if seed % 4 == 0:
-        return integer_problem(rng, p)
-    if seed % 4 == 1:
-        return touching_problem(rng, p)
-    if seed % 4 == 2:
-        return random_problem(rng, p)
-    S, F = fe_compliance(rng, p), rng.uniform(0.05, 1.2, size=p)
-    g = planted_load(rng, S, F) if seed % 8 == 3 else None
-    return from_condensed(S, random_load(rng, p) if g is None else g, F)
+    return problem_of_any_kind(rng, int(rng.integers(1, 5)), seed % 4, (0.05, 1.2), planted=seed % 8 == 3)
 
 
 @pytest.mark.few(0, 1)
@@ -64,7 +56,7 @@ def test_all_selections_find_the_same(part, monkeypatch):
     # other numbers are sought at once, and small bodies are not spared them
     monkeypatch.setattr(closing, "_FEW", 0)
     certified = several = 0
-    for seed in range(32 * part, 32 * part + 32):
+    for seed in range(32 * part, 32 * part + some(16, of=32)):
         problem = problems(seed)
         alpha = 1.0 if seed % 4 == 2 else 0
         exact = enumerate_roots(problem, alpha, "exact", "exhaustive")
@@ -81,8 +73,8 @@ def test_all_selections_find_the_same(part, monkeypatch):
         if roots.by_one_certificate:
             assert len(exact) == 1
             assert not exact.families
-    assert certified > 6
-    assert several > 1
+    assert certified > some(2, of=6)
+    assert several > some(0, of=1)
 
 
 def test_long_trees_of_small_bodies_are_cut_short(monkeypatch):
@@ -176,17 +168,16 @@ def test_what_descent_finds_is_definite(seed):
     assert found > 5
 
 
-@pytest.mark.few(0, 1)
-@pytest.mark.parametrize("seed", range(1))
-def test_changed_certificates_prove_nothing_false(seed):
-    rng = np.random.default_rng(seed)
+@pytest.mark.slow
+def test_changed_certificates_prove_nothing_false():
+    rng = np.random.default_rng(0)
     problem = gallery.clamped_block(4, 2, traction=(1.0, -0.3))
     records = records_of(enumerate_roots(problem, 1.0).proof)
     record = records[1]
     assert record[0] == "m"
     for place in (3, 4, 5):
         for k, old in enumerate(record[place]):
-            for new in (-1.0, 0.0, 1e-3 * old, 50.0 * old, -old):
+            for new in (-1.0, 0.0, 1e-3 * old, 50.0 * old, -old)[k % 2 :: some(2, of=1)]:
                 forged = copied(records)
                 forged[1][place][k] = new
                 if verify(problem, proof_of(forged)).ok:
@@ -198,7 +189,7 @@ def test_changed_certificates_prove_nothing_false(seed):
     # a problem with three roots takes no certificate, whatever the numbers
     problem = gallery.one_node_triangle()
     header, *_ = records_of(enumerate_roots(problem, 5.0).proof)
-    for _ in range(200):
+    for _ in range(some(60, of=200)):
         codes = [int(rng.choice([0, 1, 2, 3]))]
         numbers = [*np.exp(rng.normal(size=2)), *rng.uniform(-1, 1, size=2), float(rng.choice([0.0, 1.0]))]
         forged = [header, ["m", codes, [0], numbers, rng.normal(size=2).tolist(), [1e9, 1e9], 1]]

@@ -8,7 +8,7 @@ import enumsol
 from enumsol import gallery
 
 
-@pytest.mark.few(7)
+@pytest.mark.few(4, 4)
 @pytest.mark.parametrize("length", [1.0, 2.0])
 @pytest.mark.parametrize("traction", [(0.3, -1.0), (0.0, -1.0)])
 @pytest.mark.parametrize("p", [8, 14, 20, 32])
@@ -49,7 +49,7 @@ def test_a_soft_body_is_excluded_by_its_bounds():
     assert roots.stats.escalations.refined < 10
 
 
-@pytest.mark.few(2)
+@pytest.mark.few(2, 1)
 @pytest.mark.parametrize("p", [8, 14, 20, 32])
 def test_wedges(p):
     for name in (f"wedge-{p}-3", f"wedge-{p}-5"):

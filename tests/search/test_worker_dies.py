@@ -133,6 +133,31 @@ def test_a_task_that_a_broken_pool_forgets(square, wedge, monkeypatch):
     check(found, *wedge)
 
 
+class Renewed(ThreadPoolExecutor):
+    """Forgets its first task, breaks with the second, and takes all others."""
+
+    def __init__(self):
+        super().__init__(1)
+        self.taken = 0
+
+    def renew(self):
+        """It is as good as a new one."""
+
+    def submit(self, function, /, *args, **kwargs):
+        self.taken += 1
+        if self.taken == 2:
+            raise BrokenProcessPool("broken")
+        return Future() if self.taken == 1 else super().submit(function, *args, **kwargs)
+
+
+def test_patience_is_for_what_was_forgotten_alone(monkeypatch):
+    """Where no time is given, what takes longer than it is waited for."""
+    monkeypatch.setattr(workers, "_PATIENCE", 0.05)
+    with Renewed() as executor, pytest.warns(RuntimeWarning, match="a worker died"):
+        found, redone = results(executor, (pow, 2, 3), (time.sleep, 0.3))
+    assert (set(found), redone) == ({8, None}, 1)
+
+
 def test_arithmetic_without_a_proof(wedge):
     with ProcessPoolExecutor(2) as pool, pytest.warns(RuntimeWarning, match="a worker died"):
         found = enumerate_roots(*wedge, "fast", executor=DyingExecutor(pool, 12, *DEATHS["os._exit"]))
@@ -167,12 +192,12 @@ def dies_in_workers(home):
     return home
 
 
-def results(pool, function, *arguments):
-    """What tasks come to, and how many were done again."""
+def results(pool, *calls):
+    """What calls come to, and how many were made again."""
     crew = Crew(pool)
-    for last in arguments:
-        crew.submit(function, *last)
-    return [crew.next().result for _ in arguments], crew.redone
+    for call in calls:
+        crew.submit(*call)
+    return [crew.next().result for _ in calls], crew.redone
 
 
 #: Processes that are not forked import this module by its path from the root: only `python -m pytest` has that.
@@ -188,7 +213,7 @@ def test_a_pool_is_made_anew(tmp_path):
     pool.renew()
     mark = str(tmp_path / "mark")
     with pool, pytest.warns(RuntimeWarning, match="a worker died"):
-        found, redone = results(pool, dies_once, *((os.getpid(), mark, k) for k in range(6)))
+        found, redone = results(pool, *((dies_once, os.getpid(), mark, k) for k in range(6)))
     assert sorted(value for value, _ in found) == list(range(6))
     # the work went on in processes, not here
     assert os.getpid() not in {pid for _, pid in found}
@@ -200,7 +225,7 @@ def test_what_kills_every_worker_is_done_here():
     pool = RenewedPool(1)
     pool.renew()
     with pool, pytest.warns(RuntimeWarning, match="a worker died"):
-        assert results(pool, dies_in_workers, (os.getpid(),)) == ([os.getpid()], 3)
+        assert results(pool, (dies_in_workers, os.getpid())) == ([os.getpid()], 3)
 
 
 @pytest.mark.long
@@ -316,19 +341,7 @@ def test_a_worker_killed_from_outside(tmp_path):
     file, proof = tmp_path / "chain.npz", tmp_path / "chain.proof"
     problem = gallery.chain(6, 0.05)
     write_problem(problem, file)
-    command = [
-        sys.executable,
-        "-m",
-        "enumsol",
-        "roots",
-        str(file),
-        "--alpha",
-        "5",
-        "--jobs",
-        "2",
-        "--proof",
-        str(proof),
-    ]
+    command = [sys.executable, "-m", "enumsol", "roots", str(file), "--alpha=5", "--jobs=2", f"--proof={proof}"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         while process.poll() is None and not spawned(process.pid):

@@ -5,10 +5,9 @@ from itertools import product
 import numpy as np
 import pytest
 from effort import some
-from generators import fe_compliance, from_condensed, integer_problem, planted_load, random_load, random_problem
 from rational_closings import Closings, Lone
 from rational_forms import Data, Forms, Refused, exact
-from touching import touching_problem
+from touching import problem_of_any_kind
 
 from enumsol.condensation.enclosure import CondensedEnclosure
 from enumsol.search.fathoming_in_contact import KnownRoot, Lone as Proposed
@@ -17,20 +16,6 @@ from enumsol.search.tree import make_engine
 from enumsol.trusted import uniqueness_in_contact as lone
 from enumsol.trusted.at_alpha import solve_selection
 from enumsol.trusted.uniqueness_in_contact import gaps, lone_root
-
-
-def problem_of(rng, kind):
-    """Integers full of coincidences, nodes that touch, generic problems, some with several roots."""
-    p = int(rng.integers(1, 4))
-    if kind == 0:
-        return integer_problem(rng, p)
-    if kind == 1:
-        return touching_problem(rng, p)
-    if kind == 2:
-        return random_problem(rng, p)
-    S, F = fe_compliance(rng, p), rng.uniform(0.3, 3.0, size=p)
-    g = planted_load(rng, S, F)
-    return from_condensed(S, random_load(rng, p) if g is None else g, F)
 
 
 def assignment(rng, selection, friction):
@@ -90,7 +75,7 @@ class Case:
 def cases(seeds):
     for seed in seeds:
         rng = np.random.default_rng([23, seed])
-        case = Case(problem_of(rng, seed % 4))
+        case = Case(problem_of_any_kind(rng, int(rng.integers(1, 4)), seed % 4, (0.3, 3.0)))
         for root in case.roots:
             for _ in range(3):
                 codes = assignment(rng, root[0], case.friction)
