@@ -63,7 +63,8 @@ def multiplicity_table(
         with_slip_minus, or in 3D with_slip (isolated roots at which at least one node has the status); index_sum
         (missing where a degree is not known), complete, undecided, stopped (why the search ended early, or missing),
         nodes of the search, and seconds. Where a search was cut short or left something undecided, the counts are
-        those of what was found, and so lower bounds.
+        those of what was found, and so lower bounds. ``attrs["held"]`` says whether supports or springs hold the body:
+        if not, the indices may have any sum.
 
     Raises
     ------
@@ -125,7 +126,9 @@ def _frame(problem: ContactProblem | ContactProblem3D, done: dict[int, dict[str,
     counts = ["alpha", "roots", "families", *kinds_of(problem).values(), "index_sum"]
     columns = [*counts, "complete", "undecided", "stopped", "nodes", "seconds"]
     table = pd.DataFrame([done[k] for k in sorted(done)], columns=columns)
-    return table.astype({"index_sum": "Int64"})  # whole numbers, and missing ones
+    table = table.astype({"index_sum": "Int64"})  # whole numbers, and missing ones
+    table.attrs["held"] = problem.modes is None
+    return table
 
 
 def table_row(problem: ContactProblem | ContactProblem3D, options: dict[str, Any], alpha: Alpha) -> dict[str, Any]:

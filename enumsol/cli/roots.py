@@ -203,7 +203,7 @@ def roots(problem: options.ProblemArgument, alpha: AtAlpha, *, quiet: options.Qu
     """Find all solutions of PROBLEM at one ALPHA.
 
     Prints a table of the roots and whether it is complete; lambda_n and lambda_t are nodal forces, not pressures. The
-    index of a root is the sign of a determinant; the indices of all solutions add up to +1.
+    index of a root is the sign of a determinant; the indices of all solutions add up to +1 if the body is held.
 
     Exit status: 0 if the result is complete (in fast arithmetic, which proves nothing: if the search ran to its end
     with nothing undecided), with --unique if yes or no is proven; 3 if something remained undecided, a limit cut the
@@ -242,6 +242,6 @@ def _write_vtu(problem: ContactProblem | ContactProblem3D, found: RootSet, path:
 
 
 def _status(found: RootSet) -> ExitStatus:
-    if found.stopped is not None or found.undecided or found.index_sum not in (None, 1):
+    if found.stopped is not None or found.undecided or not found.adds_up:
         return ExitStatus.INCOMPLETE
     return ExitStatus.DONE

@@ -124,7 +124,8 @@ def _content(frame: pd.DataFrame, alphas: list[Alpha], ended: EnumsolError | Non
 
 def _open(frame: pd.DataFrame) -> pd.DataFrame:
     """Rows at which the search was cut short, something is undecided, or the indices show that something is missing."""
-    return frame[_gaps(frame) | (frame["index_sum"].notna() & frame["index_sum"].ne(1))]
+    missing = frame["index_sum"].notna() & frame["index_sum"].ne(1) if frame.attrs["held"] else False
+    return frame[_gaps(frame) | missing]
 
 
 def _gaps(frame: pd.DataFrame) -> pd.Series[bool]:

@@ -17,8 +17,10 @@ from enumsol.support.messages import counted
 _WALL = 0.5
 #: Nodes nearer to each other than this share of the extent of the mesh are at the same place.
 _SAME = 1e-9
-#: Press fits and given displacements above this part of the extent of the largest body are not small.
-_SMALL = 0.25
+#: Press fits, and given displacements, above these parts of the extent of the largest body are not small.
+_FIT, _SMALL = 0.05, 0.25
+#: A node that is deeper in what it faces than this share of a facet faces it through the body.
+_DEEP = 0.5
 #: Strains by loads above this come from wrong units: ten times the length of the body.
 _ABSURD = 10.0
 #: Loads that strain the body by less than this are below what its own rounding does.
@@ -67,6 +69,36 @@ def refuse_walls(scene: Any) -> None:
                 )
 
 
+def refuse_pairs(scene: Any) -> None:
+    """Refuse pairs of two sides of one body that face away from each other, through the body.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It names the pair.
+    """
+    mesh, rows = scene.mesh, scene.contacts.rows
+    places = rows.means @ mesh.points
+    body = np.zeros(len(mesh.points), dtype=np.int64)
+    for number, piece in enumerate(scene.pieces):
+        body[piece.nodes] = number
+    first = 0
+    for group in scene.contacts.groups:
+        own, first = np.arange(first, first + group.count), first + group.count
+        if group.pair is None:
+            continue
+        facets = mesh.part(group.pair.master)
+        # nodes of faces of a crack may be a little beyond the other face where that is curved
+        length = np.max(np.ptp(mesh.points[facets], axis=1))
+        deep = np.sum(places[own] * group.normals, axis=1) > _DEEP * length
+        faced = body[facets.ravel()]
+        if np.any(deep) and np.all(np.isin(faced, body[rows.nodes[own][deep]])) and len(np.unique(faced)) == 1:
+            raise InvalidArgumentError(
+                f"{group.pair.slave} of the pair {group.pair} faces {group.pair.master} through the body that both "
+                "belong to; expected parts of two bodies, or of one that face each other with a gap between them"
+            )
+
+
 def _refuse_cracks(scene: Any, nodes: Any, parts: list[str]) -> None:
     """Refuse parts that are a face of a crack: nodes of the same body are where theirs are."""
     from scipy.spatial import cKDTree  # not needed for paths that read no mesh
@@ -96,7 +128,7 @@ def _refuse_cracks(scene: Any, nodes: Any, parts: list[str]) -> None:
 
 def scene_notes(scene: Any) -> list[str]:
     """What may be meant otherwise."""
-    checks = (_unfaced, _shared, _alone, _rest, _loaded_contact, _reach, _units, _friction)
+    checks = (_unfaced, _shared, _alone, _rest, _loaded_contact, _reach, _units, _friction, _held)
     with np.errstate(over="ignore"):  # what overflows is out of proportion, and told as such
         return [note for check in checks for note in check(scene)]
 
@@ -163,7 +195,7 @@ def _reach(scene: Any) -> list[str]:
                 f"the smallest gap of {group} is {gaps.min():.3g}, more than the extent {extent:.3g} of the body: it "
                 "will not be in contact"
             )
-        elif gaps.min() < -_SMALL * extent:
+        elif gaps.min() < -_FIT * extent:
             notes.append(
                 f"the press fit of {group} is {-gaps.min():.3g}, which is not small beside the extent {extent:.3g} of "
                 "the body, as displacements have to be"
@@ -218,3 +250,12 @@ def _friction(scene: Any) -> list[str]:
         if steep > _STEEP:
             notes.append(f"{name} is {steep:g}; coefficients of friction above 1 are rare")
     return notes
+
+
+def _held(scene: Any) -> list[str]:
+    """A bound of rigid displacements where nothing can move as a whole."""
+    if scene.options["max_rigid_displacement"] is None:
+        return []
+    if any(piece.free_motions(scene.mesh.points, scene.hold) for piece in scene.pieces):
+        return []
+    return ["max_rigid_displacement has no effect, for supports or springs hold everything"]

@@ -30,7 +30,7 @@ from enumsol.fem.mesh_files import read_mesh
 from enumsol.fem.named_parts import PartedMesh
 from enumsol.fem.pairs import Pair
 from enumsol.fem.restrained import plain_dofs
-from enumsol.fem.scene_checks import refuse_walls, scene_notes
+from enumsol.fem.scene_checks import refuse_pairs, refuse_walls, scene_notes
 from enumsol.fem.scene_text import described, sections_of
 from enumsol.model.mesh import BodyMesh
 from enumsol.support.arguments import exact_number, finite_number, positive_number, shown
@@ -105,6 +105,7 @@ class Scene:
         springs, pieces = part_springs(body, mesh, options["spring"]), pieces_of(mesh)
         scene = cls(mesh, options, body, held, contacts, forces, slope, springs, coefficients, pieces)
         refuse_walls(scene)
+        refuse_pairs(scene)
         return scene
 
     @property

@@ -78,7 +78,7 @@ def _answers(found: RootSet) -> list[str]:
     else:
         lines = [f"{number} found, at least {found.at_least} in all."]
     total = found.index_sum
-    note = "" if total in (None, 1) else " (not +1: something is missing or wrong)"
+    note = "" if found.adds_up else " (not +1: something is missing or wrong)"
     lines.append(f"Sum of the indices: {'unknown' if total is None else f'{total:+d}'}{note}.")
     if found.mirror_images is not None:
         lines += [f"{line[0].upper()}{line[1:]}." for line in found.mirror_images.notes(complete=found.complete)]

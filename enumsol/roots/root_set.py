@@ -257,12 +257,18 @@ class RootSet(Sequence[Root], Immutable):
     def index_sum(self) -> int | None:
         """Sum of the indices of all roots and families: +1 when nothing is missing; None if one is unknown.
 
-        It is unknown, too, after a search that was cut short or left something undecided.
+        It is unknown, too, after a search that was cut short or left something undecided. The indices of a body that
+        nothing holds may have any sum (theory, section 14.2).
         """
         if not self.whole:
             return None
         indices = [root.index for root in self._roots] + [family.index for family in self.families]
         return None if any(index is None for index in indices) else sum(index for index in indices if index is not None)
+
+    @property
+    def adds_up(self) -> bool:
+        """Whether the sum of the indices, where it is known and the body is held, is +1 (theory, (6.7))."""
+        return self.rigid_bound is not None or self.index_sum in (None, 1)
 
     def __len__(self) -> int:
         return len(self._roots)

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from command_line import assert_refused, call, on_terminal, run
+from helpers.floating_oracle import block_on_table
 from typer.testing import CliRunner
 
 from enumsol import Proof, gallery, read_problem, verify, write_problem
@@ -526,3 +527,15 @@ def test_every_verb_that_takes_a_problem(capsys):
         ("verify", "wedge-14-5", "some.proof"),
     ):
         assert_refused(*run(capsys, *arguments), "did you mean gallery:wedge-14-5?")
+
+
+def test_a_body_that_is_pulled_off_has_no_solution_and_that_is_all(capsys, tmp_path):
+    """The indices of a body that nothing holds need not add up to +1."""
+    block = block_on_table()
+    write_problem(block.replace(f=-block.f), tmp_path / "lifted.npz")
+    page = tmp_path / "page.html"
+    status, out, _ = run(capsys, "roots", tmp_path / "lifted.npz", "--alpha", 0, "--report", page)
+    assert (status, "index sum: +0" in out) == (0, True)
+    assert "something is missing" not in page.read_text(encoding="utf-8")
+    status, _, _ = run(capsys, "table", tmp_path / "lifted.npz", "--alphas", "0,1")
+    assert status == 0

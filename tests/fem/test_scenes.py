@@ -84,6 +84,16 @@ REFUSED = [
     (one, {"displacement": {"bottom": (0.1, "free")}}, "contact node 0 is held or displaced in some components only"),
     (one, {"displacement": {"top": (0.1, 0.0)}}, "top moves node 6 by 0.1 in x, and another part .* by 0"),
     (one, {"thickness": -1}, "thickness is -1; expected a finite number > 0"),
+    (
+        two,
+        PAIR | {"pairs": [("lower.top", "lower.bottom")]},
+        "lower.top of the pair .* through the body that both belong",
+    ),
+    (
+        two,
+        PAIR | {"pairs": [("lower.left", "lower.right", 0.0)]},
+        "lower.left of the pair .* expected parts of two bodies, or of one that face each other with a gap",
+    ),
 ]
 
 NOTED = [
@@ -98,6 +108,8 @@ NOTED = [
         "the smallest gap of bottom is 5, more than the extent 1 of the body: it will not be in contact",
     ),
     (one, {"gap": -0.5}, "the press fit of bottom is 0.5, which is not small beside the extent 1"),
+    (apart(-0.3), PAIR, "the press fit of the pair upper.bottom:lower.top is 0.3, which is not small"),
+    (one, {"max_rigid_displacement": 2.0}, "max_rigid_displacement has no effect, for supports or springs hold ever"),
     (one, {"load": {"bottom": (0.1, 0.0)}}, "load of bottom acts on contact nodes, as bottom is in contact"),
     (one, {"pressure": {"bottom": 0.1}}, "pressure of bottom acts on contact nodes"),
     (one, {"load": None}, "nothing acts on the body: it has no load, press fit or given displacement, and rests"),
