@@ -116,7 +116,7 @@ def test_steps_can_be_set(capsys):
 
     assert rows("--h-max", 0.1) > 2 * rows() > 2 * rows("--h-max", 5)
     # the first step is no longer than the longest
-    assert rows("--h-max", 0.02) > 500
+    assert rows("--h-max", 0.05) > 200
 
 
 def test_the_algorithm_as_printed_jumps_and_the_audit_says_so(capsys, tmp_path):

@@ -78,8 +78,7 @@ def test_every_verb_can_be_quiet_and_writes_json(proof, tmp_path, capsys):
         json.loads(file.read_text())
         if name.endswith(" list"):
             continue  # it has nothing to say but its list
-        assert main([*command, "--quiet"]) == status, name
-        assert main([*command, "-q"]) == status, name
+        assert main([*command, "--quiet" if len(name) % 2 else "-q"]) == status, name
         assert capsys.readouterr() == ("", ""), name
         assert main(command) == status, name
         assert capsys.readouterr() == said, name  # loud again

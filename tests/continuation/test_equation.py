@@ -2,6 +2,7 @@ import itertools
 
 import numpy as np
 import pytest
+from effort import some
 
 from enumsol import (
     ContactProblem,
@@ -48,7 +49,7 @@ def test_the_selection_of_h_is_the_one_that_the_sign_array_names():
     rng = np.random.default_rng(0)
     seen = set()
     negative = 0
-    for _ in range(40):
+    for _ in range(some(14, of=40)):
         equation = random_equation(rng)
         n, p = equation.problem.n, equation.problem.p
         for _ in range(50):
@@ -63,7 +64,7 @@ def test_the_selection_of_h_is_the_one_that_the_sign_array_names():
             seen.update(map(tuple, signs.tolist()))
             negative += int(np.sum(x[n : n + p] < 0))
     assert seen == set(itertools.product((-1, 1), repeat=3))  # all eight, the fourth piece of P included
-    assert negative > 1_700
+    assert negative > some(590, of=1_700)
 
 
 def test_other_sign_arrays_name_other_functions():

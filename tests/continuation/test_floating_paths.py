@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from effort import some
 from helpers.floating_oracle import block_on_table, random_body
 from helpers.floating_space import known_body
 
@@ -131,12 +132,10 @@ def paths_of(seed):
     return paths
 
 
-@pytest.mark.parametrize(
-    "seeds", [pytest.param(range(14, 28), marks=pytest.mark.slow), pytest.param(range(28, 120), marks=pytest.mark.long)]
-)
-def test_paths_of_random_bodies_run_between_enumerated_roots(seeds):
-    paths = [path for seed in seeds for path in paths_of(seed)]
-    assert len(paths) > 5
+@pytest.mark.slow
+def test_paths_of_random_bodies_run_between_enumerated_roots():
+    paths = [path for seed in range(14, some(22, of=120)) for path in paths_of(seed)]
+    assert len(paths) > some(2, of=35)
 
 
 def path_in_3d(seed):

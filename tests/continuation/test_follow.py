@@ -202,7 +202,7 @@ def test_smooth_path_wrong_derivative_is_named():
         follow(problem, (2.0, [0.0], [0.0]), 1, (1, 3), smooth_path=smooth)
 
 
-@pytest.mark.few(6, 3)
+@pytest.mark.few(4, 2)
 @pytest.mark.parametrize("loading", [False, True])
 @pytest.mark.parametrize("seed", range(12))
 def test_points_are_enumerated_roots(seed, loading, random_problems):

@@ -17,6 +17,7 @@ def test_start_decides_which_of_three_roots(start, lambda_n):
     assert root.lambda_n == pytest.approx([lambda_n], abs=1e-13)
 
 
+@pytest.mark.few(10, 0)
 @pytest.mark.parametrize("seed", range(25))
 def test_random_starts_end_at_enumerated_roots_or_say_why_not(seed, random_problems):
     problem = random_problems(seed)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from effort import some
 from generators import FRICTION, dense_compliance, fe_compliance, from_condensed
 
 import enumsol
@@ -23,7 +24,7 @@ def test_every_root_is_a_fixed_point(name, alpha, count):
 @pytest.mark.slow
 def test_every_root_of_random_problems_is_a_fixed_point(rng):
     several = 0
-    for k in range(120):
+    for k in range(some(40, of=120)):
         p = int(rng.integers(1, 5))
         S = dense_compliance(rng, p) if k % 2 else fe_compliance(rng, 2 * p)
         p = len(S) // 2
@@ -32,7 +33,7 @@ def test_every_root_of_random_problems_is_a_fixed_point(rng):
         roots = enumsol.enumerate_roots(problem, 0)
         several += len(roots) > 1
         assert all(enumsol.is_fixed_point(problem, root) for root in roots)
-    assert several >= 5
+    assert several >= some(1, of=5)
 
 
 def test_what_is_no_root_is_no_fixed_point():

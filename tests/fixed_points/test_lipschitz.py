@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from effort import some
 from generators import dense_compliance, from_condensed
 from problems3d import from_compliance, random_compliance
 
@@ -29,7 +30,7 @@ def test_it_is_the_bound_of_the_branch_graph_or_better(rng):
 
 @pytest.mark.slow
 def test_below_the_bound_there_is_one_root(rng):
-    for _ in range(100):
+    for _ in range(some(35, of=100)):
         p = int(rng.integers(1, 5))
         S, F = dense_compliance(rng, p), rng.uniform(0.1, 3.0, p)
         problem = from_condensed(S, rng.normal(size=2 * p), F)
@@ -41,7 +42,7 @@ def test_below_the_bound_there_is_one_root(rng):
 
 @pytest.mark.slow
 def test_the_constant_bounds_differences_of_psi(rng):
-    for _ in range(30):
+    for _ in range(some(10, of=30)):
         p = int(rng.integers(1, 4))
         S, g = random_compliance(rng, p), rng.normal(size=3 * p)
         m, L = rng.uniform(0.2, 2.0, p), 0.05
@@ -75,7 +76,7 @@ def test_the_constant_bounds_differences_of_psi(rng):
 
 @pytest.mark.slow
 def test_iterations_contract_at_least_as_much_as_the_estimate_says(rng):
-    for _ in range(20):
+    for _ in range(some(8, of=20)):
         p = int(rng.integers(1, 5))
         S, g, F = random_compliance(rng, p), rng.normal(size=3 * p), rng.uniform(0.1, 1.0, (p, 2))
         factor = 0.9 * enumsol.lipschitz_estimate(from_compliance(S, g, (F[:, 0], F[:, 1])), 0).factor

@@ -5,6 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
+from effort import some
 from problems3d import from_compliance, random_compliance, violations
 from scipy.optimize import brentq
 
@@ -43,7 +44,7 @@ def test_the_public_one_contact_problem():
 @pytest.mark.slow
 def test_random_problems_satisfy_the_equations(rng):
     converged = 0
-    for _ in range(60):
+    for _ in range(count := some(20, of=60)):
         p = int(rng.integers(1, 6))
         S, g = random_compliance(rng, p), rng.normal(size=3 * p)
         F = rng.uniform(0.0, 0.6, (p, 2)) * (rng.random((p, 2)) > 0.1)
@@ -54,7 +55,7 @@ def test_random_problems_satisfy_the_equations(rng):
             assert max(found.residuals.values()) < 1e-8
         else:
             assert found.why.startswith("not converged")
-    assert converged > 50
+    assert converged > 5 * count / 6
 
 
 def test_turning_the_axes_of_every_node_changes_nothing(rng):

@@ -57,7 +57,7 @@ def check(found, roots):
         assert distance(found, roots) < 1e-4
 
 
-@pytest.mark.few(10)
+@pytest.mark.few(5, 2)
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("spring", [0.1, 1e-3, 1e-6, 1e-8])
 def test_proven_roots_in_2d(spring, seed):
@@ -69,7 +69,7 @@ def test_proven_roots_in_2d(spring, seed):
     assert found.converged or spring < 1e-3
 
 
-@pytest.mark.few(6)
+@pytest.mark.few(3, 2)
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize("spring", [0.1, 1e-3])
 def test_proven_roots_in_3d(spring, seed):
@@ -143,7 +143,7 @@ def moved(rng, problem, found, size):
     return SimpleNamespace(alpha=0, lambda_n=normal, lambda_t=lambda_t, u_t=found.u_t)
 
 
-@pytest.mark.few(0, 2)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("spring", [1e-1, 1e-4, 1e-5, 1e-6, 1e-7])
 @pytest.mark.parametrize("body", [square, block_on_springs])
 def test_roots_and_limits_are_fixed_points_and_nothing_beside_them(body, spring):

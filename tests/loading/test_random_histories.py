@@ -109,7 +109,7 @@ def compare(problem, alphas, arithmetic):
     return history
 
 
-@pytest.mark.few(6, 6)
+@pytest.mark.few(4, 3)
 @pytest.mark.parametrize("seed", range(60))
 def test_all_paths_of_small_problems(seed):
     problem, alphas = case(seed)
@@ -117,7 +117,7 @@ def test_all_paths_of_small_problems(seed):
     compare(problem, alphas, "verified")
 
 
-@pytest.mark.few(0, 2)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("seed", [*range(1000, 1011), 11568])
 def test_all_paths_with_up_to_three_nodes(seed):
     problem, alphas = case(seed, most=3)

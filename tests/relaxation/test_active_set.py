@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from effort import some
 from generators import dense_compliance, fe_compliance, friction, planted_load, random_load
 from oracles import brute_force
 
@@ -87,13 +88,12 @@ def descend(rng, system, engine):
         node = node.child(*rows_of(codes, F, [i]), last=bool(rng.random() < 0.5))
 
 
-@pytest.mark.slow
-@pytest.mark.few(1)
+@pytest.mark.few(0, 1)
 @pytest.mark.parametrize("seed", range(4))
 def test_values_agree_with_an_interior_point_solver(seed):
     rng = np.random.default_rng(seed)
     seen = {"pruned": 0, "solved": 0}
-    for _ in range(12):
+    for _ in range(some(6, of=12)):
         system = random_system(rng, int(rng.integers(1, 6)))
         for codes, node in descend(rng, system, ActiveSetEngine(system)):
             value = reference(system, codes)
@@ -104,16 +104,16 @@ def test_values_agree_with_an_interior_point_solver(seed):
             else:
                 assert node.bound == pytest.approx(value, abs=1e-6)
                 seen["solved"] += 1
-    assert min(seen.values()) > 7
+    assert min(seen.values()) > some(3, of=7)
 
 
-@pytest.mark.few(3, 4)
+@pytest.mark.few(2, 2)
 @pytest.mark.parametrize("engine", [ActiveSetEngine, InteriorPointEngine])
 @pytest.mark.parametrize("seed", range(4))
 def test_multipliers_prove_the_bound(engine, seed):
     rng = np.random.default_rng(seed + 10)
     pruned = 0
-    for _ in range(40):
+    for _ in range(some(20, of=40)):
         system = random_system(rng, int(rng.integers(1, 9)))
         for codes, node in descend(rng, system, engine(system)):
             assert not node.stalled
@@ -122,7 +122,7 @@ def test_multipliers_prove_the_bound(engine, seed):
             if node.pruned:
                 assert bound > 0.5 * PRUNE_MARGIN
                 pruned += 1
-    assert pruned > 20
+    assert pruned > some(10, of=20)
 
 
 @pytest.mark.parametrize("seed", range(4))

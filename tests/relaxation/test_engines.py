@@ -83,7 +83,7 @@ class Failing:
         monkeypatch.setattr(cls, "__init__", init)
 
 
-@pytest.mark.few(17)
+@pytest.mark.few(8, 0)
 @pytest.mark.parametrize("share", [0.2, 1.0])
 @pytest.mark.parametrize(("problem", "alpha"), PROBLEMS)
 def test_a_stalling_engine_is_replaced(monkeypatch, problem, alpha, share):
