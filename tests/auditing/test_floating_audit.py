@@ -94,9 +94,9 @@ def followed(seed):
 
 @pytest.mark.slow
 def test_all_paths_of_random_bodies_are_on_their_graphs():
-    seeds = [*range(some(13, of=20)), *range(100, some(100, of=300))]
+    seeds = [*range(some(10, of=20)), *range(100, some(100, of=300))]
     found = {seed: result for seed in seeds if (result := followed(seed)) is not None}
-    assert len(found) > len(seeds) // 6
+    assert len(found) > some(0, of=36)
     for seed, result in found.items():
         report = result.report
         assert report.ok, (seed, result)
