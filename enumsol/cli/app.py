@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import difflib
 import sys
 import warnings
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -26,12 +27,16 @@ from enumsol.cli.common import ExitStatus
 from enumsol.cli.quiet import loud_again
 from enumsol.cli.streams import guarded_streams
 from enumsol.errors import EnumsolError, OutputError
+from enumsol.support.messages import listed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
 #: Raised on options that typer cannot make sense of; it comes with click or with typer, by the version of typer.
 _UsageError: type[Exception] = typer.BadParameter.__bases__[0]
+
+#: Likeness from which an option counts as misspelt: --alpha is no --graph.
+_CLOSE = 0.65
 
 app = typer.Typer(
     name="enumsol",
@@ -93,11 +98,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except EnumsolError as error:
             return _refuse(str(error))
         except _UsageError as error:
-            # several sentences: "No such command 'rots'. Did you mean 'roots'?"
-            return _refuse(error.format_message().replace(". Did", "; did"))  # type: ignore[attr-defined]
+            return _refuse(_in_a_sentence(error))
         except (KeyboardInterrupt, typer.Abort):
             return ExitStatus.INTERRUPTED
     return int(status or 0)
+
+
+def _in_a_sentence(error: Any) -> str:
+    """What typer could not make sense of, and what it would."""
+    if (
+        (option := getattr(error, "option_name", None)) is None
+        or error.ctx is None
+        or not hasattr(error, "possibilities")
+    ):
+        # several sentences: "No such command 'rots'. Did you mean 'roots'?"
+        return str(error.format_message()).replace(". Did", "; did")
+    options = [name for parameter in error.ctx.command.params for name in parameter.opts if name.startswith("--")]
+    close = difflib.get_close_matches(option.lstrip("-"), [name[2:] for name in options], n=1, cutoff=_CLOSE)
+    return f"no such option: {option}; " + (
+        f"did you mean --{close[0]}?" if close else f"expected some of {listed(options)}"
+    )
 
 
 def _refuse(message: str, status: ExitStatus = ExitStatus.BAD_INPUT) -> ExitStatus:

@@ -339,7 +339,10 @@ def _problem(mesh: str, scene: Scene) -> ContactProblem | ContactProblem3D:
     except (InvalidArgumentError, InvalidProblemError) as error:
         if mesh.endswith(TOML):
             raise InvalidProblemError(f"{mesh}: {error}") from error
-        raise
+        message = str(error)
+        for name in (name for name in MESH_OPTIONS if "_" in name):
+            message = message.replace(name, _flags(name)[0])
+        raise type(error)(message) from error
 
 
 def _write(problem: ContactProblem | ContactProblem3D, place: str) -> None:

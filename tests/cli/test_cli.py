@@ -357,7 +357,11 @@ def test_bad_problems_get_one_sentence(capsys, tmp_path, case):
         ),
         (("roots", "gallery:chain-2"), "missing option '--alpha'"),
         (("roots", "--alpha", "5"), "missing argument 'PROBLEM'"),
-        (("roots", "gallery:chain-2", "--alfa", "5"), "no such option: --alfa"),
+        (("roots", "gallery:chain-2", "--alfa", "5"), "no such option: --alfa; did you mean --alpha?"),
+        (
+            ("follow", "gallery:chain-2", "--alpha", "5"),
+            "no such option: --alpha; expected some of --from, --to, --start",
+        ),
         (("roots", "gallery:chain-2", "more", "--alpha", "5"), "unexpected extra argument"),
         (("rots",), "no such command 'rots'"),
         (("gallery", "lst"), "no such command 'lst'"),

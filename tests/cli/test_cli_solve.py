@@ -255,6 +255,7 @@ def test_a_scene_that_is_no_problem_is_printed_before_it_is_refused(here, capsys
     assert "3 rigid modes that nothing but contact holds" in out
     assert "note      nothing acts on the body" in out
     assert err.startswith("enumsol: error: the body is free to move as a rigid body")
+    assert err.endswith("or --max-rigid-displacement, if contact alone is to hold it\n")
     (here / "body.toml").write_text(TOML.replace("spring", "pressure_slope").replace("[1, 0.5]", "1"))
     status, out, err = run(capsys, "roots", "body.toml", "--alpha", "1")
     assert status == 2
