@@ -1,118 +1,145 @@
-"""Forged proofs about bodies that nothing holds are refused; exclusions hold no solution whatever the multipliers."""
+"""Forged proofs about bodies that nothing holds, in 2D and 3D, are refused; nothing excludes what holds a solution."""
 
-import dataclasses
 from fractions import Fraction
 
 import numpy as np
 import pytest
+from effort import some
 from helpers.floating_oracle import Oracle, block_on_table, random_body
+from helpers.floating_space import known_body
 from helpers.proof_tools import copied, leaves_of, multipliers, proof_of, records_of, with_multipliers
 
 import enumsol
 from enumsol.condensation.floating import FloatingSystem, RigidRows
+from enumsol.condensation.floating_space import FloatingSpace
+from enumsol.model.sectors import SECTORS, nearest
 from enumsol.trusted.exclusion import exclusion_margin
+from enumsol.trusted.space import sector_rows as sr
+from enumsol.trusted.space.resultants import floating_margin, is_unbalanced_in_space
 from enumsol.trusted.status_rows import FORBIDDEN, FREE, row_signs
 
-PROBLEM = block_on_table(cells=2, push=0.5, max_rigid_displacement=4.0)
-RECORDS = records_of(enumsol.enumerate_roots(PROBLEM, 0).proof)
+
+def proven(problem):
+    return problem, records_of(enumsol.enumerate_roots(problem, 0).proof)
+
+
+@pytest.fixture(scope="module", params=["plane", "space"])
+def body(request):
+    """A body and the records of its proof."""
+    block = block_on_table(cells=2, push=0.5, max_rigid_displacement=4.0)
+    return proven(block if request.param == "plane" else known_body(113).problem)
+
+
+def is_plane(problem):
+    return isinstance(problem, enumsol.ContactProblem)
+
+
 SLIDING = block_on_table(cells=1, push=1.0, max_rigid_displacement=4.0)
 
 
-def refusal(records, problem=PROBLEM):
+def refusal(problem, records):
     report = enumsol.verify(problem, proof_of(records))
     assert not report.ok
     return " ".join(report.failures)
 
 
-def test_the_proof_itself_is_accepted():
-    assert enumsol.verify(PROBLEM, proof_of(RECORDS)).complete
+def with_record(records, place, record):
+    """Other records, of which one is this."""
+    changed = copied(records)
+    changed[place] = record
+    return changed
 
 
-@pytest.mark.parametrize("bound", [2.0, 8.0, 4, None, "4.0"])
-def test_another_bound_in_the_header(bound):
-    records = copied(RECORDS)
-    records[0]["max_rigid_displacement"] = bound
-    assert "bound of the rigid displacement" in refusal(records)
-    del records[0]["max_rigid_displacement"]
-    assert "bound of the rigid displacement" in refusal(records)
+def places(kind, records):
+    return [k for k, record in enumerate(records) if isinstance(record, list) and record[0] == kind]
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"max_rigid_displacement": 2.0},
-        {"max_rigid_displacement": 8.0},
-        {"rigid_modes": 2 * PROBLEM.rigid_modes},
-        {"rigid_modes": PROBLEM.rigid_modes[:, [1, 0, 2]]},
-    ],
-)
-def test_another_problem(change):
-    assert "another problem" in refusal(RECORDS, dataclasses.replace(PROBLEM, **change))
+def test_the_proof_itself_is_accepted(body):
+    problem, records = body
+    assert enumsol.verify(problem, proof_of(records)).complete
 
 
-def test_a_body_on_springs_is_another_problem():
-    assert "another problem" in refusal(RECORDS, PROBLEM.on_springs)
+@pytest.mark.parametrize("bound", [2.0, 8.0, 15.0, 60.0, 4, 30, None, "4.0", "30.0"])
+def test_another_bound_in_the_header(body, bound):
+    problem, records = body
+    other = {key: value for key, value in records[0].items() if key != "max_rigid_displacement"}
+    for header in (other, other | {"max_rigid_displacement": bound}):
+        assert "bound of the rigid displacement" in refusal(problem, [header, *records[1:]])
+
+
+def test_another_problem(body):
+    problem, records = body
+    modes = problem.rigid_modes
+    changes = [{"max_rigid_displacement": 2.0}, {"max_rigid_displacement": 8.0}]
+    changes += [{"rigid_modes": 2 * modes}, {"rigid_modes": modes[:, ::-1]}] if modes.shape[1] > 1 else []
+    for other in (problem.on_springs, *(problem.replace(**change) for change in changes)):
+        assert "another problem" in refusal(other, records)
 
 
 @pytest.mark.slow
-def test_every_exclusion_is_needed_as_it_is():
-    for place, _ in leaves_of(RECORDS):
-        if RECORDS[place][0] != "x":
-            continue
-        rows, values = multipliers(RECORDS[place])
-        for forged in ([0.0] * len(values), [-v for v in values]):
-            records = copied(RECORDS)
-            records[place] = with_multipliers(records[place], rows, forged)
-            assert "do not exclude" in refusal(records)
+def test_every_exclusion_is_needed_as_it_is(body):
+    problem, records = body
+    exclusions = places("x", records)
+    assert exclusions
+    for place in exclusions[: some(4, of=len(exclusions))]:
+        if not is_plane(problem):
+            forgeries = [["x", [], ""]]
+        else:
+            rows, values = multipliers(records[place])
+            others = ([0.0] * len(values), [-v for v in values])
+            forgeries = [with_multipliers(records[place], rows, other) for other in others]
+        for forged in forgeries:
+            assert "do not exclude" in refusal(problem, with_record(records, place, forged))
 
 
-def test_leaves_that_rest_on_a_body_that_is_held():
-    empty = with_multipliers(["x", "", ""], [], [])[1:]
-    one = [[0] * 3, [], [[], [], [], [], []], [0.0] * 6]
-    for leaf in (["z"], ["X", *empty], ["m", *one], ["M", [0] * 3, [[]], 0], ["a", [0] * 3, [], [], *empty, [], [], 1]):
-        place = leaves_of(RECORDS)[0][0]
-        records = copied(RECORDS)
-        records[place] = leaf
-        assert "unknown kind" in refusal(records)
+EMPTY = with_multipliers(["x", "", ""], [], [])[1:]
+ONE = [[0] * 3, [], [[], [], [], [], []], [0.0] * 6]
+HELD = [["z"], ["X", *EMPTY], ["m", *ONE], ["M", [0] * 3, [[]], 0], ["a", [0] * 3, [], [], *EMPTY, [], [], 1]]
+HELD_3D = [["z"], ["m", [], [], [], [], 1], ["l", [], [], [], [], [], 1], ["D", [], 0]]
 
 
-def test_a_root_cannot_be_left_out_or_added():
-    kinds = [record[0] for record in RECORDS[1:-1]]
-    place = 1 + kinds.index("r")
-    records = copied(RECORDS)
-    records[place] = ["n"]
-    records[-1]["roots"] = 0
-    assert refusal(records)
-    records[place] = ["N"]
-    assert "it holds a root" in refusal(records)
-    for index in range(1, 3):
-        records = copied(RECORDS)
-        records[place][index][0] += 1.0 if index == 1 else -records[place][index][0]
-        assert refusal(records)
-    records = copied(RECORDS)
-    records[place][3] *= -1
-    assert refusal(records)
+def test_leaves_that_rest_on_a_body_that_is_held(body):
+    problem, records = body
+    for leaf in HELD if is_plane(problem) else HELD_3D:
+        assert "unknown kind" in refusal(problem, with_record(records, leaves_of(records)[0][0], leaf))
 
 
-def test_a_direction_of_imbalance_is_tested():
-    problem = block_on_table(cells=2, push=1.25)
-    records = records_of(enumsol.enumerate_roots(problem, 0).proof)
-    places = [k for k, record in enumerate(records) if isinstance(record, list) and record[0] == "i"]
-    assert places
-    for place in places:
-        for forged in ([-x for x in records[place][1]], [0.0] * 3):
-            changed = copied(records)
-            changed[place][1] = forged
-            assert "may be in balance with the load" in refusal(changed, problem)
-        for forged in (records[place][1][:2], ["1", 0, 0], 1.0):
-            changed = copied(records)
-            changed[place][1] = forged
-            assert "expected 3 numbers" in refusal(changed, problem)
+def test_a_root_cannot_be_left_out_or_moved(body):
+    problem, records = body
+    for place in places("r", records)[: some(1, of=9)]:
+        _, mid, rad, index = records[place]
+        fewer = {**records[-1], "roots": records[-1]["roots"] - 1}
+        for leaf in (["n"], *([["N"]] if is_plane(problem) else [])):
+            said = refusal(problem, [*with_record(records, place, leaf)[:-1], fewer])
+            assert "it holds a root" in said or (leaf == ["n"] and is_plane(problem))
+        for forged in (["r", [mid[0] + 1.0, *mid[1:]], rad, index], ["r", mid, rad, -index]):
+            assert refusal(problem, with_record(records, place, forged))
+        assert refusal(problem, with_record(records, place, ["r", mid, [0.0, *rad[1:]], index])) or not rad[0]
+
+
+def lifted():
+    """A body in 3D that its load pulls away."""
+    problem = known_body(1).problem
+    away = 50 * (problem.Bn.sum(axis=0) @ problem.rigid_modes) @ problem.rigid_modes.T
+    return problem.replace(f=problem.f - away)
+
+
+@pytest.mark.parametrize("make", [lambda: block_on_table(cells=2, push=1.25), lifted], ids=["plane", "space"])
+def test_a_direction_of_imbalance_is_tested(make):
+    problem, records = proven(make())
+    found = places("i", records)
+    assert found
+    for place in found:
+        z = records[place][1]
+        for forged in ([-x for x in z], [0.0] * len(z)):
+            assert "in balance with the load" in refusal(problem, with_record(records, place, ["i", forged]))
+        for forged in (z[:-1], [*z, 1.0], ["1", *z[1:]], 1.0):
+            said = refusal(problem, with_record(records, place, ["i", forged]))
+            assert f"expected {len(z)} numbers" in said
 
 
 def test_a_direction_of_imbalance_means_nothing_for_a_body_that_is_held():
-    held = PROBLEM.on_springs
-    records = records_of(enumsol.enumerate_roots(held, 0).proof)
+    held, records = proven(SLIDING.on_springs)
     records[1] = ["i", [1.0, 0.0, 0.0]]
     report = enumsol.verify(held, proof_of([records[0], records[1], {**records[-1], "leaves": 1, "roots": 0}]))
     assert "unknown kind" in " ".join(report.failures)
@@ -127,15 +154,15 @@ def test_a_proof_with_huge_multipliers_is_accepted():
 
 
 def test_a_family_is_as_long_as_the_bound():
-    records = records_of(enumsol.enumerate_roots(SLIDING, 0).proof)
+    _, records = proven(SLIDING)
     assert enumsol.verify(SLIDING, proof_of(records)).within == 4.0
-    place = next(k for k, record in enumerate(records) if isinstance(record, list) and record[0] == "D")
+    place = places("D", records)[0]
     for point in range(len(records[place][1])):
         forged = copied(records)
         forged[place][1][point][-1] = "1/1"
-        assert "not those that are claimed" in refusal(forged, SLIDING)
+        assert "not those that are claimed" in refusal(SLIDING, forged)
         forged[place][1][point].pop()
-        assert "expected points of 7 fractions" in refusal(forged, SLIDING)
+        assert "expected points of 7 fractions" in refusal(SLIDING, forged)
 
 
 def enclosed(problem):
@@ -188,3 +215,64 @@ def _proposals(problem):
             yield found, values * factor
 
     return best
+
+
+def _status(known, system, node, rng):
+    """A code of a node, complete or not, that the known solution has."""
+    force, F = known.lambda_n[node], np.array(known.problem.friction).T[node]
+    tau = known.lambda_t[node] / F / force if force > 0 else np.zeros(2)
+    if rng.random() < 0.3:
+        return sr.UNDECIDED
+    if force == 0:
+        return sr.OPEN
+    if rng.random() < 0.3:
+        return sr.CONTACT
+    if np.hypot(*tau) < 0.99:
+        return sr.STICK
+    number = nearest(*tau, 6)
+    number = 64 + (number - 64 - 1) % 64 if rng.random() < 0.5 else number
+    return SECTORS + number
+
+
+def test_what_holds_a_solution_is_not_excluded():
+    """Whatever the multipliers are. Sectors are the two around the direction; only those with it inside are used."""
+    tried = 0
+    for seed in range(6):
+        known, rng = known_body(seed), np.random.default_rng(seed)
+        ones = np.ones(known.problem.p)
+        system = FloatingSpace.of(known.problem, Fraction(0), ones, ones)
+        free = system.reaching(np.full_like(system.reach, np.inf))
+        for _ in range(12):
+            codes = [_status(known, system, node, rng) for node in range(known.problem.p)]
+            if not all(_inside(known, node, code) for node, code in enumerate(codes)):
+                continue
+            rows = [row for node, code in enumerate(codes) for row in _rows(node, code)]
+            signs = [sr.row_sign(codes[row[1]], row) for row in rows]
+            for scale in (0.1, 1.0, 10.0):
+                values = scale * rng.normal(size=len(rows))
+                values = np.where(np.array(signs) == sr.NONNEGATIVE, np.abs(values), values)
+                for within in (system, free):
+                    assert not floating_margin(within, codes, rows, values) > 0
+            for z in rng.normal(size=(10, len(system.reach))):
+                assert not is_unbalanced_in_space(system, codes, z)
+            tried += 1
+    assert tried > 30
+
+
+def _rows(node, code):
+    """Some rows that a node imposes."""
+    rows = [(sr.GAP, node, 0), (sr.FORCE, node, 0), *((sr.TANGENT, node, 8 + k) for k in range(8))]
+    rows += [(sr.TAU, node, k) for k in (0, 1)] if code == sr.OPEN else []
+    rows += [(sr.SLIP, node, k) for k in (0, 1)] if code == sr.STICK else []
+    if code > SECTORS:
+        rows += [(kind, node, code - SECTORS) for kind in (sr.CHORD, sr.LEFT, sr.RIGHT)]
+    return [row for row in rows if sr.row_sign(code, row) != sr.FORBIDDEN]
+
+
+def _inside(known, node, code):
+    if code <= SECTORS:
+        return True
+    F = np.array(known.problem.friction).T[node]
+    tau = known.lambda_t[node] / F
+    (x, y), (p, q) = sr.direction(code - SECTORS), sr.direction(sr.end_number(code - SECTORS))
+    return x * tau[1] - y * tau[0] > 0 and tau[0] * q - tau[1] * p > 0

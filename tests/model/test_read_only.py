@@ -1,4 +1,4 @@
-"""What a problem or a result holds cannot be written to, so that no answer changes behind a proof."""
+"""What a problem or a result holds, in 2D and 3D, cannot be written to: no answer changes behind a proof."""
 
 import copy
 import pickle
@@ -27,6 +27,7 @@ DATA = {
     "coordinates": np.array([[0.0, 0.0], [1.0, 0.0]]),
 }
 MATRICES = ("A", "Bn", "Bt")
+COPIES = [copy.copy, copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))]
 
 
 @pytest.fixture
@@ -37,6 +38,26 @@ def problem():
     assert made.condensed.S.shape == made.enclosure.S.shape == (4, 4)
     assert enumsol.enumerate_roots(made, 1.5).complete
     return made
+
+
+@pytest.fixture
+def body():
+    """The same in 3D, with a table of friction and means of slips."""
+    table = enumsol.FrictionTable([0, 0.1, 1], [0.5, 0.4, 0.3], [0.3, 0.2, 0.2])
+    made = gallery.block3d(4, 4, 1, friction=table, multipliers="elements", ratio=2)
+    assert enumsol.successive_approximations(made, 0).converged
+    assert enumsol.lipschitz_estimate(made, 0).C2 > 0
+    return made
+
+
+def forces(body):
+    return enumsol.successive_approximations(body, 0).forces.tolist()
+
+
+def unchangeable(owner, name):
+    for change in (lambda: setattr(owner, name, None), lambda: delattr(owner, name)):
+        with pytest.raises(AttributeError):
+            change()
 
 
 def answers(problem):
@@ -127,27 +148,39 @@ def test_no_array_of_a_problem_can_be_written(problem):
         assert_locked(array)
 
 
-def test_no_attribute_of_a_problem_can_be_set(problem):
-    for owner, name in (
-        (problem, "A"),
-        (problem, "_A"),
-        (problem, "f"),
-        (problem, "node_ids"),
-        (problem, "fingerprint"),
-        (problem, "condensed"),
-        (problem, "new"),
-        (problem.condensed, "S"),
-        (problem.enclosure, "S"),
-        (problem.factorization, "_scale"),
-        (problem.factorization, "_lu"),
-        (problem._A, "data"),
-    ):
-        with pytest.raises(AttributeError):
-            setattr(owner, name, None)
-        with pytest.raises(AttributeError):
-            delattr(owner, name)
+def test_no_array_of_a_problem_in_3d_can_be_written(body):
+    found = dict(reachable(body, "problem"))
+    for name in (".f", ".areas", ".law.F1", ".mesh.points", ".mesh.rows", ".slip_mean.offset", ".condensed.S"):
+        assert f"problem{name}" in found
+    for part in ("_A.data", "_rows[Bt1].data", "slip_mean._parts[weights].data"):
+        assert f"problem.{part}" in found
+    for array in found.values():
+        assert_locked(array)
+
+
+def test_no_attribute_of_a_problem_can_be_set(problem, body):
+    for name in ("A", "_A", "f", "node_ids", "fingerprint", "condensed", "new"):
+        unchangeable(problem, name)
+    for part in (problem.condensed, problem.enclosure, body.condensed):
+        unchangeable(part, "S")
+    for owner, name in ((problem.factorization, "_scale"), (problem.factorization, "_lu"), (problem._A, "data")):
+        unchangeable(owner, name)
     assert isinstance(problem.node_ids, tuple)
     assert isinstance(problem.friction, tuple)
+
+
+def test_no_attribute_of_a_problem_in_3d_can_be_set(body):
+    before = forces(body)
+    for name in ("law", "areas", "slip_mean", "mesh"):
+        unchangeable(body, name)
+    friction, mean = body.friction, body.slip_mean
+    for owner, name in ((friction, "F1"), (friction, "new"), (body.mesh, "rows"), (mean, "weights"), (mean, "offset")):
+        unchangeable(owner, name)
+    for name in ("T1", "T2", "weights"):
+        matrix = getattr(mean, name)
+        matrix.data = np.zeros_like(matrix.data)
+        assert_locked(getattr(mean, name).data)
+    assert forces(body) == before
 
 
 def test_what_flint_computes_with_cannot_be_written():
@@ -178,7 +211,22 @@ def test_the_callers_arrays_are_copied():
     assert np.array_equal(made.coordinates, DATA["coordinates"])
 
 
-@pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])
+def test_the_callers_arrays_are_copied_in_3d():
+    mesh = gallery.block3d(2, 1, 1).mesh
+    given = {name: np.array(getattr(mesh, name)) for name in ("points", "cells", "dofs", "facets")}
+    weights, rows, offset = np.array([[0.5, 0.5]]), np.eye(4)[:2], np.zeros((2, 2))
+    made, mean = enumsol.BodyMesh.of_dofs(**given), enumsol.SlipMean(rows, rows, offset, weights)
+    slips = np.array([0.0, 1.0, 2.0])
+    table = enumsol.FrictionTable(slips, slips)
+    for array in (*given.values(), weights, rows, offset, slips):
+        array[...] = 7
+    assert np.array_equal(made.points, mesh.points)
+    assert np.array_equal(made.cells, mesh.cells)
+    assert mean([1.0, 3.0, 0.0, 0.0]) == pytest.approx([2.0 * np.sqrt(2.0)])
+    assert table.slip.tolist() == table.F1.tolist() == [0.0, 1.0, 2.0]
+
+
+@pytest.mark.parametrize("again", COPIES)
 def test_copies_are_as_locked_and_as_right(problem, again):
     other = again(problem)
     assert answers(other) == answers(problem)
@@ -188,6 +236,17 @@ def test_copies_are_as_locked_and_as_right(problem, again):
         other.f = other.f
     with pytest.raises(AttributeError, match="ContactProblem is immutable: f cannot be deleted"):
         del other.f
+
+
+@pytest.mark.parametrize("again", COPIES)
+def test_copies_in_3d_are_as_locked_and_as_right(body, again):
+    other = again(body)
+    assert forces(other) == forces(body)
+    for array in dict(reachable(other, "copy")).values():
+        assert_locked(array)
+    for owner, name in ((other, "f"), (other.friction, "F1"), (other.slip_mean, "offset")):
+        with pytest.raises(AttributeError, match=f"is immutable: {name} cannot be set"):
+            setattr(owner, name, None)
 
 
 # -- results ---------------------------------------------------------------------------------------------------------
@@ -247,6 +306,29 @@ def test_no_attribute_of_a_result_can_be_set(results):
         with pytest.raises(AttributeError):
             setattr(owner, name, ())
     assert not cut.complete
+
+
+@pytest.mark.parametrize("again", [lambda x: x, *COPIES[1:]])
+def test_no_array_or_attribute_of_a_fixed_point_can_be_changed(body, again, tmp_path):
+    limit = enumsol.successive_approximations(body, 0)
+    limit.save(tmp_path / "limit.npz")
+    solved = enumsol.solve_tresca(body, 1.0, 0)
+    for result in (limit, solved, enumsol.FixedPoint.load(tmp_path / "limit.npz", body)):
+        assert result.u.size
+        assert result.statuses
+        assert result.residuals
+        kept = again(result)
+        for array in dict(reachable(kept, "result")).values():
+            assert_locked(array)
+        for name in ("lambda_n", "u", "statuses", "residuals", "new"):
+            with pytest.raises(AttributeError):
+                setattr(kept, name, None)
+        with pytest.raises(TypeError, match="does not support item assignment"):
+            result.residuals["cone"] = 0.0
+    with pytest.raises(AttributeError):
+        limit.outcome = enumsol.fixed_points.Outcome.CONVERGED
+    with pytest.raises(AttributeError):
+        enumsol.lipschitz_estimate(body, 0).sampled = False
 
 
 def test_the_network_of_a_graph_is_frozen(results):
