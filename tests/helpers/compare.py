@@ -3,6 +3,8 @@
 import numpy as np
 from oracles import NAMES
 
+from enumsol import enumerate_roots, verify
+
 METHODS = (("fast", "tree"), ("fast", "exhaustive"), ("exact", "tree"), ("exact", "exhaustive"))
 
 
@@ -76,6 +78,16 @@ def differences_from_exact(roots, components, indices):
         elif family.dimension != match[0][0].dimension or family.index != match[0][1]:
             out.append(f"family: dimension {family.dimension}, index {family.index} against {match[0][1]}")
     return out
+
+
+def assert_as_exhaustive(problem, alpha, roots):
+    """A complete and proven list of roots is that of all selections in rationals, which is returned."""
+    exact = enumerate_roots(problem, alpha, "exact", "exhaustive")
+    assert roots.complete
+    assert (len(roots), len(roots.families)) == (len(exact), len(exact.families))
+    assert [(root.active, root.index) for root in roots] == [(root.active, root.index) for root in exact]
+    assert verify(problem, roots.proof).complete
+    return exact
 
 
 def _near(points, vertices, tolerance):

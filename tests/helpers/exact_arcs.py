@@ -221,3 +221,16 @@ def two_zeros(gap):
     """Data of one node that slips, w_t = (alpha - 1)^2 - gap, with the codes and the condition's number."""
     data = np.eye(2), np.array([2.0, 1.0 - gap]), np.array([-1.0, 0.0]), np.zeros(1), np.ones(1)
     return data, (2,), 0
+
+
+def check_slopes(truth, expansion, known, a, b, made):
+    """Slopes of conditions that are known over a part are true, and so are the zeros that follow; counts them."""
+    slopes = known.slopes
+    for k in np.flatnonzero(slopes).tolist():
+        made["slopes"] += 1
+        assert truth.only_zero(k, int(slopes[k]), a, b)
+        if a < b and [int(end[k]) for end in known.ends] == [-slopes[k], slopes[k]]:
+            made["zeros"] += 1
+            first, last = expansion.zero_bounds(k, int(slopes[k]), a, b)
+            assert a <= first < last <= b
+            assert truth.signs(truth.conditions[k], first, last) == {-1, 0, 1}

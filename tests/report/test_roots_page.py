@@ -5,7 +5,7 @@ import sys
 
 import numpy as np
 import pytest
-from browser import Browser, find_browser
+from browser import find_browser
 from pages import Reader, data_of
 
 import enumsol
@@ -222,13 +222,6 @@ def test_the_command(tmp_path, capsys, monkeypatch):
 # -- in a browser -----------------------------------------------------------------------------------------------------
 
 in_a_browser = pytest.mark.skipif(find_browser() is None, reason="no headless browser (Debian's package chromium)")
-
-
-@pytest.fixture(scope="module")
-def browser():
-    browser = Browser(find_browser())
-    yield browser
-    browser.close()
 
 
 def drawn(browser, count):

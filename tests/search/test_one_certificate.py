@@ -4,7 +4,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from compare import differences
+from compare import assert_as_exhaustive, differences
 from effort import some
 from generators import fe_compliance
 from proof_tools import copied, proof_of, records_of
@@ -59,13 +59,8 @@ def test_all_selections_find_the_same(part, monkeypatch):
     for seed in range(32 * part, 32 * part + some(16, of=32)):
         problem = problems(seed)
         alpha = 1.0 if seed % 4 == 2 else 0
-        exact = enumerate_roots(problem, alpha, "exact", "exhaustive")
         roots = enumerate_roots(problem, alpha)
-        assert roots.complete
-        assert (len(roots), len(roots.families)) == (len(exact), len(exact.families)), seed
-        assert [root.active for root in roots] == [root.active for root in exact], seed
-        assert [root.index for root in roots] == [root.index for root in exact], seed
-        assert verify(problem, roots.proof).complete
+        exact = assert_as_exhaustive(problem, alpha, roots)
         assert check_records(problem, records_of(roots.proof)) == records_of(roots.proof)[-1]
         assert is_unique(problem, alpha) is (len(exact) == 1 and not exact.families)
         certified += roots.by_one_certificate

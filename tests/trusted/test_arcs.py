@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 from effort import some
-from exact_arcs import Truth, arc_system, beside, exact_of, interval_at, random_data, two_zeros, widened
+from exact_arcs import Truth, arc_system, beside, check_slopes, exact_of, interval_at, random_data, two_zeros, widened
 
 from enumsol.arithmetic.rationals import rational
 from enumsol.trusted.arcs.over_parts import expansions, over_parts
@@ -70,21 +70,12 @@ def check_claims(count, start=0):
                 assert truth.signs(truth.det, a, b) == {known.index}
             if not known.regular:
                 continue
-            slopes = known.slopes
-            for k, end in product(range(len(slopes)), (0, 1)):
+            for k, end in product(range(len(known.slopes)), (0, 1)):
                 sign = int(known.ends[end][k])
                 made["ends"] += sign != 0
                 alpha = (a, b)[end]
                 assert not sign or truth.signs(truth.conditions[k], alpha, alpha) == {sign * index_at(truth, alpha)}
-            for k in np.flatnonzero(slopes).tolist():
-                made["slopes"] += 1
-                assert truth.only_zero(k, int(slopes[k]), a, b)
-                signs = [int(end[k]) for end in known.ends]
-                if a < b and signs == [-slopes[k], slopes[k]]:
-                    made["zeros"] += 1
-                    first, last = expansion.zero_bounds(k, int(slopes[k]), a, b)
-                    assert a <= first < last <= b
-                    assert truth.signs(truth.conditions[k], first, last) == {-1, 0, 1}
+            check_slopes(truth, expansion, known, a, b, made)
     return made
 
 

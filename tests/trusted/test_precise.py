@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from effort import some
-from exact_arcs import Truth, beside, exact_of, interval_at, precise_system, random_data, two_zeros
+from exact_arcs import Truth, beside, check_slopes, exact_of, interval_at, precise_system, random_data, two_zeros
 from flint import arb, arb_mat, ctx
 from path_problems import generic_problem
 
@@ -61,16 +61,7 @@ def check_claims(count, start=0):
                 continue
             made["index"] += 1
             assert truth.signs(truth.det, a, b) == {index}
-            slopes = known.slopes
-            for k in np.flatnonzero(slopes).tolist():
-                made["slopes"] += 1
-                assert truth.only_zero(k, int(slopes[k]), a, b)
-                signs = [int(end[k]) for end in known.ends]
-                if a < b and signs == [-slopes[k], slopes[k]]:
-                    made["zeros"] += 1
-                    first, last = expansion.zero_bounds(k, int(slopes[k]), a, b)
-                    assert a <= first < last <= b
-                    assert truth.signs(truth.conditions[k], first, last) == {-1, 0, 1}
+            check_slopes(truth, expansion, known, a, b, made)
     return made
 
 
