@@ -6,21 +6,25 @@ checked again with the balls of S, g and F widened, and the widening is enlarged
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE
+from enumsol.arithmetic.ball_arrays import Ball
+from enumsol.arithmetic.balls import SAFE, gamma
+from enumsol.checker.floating import FloatingChecker
 from enumsol.checker.plane_checker import Checker, FormLeaves
 from enumsol.checker.verify import verify
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
+from enumsol.condensation.floating import FloatingSystem
 from enumsol.model.problem import ContactProblem
 from enumsol.proof import records
 from enumsol.support.arguments import instance_of
 from enumsol.trusted.at_alpha import solve_selection
 from enumsol.trusted.exclusion import Leaves, exclusion_margins
+from enumsol.trusted.floating_bounds import is_unbalanced
 from enumsol.trusted.uniqueness_in_contact import lone_root
 
 if TYPE_CHECKING:
@@ -57,6 +61,13 @@ def stability_radius(problem: ContactProblem, proof: Proof) -> float:
     largest radius is larger: only the multipliers of this proof are tried. The cost is that of several
     checks of the proof.
 
+    Of a body that nothing holds, S and g are those of the body on springs, the roots those within its bound of the
+    rigid displacement, and the load of the body as a whole (theory, (14.2)) may change as well:
+
+        |h'_k - h_k|   <= r H_k a,    H_k = sum_i |G_ki| / sqrt(S_ii)
+
+    where a is the larger one of max_j |g_j| / sqrt(S_jj), in place of which it is, and of max_k |h_k| / H_k.
+
     Parameters
     ----------
     problem : ContactProblem
@@ -75,15 +86,15 @@ def stability_radius(problem: ContactProblem, proof: Proof) -> float:
     InvalidArgumentError
         The problem is no ContactProblem.
     """
-    instance_of(problem, ContactProblem, "problem").check_held("stability_radius")
+    kind = _WidenedChecker if instance_of(problem, ContactProblem, "problem").modes is None else _WidenedFloating
     if not verify(problem, proof).complete:
         return 0.0
-    search = _WidenedChecker(problem, None, radius=LARGEST, adjust=True)
+    search = kind(problem, None, radius=LARGEST, adjust=True)
     search.run(proof)
     radius = search.radius
     # what was found leaf by leaf is proven for all leaves at once
     while radius >= SMALLEST:
-        check = _WidenedChecker(problem, None, radius=radius, adjust=False)
+        check = kind(problem, None, radius=radius, adjust=False)
         if check.run(proof).complete and not check.polytopes:
             return radius
         radius *= 0.5
@@ -103,9 +114,21 @@ class _WidenedChecker(Checker):
         """Upper bounds of what changes of S and g are measured by."""
         system = self.system
         root = np.sqrt(np.diagonal(system.S) + np.diagonal(system.S_rad)) * SAFE
-        lower = np.sqrt(np.diagonal(system.S) - np.diagonal(system.S_rad)) / SAFE
-        largest = np.max((np.abs(system.g) + system.g_rad) / lower) * SAFE
-        return np.outer(root, root) * SAFE, root * largest * SAFE
+        return np.outer(root, root) * SAFE, root * self._load * SAFE
+
+    @cached_property
+    def _roots(self) -> NDArray[np.float64]:
+        """Lower bounds of the roots of S_ii."""
+        return np.asarray(np.sqrt(np.diagonal(self.system.S) - np.diagonal(self.system.S_rad)) / SAFE)
+
+    @cached_property
+    def _load(self) -> float:
+        """An upper bound of the size of the load."""
+        return float(np.max((np.abs(self.system.g) + self.system.g_rad) / self._roots) * SAFE)
+
+    def _with(self, system: EnclosedSystem, radius: float) -> EnclosedSystem:
+        """Wider balls, complete."""
+        return system
 
     def _widened(self, radius: float) -> EnclosedSystem | None:
         """The balls of this radius; None when S is not positive definite in all of them."""
@@ -121,6 +144,7 @@ class _WidenedChecker(Checker):
                 system.F,
                 (system.F_rad + radius * (system.F + system.F_rad)) * SAFE,
             )
+            wide = self._with(wide, radius)
             # the midpoint is the same
             wide.__dict__["inverse"] = system.inverse
             try:
@@ -193,6 +217,40 @@ class _WidenedChecker(Checker):
 
     def _for_all(self, holds: Callable[[EnclosedSystem], bool]) -> str | None:
         return None if self._passes(holds) else "it does not hold for all data"
+
+
+@dataclass
+class _WidenedFloating(_WidenedChecker, FloatingChecker):
+    """The same for a body that nothing holds, within its bound of the rigid displacement."""
+
+    @cached_property
+    def _weights(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Lower and upper bounds of what changes of h are measured by, for a load of size one, (r,)."""
+        G, S, k = self.system.rows.G, self.system, gamma(len(self.system.g) + 2)
+        most = np.sqrt(np.diagonal(S.S) + np.diagonal(S.S_rad)) * SAFE
+        least = np.sum(np.maximum(np.abs(G.mid) - G.rad, 0.0) / most, axis=1)
+        return least * (1 - k), np.sum((np.abs(G.mid) + G.rad) / self._roots, axis=1) * (1 + k) * SAFE
+
+    @cached_property
+    def _load(self) -> float:
+        h, (least, _) = self.system.rows.h.size, self._weights
+        own = np.max(np.divide(h, least, out=np.zeros_like(h), where=least > 0))
+        return float(max(np.max((np.abs(self.system.g) + self.system.g_rad) / self._roots), own) * SAFE)
+
+    def _with(self, system: EnclosedSystem, radius: float) -> EnclosedSystem:
+        rows = self.system.rows
+        h = Ball(rows.h.mid, (rows.h.rad + radius * self._weights[1] * self._load * SAFE) * SAFE)
+        return FloatingSystem.on(system, replace(rows, h=h))
+
+    def _tests(self) -> dict[type[Record], Test]:
+        # what rationals told of a selection may hold in balls as well
+        return super()._tests() | {
+            records.Unbalanced: self._unbalanced,
+            records.NoRootInRationals: self._no_root,
+        }
+
+    def _unbalanced(self, codes: Codes, said: records.Unbalanced) -> str | None:
+        return self._for_all(lambda system: is_unbalanced(cast("FloatingSystem", system), codes, said.direction))
 
 
 def _sturdiest(system: EnclosedSystem, leaves: Leaves) -> NDArray[np.float64]:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from effort import some
 from generators import fe_compliance, from_condensed, planted_load, random_load
+from helpers.floating_oracle import block_on_table, random_body
 from oracles import exact_condense
 from proof_tools import copied, proof_of, records_of
 
@@ -113,3 +114,72 @@ def test_larger_bodies_have_one():
         entry = gallery.get(name)
         problem = entry.build()
         assert stability_radius(problem, enumerate_roots(problem, entry.alpha).proof) > 1e-12
+
+
+def shaken(rng, problem, radius, *, corner):
+    """A body that nothing holds with other friction, gap, slip offset and load, within a radius."""
+    held = problem.on_springs.condensed
+    root = np.sqrt(np.diagonal(held.S))
+    h, weights = (
+        problem.rigid_modes.T @ problem.f,
+        (np.abs(held.problem.contact_rows @ problem.rigid_modes).T / root).sum(1),
+    )
+    size = max(np.max(np.abs(held.g0) / root), np.max(np.abs(h)[weights > 0] / weights[weights > 0], initial=0.0))
+
+    def step(shape):
+        return rng.choice([-1.0, 1.0], size=shape) if corner else rng.uniform(-1, 1, size=shape)
+
+    rows = problem.contact_rows.toarray()
+    change = rows.T @ step(len(rows)) + rng.choice([0.0, 1.0]) * rng.normal(size=problem.n)
+    moved = np.abs(rows @ problem.on_springs.factorization.solve(change)) / (root * size)
+    lifted = np.abs(problem.rigid_modes.T @ change) / np.where(weights > 0, weights * size, 1.0)
+    largest = max(np.max(moved), np.max(lifted[weights > 0], initial=0.0))
+    if np.any(lifted[weights == 0] > 0) or largest == 0:
+        change, largest = np.zeros(problem.n), 1.0
+    free = 0.499 * radius * root * size * step(len(root))
+    F = problem.friction_at(0)
+    return problem.replace(
+        f=problem.f + 0.499 * radius / largest * change,
+        gap=problem.gap + free[: problem.p],
+        slip_offset=problem.slip_offset + free[problem.p :],
+        friction=(F * (1 + 0.999 * radius * step(problem.p)), 0.0),
+    )
+
+
+def selections(roots):
+    """As `outline`, without names for the slip of nodes that have no friction."""
+    without = [root.problem.friction_at(0) == 0 for root in roots]
+    return sorted(
+        (
+            tuple(
+                "contact" if free and s.value != "open" else s.value for s, free in zip(root.statuses, F, strict=True)
+            ),
+            root.index,
+        )
+        for root, F in zip(roots, without, strict=True)
+    )
+
+
+@pytest.mark.few(0, 4)
+@pytest.mark.parametrize("seed", range(60))
+def test_perturbed_bodies_that_nothing_holds_have_the_same_roots(seed):
+    rng = np.random.default_rng(seed)
+    problem = random_body(seed + 500)
+    problem = problem.replace(friction=(problem.friction_at(0), 0.0))
+    roots = enumerate_roots(problem, 0.0)
+    radius = stability_radius(problem, roots.proof)
+    if roots.families or not all(root.regular for root in roots):
+        assert radius == 0.0
+    for trial in range(4 if radius else 0):
+        exact = enumerate_roots(shaken(rng, problem, radius, corner=trial % 2 == 0), 0.0, "exact")
+        assert not exact.families
+        assert selections(exact) == selections(roots)
+
+
+@pytest.mark.parametrize("push", [0.5, 0.999, 1.0, 1.001])
+def test_a_block_that_nothing_holds(push):
+    problem = block_on_table(push=push)
+    radius = stability_radius(problem, enumerate_roots(problem, 0.0).proof)
+    assert (radius > 0) == (push != 1.0)
+    # at 1 it slides
+    assert radius <= abs(1 - push)
