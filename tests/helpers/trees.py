@@ -33,6 +33,20 @@ def closed_in_the_tree():
 
 
 @contextmanager
+def every_subtree():
+    """In this context every subtree in 2D is tried."""
+    before = Closer.closed
+
+    def closed(self, codes, relaxation):
+        self._alert, self._wait = True, 0
+        return before(self, codes, relaxation)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Closer, "closed", closed)
+        yield
+
+
+@contextmanager
 def without_boxes():
     """In this context no leaf in 3D is settled by a box that holds one solution."""
     with pytest.MonkeyPatch.context() as patch:

@@ -8,6 +8,7 @@ from generators import integer_problem, random_problem
 from proof_tools import records_of
 from rational_checker import check_records
 from touching import beside_a_loaded_node, row_of_discs, touching_problem
+from trees import every_subtree
 
 from enumsol import ContactProblem, enumerate_roots, verify
 from enumsol.model.statuses import BACKWARD, FORWARD
@@ -51,33 +52,30 @@ def test_sides_without_rationals(monkeypatch):
     assert verify(problem, roots.proof).complete
 
 
-@pytest.mark.parametrize("weights", [(2.0, 3.0), (1.0, 2.0, 4.0)])
-def test_a_row_of_unequal_discs(weights):
-    problem = row_of_discs(12, weights=weights, friction=0.9, stiffness=4.0)
-    roots = enumerate_roots(problem, 0, max_nodes=60)
+def only_root(problem, most):
+    """The one root, with a proof, of a search of at most so many nodes."""
+    roots = enumerate_roots(problem, 0, max_nodes=most)
     assert roots.complete
     assert roots.index_sum == len(roots) == 1
     assert verify(problem, roots.proof).complete
+    return roots[0]
+
+
+@pytest.mark.parametrize("weights", [(2.0, 3.0), (1.0, 2.0, 4.0)])
+def test_a_row_of_unequal_discs(weights):
+    only_root(row_of_discs(12, weights=weights, friction=0.9, stiffness=4.0), 60)
 
 
 @pytest.mark.few(0, 1)
 @pytest.mark.parametrize("seed", range(2))
 def test_a_row_of_stiff_discs_of_any_weights(seed):
-    problem = row_of_discs(20, weights=np.random.default_rng(seed).uniform(1.5, 3.0, 20), friction=0.9)
-    roots = enumerate_roots(problem, 0, max_nodes=600)
-    assert roots.complete
-    assert roots.index_sum == len(roots) == 1
-    assert verify(problem, roots.proof).complete
+    only_root(row_of_discs(20, weights=np.random.default_rng(seed).uniform(1.5, 3.0, 20), friction=0.9), 600)
 
 
 @pytest.mark.slow
 def test_the_index_where_very_many_selections_hold():
     # some neighbours have equal weights: those touch at rest
-    problem = row_of_discs(20, weights=np.random.default_rng(1).integers(12, 25, 20) / 8, friction=0.9)
-    roots = enumerate_roots(problem, 0, max_nodes=600)
-    assert roots.complete
-    assert roots.index_sum == len(roots) == 1
-    assert verify(problem, roots.proof).complete
+    only_root(row_of_discs(20, weights=np.random.default_rng(1).integers(12, 25, 20) / 8, friction=0.9), 600)
 
 
 @pytest.mark.slow
@@ -91,25 +89,15 @@ def test_sixty_four_unloaded_nodes():
 
 
 def test_a_row_of_discs():
-    problem = row_of_discs(20)
-    roots = enumerate_roots(problem, 0, max_nodes=40)
-    assert roots.complete
-    assert roots.index_sum == len(roots) == 1
     # 18 pairs of discs touch without load
-    assert sum(len(held) == 4 for held in roots[0].active) == 18
-    assert verify(problem, roots.proof).complete
+    assert sum(len(held) == 4 for held in only_root(row_of_discs(20), 40).active) == 18
 
 
 @pytest.fixture
-def every_node(monkeypatch):
+def every_node():
     """Every subtree is tried."""
-    before = closing.Closer.closed
-
-    def closed(self, codes, relaxation):
-        self._alert, self._wait = True, 0
-        return before(self, codes, relaxation)
-
-    monkeypatch.setattr(closing.Closer, "closed", closed)
+    with every_subtree():
+        yield
 
 
 def alike(problem, exact, roots):
