@@ -18,18 +18,24 @@ from enumsol.proof.records import Limits, NoRoot, RegularRoot
 from enumsol.proof.space_records import (
     LEAVES,
     BoxedRoot,
+    DeclaredProductForm,
     DeclaredSlipForm,
+    EnclosedByProducts,
     ExcludedBySlipForm,
     ExcludedInSpace,
+    MissedByProducts,
     OnlyRoot,
 )
 from enumsol.trusted.space.boxed_solution import Box, apart_in_boxes, is_inside, solution_in_box
 from enumsol.trusted.space.leaves import Open, distinct_roots, settle
+from enumsol.trusted.space.product_forms import Ellipsoid, refines
 from enumsol.trusted.space.sector_rows import STICK, UNDECIDED, is_sector_covering, sector_margin
 from enumsol.trusted.space.slip_forms import SlipForm
 from enumsol.trusted.space.space_uniqueness import OnlySolution, lone_root, only_root, only_solution_in_space
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from enumsol.checker.walk import Codes, Test
@@ -39,6 +45,7 @@ if TYPE_CHECKING:
     from enumsol.trusted.space.space_uniqueness import LooseSolution
 
 _OPEN = "what it holds is not proven"
+_NO_FORM = "no form that is convex was declared over it"
 
 
 @dataclass
@@ -53,6 +60,8 @@ class SpaceChecker(TreeChecker):
     known: dict[bytes, BoxedSolution | None] = field(default_factory=dict)
     #: The form that was declared last.
     form: SlipForm | None = None
+    #: The ellipsoid of the form of products that was declared last; None where it is not proven to be one.
+    ellipsoid: Ellipsoid | None = None
 
     # -- header and tree -------------------------------------------------------------------------------------------
 
@@ -94,6 +103,8 @@ class SpaceChecker(TreeChecker):
             NoRoot: self._no_root,
             RegularRoot: self._regular_root,
             BoxedRoot: self._in_box,
+            MissedByProducts: self._missed,
+            EnclosedByProducts: self._in_ellipsoid,
             OnlyRoot: self._only,
         }
 
@@ -109,6 +120,12 @@ class SpaceChecker(TreeChecker):
         system = self.system
         try:
             limits = Limits((UNDECIDED,) * self.problem.p, components=len(system.g))
+            if len(record) in DeclaredProductForm.sizes:
+                said = DeclaredProductForm.read(record, limits)
+                with np.errstate(over="ignore", invalid="ignore"):
+                    centre = said.centre / system.unit
+                self.ellipsoid = Ellipsoid.of(system, said.codes, centre, said.numbers)
+                return
             numbers = DeclaredSlipForm.read(record, limits).numbers
             if self.form is None or not np.array_equal(self.form.numbers, numbers):
                 self.form = SlipForm.of(system, numbers)
@@ -138,8 +155,35 @@ class SpaceChecker(TreeChecker):
         self._locate(found.y, np.array(codes) == STICK)
         return self._placed(found, said.enclosure)
 
+    def _missed(self, codes: Codes, said: MissedByProducts) -> str | None:
+        del said
+        ellipsoid = self.ellipsoid
+        if ellipsoid is None or not refines(codes, ellipsoid.codes):
+            return _NO_FORM
+        return None if ellipsoid.misses(codes) else "its ellipsoid does not exclude it"
+
+    def _in_ellipsoid(self, codes: Codes, said: EnclosedByProducts) -> str | None:
+        """The only solution of a box that holds an ellipsoid in which all roots of the assignment lie."""
+        ellipsoid = self.ellipsoid
+        if ellipsoid is None or not refines(codes, ellipsoid.codes):
+            return _NO_FORM
+        return self._of_box(codes, said, ellipsoid.is_in)
+
     def _in_box(self, codes: Codes, said: BoxedRoot) -> str | None:
         """The only solution of a box, in which all roots of the leaf lie."""
+        leaf = settle(self.system, codes)
+        bounds = None if leaf is None else (leaf.y, leaf.w)
+
+        def within(box: Box) -> bool:
+            if bounds is None:
+                return True
+            y, w = bounds
+            return y is not None and w is not None and is_inside(y, w, box)
+
+        return self._of_box(codes, said, within)
+
+    def _of_box(self, codes: Codes, said: BoxedRoot, within: Callable[[Box], bool]) -> str | None:
+        """The only solution of a box, of which ``within`` tells whether all roots of the leaf lie in it."""
         (mid, rad, rho), unit = said.box(len(self.system.g)), self.system.unit
         with np.errstate(over="ignore", invalid="ignore"):
             box = Box.of(self.system, mid / unit, rad / unit, rho / unit**2)
@@ -149,8 +193,7 @@ class SpaceChecker(TreeChecker):
         found = self.known[key]
         if found is None:
             return "its box is not proven to hold one solution"
-        leaf = settle(self.system, codes)
-        if leaf is not None and (leaf.y is None or leaf.w is None or not is_inside(leaf.y, leaf.w, box)):
+        if not within(box):
             return "its roots are not proven to lie in its box"
         self.boxed.append((codes, found))
         self._locate(found.y, ~(found.slip | found.open))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.model.sectors import DEEPEST, RUN
+from enumsol.model.sectors import DEEPEST, RUN, SECTORS, is_sector
 from enumsol.proof.reading import bytes_from, numbers_from, quoted, rational_from
 from enumsol.proof.records import (
     ClosingRecord,
@@ -87,6 +87,44 @@ class DeclaredSlipForm(Record):
 
 
 @dataclass(frozen=True, eq=False)
+class DeclaredProductForm(Record):
+    """A sum of products over an assignment, to whose ellipsoid later leaves refer.
+
+    Attributes
+    ----------
+    codes : of the assignment, which has no undecided node
+    centre : (m,) array
+        A point near the minimiser of the form.
+    numbers : a multiplier for every product, as ``trusted.space.product_forms.Ellipsoid.of`` takes them
+    """
+
+    kind, sizes, unfit = DeclaredForm.kind, (4,), "a form has {} entries; expected {}"
+
+    codes: tuple[int, ...]
+    centre: Array
+    numbers: Array
+
+    @classmethod
+    def of(cls, entries: list[Any], limits: Limits) -> DeclaredProductForm:
+        """Codes and numbers; ValueError where they make no sense."""
+        codes, centre, numbers = entries
+        if not isinstance(codes, list) or len(codes) != limits.p or not all(map(_is_final, codes)):
+            raise ValueError("a form cannot be read: it is about no assignment")
+        try:
+            count = len(numbers) if isinstance(numbers, list) else 0
+            return cls(tuple(codes), numbers_from(centre, limits.components), numbers_from(numbers, count))
+        except ValueError as error:
+            raise ValueError(f"a form cannot be read: {error}") from None
+
+
+@dataclass(frozen=True)
+class MissedByProducts(Exclusion):
+    """The ellipsoid of the form of products that was declared last leaves no solution."""
+
+    kind, sizes = "e", (1,)
+
+
+@dataclass(frozen=True, eq=False)
 class ExcludedBySlipForm(ExcludedInSpace):
     """The same with the form that was declared last in place of the energy."""
 
@@ -159,6 +197,17 @@ class BoxedRoot(Solved):
     def entries(self) -> Iterable[Any]:
         """Those of the enclosure after the box."""
         return self.mid, self.rad, self.rho, *self.enclosure
+
+
+class EnclosedByProducts(BoxedRoot, ClosingRecord):
+    """All solutions lie in the ellipsoid that was declared last, which lies in a box with one solution."""
+
+    kind = "j"
+
+    @classmethod
+    def check(cls, record: list[Any], limits: Limits) -> None:
+        """The same; statuses may be open."""
+        super(Solved, cls).check(record, limits)
 
 
 @dataclass(frozen=True, eq=False)
@@ -280,12 +329,26 @@ class OnlyOverPiece(Record):
 
 #: All kinds of leaves in 3D.
 LEAVES = table_of(
-    ExcludedInSpace, ExcludedBySlipForm, NoRoot, RegularRoot, BoxedRoot, OnlyRoot, Unloaded, UndecidedRecord
+    ExcludedInSpace,
+    ExcludedBySlipForm,
+    MissedByProducts,
+    NoRoot,
+    RegularRoot,
+    BoxedRoot,
+    EnclosedByProducts,
+    OnlyRoot,
+    Unloaded,
+    UndecidedRecord,
 )
 #: The same of a body that nothing holds; others rest on a stiffness that is positive definite.
 FLOATING_LEAVES = table_of(ExcludedInSpace, Unbalanced, NoRoot, RegularRoot, UndecidedRecord)
 #: Of a tree over alpha, too.
 PIECE_LEAVES = table_of(ExcludedInSpace, NoRoot, InCurveBox, ThroughCurveBox, OnlyOverPiece, UndecidedRecord)
+
+
+def _is_final(code: Any) -> bool:
+    """Whether a code is a status that is not undecided, or that of a sector."""
+    return type(code) is int and (0 <= code < UNDECIDED or (code > SECTORS and is_sector(code - SECTORS)))
 
 
 def _row(row: Any, p: int) -> Row:

@@ -32,6 +32,7 @@ IN_SPACE = {
     "enumsol.trusted.space.slip_forms",
     "enumsol.trusted.space.leaves",
     "enumsol.trusted.space.boxed_solution",
+    "enumsol.trusted.space.product_forms",
     "enumsol.trusted.space.natural_map",
     "enumsol.trusted.space.space_uniqueness",
     "enumsol.trusted.space.turning",
@@ -89,8 +90,9 @@ SHARED = {
     "trusted.space.resultants": None,
     "trusted.space.turning": {"turned_by"},
     "trusted.space.boxed_solution": {
-        *("Box", "BoxedSolution", "apart_in_boxes", "box_around", "is_inside", "solution_in_box")
+        *("Box", "BoxedSolution", "apart_in_boxes", "box_around", "is_inside", "proposed_rho", "solution_in_box")
     },
+    "trusted.space.product_forms": {"CONE", "SIGNED", "Ellipsoid", "Frame", "refines"},
     "trusted.space.solution_curve": None,
     "trusted.space.curve_chains": None,
     "trusted.space.curve_events": None,

@@ -111,6 +111,18 @@ def random_coupled(rng, p):
     return S, rng.normal(size=3 * p), F
 
 
+def soft_or_coupled(seed, p):
+    """S, g and F of nodes on a body on weak springs, or of strongly coupled ones."""
+    rng = np.random.default_rng([seed, p])
+    if seed % 2:
+        return random_coupled(rng, p)
+    X = rng.normal(size=(3 * p, 3 * p))
+    together = np.kron(np.eye(3), np.ones((p, 1)))
+    S = X @ X.T / p + 0.1 * np.eye(3 * p) + together @ together.T / 10 ** rng.uniform(-3, 0)
+    load = np.array([1.0, *rng.uniform(-0.5, 0.5, 2)])
+    return S, S @ together @ load / p + rng.normal(size=3 * p), np.full((p, 2), 10 ** rng.uniform(-0.5, 0.5))
+
+
 def forces(root):
     return np.concatenate([root.lambda_n, root.lambda_t[:, 0], root.lambda_t[:, 1]])
 

@@ -8,7 +8,7 @@ from enumsol.branches.enclosed.single_branches import ClosedPieces
 from enumsol.search import fathoming as closing
 from enumsol.search.fathoming import Closer
 from enumsol.search.reduction import WeightSource
-from enumsol.search.space import space_forms
+from enumsol.search.space import space_fathoming, space_forms
 from enumsol.search.space.known_boxes import KnownBoxes
 from enumsol.search.space.space_fathoming import SpaceCloser
 
@@ -71,6 +71,17 @@ def above_known_roots():
         patch.setattr(Closer, "whole", whole)
         patch.setattr(Closer, "closed", closed)
         patch.setattr(closing, "_FEW", 0)
+        yield
+
+
+@contextmanager
+def products_at_once():
+    """In this context searches in 3D try forms of products at all assignments of final statuses, and nothing before."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(SpaceCloser, "whole", lambda self: None)
+        patch.setattr(SpaceCloser, "_alone", lambda self, codes: None)
+        patch.setattr(space_fathoming, "_HARD", 0)
+        patch.setattr(space_fathoming, "_LONGEST", 0)
         yield
 
 

@@ -16,10 +16,10 @@ from enumsol.trusted.space.boxed_solution import (
     Box,
     BoxedSolution,
     _NaturalMap,
-    _proposed_rho,
     apart_in_boxes,
     box_around,
     is_inside,
+    proposed_rho,
     solution_in_box,
 )
 
@@ -86,7 +86,7 @@ def test_steps_stay_within_their_bounds():
     rng, tried = np.random.default_rng(0), 0
     for seed in range(some(12, of=60)):
         solvers, y, _, _, _ = boxed(seed)
-        problem = _NaturalMap.of(solvers.enclosed, _proposed_rho(solvers.enclosed)[seed % 2])
+        problem = _NaturalMap.of(solvers.enclosed, proposed_rho(solvers.enclosed)[seed % 2])
         assert problem.T.mid @ (np.eye(len(y)) + problem.rho[:, None] * problem.S.mid) == pytest.approx(np.eye(len(y)))
         centre = y * problem.system.unit + rng.normal(size=len(y)) * rng.choice([0.0, 1e-3, 0.1])
         reach = np.full(len(y), 10.0 ** rng.uniform(-4, 0))

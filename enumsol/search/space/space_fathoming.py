@@ -14,16 +14,20 @@ import scipy.linalg
 
 from enumsol.model.sectors import SECTORS, nearest, start_of
 from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.search.space.product_search import ProductSearch
 from enumsol.search.space.space_newton import Isotropic
 from enumsol.support.deadlines import look
 from enumsol.trusted.space.space_uniqueness import LARGEST_UNIT, equations
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from numpy.typing import NDArray
 
     from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
     from enumsol.relaxation.engine import Relaxation
     from enumsol.search.fathoming_in_contact import KnownRoot
+    from enumsol.search.space.product_search import Branched, Enclosed, Missed
     from enumsol.selections.solution import Codes
 
     Array = NDArray[np.float64]
@@ -32,6 +36,10 @@ if TYPE_CHECKING:
 NEAR = 1e-9
 #: Level of the sectors in which a regular solution is sought.
 _LEVEL = 20
+#: Assignments of final statuses that are met before forms of products are tried, and programs for one of them.
+_HARD, _PROGRAMS = 256, 8
+#: Assignments that pass before the next try, at most.
+_LONGEST = 4096
 #: Smallest eigenvalue of Q relative to S below which it counts as not definite, at which numbers are good enough, and
 #: below which plain numbers leave no hope of better ones.
 _DEFINITE, _GOOD, _HOPELESS = 1e-9, 1e-2, -0.5
@@ -65,6 +73,9 @@ class SpaceClosing(Protocol):
     def alone(self, codes: Codes, numbers: Array, leaf: Codes) -> list[Any] | None:
         """The root of a leaf, as a list, if no other solution has the statuses of an assignment; None if not proven."""
 
+    def fathom(self, codes: Codes, tree: Sequence[Branched | Missed | Enclosed]) -> list[Any]:
+        """The solutions of boxes in a tree below an assignment that is proven already, which is written."""
+
 
 class SpaceCloser:
     """Tries once before the tree, and then at every assignment that allows the statuses of a regular solution.
@@ -83,6 +94,8 @@ class SpaceCloser:
         self._enough, self._least = (_CLEAR, _CLEAR) if regular else (_DEFINITE, NEAR)
         #: Assignments of statuses that were tried in vain.
         self._tried: set[Codes] = set()
+        #: Assignments of final statuses that were met, and that pass before products are tried again.
+        self._met = self._wait = self._pause = 0
         #: No node slides without load in a part of the tree, and no root is tried there.
         self.sliding: dict[int, int] = {}
         self.known: KnownRoot | None = None
@@ -97,14 +110,44 @@ class SpaceCloser:
         """The only solution, proven again where an earlier search has proven it."""
         if all(code == UNDECIDED for code in codes):
             return self.whole()
-        return self.closed(codes, relaxation)
+        found = self._alone(codes)
+        return self._by_products(codes) if found is None else found
 
     def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[Any] | None:
+        """The only solutions below an assignment, if that is proven.
+
+        That is the regular solution that is known, or what forms of products leave where many assignments of final
+        statuses were met.
+        """
+        del relaxation
+        found = self._alone(codes)
+        if found is not None or self._regular or UNDECIDED in codes or CONTACT in codes:
+            return found
+        self._met += 1
+        if self._met <= _HARD:
+            return None
+        if self._wait > 0:
+            self._wait -= 1
+            return None
+        found = self._by_products(codes)
+        self._pause = 2 * self._pause + 1 if found is None else 0
+        self._wait = min(self._pause, _LONGEST)
+        return found
+
+    @cached_property
+    def _products(self) -> ProductSearch:
+        return ProductSearch(self._certifier.enclosed)
+
+    def _by_products(self, codes: Codes) -> list[Any] | None:
+        """What forms of products leave of an assignment, if that is a few boxes with a solution each."""
+        tree = None if self._regular else self._products.closed(codes, _PROGRAMS)
+        return None if tree is None else self._certifier.fathom(codes, tree)
+
+    def _alone(self, codes: Codes) -> list[Any] | None:
         """The regular solution that is known, if it is proven to be the only one with the statuses of an assignment.
 
         Sectors count as contact: each assignment of statuses is tried once.
         """
-        del relaxation
         statuses, found = tuple(CONTACT if code > SECTORS else code for code in codes), None
         with np.errstate(all="ignore"):
             point = self._point

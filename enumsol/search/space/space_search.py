@@ -13,9 +13,12 @@ from enumsol.proof.records import EnclosureRecord, Limits, NoRoot, RegularRoot, 
 from enumsol.proof.space_records import (
     LEAVES,
     BoxedRoot,
+    DeclaredProductForm,
     DeclaredSlipForm,
+    EnclosedByProducts,
     ExcludedBySlipForm,
     ExcludedInSpace,
+    MissedByProducts,
     OnlyRoot,
 )
 from enumsol.relaxation.engine import PRUNE_MARGIN
@@ -23,7 +26,9 @@ from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
 from enumsol.search.certifiers.protocol import WIDEN, Certified, RecordingCertifier, Refine, UndecidedPart
 from enumsol.search.resume import RecordedBound
 from enumsol.search.space.known_boxes import KnownBoxes
+from enumsol.search.space.product_search import Branched, Enclosed, Missed
 from enumsol.trusted.space.leaves import Cause, Open, SpaceRoot, settle
+from enumsol.trusted.space.product_forms import Ellipsoid, refines
 from enumsol.trusted.space.sector_rows import is_sector_covering, sector_margin, sector_row_terms
 from enumsol.trusted.space.slip_forms import SlipForm
 from enumsol.trusted.space.space_uniqueness import OnlySolution, lone_root, only_root, only_solution_in_space
@@ -108,13 +113,18 @@ class SpaceReader:
 
     def __init__(self, engine: SpaceEngine, enclosed: EnclosedSpace) -> None:
         self._engine, self._enclosed = engine, enclosed
-        #: The form that was declared last.
+        #: The form that was declared last, and the ellipsoid of the last form of products.
         self._form: SlipForm | None = None
+        self._ellipsoid: Ellipsoid | None = None
 
     def declare(self, record: list[Any]) -> None:
         """Take note of a form; ValueError where the record makes no sense."""
         system = self._engine.system
         limits = Limits((UNDECIDED,) * system.p, components=len(system.g))
+        if len(record) in DeclaredProductForm.sizes:
+            said = DeclaredProductForm.read(record, limits)
+            self._ellipsoid = Ellipsoid.of(self._enclosed, said.codes, said.centre / system.unit, said.numbers)
+            return
         numbers = DeclaredSlipForm.read(record, limits).numbers
         # parts of one search declare the same form
         if self._form is None or not np.array_equal(self._form.numbers, numbers):
@@ -133,6 +143,11 @@ class SpaceReader:
     def bound(self, codes: Codes, record: list[Any]) -> Bound:
         """What is said to exclude a partial assignment; ValueError where the record makes no sense."""
         engine, p = self._engine, len(codes)
+        if record[0] == MissedByProducts.kind:
+            MissedByProducts.read(record, Limits(codes))
+            if self._ellipsoid is None:
+                raise ValueError("there is no ellipsoid")
+            return RecordedBound(np.zeros(0, dtype=np.intp), np.zeros(0), self._ellipsoid)
         by_form = record[0] == ExcludedBySlipForm.kind
         if by_form and self._form is None:
             raise ValueError("its form was not declared")
@@ -169,13 +184,16 @@ class SpaceCertifier(RecordingCertifier):
         super().__init__(recorder)
         self._engine, self.enclosed = engine, enclosed
         self._boxes = KnownBoxes(engine.system, enclosed)
-        #: The form that was written last.
+        #: The form that was written last, and the ellipsoid of the last form of products.
         self._form: SlipForm | None = None
+        self._ellipsoid: Ellipsoid | None = None
 
     def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """Whether the relaxation's multipliers are proven to exclude the partial assignment."""
         if not relaxation.bound > PRUNE_MARGIN:
             return False
+        if isinstance(relaxation.form, Ellipsoid):
+            return self._missed(codes, relaxation.form)
         numbers, values = relaxation.multipliers()
         rows = [self._engine.rows[number] for number in numbers.tolist()]
         form = relaxation.form
@@ -190,12 +208,12 @@ class SpaceCertifier(RecordingCertifier):
     def add(self, part: Certified) -> None:
         """Take over what the certifier of a subtree has proven, which may have declared another form."""
         super().add(part)
-        self._form = None
+        self._form = self._ellipsoid = None
 
     def forget(self) -> None:
         """Forget what was proven, and what was declared."""
         super().forget()
-        self._form = None
+        self._form = self._ellipsoid = None
 
     def selection(self, codes: Codes) -> SpaceRoot | BoxedSolution | UndecidedPart | Refine | None:
         """The root of a leaf, a sector to halve, or why the leaf stays open."""
@@ -204,11 +222,7 @@ class SpaceCertifier(RecordingCertifier):
             self._leaf(NoRoot())
         elif isinstance(answer, Open):
             if (boxed := self._boxed(answer)) is not None:
-                self._verified[codes], unit = boxed, self.enclosed.unit
-                centre, radius, rho = boxed.box.numbers
-                ball = self._ball(boxed, wider=_WIDER)
-                self._leaf(BoxedRoot(centre * unit, radius * unit, rho * unit**2, ball))
-                return boxed
+                return self._in_box(codes, boxed, BoxedRoot)
             if answer.node is not None and level_of(codes[answer.node] - SECTORS) < DEEPEST:
                 return Refine(answer.node)
             reason = answer.cause.value if answer.mode is None else f"{answer.cause.value} (rigid mode {answer.mode})"
@@ -219,6 +233,52 @@ class SpaceCertifier(RecordingCertifier):
             self._leaf(RegularRoot(self._ball(answer)))
             answer = self._verified[codes] = self._placed(codes, answer)
         return answer
+
+    def _in_box(self, codes: Codes, found: BoxedSolution, kind: type[BoxedRoot]) -> BoxedSolution:
+        """The solution of a box, and its leaf written."""
+        self._verified[codes], unit = found, self.enclosed.unit
+        centre, radius, rho = found.box.numbers
+        self._leaf(kind(centre * unit, radius * unit, rho * unit**2, self._ball(found, wider=_WIDER)))
+        return found
+
+    def _missed(self, codes: Codes, ellipsoid: Ellipsoid) -> bool:
+        """Whether an ellipsoid leaves no solution of an assignment; if so, that is written."""
+        if not refines(codes, ellipsoid.codes) or not ellipsoid.misses(codes):
+            return False
+        self._declare(ellipsoid)
+        self._leaf(MissedByProducts())
+        return True
+
+    def _declare(self, ellipsoid: Ellipsoid) -> None:
+        """Write a form of products, unless it is the last one."""
+        if ellipsoid is not self._ellipsoid:
+            self._ellipsoid = ellipsoid
+            centre = ellipsoid.frame.centre * self.enclosed.unit
+            self.recorder.write(DeclaredProductForm(ellipsoid.codes, centre, ellipsoid.numbers).write())
+
+    def fathom(self, codes: Codes, tree: Sequence[Branched | Missed | Enclosed]) -> list[BoxedSolution]:
+        """The solutions of boxes in a tree below an assignment that is proven already, which is written.
+
+        Parameters
+        ----------
+        codes : of the assignment
+        tree : depth first
+        """
+        found: list[BoxedSolution] = []
+        stack = [codes]
+        for node in tree:
+            codes = stack.pop()
+            if isinstance(node, Branched):
+                self.branching(node.node, node.children)
+                after = codes[node.node + 1 :]
+                stack += [(*codes[: node.node], child, *after) for child in reversed(node.children)]
+                continue
+            self._declare(node.ellipsoid)
+            if isinstance(node, Enclosed):
+                found.append(self._in_box(codes, node.found, EnclosedByProducts))
+            else:
+                self._leaf(MissedByProducts())
+        return found
 
     def _boxed(self, leaf: Open) -> BoxedSolution | None:
         """The one solution that an open leaf can have, if that is proven."""

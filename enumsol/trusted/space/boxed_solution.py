@@ -94,7 +94,7 @@ def box_around(system: EnclosedSpace, y: Array) -> Box | None:
     if not _moderate(system) or not np.all(np.isfinite(y)):
         return None
     with np.errstate(all="ignore"):
-        for rho in _proposed_rho(system):
+        for rho in proposed_rho(system):
             found = _NaturalMap.of(system, rho)
             box = None if found is None else found.proposed(y)
             if box is not None:
@@ -115,7 +115,7 @@ def _displacements(system: EnclosedSpace, y: Ball) -> Ball:
     return g - (S @ y[:, None])[:, 0]
 
 
-def _proposed_rho(system: EnclosedSpace) -> list[Array]:
+def proposed_rho(system: EnclosedSpace) -> list[Array]:
     """rho, one for lambda_n and one for tau of every node, scaled: between 1 / S_ii and the stiffness S^-1_ii."""
     soft = system.unit**2 / np.diagonal(system.S)
     try:

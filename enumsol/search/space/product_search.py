@@ -1,0 +1,278 @@
+"""In 3D: an assignment that holds one known solution, or none, by forms of products (theory, section 12.11).
+
+Nothing here is trusted: ``trusted.space.product_forms`` proves the ellipsoids that are proposed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse
+
+from enumsol.model.sectors import DEEPEST, SECTORS, cut, level_of, width_of
+from enumsol.model.statuses import CONTACT, UNDECIDED
+from enumsol.support.deadlines import look
+from enumsol.trusted.space.boxed_solution import proposed_rho, solution_in_box
+from enumsol.trusted.space.product_forms import CONE, SIGNED, Ellipsoid, Frame
+from enumsol.trusted.space.sector_rows import sector_children
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.space_condensed import EnclosedSpace
+    from enumsol.selections.solution import Codes
+    from enumsol.trusted.space.boxed_solution import BoxedSolution
+
+    Array = NDArray[np.float64]
+
+#: What a writer of proofs asks for (see ``Ellipsoid.of``).
+_ERRORS = 2.0
+#: Size of the ellipsoid that is expected at first, and powers of 1/2 of a sector that are cut off its ends.
+_WIDEST, _SLICES = 1.0, (1, 2, 3)
+#: Log2 of what an ellipsoid has to take off the widths of all sectors, or else one is halved.
+_GAIN = 1.0
+#: The mean curvature of a form is at most so many times the least one.
+_STEEPEST = 1e3
+#: The radius of the ellipsoid that a program is scaled for should be within this of the one that it finds.
+_SCALED, _RESCALINGS = 30.0, 2
+
+
+@dataclass(frozen=True)
+class Branched:
+    """A node of the tree whose children follow, depth first."""
+
+    node: int
+    children: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Missed:
+    """A leaf without a solution of the ellipsoid."""
+
+    ellipsoid: Ellipsoid
+
+
+@dataclass(frozen=True)
+class Enclosed:
+    """A leaf whose ellipsoid lies in the box of a solution."""
+
+    ellipsoid: Ellipsoid
+    found: BoxedSolution
+
+
+class ProductSearch:
+    """A tree of its own below an assignment without undecided nodes, whose nodes are bounded by forms of products.
+
+    Parameters
+    ----------
+    system : EnclosedSpace
+    """
+
+    def __init__(self, system: EnclosedSpace) -> None:
+        self._system = system
+        self._rho, self._tangents = proposed_rho(system), np.sum(system.tau >= 0, axis=1).tolist()
+        self._boxes: list[BoxedSolution] = []
+        #: A point of the last ellipsoid: what is far from zero is rounded more.
+        self._near: Array | None = None
+        #: Programs solved.
+        self.programs = 0
+
+    def closed(self, codes: Codes, programs: int) -> list[Branched | Missed | Enclosed] | None:
+        """The tree below an assignment, depth first; None where more programs than so many would be needed.
+
+        It is given up at once where the first form cuts nothing off.
+        """
+        if UNDECIDED in codes or not self._rho:
+            return None
+        last = self.programs + programs
+        tree: list[Branched | Missed | Enclosed] = []
+        stack: list[tuple[Codes, Ellipsoid | None, float]] = [(codes, None, _WIDEST)]
+        while stack:
+            codes, above, size = stack.pop()
+            if above is not None and above.misses(codes):
+                tree.append(Missed(above))
+                continue
+            if self.programs >= last:
+                return None
+            self.programs += 1
+            found = self.best(codes, size)
+            if found is not None:
+                above, size = found
+                if above.empty:
+                    tree.append(Missed(above))
+                    continue
+                boxed = self._boxed(above)
+                if boxed is not None:
+                    tree.append(Enclosed(above, boxed))
+                    continue
+                narrowed = self._narrowed(above, tree)
+                if narrowed is not None:
+                    stack.append((narrowed, above, size))
+                    continue
+            if not tree:
+                # of no use here: the first form cuts nothing off
+                return None
+            node = self._widest(codes)
+            if node < 0:
+                return None
+            children = sector_children(codes[node], self._tangents[node])
+            tree.append(Branched(node, children))
+            stack += [((*codes[:node], child, *codes[node + 1 :]), above, size) for child in reversed(children)]
+        return tree
+
+    def _boxed(self, ellipsoid: Ellipsoid) -> BoxedSolution | None:
+        """The one solution in a box around an ellipsoid, if that is proven."""
+        for known in self._boxes:
+            if ellipsoid.is_in(known.box, _ERRORS):
+                return known
+        for rho in self._rho:
+            box = ellipsoid.box(rho)
+            found = None if box is None else solution_in_box(self._system, box, _ERRORS)
+            if found is not None and ellipsoid.is_in(found.box, _ERRORS):
+                self._boxes.append(found)
+                return found
+        return None
+
+    def _narrowed(self, ellipsoid: Ellipsoid, tree: list[Branched | Missed | Enclosed]) -> Codes | None:
+        """What an ellipsoid leaves of an assignment, if that is much less; what it cuts off is put into the tree."""
+        codes, gain, cuts = list(ellipsoid.codes), 0.0, []
+        for i, code in enumerate(codes):
+            parts: list[int] = []
+            rest = code
+            if code == CONTACT:
+                children = sector_children(code, self._tangents[i])
+                parts = [child for child in children if ellipsoid.node_misses(i, child)]
+                if len(parts) != len(children) - 1:
+                    continue
+                (rest,) = set(children) - set(parts)
+            elif code > SECTORS:
+                for end in (0, 1):
+                    for halvings in _SLICES:
+                        part, left = cut(rest - SECTORS, end, halvings)
+                        if level_of(left) <= DEEPEST and ellipsoid.node_misses(i, SECTORS + part):
+                            parts.append(SECTORS + part)
+                            rest = SECTORS + left
+                            break
+            if parts:
+                gain += 2.0 if code == CONTACT else float(np.log2(width_of(code - SECTORS) / width_of(rest - SECTORS)))
+                cuts.append((i, parts, rest))
+        if gain < _GAIN:
+            return None
+        for i, parts, rest in cuts:
+            tree.append(Branched(i, (*parts, rest)))
+            tree += [Missed(ellipsoid)] * len(parts)
+            codes[i] = rest
+        return tuple(codes)
+
+    @staticmethod
+    def _widest(codes: Codes) -> int:
+        """The node to branch on."""
+        widths = [2.0 if c == CONTACT else width_of(c - SECTORS) if c > SECTORS else 0.0 for c in codes]
+        node = int(np.argmax(widths))
+        return node if widths[node] > 0 else -1
+
+    def best(self, codes: Codes, size: float) -> tuple[Ellipsoid, float] | None:
+        """The smallest ellipsoid around all solutions of an assignment, and its size, near a guess of it; or None.
+
+        Lengths are those of y - rho w.
+        """
+        frame = Frame.of(self._system, codes, np.zeros(len(self._system.g)))
+        products = frame.products()
+        rows = frame.equations.mid
+        norm = np.linalg.norm(rows, axis=1)
+        scaled = rows / norm[:, None]
+        inside = scipy.linalg.null_space(scaled)
+        if not products or not inside.shape[1]:
+            return None
+        away = np.eye(len(self._system.g)) + self._rho[0][:, None] * self._system.S
+        U, long, V = np.linalg.svd(away @ inside, full_matrices=False)
+        T = inside @ (V.T / long)
+        at = -np.linalg.pinv(scaled) @ (frame.rest.mid / norm)
+        if self._near is not None:
+            at = at + T @ (U.T @ (away @ (self._near - at)))
+        values = frame.values.mid + frame.parts.mid @ at
+        whole = np.concatenate([frame.parts.mid @ T, values[:, :, None]], axis=2)
+        matrices = np.array([whole[i].T @ matrix.mid @ whole[i] for i, matrix, _ in products])
+        kinds = [kind for _, _, kind in products]
+        for _ in range(_RESCALINGS):
+            look()
+            found = _solved(matrices, kinds, size)
+            if found is None:
+                return None
+            z, u, least = found
+            if least >= 0 or 1 / _SCALED <= (root := np.sqrt(-least)) <= _SCALED:
+                break
+            size *= float(root)
+        centre = at + T @ u
+        ellipsoid = Ellipsoid.of(self._system, codes, centre, z, _ERRORS)
+        if ellipsoid is None:
+            return None
+        self._near = centre
+        return ellipsoid, size * float(np.sqrt(max(-least, 1e-2)))
+
+
+def _solved(matrices: Array, kinds: list[int], size: float) -> tuple[Array, Array, float] | None:
+    """Multipliers of the form with curvature one at least that has the largest minimum, where it is, and that minimum.
+
+    u is measured by ``size``, in the minimum as well.
+    """
+    import clarabel  # takes a while to import
+
+    rank, kind, count = matrices.shape[1] - 1, np.array(kinds), len(kinds)
+    signed, triples = np.flatnonzero(kind == SIGNED), np.flatnonzero(kind == CONE)
+    scale = np.append(np.full(rank, size), 1.0)
+    reduced = -scale[:, None] * matrices * scale
+    norm = np.linalg.norm(reduced, axis=(1, 2))
+    norm[triples] = np.repeat(np.max(norm[triples].reshape(-1, 3), axis=1), 3)
+    reduced = reduced / norm[:, None, None]
+    inner, corner = reduced[:, :rank, :rank], np.zeros((rank + 1, rank + 1))
+    corner[rank, rank] = 1.0
+    # unknowns: the multipliers, and the minimum; whose signs, mean curvature and cones, and what is to be definite
+    chosen = -np.eye(count, count + 1)
+    flat = np.append(np.trace(inner, axis1=1, axis2=2), 0.0)
+    blocks = [
+        (np.vstack([chosen[signed], flat]), np.append(np.zeros(len(signed)), _STEEPEST * rank)),
+        (chosen[triples], np.zeros(len(triples))),
+        (-np.column_stack([_packed(reduced).T, _packed(-corner)]), np.zeros(len(_packed(corner)))),
+        (-np.column_stack([_packed(inner).T, 0.0 * _packed(np.eye(rank))]), -_packed(np.eye(rank))),
+    ]
+    cones = [clarabel.NonnegativeConeT(len(signed) + 1)] + [clarabel.SecondOrderConeT(3)] * (len(triples) // 3)
+    cones += [clarabel.PSDTriangleConeT(rank + 1), clarabel.PSDTriangleConeT(rank)]
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    rows, right = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
+    goal, none = np.append(np.zeros(count), -1.0), scipy.sparse.csc_matrix((count + 1, count + 1))
+    answer = clarabel.DefaultSolver(none, goal, scipy.sparse.csc_matrix(rows), right, cones, settings).solve()
+    z = np.array(answer.x)[:count]
+    if not np.all(np.isfinite(z)):
+        return None
+    form = np.tensordot(z, reduced, 1)
+    try:
+        u = -np.linalg.solve(form[:rank, :rank], form[:rank, rank])
+    except np.linalg.LinAlgError:
+        return None
+    least = float(form[rank, rank] + form[rank, :rank] @ u)
+    return (_allowed(z / norm, kinds), size * u, least) if np.isfinite(least) else None
+
+
+def _allowed(z: Array, kinds: list[int]) -> Array:
+    """Multipliers moved to where they are allowed."""
+    z = np.where(np.array(kinds) == SIGNED, np.maximum(z, 0.0), z)
+    first = 0
+    while first < len(kinds):
+        if kinds[first] == CONE:
+            z[first] = max(z[first], np.hypot(z[first + 1], z[first + 2]) * (1 + 1e-12))
+            first += 3
+        else:
+            first += 1
+    return z
+
+
+def _packed(matrices: Array) -> Array:
+    """Upper triangles by columns, with what is off the diagonal times the root of two."""
+    size = matrices.shape[-1]
+    column, row = np.tril_indices(size)
+    return np.where(row == column, 1.0, np.sqrt(2.0)) * matrices[..., row, column]
