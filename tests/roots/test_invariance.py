@@ -42,6 +42,11 @@ PROBLEMS = list(problems())
 each = pytest.mark.parametrize(("problem", "alpha"), [p[1:] for p in PROBLEMS], ids=[p[0] for p in PROBLEMS])
 
 
+def in_other_units(test):
+    """For every problem and units smaller and larger; a third of these in every run."""
+    return pytest.mark.few(14, 8)(each(pytest.mark.parametrize("factor", [1e-9, 1e-3, 3.7, 1e6, 1e9])(test)))
+
+
 def found(problem, alpha):
     roots = enumsol.enumerate_roots(problem, alpha, "fast")
     assert roots.index_sum == 1
@@ -50,8 +55,7 @@ def found(problem, alpha):
     return roots
 
 
-@each
-@pytest.mark.parametrize("factor", [1e-9, 1e-3, 3.7, 1e6, 1e9])
+@in_other_units
 def test_stiffness_and_load_together(problem, alpha, factor):
     # forces in other units
     before = found(problem, alpha)
@@ -61,16 +65,14 @@ def test_stiffness_and_load_together(problem, alpha, factor):
         np.testing.assert_allclose(a.lambda_n, factor * b.lambda_n, rtol=1e-8, atol=1e-10 * factor * np.max(b.lambda_n))
 
 
-@each
-@pytest.mark.parametrize("factor", [1e-9, 1e-3, 3.7, 1e6, 1e9])
+@in_other_units
 def test_load_with_gap(problem, alpha, factor):
     # load alone where the gap is zero; with the gap and the slip offset otherwise
     scaled = rebuild(problem, f=problem.f * factor, gap=problem.gap * factor, slip_offset=problem.slip_offset * factor)
     assert statuses(found(scaled, alpha)) == statuses(found(problem, alpha))
 
 
-@each
-@pytest.mark.parametrize("factor", [1e-9, 1e-3, 3.7, 1e6, 1e9])
+@in_other_units
 def test_length_unit(problem, alpha, factor):
     # displacements in other units: stiffness down, gap up, forces the same
     scaled = rebuild(problem, A=problem.A / factor, gap=problem.gap * factor, slip_offset=problem.slip_offset * factor)
