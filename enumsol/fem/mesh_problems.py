@@ -247,7 +247,7 @@ def _of_file(path: Any, made: Callable[[Scene], T]) -> T:
         options = _toml(place)
         name = file_path(options.pop("mesh", None), "mesh", "the name of a mesh file in quotes")
         options.pop("steps", None)  # of enumsol history
-        check_keys(options)
+        check_keys(options, also=(_PAIRS,))
         return made(mesh_scene(place.parent / name, **options))
     except (InvalidArgumentError, InvalidProblemError) as error:
         raise InvalidProblemError(f"{place}: {error}") from error
@@ -272,10 +272,10 @@ def _toml(place: Path) -> dict[str, Any]:
     return {"pairs" if name == _PAIRS else name: value for name, value in options.items()}
 
 
-def check_keys(options: Mapping[str, Any], spelled: Callable[[str], str] = str) -> None:
+def check_keys(options: Mapping[str, Any], spelled: Callable[[str], str] = str, also: tuple[str, ...] = ()) -> None:
     """Refuse options that `mesh_problem` does not have, and the lack of those that it must have.
 
-    ``spelled`` gives the name of an option as its user writes it.
+    ``spelled`` gives the name of an option as its user writes it, and ``also`` has names that may be meant as well.
 
     Raises
     ------
@@ -285,7 +285,7 @@ def check_keys(options: Mapping[str, Any], spelled: Callable[[str], str] = str) 
     known = {name: p.default for name, p in inspect.signature(mesh_problem).parameters.items() if name != "mesh"}
     for name in options:
         if name not in known:
-            close = difflib.get_close_matches(name, known, n=1)
+            close = difflib.get_close_matches(name, [*known, *also], n=1)
             hint = f"did you mean {close[0]}?" if close else f"expected some of mesh, {', '.join(known)}"
             raise InvalidArgumentError(f"there is no option {shown(name)}; {hint}")
     missing = [name for name, default in known.items() if default is inspect.Parameter.empty and name not in options]

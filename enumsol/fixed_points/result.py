@@ -167,10 +167,16 @@ class FixedPoint(TrescaState):
                     f"converged after {solved} ({last}); the body may move on along {modes} with the same forces: its "
                     "rigid displacement is not unique"
                 )
+            case Outcome.NOT_HELD if depends:
+                return (
+                    "no contact forces hold the body with the coefficients of friction at zero slip, along "
+                    f"{modes_of(body.rigid_modes, motion)}; there may be a solution all the same, to which another "
+                    "start may lead"
+                )
             case Outcome.NOT_HELD:
                 return (
-                    "there is no solution: no contact forces hold the body, however large friction is, along "
-                    f"{modes_of(body.rigid_modes, motion)}"
+                    "there is no solution with forces of less than a million times the load: no contact forces hold "
+                    f"the body, however large friction is, along {modes_of(body.rigid_modes, motion)}"
                 )
             case Outcome.NOT_FEASIBLE:
                 words = driven(body, self.alpha, self.slip_bound, self.coefficients, np.asarray(motion))

@@ -155,11 +155,12 @@ class ContactSystem:
 
     def moves(self, x: Vector) -> Vector:
         """Scaled displacements w of all rows, shape (m,)."""
-        return np.asarray(self.g - self.S @ x[: self.m] + self.G.T @ x[self.m :])
+        w = np.asarray(self.g - self.S @ x[: self.m])
+        return w + self.G.T @ x[self.m :] if self.modes else w
 
     def imbalance(self, x: Vector) -> Vector:
         """What contact forces, and springs if there are any, leave of the load on the body as a whole, shape (r,)."""
-        return np.asarray(self.h - self.G @ x[: self.m] - self.compliance * x[self.m :])
+        return np.asarray(self.h - self.G @ x[: self.m] - self.compliance * x[self.m :]) if self.modes else self.h
 
     @cached_property
     def load_energy(self) -> float:

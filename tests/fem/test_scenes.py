@@ -221,3 +221,9 @@ def test_a_scene_as_a_picture(mesh, tmp_path):
 def test_options_that_do_not_exist():
     with pytest.raises(EnumsolError, match="there is no option 'contacts'; did you mean contact"):
         fem.mesh_scene(one(), **GOOD, contacts="bottom")
+
+
+def test_the_name_of_pairs_in_files_is_suggested(tmp_path):
+    (tmp_path / "pairs.toml").write_text("mesh = 'a.msh'\ncontact_pairs = [['upper', 'lower']]\n", encoding="utf-8")
+    with pytest.raises(InvalidProblemError, match=r"there is no option 'contact_pairs'; did you mean contact_pair\?"):
+        fem.read_mesh_problem(tmp_path / "pairs.toml")

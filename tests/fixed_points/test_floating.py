@@ -165,6 +165,13 @@ def test_a_block_that_slides_or_is_lifted():
     assert "however large friction is, along rigid mode 1" in lifted.why
     assert not np.any(lifted.lambda_n)
 
+    # whether friction that grows with the slip could hold it is another matter
+    table = enumsol.FrictionTable([0.0, 1.0], [0.0, 0.5], [0.0, 0.5])
+    smooth = enumsol.gallery.block_on_table3d(1).replace(friction=table)
+    found = enumsol.successive_approximations(smooth, 0)
+    assert found.outcome is Outcome.NOT_HELD
+    assert "with the coefficients of friction at zero slip" in found.why
+
 
 def test_without_friction_it_may_move_on():
     found = enumsol.successive_approximations(block_on_table(friction=0.0), 0)
