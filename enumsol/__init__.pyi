@@ -40,7 +40,7 @@ from .continuation import (
     local_branch_test as local_branch_test,
     newton as newton,
 )
-from .continuation.equation import PiecewiseSmoothEquation as PiecewiseSmoothEquation
+from .continuation.condensed_equation import PiecewiseSmoothEquation as PiecewiseSmoothEquation
 from .errors import (
     EnumsolError as EnumsolError,
     FrictionJumpWarning as FrictionJumpWarning,

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 from enumsol.branches.graph import BranchGraph
 from enumsol.branches.graph_data import GraphStats
 from enumsol.branches.ways import way_of
-from enumsol.condensation.affine import exactly_at
-from enumsol.condensation.data import EXACT_DOF_LIMIT
+from enumsol.condensation.data import EXACT_DOF_LIMIT, exactly_at
 from enumsol.errors import Interrupted, InvalidArgumentError, TooLargeError
 from enumsol.model.problem import ContactProblem, check_is_problem
 from enumsol.search.outcome import Stop, StopReason

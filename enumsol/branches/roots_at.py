@@ -7,7 +7,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from enumsol.arithmetic.rationals import rational
-from enumsol.condensation.affine import exactly_at
+from enumsol.condensation.data import exactly_at
 from enumsol.model.problem import ContactProblem
 from enumsol.model.statuses import FRICTIONLESS, OPEN
 from enumsol.roots.builder import RootBuilder, in_order, root_family

@@ -22,8 +22,8 @@ What checker and search share
 
     - ``trusted.status_rows``: the codes, the rows and the branchings that cover, on which writer and reader have to
       agree;
-    - ``condensation.products``, ``condensation.enclosure`` and ``arithmetic.balls``: balls for S, g and F, and the
-      proofs that A and S are positive definite;
+    - ``condensation.products``, ``condensation.enclosure`` and ``arithmetic.balls``: balls for S, g and F, the
+      proofs that A and S are positive definite, and linear systems of balls;
     - ``trusted.exclusion``: the exclusion inequality, of which the search has a compiled copy, at one alpha and over
       a piece of an interval (``trusted.over_interval``); ``trusted.energy_bounds``, what multipliers prove;
       ``trusted.quadratic_forms``, other forms than the energy;
@@ -33,15 +33,14 @@ What checker and search share
     - ``trusted.at_alpha``: the verified solve of a selection and the contradiction of its equations;
       ``trusted.precise_at_alpha``, the same solve with many digits, loaded where double arithmetic does not decide;
     - ``trusted.uniqueness``, the test by which a subtree is closed by its only possible solution, and which of these
-      solutions are the same; ``trusted.uniqueness_in_contact``, the test that a root is alone below an assignment;
-      ``trusted.uniqueness_weights``, the form of both, and ``arithmetic.ball_arrays``, their linear systems of balls;
+      solutions are the same, and the test that a root is alone below an assignment;
+      ``trusted.uniqueness_weights``, the form of both;
     - for the arcs of branch graphs: ``trusted.selection``, the numbers of unknowns and conditions;
       ``trusted.arcs.selection_balls``, ``trusted.arcs.series`` and ``trusted.arcs.over_parts``, a selection over an
       interval as a series with bounds of its error; ``trusted.arcs.precise`` and ``trusted.arcs.many_digits``, the same
-      with many digits, of S and g by ``trusted.arcs.refined``, loaded only where a box asks for it;
+      with many digits, loaded only where a box asks for it;
       ``trusted.arcs.only_branch``, the test by which the roots of arcs are the only solutions over a piece, with the
       form of ``trusted.piece_form`` (on maps, of which no proof is written, ``trusted.data_box`` has it, too);
-      ``arithmetic.ball_arrays`` (in 3D, too);
     - for problems in 3D, and loaded for their proofs only: ``trusted.space.sector_rows``, the rows and branchings
       and the exclusion inequality; ``trusted.space.slip_forms``, forms other than the energy;
       ``trusted.space.leaves`` and ``trusted.space.turning``, what a complete assignment holds and which leaves
@@ -54,14 +53,14 @@ What checker and search share
       piece of alpha (where such a curve changes its statuses or turns back is a matter of
       ``trusted.space.curve_events``: a proof does not hold that, and it is not checked);
       ``model.sectors``, the ends of sectors; ``condensation.space_condensed``, balls for S and g in the
-      variables in which friction is isotropic; of bodies that nothing holds ``condensation.floating_space``, the same
-      with G and h, and ``trusted.space.resultants``, what multipliers and balance prove; ``model.problem3d``,
+      variables in which friction is isotropic; of bodies that nothing holds the same with G and h,
+      and ``trusted.space.resultants``, what multipliers and balance prove; ``model.problem3d``,
       ``model.slip_mean`` and ``model.friction``, the data and their checks;
     - for histories: ``trusted.positions``, where a root leaves the contact nodes; ``model.restart``, the problem of a
       step;
     - ``condensation.unloaded`` and ``condensation.free_displacements``: the alpha at which g vanishes, and for the
       search whether it does at all (then there is no proof), and the solution of A X = K in rationals;
-      ``condensation.affine``: F(alpha) and f(alpha) without rounding; of ``arithmetic.rationals`` the pivots of a
+      ``condensation.data``: F(alpha) and f(alpha) without rounding; of ``arithmetic.rationals`` the pivots of a
       definite matrix, and floats as rationals;
     - ``proof.proof_file`` and of ``proof.reading`` what a fraction in a proof may be: the file;
     - ``proof.records`` and, for problems in 3D, ``proof.space_records``: what a record of each kind may say. The search
@@ -69,8 +68,7 @@ What checker and search share
       resumes from an earlier proof. It takes what ``proof.begun`` finds, and proves it again before ``proof.writer``
       and ``proof.compressed_parts`` have it. What a record makes of a leaf is not in these classes: a checker tests it;
     - ``model.problem``, ``model.mesh``, ``model.cells``, ``model.contact_body``, ``condensation.data``,
-      ``condensation.condensed``, ``condensation.factorization``, ``support.deadlines``, ``support.telling``,
-      ``support.immutable``,
+      ``condensation.condensed``, ``condensation.factorization``, ``support.deadlines``, ``support.immutable``,
       ``support.arguments``, ``support.array_arguments``, ``support.array_types``, ``support.files``,
       ``support.messages`` and ``errors``: the data, their checks and their fingerprint, the factorization of A (no
       bound assumes that it is accurate), S and g as computed;

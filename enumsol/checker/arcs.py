@@ -22,16 +22,9 @@ import numpy as np
 from enumsol.checker.arc_boxes import Boxes, BoxSelection, alpha_number, check_entries, inside
 from enumsol.checker.only_branches import ClaimedArc, ClaimedEvent
 from enumsol.proof.reading import RefusedError, codes_from, names_only, quoted, same, units_from
-from enumsol.support.telling import tell
+from enumsol.support.deadlines import tell
 from enumsol.trusted.arcs.selection_balls import ArcSelection, ArcSystem
-from enumsol.trusted.selection import (
-    CONE_MINUS,
-    CONE_PLUS,
-    NORMAL_FORCE,
-    PENETRATION,
-    SLIP_BACKWARD,
-    SLIP_FORWARD,
-)
+from enumsol.trusted.selection import CONE_MINUS, CONE_PLUS, NORMAL_FORCE, PENETRATION, SLIP_BACKWARD, SLIP_FORWARD
 from enumsol.trusted.status_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
@@ -238,8 +231,8 @@ class ArcChecker:
     @cached_property
     def precise_system(self) -> Any:
         """The problem in many digits."""
+        from enumsol.trusted.arcs.many_digits import affordable
         from enumsol.trusted.arcs.precise import PreciseSystem  # python-flint, not for all proofs
-        from enumsol.trusted.arcs.refined import affordable
 
         if not affordable(self._problem):
             raise ValueError("a box in many digits belongs to a problem that is too large for it")

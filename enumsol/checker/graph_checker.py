@@ -43,7 +43,7 @@ from enumsol.proof.reading import (
     same,
     units_from,
 )
-from enumsol.support.telling import tell
+from enumsol.support.deadlines import tell
 from enumsol.trusted.exclusion import Leaves, exclusion_margin, exclusion_margins
 from enumsol.trusted.over_interval import KINDS, EnclosedPiece, as_computed
 from enumsol.trusted.status_rows import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, STICK, UNDECIDED, children_of

@@ -12,7 +12,7 @@ from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.model.restart import SlipStart, afresh, restarted
 from enumsol.proof.reading import RefusedError, numbers_from, quoted, rational_from, same
-from enumsol.support.telling import heard_by, tell, tell_part
+from enumsol.support.deadlines import heard_by, tell, tell_part
 from enumsol.trusted.positions import tangential_positions
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from enumsol.arithmetic.ball_arrays import Ball
+    from enumsol.arithmetic.balls import Ball
 
 _HEADER = {"format", "version", "kind", "problem", "p", "steps", "stages"}
 _END = object()

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.condensation.affine import exactly_at
+from enumsol.condensation.data import exactly_at
 from enumsol.proof.reading import RefusedError, quoted
 from enumsol.proof.records import Branching, Limits, NoRoot, RecordError, UndecidedRecord, kind_of
 from enumsol.proof.space_records import (

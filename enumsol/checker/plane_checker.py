@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
 from enumsol.checker.walk import TreeChecker
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.proof import records
@@ -26,7 +25,7 @@ from enumsol.trusted.exclusion import Leaves, exclusion_margins
 from enumsol.trusted.positions import certain_statuses
 from enumsol.trusted.quadratic_forms import EnclosedForm
 from enumsol.trusted.status_rows import ROW_KINDS, UNDECIDED, is_covering, row_signs
-from enumsol.trusted.uniqueness_in_contact import lone_root
+from enumsol.trusted.uniqueness import lone_root
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from flint import fmpq, fmpq_mat
 
 from enumsol.arithmetic.rationals import is_positive_definite, rational
-from enumsol.condensation.affine import exactly_at
+from enumsol.condensation.data import exactly_at
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.free_displacements import exact_matrices, free_displacements, solved
 from enumsol.trusted.status_rows import CONDITIONS, FORBIDDEN, NONNEGATIVE

@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import SAFE, TINY
+from enumsol.arithmetic.balls import SAFE, TINY, Ball
 from enumsol.checker.walk import TreeChecker
-from enumsol.condensation.affine import exactly_at
+from enumsol.condensation.data import exactly_at
 from enumsol.condensation.space_condensed import EnclosedSpace
 from enumsol.proof.reading import RefusedError, data_of, exponents_from, rational_from, shown_alpha
 from enumsol.proof.records import Limits, NoRoot, RegularRoot

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from enumsol.checker.floating import WithinReach
 from enumsol.checker.space_checker import SpaceChecker
-from enumsol.condensation.floating_space import FloatingSpace
+from enumsol.condensation.space_condensed import FloatingSpace
 from enumsol.proof import records
 from enumsol.proof.reading import RefusedError
 from enumsol.proof.space_records import FLOATING_LEAVES, ExcludedInSpace

@@ -18,7 +18,7 @@ import numpy as np
 
 from enumsol.checker.piece_tree import PieceTreeChecker
 from enumsol.checker.reports import MAX_FAILURES, GraphVerificationReport
-from enumsol.condensation.affine import exactly_at
+from enumsol.condensation.data import exactly_at
 from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.proof.reading import RefusedError, data_of, exponents_from, quoted, rational_from, same

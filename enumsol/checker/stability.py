@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import SAFE, gamma
+from enumsol.arithmetic.balls import SAFE, Ball, gamma
 from enumsol.checker.floating import FloatingChecker
 from enumsol.checker.plane_checker import Checker, FormLeaves
 from enumsol.checker.verify import verify
@@ -25,7 +24,7 @@ from enumsol.support.arguments import instance_of
 from enumsol.trusted.at_alpha import solve_selection
 from enumsol.trusted.exclusion import Leaves, exclusion_margins
 from enumsol.trusted.floating_bounds import is_unbalanced
-from enumsol.trusted.uniqueness_in_contact import lone_root
+from enumsol.trusted.uniqueness import lone_root
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -11,7 +11,7 @@ from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.proof.reading import RefusedError, quoted, same
 from enumsol.proof.records import Branching, DeclaredForm, Limits, RecordError, UndecidedRecord, Unloaded, kind_of
-from enumsol.support.telling import tell
+from enumsol.support.deadlines import tell
 from enumsol.trusted.status_rows import UNDECIDED
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from enumsol.arithmetic.ball_arrays import Ball
+    from enumsol.arithmetic.balls import Ball
     from enumsol.condensation.data import Data
     from enumsol.proof.proof_file import Proof
     from enumsol.proof.records import Record

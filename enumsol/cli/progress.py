@@ -8,7 +8,7 @@ from threading import Lock, Timer
 from typing import TYPE_CHECKING, Any, Self
 
 from enumsol.cli.quiet import is_quiet
-from enumsol.support.telling import heard_by
+from enumsol.support.deadlines import heard_by
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -26,7 +26,7 @@ _LEAST_SHARE = 0.02
 class Display:
     """A progress bar on stderr, shown on a terminal when the work lasts, also if nothing is told of it.
 
-    Inside, it hears what long calls tell of themselves (``support.telling``), and says it behind the bar.
+    Inside, it hears what long calls tell of themselves (``support.deadlines``), and says it behind the bar.
 
     Parameters
     ----------

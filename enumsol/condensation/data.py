@@ -1,12 +1,15 @@
-"""What condensing asks of a contact problem; ``enumsol.model.problem.ContactProblem`` is one."""
+"""What condensing asks of a contact problem; ``enumsol.model.problem.ContactProblem`` is one.
+
+Friction and load at an alpha are computed here without rounding: whether one is zero, or negative, is decided with
+these values.
+"""
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 if TYPE_CHECKING:
-    from fractions import Fraction
-
     import numpy as np
     import scipy.sparse as sp
     from numpy.typing import NDArray
@@ -94,3 +97,8 @@ class FloatingData(CondensableData, Protocol):
     @property
     def on_springs(self) -> Any:
         """The problem of the body on springs."""
+
+
+def exactly_at(alpha: Fraction, first: NDArray[np.float64], slope: NDArray[np.float64]) -> list[Fraction]:
+    """The values first + alpha slope of floats, exactly: F(alpha) for the parts of ``problem.friction``."""
+    return [Fraction(x) + alpha * Fraction(y) for x, y in zip(first.tolist(), slope.tolist(), strict=True)]

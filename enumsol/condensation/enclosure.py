@@ -13,17 +13,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.arithmetic.ball_arrays import Ball
 from enumsol.arithmetic.balls import (
     SAFE,
     TINY,
     UNIT,
+    Ball,
     dense_eigenvalue_bound,
     gamma,
     sparse_eigenvalue_bound,
     upper_norm,
 )
-from enumsol.condensation.affine import exactly_at
+from enumsol.condensation.data import exactly_at
 from enumsol.condensation.products import Products, scaled
 from enumsol.errors import EnumsolError
 from enumsol.support.arguments import alpha_value

@@ -15,8 +15,7 @@ from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.free_displacements import solved
 from enumsol.condensation.unloaded import vanishing_alpha
 from enumsol.errors import InvalidProblemError, TooLargeError
-from enumsol.support.deadlines import look
-from enumsol.support.telling import tell
+from enumsol.support.deadlines import look, tell
 
 if TYPE_CHECKING:
     from collections.abc import Callable

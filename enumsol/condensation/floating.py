@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import SAFE, TINY, gamma, upper_norm
+from enumsol.arithmetic.balls import SAFE, TINY, Ball, gamma, upper_norm
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, float_at
 
 if TYPE_CHECKING:

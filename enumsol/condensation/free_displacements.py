@@ -12,8 +12,7 @@ from flint import fmpq_mat
 from enumsol.arithmetic.rationals import rational, rational_matrix
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.enclosure import NotEnclosedError
-from enumsol.support.deadlines import look
-from enumsol.support.telling import tell
+from enumsol.support.deadlines import look, tell
 
 if TYPE_CHECKING:
     from enumsol.condensation.data import ProblemData

@@ -10,9 +10,8 @@ import scipy.sparse as sp
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, SlicedMatrix, gamma, upper_norm
 from enumsol.condensation.data import CondensableData
-from enumsol.support.deadlines import look
+from enumsol.support.deadlines import look, tell
 from enumsol.support.immutable import Sealed
-from enumsol.support.telling import tell
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

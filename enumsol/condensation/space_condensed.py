@@ -1,19 +1,22 @@
-"""A condensed problem in 3D at one alpha in the variables in which every node is isotropic (theory, section 12.1)."""
+"""A condensed problem in 3D at one alpha in the variables in which every node is isotropic (theory, section 12.1).
+
+Of a body that nothing holds, too (theory, section 14.6).
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, gamma, upper_norm
-from enumsol.condensation.affine import exactly_at
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, upper_norm
 from enumsol.condensation.condensed import LARGEST_FRICTION, cholesky_factor, load_unit, node_units
+from enumsol.condensation.data import exactly_at
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, nearest_floats
+from enumsol.condensation.floating import FloatingSystem, RigidRows
 from enumsol.errors import InvalidProblemError
 
 if TYPE_CHECKING:
@@ -23,6 +26,7 @@ if TYPE_CHECKING:
 
     Vector = NDArray[np.float64]
     Matrix = NDArray[np.float64]
+    from enumsol.arithmetic.balls import Array
 
 #: Coefficients between 2^-9 and 2^8 keep tau as it is: S loses no more than twice so many binary digits by them.
 _NEAR_ONE = 8
@@ -417,3 +421,32 @@ def _quotients(problem: Any, piece: tuple[Fraction, Fraction], F: Matrix) -> tup
             rad[k, i] = 0.0 if Fraction(mid[k, i]) == number else UNIT * abs(mid[k, i]) * SAFE + TINY
     disc, turn = (Ball(mid[k], rad[k]) for k in (0, 1))
     return disc, turn
+
+
+@dataclass(frozen=True)
+class FloatingSpace(FloatingSystem, EnclosedSpace):
+    """The problem of a body in 3D that nothing holds at one alpha as balls, in the variables of EnclosedSpace.
+
+    S and g are those of the body on springs. The rows G of its equilibrium as a whole act on (lambda_n, tau).
+    """
+
+    @classmethod
+    def of(cls, problem: Any, alpha: Fraction, force: Array, length: Array) -> Self:
+        """That of a problem, in units of the nodes given by powers of two.
+
+        Raises
+        ------
+        NotEnclosedError
+            Something over- or underflows.
+        """
+        held = EnclosedSpace.of_problem(problem.on_springs.enclosure, alpha, force, length)
+        rows = RigidRows.of(problem, alpha, np.tile(force, 3), np.tile(length, 3))
+        _, own, node, axis = places(held.F > 0)
+        none = np.zeros(held.p)
+        weight = Ball(np.r_[none + 1.0, held.F[node, axis]], np.r_[none, held.F_rad[node, axis]])
+        G = rows.G[:, own]
+        product = G * weight
+        # zeros are exact
+        rows = replace(rows, G=Ball(product.mid, np.where(G.size > 0, product.rad, 0.0)))
+        data = held.S, held.S_rad, held.g, held.g_rad, held.F, held.F_rad, held.tau, held.unit
+        return cls(*data, rows=rows)

@@ -2,25 +2,170 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from enumsol.continuation.continuation_options import ContinuationOptions
 from enumsol.continuation.follower import Follower
-from enumsol.continuation.path_data import PathData, PathStatus
-from enumsol.continuation.path_files import load_path, save_path
-from enumsol.continuation.path_plots import draw_path
+from enumsol.continuation.path_data import ARRAYS, RIGID, PathData, PathStats, PathStatus, PointKind, Transition
 from enumsol.continuation.start import Start
 from enumsol.continuation.tangents import curve_tangent
 from enumsol.continuation.transitions import CurvePoint
 from enumsol.errors import InvalidArgumentError
+from enumsol.model.statuses import ContactStatus
+from enumsol.roots.local_branch import LocalBranchTest
+from enumsol.support.arguments import file_path, one_of, row_number
+from enumsol.support.files import read_arrays, reading, write_arrays
+from enumsol.support.plotting import axes_or_none, figure_of, new_figure
 
 if TYPE_CHECKING:
     import os
 
-    from enumsol.continuation.continuation_options import ContinuationOptions
     from enumsol.continuation.parameter_path import SmoothPath
     from enumsol.model.problem import ContactProblem
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.support.arguments import AlphaLike
+
+
+#: Version of the files of paths.
+_FORMAT = 1
+
+
+def save_path(followed: PathData, path: str | os.PathLike[str]) -> None:
+    """Write the path to a .npz file; the problem and the callables of a smooth path are not in it."""
+    report = {
+        "kinds": followed.kinds,
+        "transitions": [_pack(item) for item in followed.transitions],
+        "status": followed.status,
+        "message": followed.message,
+        "orientation": followed.orientation,
+        "interval": followed.interval,
+        "options": followed.options.to_dict(),
+        "next_step": followed.next_step,
+        "stats": followed.stats.__dict__,
+        "node_ids": followed.node_ids,
+        "names": [[status.value for status in point.statuses] for point in followed],
+    }
+    if followed.rigid_coordinates is not None:
+        report[RIGID] = followed.rigid_coordinates.tolist()
+    write_arrays(file_path(path, "path"), _FORMAT, report, {name: getattr(followed, name) for name in ARRAYS})
+
+
+def _unpacked(report: dict[str, Any], arrays: dict[str, Any]) -> Path:
+    low, high = report["interval"]
+    return Path(
+        **arrays,
+        kinds=tuple(PointKind(kind) for kind in report["kinds"]),
+        transitions=tuple(_unpack(item) for item in report["transitions"]),
+        status=PathStatus(report["status"]),
+        message=report["message"],
+        orientation=report["orientation"],
+        interval=(float(low), float(high)),
+        options=ContinuationOptions.from_dict(report["options"]),
+        next_step=report["next_step"],
+        stats=PathStats(**report["stats"]),
+        node_ids=tuple(report["node_ids"]),
+        _names=tuple(tuple(ContactStatus(value) for value in names) for names in report["names"]),
+        rigid_coordinates=np.array(report[RIGID]) if RIGID in report else None,
+    )
+
+
+def _pack(item: Transition) -> dict[str, Any]:
+    test = item.local_test
+    packed = None
+    if test is not None:
+        signs = [[[s.value for s in statuses], sign] for statuses, sign in test.signs]
+        packed = {"exists": test.exists, "premise": test.premise, "signs": signs}
+    return {
+        "point": item.point,
+        "alpha": item.alpha,
+        "before": [s.value for s in item.before],
+        "after": [s.value for s in item.after],
+        "nodes": item.nodes,
+        "dalpha": [item.dalpha_before, item.dalpha_after],
+        "local_test": packed,
+    }
+
+
+def _unpack(data: dict[str, Any]) -> Transition:
+    test, packed = None, data["local_test"]
+    if packed is not None:
+        signs = tuple((tuple(ContactStatus(s) for s in statuses), sign) for statuses, sign in packed["signs"])
+        test = LocalBranchTest.from_signs(signs, premise=packed["premise"])
+    left, right = data["dalpha"]
+    before, after = (tuple(ContactStatus(s) for s in data[name]) for name in ("before", "after"))
+    return Transition(
+        data["point"], data["alpha"], before, after, tuple(data["nodes"]), float(left), float(right), test
+    )
+
+
+#: What a figure of a path may show.
+_QUANTITIES = ("lambda_n", "lambda_t", "u_n", "u_t")
+
+
+def draw_path(
+    path: PathData, graph: Any = None, *, node: int = 0, quantity: str = "lambda_n", ax: Any = None, **of_graph: Any
+) -> Any:
+    """A figure of the accepted steps as dots, transition points as circles, folds as squares, the start as a star.
+
+    The spacing of the dots is the step control. With a graph its branches are drawn underneath.
+
+    Parameters
+    ----------
+    graph : BranchGraph or None
+        Drawn by its own ``plot`` in a new figure, whose options may be given too.
+    node : int
+        Contact node (row number).
+    quantity : {"lambda_n", "lambda_t", "u_n", "u_t"}
+        In 3D the tangential ones are drawn as their lengths.
+    ax : matplotlib Axes or None
+        Draw there, for example in ``figure.axes[0]`` of an earlier plot to add a path to it.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Notebooks show it.
+
+    Raises
+    ------
+    MissingDependencyError
+        matplotlib is not installed.
+    InvalidArgumentError
+        An argument is not one of those above.
+    """
+    one_of(quantity, "quantity", _QUANTITIES)
+    node = row_number(node, "node", path.lambda_n.shape[1])
+    if graph is not None and ax is not None:
+        raise InvalidArgumentError("graph and ax are both given; draw further paths with path.plot(ax=...) alone")
+    if graph is not None:
+        # the graph draws a figure of its own; its first panel is this node's, and no zoom shows the path
+        ax = graph.plot(quantity, [path.node_ids[node]], **{"zoom": False, **of_graph}).axes[0]
+    elif axes_or_none(ax) is None:
+        ax = new_figure().subplots()
+    values = getattr(path, quantity)[:, node]
+    name = quantity
+    if values.ndim == 2:
+        values, name = np.linalg.norm(values, axis=1), f"|{quantity}|"
+    dots = [k for k, kind in enumerate(path.kinds) if kind in (PointKind.STEP, PointKind.END)]
+    ax.plot(path.alpha[dots], values[dots], ".", color="black", markersize=3, label="steps", zorder=3)
+    folds = {item.point for item in path.folds}
+    for marker, label, chosen in (
+        ("o", "transitions", [item.point for item in path.transitions if item.point not in folds]),
+        ("s", "folds", sorted(folds)),
+    ):
+        if chosen:
+            ax.plot(
+                path.alpha[chosen], values[chosen], marker, color="black", markerfacecolor="none", label=label, zorder=4
+            )
+    ax.plot(path.alpha[:1], values[:1], "*", color="tab:red", markersize=10, label="start", zorder=5)
+    if not ax.get_ylabel():
+        ax.set_xlabel("alpha")
+        ax.set_ylabel(f"{name} of node {path.node_ids[node]}")
+        ax.set_title(f"path for alpha in [{path.alpha.min():g}, {path.alpha.max():g}]: {path.status.value}", fontsize=9)
+    named = dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))  # of several paths once
+    ax.legend(handles=list(named.values()), labels=list(named), fontsize=7, frameon=False)
+    return figure_of(ax)
 
 
 class Path(PathData):
@@ -79,7 +224,9 @@ class Path(PathData):
         InvalidArgumentError
             The file does not hold a path.
         """
-        return load_path(cls, path)
+        place = file_path(path, "path")
+        with reading(place, "a path", "Path.save"):
+            return _unpacked(*read_arrays(place, _FORMAT, ARRAYS))
 
     def resume(
         self,

@@ -16,15 +16,21 @@ from .mesh_problems import (
     read_mesh_problem as read_mesh_problem,
     read_mesh_scene as read_mesh_scene,
 )
-from .meshes import Mesh as Mesh, edges_along as edges_along, rectangle as rectangle, trapezoid as trapezoid
+from .meshes import (
+    Mesh as Mesh,
+    blocks as blocks,
+    box as box,
+    edges_along as edges_along,
+    rectangle as rectangle,
+    trapezoid as trapezoid,
+)
 from .named_parts import PartedMesh as PartedMesh, SolidMesh as SolidMesh
 from .norms import MeshNorms as MeshNorms, h1_norms as h1_norms
 from .scenes import Scene as Scene
-from .solid_meshes import blocks as blocks, box as box
-from .solid_problems import solid_contact_problem as solid_contact_problem
-from .solids import (
+from .solid_problems import (
     facet_forces as facet_forces,
     solid_body_forces as solid_body_forces,
+    solid_contact_problem as solid_contact_problem,
     solid_stiffness as solid_stiffness,
 )
 from .stresses import cell_stresses as cell_stresses

@@ -19,7 +19,6 @@ import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.bases import FLAT, nodal_basis
-from enumsol.fem.construction import axes_of, problem_of
 from enumsol.fem.mesh_checks import (
     elements,
     held_mask,
@@ -31,7 +30,7 @@ from enumsol.fem.mesh_checks import (
     unit_vectors,
     vectors_of_all,
 )
-from enumsol.fem.restrained import Supports, gathered, movable, plain_dofs
+from enumsol.fem.restrained import Supports, axes_of, gathered, movable, plain_dofs, problem_of
 from enumsol.model.cells import numbers_of_nodes
 from enumsol.model.mesh import BodyMesh
 

@@ -8,9 +8,8 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.bases import between_corners, facet_basis
-from enumsol.fem.construction import axes_of, problem_of
 from enumsol.fem.mesh_checks import unit_vectors, vectors_of_all
-from enumsol.fem.restrained import Supports, movable
+from enumsol.fem.restrained import Supports, axes_of, movable, problem_of
 from enumsol.support.arguments import shown
 from enumsol.support.array_arguments import plain_array, real_array, real_matrix
 

@@ -1,20 +1,24 @@
-"""Structured triangle meshes of rectangles and trapezoids."""
+"""Structured meshes: triangles in rectangles and trapezoids, boxes in 3D, and blocks of facets of a surface."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.named_parts import PartedMesh
-from enumsol.support.arguments import positive_integer, positive_number
-from enumsol.support.array_arguments import plain_array
+from enumsol.fem.mesh_checks import elements, positions
+from enumsol.fem.named_parts import PartedMesh, SolidMesh
+from enumsol.model.cells import KINDS, boundary_facets
+from enumsol.support.arguments import one_of, positive_integer, positive_number, shown
+from enumsol.support.array_arguments import plain_array, short_vector
 
 if TYPE_CHECKING:
     from enumsol.support.array_types import ArrayLike, Floats, Integers
+
+    Cells = Literal["hexahedra", "tetrahedra"]
 
 #: Largest number of cells along one side of a mesh.
 MOST_CELLS = 10_000
@@ -145,3 +149,132 @@ def _structured(nx: int, ny: int, x: Floats, y: Floats, *, mirrored: bool) -> Me
     triangles = np.where(turned[:, None, None], falling, rising).reshape(-1, 3)
     points = np.stack([x.ravel(), y.ravel()], axis=1)
     return Mesh(points, triangles, number[0], number[-1], number[:, 0], number[:, -1])
+
+
+#: Most cells along one side of a box.
+MOST_CELLS_OF_A_SIDE = 1_000
+#: Coordinates that differ by less than this share of the extent are equal.
+_SAME = 1e-9
+#: The six tetrahedra of a cell: ways along its edges from its first corner to the opposite one.
+_PATHS = ((0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6))
+
+
+def box(nx: int, ny: int, nz: int, size: ArrayLike = (1.0, 1.0, 1.0), cells: Cells = "hexahedra") -> SolidMesh:
+    """Mesh of (0, a) x (0, b) x (0, c) with nx by ny by nz cells and its six sides.
+
+    Node (i, j, k) has the number ``(k (ny + 1) + j) (nx + 1) + i``. The sides are named left and right (x = 0, a),
+    front and back (y = 0, b), bottom and top (z = 0, c).
+
+    Parameters
+    ----------
+    nx, ny, nz : int
+        Cells along x, y and z, 1 to MOST_CELLS_OF_A_SIDE.
+    size : (3,) array_like
+        Lengths a, b, c of the sides [length].
+    cells : {"hexahedra", "tetrahedra"}
+        Whole cells, or six tetrahedra of each that share its diagonal; those of neighbours fit together.
+
+    Raises
+    ------
+    InvalidArgumentError
+        An argument is not of the stated form.
+
+    Examples
+    --------
+    >>> from enumsol import fem
+    >>> fem.box(4, 3, 2, cells="tetrahedra")
+    SolidMesh with 60 nodes
+      cells   144 tetrahedra
+      facets  left (12), right (12), front (16), back (16), bottom (24), top (24)
+    """
+    counts = [
+        positive_integer(count, name, most=MOST_CELLS_OF_A_SIDE) for name, count in (("nx", nx), ("ny", ny), ("nz", nz))
+    ]
+    lengths = short_vector(size, "size", 3)
+    if np.min(lengths) <= 0:
+        raise InvalidArgumentError(f"size is {shown(size)}; expected three lengths > 0")
+    one_of(cells, "cells", (KINDS[3, 8].name, KINDS[3, 4].name))
+    z, y, x = np.meshgrid(*(np.linspace(0.0, lengths[k], counts[k] + 1) for k in (2, 1, 0)), indexing="ij")
+    points = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
+    number = np.arange(len(points)).reshape(z.shape)
+    low, high = slice(None, -1), slice(1, None)
+    corners = [(k, j, i) for k in (low, high) for j, i in ((low, low), (low, high), (high, high), (high, low))]
+    hexahedra = np.stack([number[corner].ravel() for corner in corners], axis=1)
+    bodies = hexahedra if cells == "hexahedra" else hexahedra[:, np.array(_PATHS)].reshape(-1, 4)
+    return SolidMesh(points, bodies, _sides(points, bodies, lengths))
+
+
+def _sides(points: Floats, cells: Integers, size: Floats) -> Any:
+    facets = boundary_facets(3, cells)
+    corners = points[facets]
+    names = (("left", "right"), ("front", "back"), ("bottom", "top"))
+    return MappingProxyType(
+        {
+            name: facets[np.all(corners[:, :, axis] == place, axis=1)]
+            for axis, pair in enumerate(names)
+            for name, place in zip(pair, (0.0, size[axis]), strict=True)
+        }
+    )
+
+
+def blocks(points: ArrayLike, facets: ArrayLike, ratio: int) -> Integers:
+    """Labels (k,) of facets in a rectangular grid, joined to blocks of ratio by ratio cells of the grid.
+
+    The grid lies in a plane perpendicular to an axis, its cells are quadrilaterals or pairs of triangles, and need not
+    be equally large. Where ratio does not divide their number along a side the last blocks are smaller. Blocks are
+    numbered along the first of the two axes, then along the second.
+
+    Parameters
+    ----------
+    points : (N, 3) array_like
+        Positions of the nodes [length].
+    facets : (k, 3) or (k, 4) array_like of int
+        Nodes of each facet.
+    ratio : int
+        Cells along the side of a block: the ratio H/h of the paper.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The facets form no such grid.
+
+    Examples
+    --------
+    >>> from enumsol import fem
+    >>> mesh = fem.box(4, 2, 1)
+    >>> fem.blocks(mesh.points, mesh.facets["bottom"], ratio=2).tolist()
+    [0, 0, 1, 1, 0, 0, 1, 1]
+    """
+    nodes = positions(points, 3)
+    surface = elements(facets, "facets", (3, 4), len(nodes))
+    width = positive_integer(ratio, "ratio")
+    low, high = nodes[surface].min(axis=1), nodes[surface].max(axis=1)
+    same = _SAME * max(float(np.max(high.max(axis=0) - low.min(axis=0))), np.finfo(np.float64).tiny)
+    flat = np.max(high, axis=0) - np.min(low, axis=0) <= same
+    if np.sum(flat) != 1:
+        raise _no_grid("they do not lie in one plane perpendicular to an axis")
+    axes = np.flatnonzero(~flat)
+    starts = np.stack([_steps(low[:, axis], same) for axis in axes], axis=1)
+    ends = np.stack([_steps(high[:, axis], same) for axis in axes], axis=1)
+    counts = starts.max(axis=0) + 1
+    # every cell of the grid is filled by one quadrilateral or two triangles, which lie in no other cell
+    filled = np.bincount(starts[:, 1] * counts[0] + starts[:, 0], minlength=int(np.prod(counts)))
+    if np.any(starts != ends) or np.any(filled != (1 if surface.shape[1] == 4 else 2)):
+        raise _no_grid("they do not fill a rectangular grid")
+    block = starts // min(width, int(counts.max()))
+    return np.asarray(block[:, 1] * (block[:, 0].max() + 1) + block[:, 0])
+
+
+def _steps(values: Floats, same: float) -> Integers:
+    """For each value how many smaller ones there are, not counting those that are the same."""
+    order = np.argsort(values, kind="stable")
+    step = np.concatenate([[0], np.cumsum(np.diff(values[order]) > same)])
+    ranks = np.empty(len(values), dtype=np.int64)
+    ranks[order] = step
+    return ranks
+
+
+def _no_grid(found: str) -> InvalidArgumentError:
+    return InvalidArgumentError(
+        f"ratio needs contact facets in a rectangular grid, and {found}; expected patches, a label for every facet"
+    )

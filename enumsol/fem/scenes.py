@@ -22,14 +22,13 @@ from enumsol.fem.conditions import (
     pieces_of,
     rigid_modes_of,
 )
-from enumsol.fem.construction import axes_of, problem_of
 from enumsol.fem.contacts import contacts_of
 from enumsol.fem.materials import body_force_of, lame_of, of_rows, thickness_of
 from enumsol.fem.mesh_checks import unit_vectors
 from enumsol.fem.mesh_files import read_mesh
 from enumsol.fem.named_parts import PartedMesh
 from enumsol.fem.pairs import Pair
-from enumsol.fem.restrained import plain_dofs
+from enumsol.fem.restrained import axes_of, plain_dofs, problem_of
 from enumsol.fem.scene_checks import refuse_pairs, refuse_walls, scene_notes
 from enumsol.fem.scene_text import described, sections_of
 from enumsol.model.mesh import BodyMesh
@@ -195,7 +194,7 @@ class Scene:
         MissingDependencyError
             matplotlib is not installed.
         """
-        from enumsol.fem.scene_plots import draw_scene  # matplotlib takes a while
+        from enumsol.fem.scene_text import draw_scene  # matplotlib takes a while
 
         return draw_scene(self)
 

@@ -182,7 +182,7 @@ def solve_scaled(data: TrescaData, start: Vector, first: str = "newton") -> tupl
 
 
 def _by_cvxpy(data: TrescaData) -> TrescaSolution:
-    from enumsol.fixed_points.reference import TrescaReference  # CVXPY takes a while to import
+    from enumsol.fixed_points.clarabel_solver import TrescaReference  # CVXPY takes a while to import
 
     system = data.system
     reference = TrescaReference(system.problem)

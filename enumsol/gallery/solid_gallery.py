@@ -116,9 +116,8 @@ def block3d(
     >>> enumsol.gallery.block3d(4, 3, 2).p
     16
     """
-    from enumsol.fem.solid_meshes import box  # as above
-    from enumsol.fem.solid_problems import solid_contact_problem
-    from enumsol.fem.solids import facet_forces
+    from enumsol.fem.meshes import box  # as above
+    from enumsol.fem.solid_problems import facet_forces, solid_contact_problem
 
     mesh = box(nx, ny, nz, size, cells)
     return solid_contact_problem(
@@ -189,8 +188,8 @@ def block_on_table3d(
     [1, 0]
     """
     from enumsol.fem.conditions import rigid_motions  # as above
-    from enumsol.fem.solid_meshes import box
-    from enumsol.fem.solids import facet_forces, solid_stiffness
+    from enumsol.fem.meshes import box
+    from enumsol.fem.solid_problems import facet_forces, solid_stiffness
     from enumsol.model.mesh import BodyMesh
     from enumsol.model.problem3d import ContactProblem3D
 
@@ -286,9 +285,8 @@ def wedge3d(
     >>> problem.p, len(enumsol.enumerate_roots(problem, alpha=1))
     (4, 3)
     """
-    from enumsol.fem.solid_meshes import blocks, box  # as above
-    from enumsol.fem.solid_problems import solid_contact_problem
-    from enumsol.fem.solids import facet_forces
+    from enumsol.fem.meshes import blocks, box  # as above
+    from enumsol.fem.solid_problems import facet_forces, solid_contact_problem
 
     layers = positive_integer(nz, "nz", least=2)
     angle = inclination(half_angle)
@@ -326,7 +324,7 @@ def _lower_layers(mesh: SolidMesh, side: str, layers: int) -> Integers:
 
 
 def _top_springs(points: Floats, top: Integers, springs: ArrayLike) -> Floats:
-    from enumsol.fem.solids import facet_forces  # as above
+    from enumsol.fem.solid_problems import facet_forces  # as above
 
     total = holding(springs, 3)
     shares = facet_forces(points, top, total)

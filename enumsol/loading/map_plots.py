@@ -11,8 +11,7 @@ from enumsol.support.plotting import axes_or_none, figure_of, new_figure
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.loading.map_rows import MapRow
-    from enumsol.loading.strips import MapStrip
+    from enumsol.loading.strips import MapRow, MapStrip
 
 #: Colours of one solution, two, and so on; the last one is for more.
 _COLOURS = ("#ffffff", "#c9b7dd", "#f2b56b", "#d97b5a", "#c04d6b", "#8a3b82", "#5b3b96", "#333a80", "#1c2c58")

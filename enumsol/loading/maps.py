@@ -13,8 +13,7 @@ import numpy as np
 
 from enumsol.branches.construction import branch_graph
 from enumsol.errors import Interrupted, InvalidArgumentError
-from enumsol.loading.map_rows import MapFold, MapRow
-from enumsol.loading.strips import map_strip, ranges_of_one
+from enumsol.loading.strips import MapFold, MapRow, map_strip, ranges_of_one
 from enumsol.model.problem import ContactProblem
 from enumsol.support.arguments import (
     alpha_interval,

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import SAFE, UNIT
+from enumsol.arithmetic.balls import SAFE, UNIT, Ball
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.model.restart import SlipStart
 from enumsol.model.statuses import ContactStatus

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.condensation.affine import exactly_at
+from enumsol.condensation.data import exactly_at
 from enumsol.errors import InvalidArgumentError, InvalidProblemError, NotHeldError
 from enumsol.model.rigid_modes import RigidModes, largest_displacement
 from enumsol.support.arguments import alpha_value, shown

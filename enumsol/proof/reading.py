@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.condensation.affine import exactly_at
+from enumsol.condensation.data import exactly_at
 from enumsol.errors import InvalidArgumentError
 from enumsol.trusted.exclusion import Terms
 from enumsol.trusted.status_rows import UNDECIDED

@@ -19,7 +19,7 @@ from enumsol.proof.proof_file import packed
 from enumsol.proof.reading import codes_from, multipliers_from, numbers_from, quoted
 from enumsol.trusted.exclusion import Terms
 from enumsol.trusted.status_rows import BACKWARD, CONTACT, FORWARD, ROW_KINDS, UNDECIDED, final_codes, refines
-from enumsol.trusted.uniqueness_in_contact import numbers_of
+from enumsol.trusted.uniqueness import numbers_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -426,7 +426,7 @@ class Alone(Record):
     Attributes
     ----------
     selection : final codes
-    weights, strengths, terms : arrays, as ``trusted.uniqueness_in_contact.lone_root`` takes them
+    weights, strengths, terms : arrays, as ``trusted.uniqueness.lone_root`` takes them
     enclosure : EnclosureRecord
     """
 
@@ -450,7 +450,7 @@ class Alone(Record):
 
     @property
     def arguments(self) -> tuple[Any, ...]:
-        """Those of ``trusted.uniqueness_in_contact.lone_root`` after the assignment."""
+        """Those of ``trusted.uniqueness.lone_root`` after the assignment."""
         return self.selection, self.weights, self.strengths, *self.terms
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, UNIT
-from enumsol.condensation.affine import exactly_at
+from enumsol.condensation.data import exactly_at
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.mirrors import Mirror

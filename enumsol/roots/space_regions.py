@@ -7,12 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import Ball, smaller, solution
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, upper_norm
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, smaller, solution, upper_norm
 from enumsol.model.sectors import SECTORS
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
-from enumsol.support.deadlines import over
-from enumsol.support.telling import tell
+from enumsol.support.deadlines import over, tell
 from enumsol.trusted.space.leaves import settle, unsettled
 
 if TYPE_CHECKING:

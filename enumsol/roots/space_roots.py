@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import SAFE, UNIT
+from enumsol.arithmetic.balls import SAFE, UNIT, Ball
 from enumsol.condensation.condensed import condensation_of
 from enumsol.condensation.floating import RigidRows
-from enumsol.condensation.floating_space import FloatingSpace
+from enumsol.condensation.space_condensed import FloatingSpace
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, STICK, UNDECIDED, ContactStatus, space_status
 from enumsol.roots.enumeration import Enumeration

@@ -13,7 +13,7 @@ from enumsol.search.definite import DEFINITE, Nodes
 from enumsol.search.descent import Descent
 from enumsol.trusted.selection import Unknowns
 from enumsol.trusted.status_rows import refines, slip_directions
-from enumsol.trusted.uniqueness_in_contact import numbers_of
+from enumsol.trusted.uniqueness import numbers_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

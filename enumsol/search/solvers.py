@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 
 import numpy as np
 
-from enumsol.condensation.affine import exactly_at
-from enumsol.condensation.data import EXACT_DOF_LIMIT
+from enumsol.condensation.data import EXACT_DOF_LIMIT, exactly_at
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.errors import InvalidArgumentError
 from enumsol.proof.writer import point_header, unit_exponents

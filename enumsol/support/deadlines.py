@@ -1,7 +1,8 @@
-"""The time that a call may take: long loops ask here whether it is over, whoever set the limit.
+"""The time that a call may take, and what it is at: long loops ask here for one and tell the other.
 
-A limit belongs to a call in its thread, and may move while it holds. Nothing has to be handed through what is between
-the call and the loop, and code that is called without a limit never stops.
+A limit belongs to a call in its thread, whoever set it, and may move while it holds. Nothing has to be handed through
+what is between the call and the loop, and code that is called without a limit never stops. In the same way whoever
+shows progress hears of it; where nobody listens nothing is done. Only the thread or the process that listens is heard.
 """
 
 from __future__ import annotations
@@ -14,10 +15,10 @@ from contextvars import ContextVar, copy_context
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
-from enumsol.support.telling import tell
-
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
+
+    Listener = Callable[[str, int, int], object]
 
 _Result = TypeVar("_Result")
 
@@ -132,3 +133,29 @@ def attended(work: Callable[[], _Result], size: int, name: str) -> _Result:
     while not wait([done], _POLL).done:
         look()
     return done.result()
+
+
+_listener: ContextVar[Listener | None] = ContextVar("listener", default=None)
+
+
+@contextmanager
+def heard_by(listener: Listener | None) -> Iterator[None]:
+    """Inside, this listener hears what is told, and no other one."""
+    token = _listener.set(listener)
+    try:
+        yield
+    finally:
+        _listener.reset(token)
+
+
+def tell(work: str, done: int = 0, of: int = 0) -> None:
+    """Tell what is done, as the plural of what is counted ("columns of S in rationals"), and how much of it."""
+    listener = _listener.get()
+    if listener is not None:
+        listener(work, done, of)
+
+
+def tell_part(part: str) -> Listener | None:
+    """A listener for a part of the work, which puts the part's name behind what it hears; None where nobody listens."""
+    listener = _listener.get()
+    return None if listener is None else lambda work, done, of: listener(f"{work} {part}", done, of)

@@ -2,7 +2,7 @@
 
 Everything that makes the word "complete" true for a regular problem passes through the functions of this module,
 in the search and in the checker alike. Codes and row kinds are plain integers with the meaning documented in
-``enumsol.trusted.status_rows``.
+``enumsol.trusted.selection``.
 """
 
 from __future__ import annotations
@@ -12,8 +12,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import Ball, VerifiedSolution, column_scale, verified_solve
-from enumsol.arithmetic.balls import ROOT_TINY, SAFE, TINY, UNIT, gamma, upper_norm
+from enumsol.arithmetic.balls import (
+    ROOT_TINY,
+    SAFE,
+    TINY,
+    UNIT,
+    Ball,
+    VerifiedSolution,
+    column_scale,
+    gamma,
+    upper_norm,
+    verified_solve,
+)
 from enumsol.trusted.selection import Selection, row_values
 from enumsol.trusted.status_rows import CONDITIONS
 

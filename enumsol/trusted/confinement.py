@@ -15,15 +15,7 @@ from enumsol.arithmetic.balls import SAFE, TINY, gamma, upper_norm
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.support.deadlines import look
 from enumsol.trusted.floating_bounds import is_unbalanced
-from enumsol.trusted.status_rows import (
-    BACKWARD,
-    FORWARD,
-    FRICTIONLESS,
-    OPEN,
-    SLIP_MINUS,
-    SLIP_PLUS,
-    UNDECIDED,
-)
+from enumsol.trusted.status_rows import BACKWARD, FORWARD, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, UNDECIDED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

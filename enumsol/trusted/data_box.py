@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import Ball, Inverse
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, Inverse
 from enumsol.condensation.enclosure import EnclosedSystem
 from enumsol.trusted.piece_form import definite
 from enumsol.trusted.selection import Selection, Unknowns

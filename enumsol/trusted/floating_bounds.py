@@ -23,8 +23,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from enumsol.arithmetic.ball_arrays import Ball
-    from enumsol.arithmetic.balls import Array
+    from enumsol.arithmetic.balls import Array, Ball
     from enumsol.condensation.floating import FloatingSystem
 
 

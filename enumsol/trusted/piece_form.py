@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, factor_above, gamma, upper_norm
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, factor_above, gamma, upper_norm
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import Ball
+from enumsol.arithmetic.balls import Ball
 from enumsol.trusted.status_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
@@ -91,8 +91,8 @@ def tangential_positions(
 
 def _by_many_digits(problem: ContactProblem, alpha: Fraction, codes: Sequence[int], before: Ball) -> Ball | None:
     """Positions of all nodes at the regular root of a selection; None where many digits do not enclose it."""
+    from enumsol.trusted.arcs.many_digits import affordable
     from enumsol.trusted.arcs.precise import PreciseSelection, PreciseSystem
-    from enumsol.trusted.arcs.refined import affordable
 
     system = PreciseSystem.of(problem) if affordable(problem) else None
     return None if system is None else PreciseSelection(system, codes).positions(alpha, before)

@@ -11,12 +11,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from flint import arb
 
-from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
 from enumsol.arithmetic.rationals import as_objects
-from enumsol.trusted.arcs.many_digits import ball_of, column, matrix, precision, sign_of, upper
+from enumsol.trusted.arcs.many_digits import affordable, ball_of, column, matrix, precision, sign_of, upper
 from enumsol.trusted.arcs.precise import PreciseSystem
-from enumsol.trusted.arcs.refined import affordable
 from enumsol.trusted.at_alpha import VerifiedSelection
 from enumsol.trusted.selection import Selection, row_values
 from enumsol.trusted.status_rows import CONDITIONS

@@ -11,7 +11,7 @@ from helpers.proof_tools import copied, leaves_of, multipliers, proof_of, record
 
 import enumsol
 from enumsol.condensation.floating import FloatingSystem, RigidRows
-from enumsol.condensation.floating_space import FloatingSpace
+from enumsol.condensation.space_condensed import FloatingSpace
 from enumsol.model.sectors import SECTORS, nearest
 from enumsol.trusted.exclusion import exclusion_margin
 from enumsol.trusted.space import sector_rows as sr

@@ -26,7 +26,6 @@ CHECKERS = (
 IN_SPACE = {
     "enumsol.checker.space_checker",
     "enumsol.checker.space_floating",
-    "enumsol.condensation.floating_space",
     "enumsol.trusted.space.resultants",
     "enumsol.trusted.space.sector_rows",
     "enumsol.trusted.space.slip_forms",
@@ -56,30 +55,30 @@ SEARCH = (
 )
 #: What may write a false proof and accept it: of these modules the search uses no more than these names; None: all.
 SHARED = {
-    "arithmetic.balls": {"SAFE", "TINY", "UNIT", "factor_above", "upper_norm"},
+    "arithmetic.balls": {*("Ball", "SAFE", "TINY", "UNIT", "factor_above", "smaller", "solution", "upper_norm")},
     "arithmetic.rationals": {"as_objects", "is_positive_definite", "rational", "rational_matrix", "to_fraction"},
-    "condensation.affine": {"exactly_at"},
+    "condensation.data": {"Data", "EXACT_DOF_LIMIT", "ProblemData", "exactly_at"},
     "condensation.enclosure": {"CondensedEnclosure", "EnclosedSystem", "NotEnclosedError"},
     "condensation.free_displacements": {"solved"},
     "condensation.floating": {"FloatingSystem", "RigidRows"},
-    "condensation.floating_space": {"FloatingSpace"},
-    "condensation.space_condensed": {"EnclosedSpace", "SpaceSystem"},
+    "condensation.space_condensed": {"EnclosedSpace", "FloatingSpace", "SpaceSystem"},
     "condensation.unloaded": {"CondensedData", "never_loaded", "vanishing_alpha"},
     "trusted.arcs.only_branch": {"only_roots"},
     "trusted.data_box": {"DataBox", "Throughout", "only_throughout", "solution_throughout"},
     "trusted.piece_form": {"PieceNumbers"},
     "trusted.arcs.selection_balls": None,
-    "trusted.arcs.over_parts": None,
     "trusted.exclusion": {"Terms", "exclusion_margin"},
     "trusted.floating_bounds": {"is_unbalanced"},
     "trusted.confinement": {"motion_against", "motion_beside", "without_bound"},
+    "trusted.arcs.many_digits": {"affordable"},
+    "trusted.arcs.over_parts": None,
     "trusted.over_interval": {"EnclosedPiece", "as_computed"},
     "trusted.arcs.precise": None,
-    "trusted.arcs.refined": {"affordable"},
     "trusted.positions": {"certain_statuses", "tangential_positions"},
     "trusted.selection": None,
-    "trusted.uniqueness_in_contact": {"lone_root", "numbers_of"},
-    "trusted.uniqueness": {"ClosedSolution", "closed_solution", "only_solution", "same_solution"},
+    "trusted.uniqueness": {
+        *("ClosedSolution", "closed_solution", "lone_root", "numbers_of", "only_solution", "same_solution")
+    },
     "trusted.at_alpha": {"VerifiedSelection", "holds_no_root", "solve_selection"},
     "trusted.precise_at_alpha": {"PreciseAtAlpha"},
     "trusted.quadratic_forms": {"EnclosedForm", "Equations"},
@@ -108,7 +107,6 @@ SHARED = {
             "only_solution_in_space",
         )
     },
-    "arithmetic.ball_arrays": None,
     "proof.begun": None,
     "proof.compressed_parts": None,
     "proof.proof_file": {"Proof", "fraction_text", "packed", "coarse"},
@@ -128,7 +126,7 @@ TRUSTED = (
     "enumsol.model.sectors",
 )
 #: Of these rooms what proves nothing: the data, and S and g as computed.
-DATA = {"condensation.condensed", "condensation.data", "condensation.factorization"}
+DATA = {"condensation.condensed", "condensation.factorization"}
 
 
 def is_search(module):

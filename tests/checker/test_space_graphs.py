@@ -10,7 +10,7 @@ from problems3d import random_over_alpha
 from proof_tools import proof_of, records_of
 
 from enumsol import enumerate_roots, gallery, verify
-from enumsol.arithmetic.ball_arrays import Ball
+from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space.cover import SpaceCover
 from enumsol.trusted.space.solution_curve import lies_in
 

@@ -17,7 +17,7 @@ from enumsol.cli.common import ExitStatus
 from enumsol.cli.graph import build
 from enumsol.cli.options import problem_names
 from enumsol.cli.progress import Display, remaining
-from enumsol.support.telling import tell
+from enumsol.support.deadlines import tell
 
 SQUARE = "gallery:two-node-6.4"
 

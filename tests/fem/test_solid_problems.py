@@ -5,7 +5,7 @@ import pytest
 
 from enumsol import fem
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.fem.surfaces import ContactSurface
+from enumsol.fem.solid_problems import ContactSurface
 
 KINDS = ("hexahedra", "tetrahedra")
 

@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 import enumsol
 from enumsol.fixed_points import FixedPoint, Outcome
-from enumsol.fixed_points.anderson import AndersonMixing
+from enumsol.fixed_points.successive import AndersonMixing
 
 # a public test of the contact community: u = W r + q, normal first, r_n >= 0, u_n >= 0; here w = -u, so g = -q, S = W
 W = np.array([[15.0, -1.0, -2.0], [-1.0, 14.0, 1.0], [-2.0, 1.0, 16.0]])

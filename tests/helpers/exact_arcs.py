@@ -7,7 +7,7 @@ import numpy as np
 from flint import arb, arb_mat, fmpq, fmpq_mat
 
 from enumsol.arithmetic.algebraic import CriticalAlpha, merge, rational_between, real_roots
-from enumsol.arithmetic.ball_arrays import Ball
+from enumsol.arithmetic.balls import Ball
 from enumsol.arithmetic.rationals import rational
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.model.statuses import RowKind

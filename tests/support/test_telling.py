@@ -7,7 +7,7 @@ import enumsol
 from enumsol import ContactProblem, gallery
 from enumsol.condensation.exact import ExactSystem
 from enumsol.errors import Interrupted
-from enumsol.support.telling import heard_by, tell, tell_part
+from enumsol.support.deadlines import heard_by, tell, tell_part
 from enumsol.trusted.arcs.precise import PreciseSystem
 
 

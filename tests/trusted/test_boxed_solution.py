@@ -10,7 +10,7 @@ from problems3d import degenerate_integers, exactly, from_compliance, random_cou
 from space_proofs import RANDOM, random_problem
 
 from enumsol import enumerate_roots
-from enumsol.arithmetic.ball_arrays import Ball
+from enumsol.arithmetic.balls import Ball
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space.boxed_solution import (
     Box,

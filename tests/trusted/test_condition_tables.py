@@ -1,4 +1,4 @@
-"""The table of the statuses that the search reads, and the checkers' own copy of it in enumsol.trusted.status_rows."""
+"""The table of the statuses that the search reads, and the checkers' own copy of it in enumsol.trusted.selection."""
 
 from fractions import Fraction
 

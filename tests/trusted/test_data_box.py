@@ -9,7 +9,7 @@ from generators import integer_problem, random_problem
 from oracles import exact_condense, solutions_of
 
 from enumsol import ContactProblem
-from enumsol.arithmetic.ball_arrays import Ball
+from enumsol.arithmetic.balls import Ball
 from enumsol.search.data_boxes import Box, BoxSearch, _located, throughout
 from enumsol.trusted.data_box import DataBox, Expansion, Throughout, only_throughout, slopes, solution_throughout
 from enumsol.trusted.piece_form import PieceNumbers

@@ -13,9 +13,9 @@ from enumsol.condensation.enclosure import CondensedEnclosure
 from enumsol.search.fathoming_in_contact import KnownRoot, Lone as Proposed
 from enumsol.search.splitting import ImposedRows, PlaneSplitting
 from enumsol.search.tree import make_engine
-from enumsol.trusted import uniqueness_in_contact as lone
+from enumsol.trusted import uniqueness as lone
 from enumsol.trusted.at_alpha import solve_selection
-from enumsol.trusted.uniqueness_in_contact import gaps, lone_root
+from enumsol.trusted.uniqueness import gaps, lone_root
 
 
 def assignment(rng, selection, friction):

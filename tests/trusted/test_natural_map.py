@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from enumsol.arithmetic.ball_arrays import Ball
+from enumsol.arithmetic.balls import Ball
 from enumsol.trusted.space.natural_map import Discs
 
 #: Nodes with two tangents, and with one of either direction.

@@ -7,7 +7,7 @@ import pytest
 from space_proofs import random_problem
 
 from enumsol import enumerate_roots
-from enumsol.arithmetic.ball_arrays import Ball
+from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space.cover import SpaceCover
 from enumsol.model.sectors import SECTORS, nearest, start_of
 from enumsol.search.space.space_setup import SpaceSolvers

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import enumsol
-from enumsol.arithmetic.ball_arrays import Ball
+from enumsol.arithmetic.balls import Ball
 from enumsol.gallery import dovetail
 from enumsol.trusted.arcs.precise import PreciseSelection, PreciseSystem
 from enumsol.trusted.positions import certain_statuses

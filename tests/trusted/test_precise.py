@@ -12,7 +12,7 @@ from path_problems import generic_problem
 from enumsol import ContactProblem
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.gallery import wedge
-from enumsol.trusted.arcs import refined
+from enumsol.trusted.arcs import many_digits as refined
 from enumsol.trusted.arcs.many_digits import PRECISION, ball_of, precision, taylor_around, upper
 from enumsol.trusted.arcs.precise import NowhereHeld, PreciseSelection, PreciseSystem
 from enumsol.trusted.status_rows import FRICTIONLESS

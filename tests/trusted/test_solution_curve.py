@@ -8,7 +8,7 @@ import pytest
 from problems3d import SLIDING, forces, from_compliance, random_compliance, sliding_node
 
 import enumsol
-from enumsol.arithmetic.ball_arrays import Ball
+from enumsol.arithmetic.balls import Ball
 from enumsol.trusted.space.solution_curve import (
     AlphaProblem,
     curve_around,

@@ -11,7 +11,7 @@ from problems3d import block_on_springs
 from space_proofs import on_the_end_of_a_sector, random_problem
 
 from enumsol import enumerate_roots
-from enumsol.arithmetic.ball_arrays import Ball, determinant_sign
+from enumsol.arithmetic.balls import Ball, determinant_sign
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.sectors import DEEPEST, RUN, SECTORS, contains, cut, end_number, is_sector, run_of, start_of
 from enumsol.search.space.space_setup import SpaceSolvers

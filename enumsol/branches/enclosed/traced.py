@@ -12,8 +12,8 @@ import numpy as np
 from enumsol.branches.enclosed.tracing import trace
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.support.deadlines import TimeOverError, over
+from enumsol.trusted.arcs.many_digits import affordable
 from enumsol.trusted.arcs.precise import PreciseSelection, PreciseSystem
-from enumsol.trusted.arcs.refined import affordable
 from enumsol.trusted.arcs.selection_balls import ArcSelection, ArcSystem
 
 if TYPE_CHECKING:

@@ -20,8 +20,7 @@ from enumsol.model.statuses import FINAL, OPEN
 from enumsol.roots.components import connected_components
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.selections.ordered_field import FiberSelections
-from enumsol.support.deadlines import Deadline, TimeOverError, look, within
-from enumsol.support.telling import tell
+from enumsol.support.deadlines import Deadline, TimeOverError, look, tell, within
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence

@@ -22,8 +22,7 @@ from enumsol.selections.solution import SelectionSolution
 from enumsol.trusted.at_alpha import VerifiedSelection, holds_no_root, solve_selection
 from enumsol.trusted.exclusion import Terms
 from enumsol.trusted.status_rows import FREE, NONNEGATIVE, row_signs
-from enumsol.trusted.uniqueness import ClosedSolution, closed_solution, same_solution
-from enumsol.trusted.uniqueness_in_contact import lone_root
+from enumsol.trusted.uniqueness import ClosedSolution, closed_solution, lone_root, same_solution
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.condensation.floating_space import FloatingSpace
+from enumsol.condensation.space_condensed import FloatingSpace
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.proof.records import NoRoot, Unbalanced
 from enumsol.proof.space_records import FLOATING_LEAVES, ExcludedInSpace

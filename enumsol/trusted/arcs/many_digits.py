@@ -1,14 +1,24 @@
-"""Balls of many digits, and what is read off them."""
+"""Balls of many digits, what is read off them, and S, g0 and g1 in such balls (theory, section 7.14).
+
+S, g0 and g1 come from solutions in floats that exact residuals refine: the factors of A in double arithmetic give some
+thirty bits of A^-1 K more with every step, K = [B', f, load_slope]. The residuals are integers: nothing is rounded, and
+the matrix A is touched only where it has entries.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from flint import arb, arb_mat, ctx, fmpq
+import scipy.sparse as sp
+from flint import arb, arb_mat, ctx, fmpq, fmpz_mat
 
 from enumsol.arithmetic.balls import SAFE, UNIT, upper_sum
+from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.condensation.products import scaled
+from enumsol.support.deadlines import look, tell
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -16,6 +26,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Signs = NDArray[np.int8]
+    from enumsol.model.problem import ContactProblem
+
+    Array = NDArray[np.float64]
+    Integers = NDArray[Any]
 
 #: Bits of the arithmetic.
 PRECISION = 320
@@ -98,3 +112,146 @@ def fraction_of(value: Any) -> Fraction:
     """The exact value of an arb without radius."""
     mantissa, exponent = (int(part) for part in value.man_exp())
     return Fraction(mantissa) * Fraction(2) ** exponent
+
+
+#: Residuals are refined to this many bits, beside columns of size one; the error of S has twice as many.
+_RESIDUAL_BITS = 170
+#: Bits behind the point of solutions.
+_SOLUTION_BITS = 208
+#: Most steps; a step that gains fewer bits is the last.
+_STEPS, _LEAST_GAIN = 40, 4
+#: Rows of A that are multiplied together.
+_ROWS = 128
+#: Bits of a residual that floats are given.
+_FLOAT_BITS = 60
+#: Most products of an entry of A with one of a solution in a step: some ten seconds for all steps.
+_MOST_PRODUCTS = 2**24
+
+
+def affordable(problem: ContactProblem) -> bool:
+    """Whether a problem is small enough for balls of many digits: by the entries of A and the number of rows."""
+    return bool(problem.A.nnz * (problem.contact_rows.shape[0] + 2) <= _MOST_PRODUCTS)
+
+
+def refined_table(problem: ContactProblem) -> list[list[Any]] | None:
+    """B A^-1 [B', f, load_slope] in balls, 2p rows of 2p + 2 arb; None where A is not proven positive definite.
+
+    With X an approximation of A^-1 K and E = K - A X, without rounding,
+
+        k_i' A^-1 k_j  =  k_i' x_j + x_i' e_j + e_i' A^-1 e_j,       |e_i' A^-1 e_j|  <=  ||e_i|| ||e_j|| / mu(A).
+
+    Raises
+    ------
+    TimeOverError
+        The deadline that holds here has passed.
+    """
+    try:
+        bound = problem.enclosure.stiffness_bound
+    except NotEnclosedError:
+        return None
+    scale = problem.products.scale
+    A, _ = scaled(sp.csr_array(problem.A), scale, scale)
+    slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
+    K = _Columns.of(np.column_stack([problem.contact_rows.toarray().T, problem.f, slope]), scale)
+    entries = _Integers.of(A.data)
+    X, E, bits = _refined(problem, A, entries, K, scale)
+    size = problem.contact_rows.shape[0]
+    first = fmpz_mat(K.values.T[:size].tolist()) * fmpz_mat(X.tolist())
+    second = fmpz_mat(X.T[:size].tolist()) * fmpz_mat(E.tolist())
+    lengths = [arb((sum(e * e for e in column), -2 * bits)).sqrt() for column in E.T.tolist()]
+    table = []
+    for i in range(size):
+        row = []
+        for j in range(size + 2):
+            rest = (lengths[i] * lengths[j] / arb(bound)).upper()
+            value = arb((int(first[i, j]), -K.bits - _SOLUTION_BITS)) + arb((int(second[i, j]), -_SOLUTION_BITS - bits))
+            row.append((value + arb(0, rest)) * arb((1, K.units[i] + K.units[j])))
+        table.append(row)
+    return table
+
+
+@dataclass(frozen=True)
+class _Integers:
+    """Floats as integers: value * 2^-bits, of any shape."""
+
+    values: Integers
+    bits: int
+
+    @classmethod
+    def of(cls, floats: Array) -> _Integers:
+        whole, exponent = _parts(floats)
+        bits = -int(np.min(exponent, where=whole != 0, initial=0))
+        return cls(whole.astype(object) << np.where(whole != 0, exponent + bits, 0).astype(object), bits)
+
+
+@dataclass(frozen=True)
+class _Columns:
+    """The columns of K, A's scaling applied, each divided by 2^unit so that its largest entry is near one.
+
+    Attributes
+    ----------
+    values : (n, m) array of int, the entries times 2^bits
+    bits : int
+    units : list of m int
+    """
+
+    values: Integers
+    bits: int
+    units: list[int]
+
+    @classmethod
+    def of(cls, columns: Array, scale: Array) -> _Columns:
+        whole, exponent = _parts(columns)
+        # a product by a power of two, without the underflow that floats may have
+        exponent = exponent + np.frexp(scale)[1][:, None] - 1
+        largest = np.max(np.where(whole != 0, exponent + 53, -(2**30)), axis=0)
+        units = np.where(np.any(whole, axis=0), largest, 0)
+        exponent = np.where(whole != 0, exponent - units, 0)
+        bits = -int(np.min(exponent, initial=0))
+        return cls(whole.astype(object) << (exponent + bits).astype(object), bits, units.tolist())
+
+
+def _parts(floats: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Integers m and e with floats = m 2^e."""
+    mantissa, exponent = np.frexp(floats)
+    return np.ldexp(mantissa, 53).astype(np.int64), exponent.astype(np.int64) - 53
+
+
+def _refined(
+    problem: ContactProblem, A: sp.csr_array, entries: _Integers, K: _Columns, scale: Array
+) -> tuple[Integers, Integers, int]:
+    """X times 2^_SOLUTION_BITS, the exact residual K - A X times 2^bits, and bits."""
+    bits = entries.bits + _SOLUTION_BITS + K.bits
+    E = K.values << (bits - K.bits)
+    X = np.zeros_like(E)
+    before = np.inf
+    for _ in range(_STEPS):
+        sizes = np.array([max((abs(e).bit_length() for e in column), default=0) for column in E.T.tolist()])
+        largest = int(np.max(sizes, initial=0)) - bits
+        if largest <= -_RESIDUAL_BITS or largest > before - _LEAST_GAIN:
+            break
+        before = largest
+        tell("bits of A^-1 B'", max(-largest, 0), _RESIDUAL_BITS)
+        drop = np.maximum(sizes - _FLOAT_BITS, 0)
+        floats = (E >> drop.astype(object)).astype(float)
+        step = np.asarray(problem.factorization.solve(floats / scale[:, None], refined=False) / scale[:, None])
+        if not np.all(np.isfinite(step)):
+            break
+        whole, exponent = _parts(step)
+        shift = np.where(whole != 0, exponent + drop - (bits - _SOLUTION_BITS), 0)
+        dX = whole.astype(object) << np.maximum(shift, 0).astype(object) >> np.maximum(-shift, 0).astype(object)
+        X = X + dX
+        E = E - (_product(A, entries.values, dX) << K.bits)
+    return X, E, bits
+
+
+def _product(A: sp.csr_array, entries: Integers, X: Integers) -> Integers:
+    """A X in integers; every row of A has an entry."""
+    parts = []
+    for start in range(0, A.shape[0], _ROWS):
+        look()
+        ends = A.indptr[start : start + _ROWS + 1]
+        part = slice(ends[0], ends[-1])
+        terms = entries[part, None] * X[A.indices[part]]
+        parts.append(np.add.reduceat(terms, ends[:-1] - ends[0], axis=0))
+    return np.concatenate(parts)

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, gamma, upper_sum
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, upper_sum
 from enumsol.trusted.arcs.over_parts import expansions
 from enumsol.trusted.arcs.series import bernstein_values
 from enumsol.trusted.piece_form import definite

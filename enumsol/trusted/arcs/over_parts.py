@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import determinant_sign
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, gamma, upper_sum
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, determinant_sign, gamma, upper_sum
 from enumsol.trusted.arcs.series import Series, bernstein_values, expand, signs_beyond
 
 if TYPE_CHECKING:

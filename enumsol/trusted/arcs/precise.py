@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from flint import arb, arb_mat
 
-from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import SAFE, upper_sum
+from enumsol.arithmetic.balls import SAFE, Ball, upper_sum
 from enumsol.arithmetic.rationals import as_objects
 from enumsol.trusted.arcs.many_digits import (
     ball_of,
@@ -24,6 +23,7 @@ from enumsol.trusted.arcs.many_digits import (
     fraction_of,
     matrix,
     precision,
+    refined_table,
     rounded,
     sign_of,
     signs_of,
@@ -31,7 +31,6 @@ from enumsol.trusted.arcs.many_digits import (
     upper,
 )
 from enumsol.trusted.arcs.over_parts import OverInterval
-from enumsol.trusted.arcs.refined import refined_table
 from enumsol.trusted.selection import Selection
 
 if TYPE_CHECKING:

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import Ball, solution
-from enumsol.arithmetic.balls import SAFE, TINY
+from enumsol.arithmetic.balls import SAFE, TINY, Ball, solution
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.trusted.selection import Selection
 

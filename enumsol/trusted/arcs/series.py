@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import SAFE, TINY, gamma, upper_sum
+from enumsol.arithmetic.balls import SAFE, TINY, Ball, gamma, upper_sum
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

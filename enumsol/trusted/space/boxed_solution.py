@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import Ball, determinant_sign, smaller, solution
-from enumsol.arithmetic.balls import SAFE, TINY, upper_sum
+from enumsol.arithmetic.balls import SAFE, TINY, Ball, determinant_sign, smaller, solution, upper_sum
 from enumsol.trusted.space.natural_map import MARGIN, Discs, Step, middle_inverse
 from enumsol.trusted.space.space_uniqueness import LARGEST_UNIT, LooseSolution
 

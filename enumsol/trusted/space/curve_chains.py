@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import SAFE
+from enumsol.arithmetic.balls import SAFE, Ball
 from enumsol.trusted.space.solution_curve import lies_in, only_curve, parameter_in
 
 if TYPE_CHECKING:

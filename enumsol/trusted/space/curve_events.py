@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import Ball, solution
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, upper_norm
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, solution, upper_norm
 from enumsol.trusted.space.natural_map import Directions, upper_product
 from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, STICK
 from enumsol.trusted.space.solution_curve import SLIP

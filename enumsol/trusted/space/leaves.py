@@ -13,8 +13,19 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.linalg import qr
 
-from enumsol.arithmetic.ball_arrays import Ball, determinant_sign, nearly_singular, rough_inverse, smaller, solution
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, upper_norm, upper_sum
+from enumsol.arithmetic.balls import (
+    SAFE,
+    TINY,
+    UNIT,
+    Ball,
+    determinant_sign,
+    nearly_singular,
+    rough_inverse,
+    smaller,
+    solution,
+    upper_norm,
+    upper_sum,
+)
 from enumsol.model.sectors import SECTORS, direction, end_number
 from enumsol.trusted.space.sector_rows import OPEN, SLIP_PLUS, STICK
 from enumsol.trusted.space.turning import LIBRARY, Box, Turning, turned_by

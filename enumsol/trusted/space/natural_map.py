@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, upper_norm, upper_sum
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, upper_norm, upper_sum
 
 if TYPE_CHECKING:
     from typing import Self

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
 from enumsol.condensation.space_condensed import PieceSpace
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
 from enumsol.trusted.space.sector_rows import sector_margin

@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import scipy.linalg
 
-from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, upper_norm
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, upper_norm
 from enumsol.model.sectors import SECTORS, contains, direction, end_number
 from enumsol.trusted.space.boxed_solution import Box
 from enumsol.trusted.space.natural_map import MARGIN

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, gamma
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma
 from enumsol.model.sectors import SECTORS, direction, end_number
 from enumsol.trusted.floating_bounds import balanced, bounds_within
 from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, Multiplied
@@ -16,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.arithmetic.balls import Array
-    from enumsol.condensation.floating_space import FloatingSpace
+    from enumsol.condensation.space_condensed import FloatingSpace
     from enumsol.trusted.space.sector_rows import Row
 
 #: A disc of forces lies in a polygon of so many corners.

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
 from enumsol.trusted.quadratic_forms import QuadraticForm
 
 if TYPE_CHECKING:

@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import Ball, determinant_sign
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, upper_norm
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, determinant_sign, upper_norm
 from enumsol.condensation.condensed import node_units
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.model.sectors import SECTORS

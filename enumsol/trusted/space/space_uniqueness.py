@@ -13,8 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import Ball
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, dense_eigenvalue_bound, upper_norm
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, dense_eigenvalue_bound, upper_norm
 from enumsol.model.sectors import DEEPEST, SECTORS, is_sector, level_of
 from enumsol.trusted.space.leaves import SpaceRoot, settle
 from enumsol.trusted.space.sector_rows import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.ball_arrays import Ball, Inverse, determinant_sign, smaller
-from enumsol.arithmetic.balls import SAFE, UNIT
+from enumsol.arithmetic.balls import SAFE, UNIT, Ball, Inverse, determinant_sign, smaller
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
