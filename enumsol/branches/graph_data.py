@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from enumsol.arithmetic.algebraic import CriticalAlpha
 from enumsol.arithmetic.rationals import rational
-from enumsol.branches.assembly import make_branches, make_components, multigraph
 from enumsol.branches.claims import Claims, Standing
-from enumsol.branches.elements import VertexKind
+from enumsol.branches.elements import VertexKind, make_branches, make_components, multigraph
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.arguments import alpha_value
 from enumsol.support.immutable import Immutable

@@ -16,8 +16,8 @@ from flint import fmpq, fmpz, fmpz_poly
 
 from enumsol.arithmetic.algebraic import CriticalAlpha, EnclosedAlpha
 from enumsol.branches.elements import Arc, Vertex, VertexKind
+from enumsol.branches.enclosed.following import TracedProblem
 from enumsol.branches.enclosed.make_traced import TracedArcValues
-from enumsol.branches.enclosed.traced import TracedProblem
 from enumsol.branches.exact.make_elements import ExactArcValues
 from enumsol.branches.graph_data import GraphData, GraphStats
 from enumsol.condensation.exact import ExactCondensed, exact_condensed

@@ -12,7 +12,7 @@ from enumsol.arithmetic.algebraic import CriticalAlpha, integer_polynomial, merg
 from enumsol.arithmetic.number_field import exact_value
 from enumsol.branches.exact.selection_arcs import Cell, SelectionArcs, SelectionEvent
 from enumsol.selections.functions import SelectionFunctions
-from enumsol.selections.ordered_field import FiberSelections, row_reduce
+from enumsol.selections.rational_selections import FiberSelections, row_reduce
 from enumsol.selections.solution import MAX_BASES, VertexLimitError
 from enumsol.support.deadlines import look
 

@@ -15,10 +15,9 @@ import numpy as np
 from flint import fmpq_mat
 
 from enumsol.arithmetic.rationals import rational
-from enumsol.branches.enclosed.following import follow_selections
+from enumsol.branches.enclosed.following import TracedProblem, follow_selections
 from enumsol.branches.enclosed.make_traced import make_traced
 from enumsol.branches.enclosed.single_branches import ClosedPieces
-from enumsol.branches.enclosed.traced import TracedProblem
 from enumsol.branches.exact.gluing import glue
 from enumsol.branches.exact.make_elements import make_arcs, make_vertices
 from enumsol.branches.proof_records import write_graph_proof

@@ -1,4 +1,7 @@
-"""What a history found, as plain data: its graph, and what is proven of it."""
+"""What a history found, as plain data: its graph, and what is proven of it.
+
+Its proof is one file: the proofs of its searches, with their starts and what follows them.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 import networkx as nx
 
 from enumsol.loading.stages import dissipated
+from enumsol.proof.reading import rational_text
+from enumsol.proof.writer import ProofWriter
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
@@ -17,6 +22,7 @@ if TYPE_CHECKING:
 
     from enumsol.loading.stages import Stage
     from enumsol.loading.steps import LoadStep
+    from enumsol.proof.proof_file import Proof
 
 #: The number of a step, and of a root in it.
 Node = tuple[int, int]
@@ -172,3 +178,46 @@ class HistoryData:
         if not bounds:
             return ""
         return f", {next((bound for bound in bounds if bound.needed), bounds[0]).words()}"
+
+
+def history_proof(data: HistoryData) -> Proof | None:
+    """The proof; None where a search has none, as in fast and exact arithmetic and after an interruption."""
+    if not data.stages or any(stage.roots.proof is None for stage in data.stages):
+        return None
+    following = _following(data)
+    writer = ProofWriter()
+    writer.write(
+        {
+            "format": "enumsol-proof",
+            "version": 1,
+            "kind": "history",
+            "problem": data.problem.fingerprint,
+            "p": data.problem.p,
+            "steps": [_step_record(step) for step in data.steps],
+            "stages": len(data.stages),
+        }
+    )
+    for stage in data.stages:
+        start, proof = stage.start, stage.roots.proof
+        radius = None if start.radius is None else start.radius.ravel().tolist()
+        writer.write(["s", stage.step, start.offset.ravel().tolist(), radius, following[stage.number]])
+        assert proof is not None
+        for record in proof.records():
+            writer.write(record)
+    writer.write({"stages": len(data.stages)})
+    return writer.close()
+
+
+def _step_record(step: LoadStep) -> list[Any]:
+    load, friction = (None if part is None else part.ravel().tolist() for part in (step.load, step.friction))
+    return [rational_text(step.exact_alpha, "alpha"), load, friction]
+
+
+def _following(data: HistoryData) -> list[list[int]]:
+    """For every stage the numbers of the stages that begin where a root of it ends."""
+    stage_of: dict[Node, int] = {node: given["stage"] for node, given in data.graph.nodes(data=True) if node[0]}
+    found: list[set[int]] = [set() for _ in data.stages]
+    for stage, parents in zip(data.stages, data.parents, strict=True):
+        for parent in parents:
+            found[stage_of[parent]].add(stage.number)
+    return [sorted(numbers) for numbers in found]

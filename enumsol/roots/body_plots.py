@@ -1,4 +1,4 @@
-"""Pictures of deformed bodies: mesh, contact forces as arrows, contact nodes by status, in 2D and 3D."""
+"""Pictures of solutions: deformed bodies in 2D and 3D, and in 3D statuses and slips on the contact surface."""
 
 from __future__ import annotations
 

@@ -13,8 +13,8 @@ from trees import by_the_tree
 
 import enumsol.branches.enclosed.single_branches
 from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery, verify
+from enumsol.branches.enclosed.following import TracedProblem
 from enumsol.branches.enclosed.single_branches import ClosedPieces
-from enumsol.branches.enclosed.traced import TracedProblem
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.unloaded import vanishing_alpha
 from enumsol.errors import Interrupted

@@ -14,8 +14,7 @@ from path_problems import assert_balanced, integer_problem
 
 import enumsol
 from enumsol import BranchGraph, ContactProblem, branch_graph, enumerate_roots
-from enumsol.branches.assembly import vertex_kind
-from enumsol.branches.elements import VertexKind
+from enumsol.branches.elements import VertexKind, vertex_kind
 from enumsol.branches.figures.marks import MARKERS
 
 #: Kinds that have no mark: curves and areas show them.

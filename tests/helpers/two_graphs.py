@@ -5,10 +5,9 @@ from fractions import Fraction
 from itertools import pairwise
 
 from enumsol.arithmetic.rationals import rational
-from enumsol.branches.enclosed.following import follow_selections
+from enumsol.branches.enclosed.following import TracedProblem, follow_selections
 from enumsol.branches.enclosed.joining import EventPlaceKind
 from enumsol.branches.enclosed.make_traced import make_traced
-from enumsol.branches.enclosed.traced import TracedProblem
 from enumsol.branches.exact.gluing import glue
 from enumsol.branches.exact.make_elements import make_arcs, make_vertices
 from enumsol.condensation.exact import ExactCondensed

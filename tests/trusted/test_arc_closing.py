@@ -18,7 +18,7 @@ from rational_forms import Data, Forms, exact
 from rational_pieces import _Along
 
 from enumsol import ContactProblem
-from enumsol.branches.enclosed.traced import TracedProblem
+from enumsol.branches.enclosed.following import TracedProblem
 from enumsol.condensation.unloaded import vanishing_alpha
 from enumsol.trusted.arcs.only_branch import only_roots
 from enumsol.trusted.piece_form import PieceNumbers

@@ -9,8 +9,7 @@ import numpy as np
 
 from enumsol.arithmetic.algebraic import EnclosedAlpha
 from enumsol.arithmetic.rationals import rational
-from enumsol.branches.assembly import make_vertex, sides_of, with_exact_zeros
-from enumsol.branches.elements import Arc, ArcValues
+from enumsol.branches.elements import Arc, ArcValues, make_vertex, sides_of, with_exact_zeros
 from enumsol.branches.enclosed.joining import EventPlaceKind
 from enumsol.model.statuses import FINAL, FRICTIONLESS, contact_status
 from enumsol.roots.slip_signs import named_statuses
@@ -19,10 +18,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence, Set
     from fractions import Fraction
 
-    from enumsol.branches.assembly import Sides
-    from enumsol.branches.elements import Pair, Vertex
+    from enumsol.branches.elements import Pair, Sides, Vertex
+    from enumsol.branches.enclosed.following import TracedProblem
     from enumsol.branches.enclosed.joining import EventPlace, Joined, JoinedArc
-    from enumsol.branches.enclosed.traced import TracedProblem
     from enumsol.selections.solution import ActiveSets, Codes
 
 

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
     from enumsol.branches.enclosed.arc_parts import Trace
+    from enumsol.branches.enclosed.following import TracedProblem
     from enumsol.branches.enclosed.joining import Joined
-    from enumsol.branches.enclosed.traced import TracedProblem
     from enumsol.search.chains import Link
     from enumsol.selections.solution import Codes
     from enumsol.trusted.arcs.selection_balls import ArcSelection

@@ -19,7 +19,7 @@ from enumsol.branches.remedies import TOLD_APART
 from enumsol.model.statuses import FINAL, OPEN
 from enumsol.roots.components import connected_components
 from enumsol.search.outcome import Stop, StopReason
-from enumsol.selections.ordered_field import FiberSelections
+from enumsol.selections.rational_selections import FiberSelections
 from enumsol.support.deadlines import Deadline, TimeOverError, look, tell, within
 
 if TYPE_CHECKING:

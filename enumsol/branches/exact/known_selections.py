@@ -12,7 +12,7 @@ from enumsol.branches.remedies import DEFECT, FEWER
 from enumsol.branches.sheets import sheet_arcs
 from enumsol.model.statuses import contact_status
 from enumsol.roots.root import summary
-from enumsol.selections.ordered_field import FiberSelections
+from enumsol.selections.rational_selections import FiberSelections
 from enumsol.selections.solution import VertexLimitError
 from enumsol.support.deadlines import look
 

@@ -10,22 +10,20 @@ import numpy as np
 from flint import fmpq
 
 from enumsol.arithmetic.rationals import rational, to_fraction
-from enumsol.branches.assembly import degree_of, make_vertex, sides_of, with_exact_zeros
-from enumsol.branches.elements import Arc, ArcValues
+from enumsol.branches.elements import Arc, ArcValues, degree_of, make_vertex, sides_of, with_exact_zeros
 from enumsol.model.statuses import RowKind, contact_status
 from enumsol.roots.builder import polytope
 from enumsol.roots.root import RootFamily
 from enumsol.roots.slip_signs import named_statuses, sign_over
 from enumsol.selections.functions import SelectionFunctions
-from enumsol.selections.ordered_field import FiberSelections, as_float
 from enumsol.selections.polytopes import dot
+from enumsol.selections.rational_selections import FiberSelections, as_float
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from fractions import Fraction
 
-    from enumsol.branches.assembly import Sides
-    from enumsol.branches.elements import Pair, Vertex
+    from enumsol.branches.elements import Pair, Sides, Vertex
     from enumsol.branches.exact.gluing import GluedArc, GluedVertex, Gluing
     from enumsol.condensation.exact import ExactCondensed
     from enumsol.roots.root import Polytope

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.condensation.exact import ExactCondensed
-    from enumsol.selections.ordered_field import FiberSelections
+    from enumsol.selections.rational_selections import FiberSelections
     from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution
 
 #: What makes a critical point, apart from the numbers of rows: the determinant vanishes; an end of the interval.

@@ -11,8 +11,7 @@ import numpy as np
 
 from enumsol.arithmetic.algebraic import EnclosedAlpha
 from enumsol.arithmetic.rationals import rational
-from enumsol.branches.assembly import make_vertex, sides_of, with_exact_zeros
-from enumsol.branches.elements import Arc, ArcValues, VertexKind, tangential
+from enumsol.branches.elements import Arc, ArcValues, VertexKind, make_vertex, sides_of, tangential, with_exact_zeros
 from enumsol.branches.remedies import END_ELSEWHERE, TOLD_APART
 from enumsol.branches.space.pieces import Run, Turn
 from enumsol.model.statuses import space_status
@@ -23,8 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from enumsol.branches.assembly import Sides
-    from enumsol.branches.elements import Pair, Vertex
+    from enumsol.branches.elements import Pair, Sides, Vertex
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.model.statuses import ContactStatus
     from enumsol.selections.solution import Codes
