@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import Any, Self
 
 
@@ -65,6 +66,14 @@ class IncompleteGraphError(EnumsolError, ValueError):
 
 class MissingDependencyError(EnumsolError, ImportError):
     """An optional package is needed for this call and is not installed."""
+
+    @classmethod
+    def imported(cls, module: str, what: str, extra: str) -> Any:
+        """The module that something needs, of a package that comes with an extra of this one; or this error."""
+        try:
+            return import_module(module)
+        except ImportError as error:
+            raise cls.of(what, module.partition(".")[0], extra) from error
 
     @classmethod
     def of(cls, what: str, package: str, extra: str) -> Self:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from contextlib import closing
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -11,10 +12,10 @@ from enumsol.model.problem import ContactProblem, check_is_problem
 from enumsol.model.statuses import STATUSES, ContactStatus
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.support.arguments import alpha_list, optional_callable, optional_executor
-from enumsol.support.workers import Crew
+from enumsol.support.workers import spread
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Mapping
     from concurrent.futures import Executor
 
     import pandas as pd
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.roots.root_set import RootSet
     from enumsol.support.arguments import Alpha, AlphaLike
-    from enumsol.support.workers import Job
 
 
 #: Columns with the number of roots at which at least one node has the status.
@@ -90,33 +90,15 @@ def multiplicity_table(
     row = partial(table_row, problem, {"arithmetic": arithmetic, **options})
     done: dict[int, dict[str, Any]] = {}
     try:
-        for k, found in enumerate(map(row, chosen)) if executor is None else _spread(executor, row, chosen):
-            done[k] = found
-            if progress is not None:
-                progress(len(done), len(chosen))
+        with closing(spread(executor, ((k, row, (alpha,)) for k, alpha in enumerate(chosen)))) as rows:
+            for k, found in rows:
+                done[k] = found
+                if progress is not None:
+                    progress(len(done), len(chosen))
     except KeyboardInterrupt as interruption:
         message = f"multiplicity_table was interrupted after {len(done)} of {len(chosen)} alphas"
         raise Interrupted(message, _frame(problem, done)) from interruption
     return _frame(problem, done)
-
-
-def _spread(
-    executor: Executor, row: Callable[[Alpha], dict[str, Any]], alphas: Sequence[Alpha]
-) -> Iterator[tuple[int, dict[str, Any]]]:
-    """Rows with their places as workers finish them; a limited number of alphas is handed out ahead."""
-    crew = Crew(executor)
-    running: dict[Job, int] = {}
-    waiting = list(enumerate(alphas))[::-1]
-    try:
-        while waiting or running:
-            while waiting and crew.room > 0:
-                k, alpha = waiting.pop()
-                running[crew.submit(row, alpha)] = k
-            job = crew.next()
-            if job is not None:
-                yield running.pop(job), job.result
-    finally:
-        crew.cancel()
 
 
 def _frame(problem: ContactProblem | ContactProblem3D, done: dict[int, dict[str, Any]]) -> pd.DataFrame:

@@ -198,10 +198,7 @@ def _has_all_nodes(nodes: Any, file: Path) -> bool:
 
 def _h5(file: Path) -> dict[str, Any]:
     """The group ``solution`` that fclib_write_solution adds to a problem."""
-    try:
-        import h5py  # an extra
-    except ImportError as error:
-        raise MissingDependencyError.of("fclib files", "h5py", "fclib") from error
+    h5py = MissingDependencyError.imported("h5py", "fclib files", "fclib")
     with h5py.File(file, "r") as content:
         if "solution" not in content:
             return dict.fromkeys(content)

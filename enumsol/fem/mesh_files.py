@@ -124,10 +124,7 @@ def read_solid(source: str | os.PathLike[str] | Any, groups: str | None = None) 
 
 
 def _read(source: Any, groups: str | None, dimension: int | None) -> PartedMesh:
-    try:
-        import meshio  # an extra
-    except ImportError as error:
-        raise MissingDependencyError.of("Meshes in files", "meshio", "meshes") from error
+    meshio = MissingDependencyError.imported("meshio", "Meshes in files", "meshes")
     if isinstance(source, meshio.Mesh):
         return _checked(source, groups, dimension)
     place = file_path(source, "source", "the name of a file or a meshio.Mesh")

@@ -41,7 +41,7 @@ _READ_AS = {2: "A, Bn and Bt", 3: "A, Bn, Bt1 and Bt2"}
 
 def read(path: Path) -> Problem:
     """The global or local problem in an fclib file; the global one if there are both."""
-    h5py = _h5py()
+    h5py = MissingDependencyError.imported("h5py", "fclib files", "fclib")
     try:
         file = h5py.File(path, "r")
     except OSError as error:
@@ -60,7 +60,7 @@ def read(path: Path) -> Problem:
 
 def write(problem: Problem, path: Path) -> None:
     """Write a global problem; node labels, coordinates, areas and meshes have no place in it."""
-    h5py = _h5py()
+    h5py = MissingDependencyError.imported("h5py", "fclib files", "fclib")
     if problem.modes is not None:
         raise InvalidProblemError(
             "the body is held by nothing, and fclib has no place for rigid_modes; "
@@ -100,14 +100,6 @@ def _isotropic(problem: Problem) -> Floats:
     if not np.array_equal(F1, F2):
         raise InvalidProblemError("friction is orthotropic, which fclib cannot hold; expected F1 = F2 at every node")
     return np.asarray(F1)
-
-
-def _h5py() -> Any:
-    try:
-        import h5py  # an extra
-    except ImportError as error:
-        raise MissingDependencyError.of("fclib files", "h5py", "fclib") from error
-    return h5py
 
 
 def _global(group: Any) -> Problem:

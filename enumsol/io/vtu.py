@@ -12,7 +12,7 @@ from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.model.cells import KINDS, by_kind
 from enumsol.model.problem import ContactProblem
 from enumsol.model.problem3d import ContactProblem3D
-from enumsol.model.shapes import body_shape
+from enumsol.model.shapes import body_shape, row_frames
 from enumsol.model.statuses import STATUSES
 from enumsol.support.arguments import file_path
 from enumsol.support.array_arguments import real_array
@@ -133,7 +133,7 @@ def write_vtu(
         raise InvalidArgumentError(f"state is {_empty(state)}; expected at least one")
     else:
         states = {place.with_stem(f"{place.stem}-{k}"): one for k, one in enumerate(state)}
-    meshio = _meshio()
+    meshio = MissingDependencyError.imported("meshio", "VTU files", "meshes")
     pictures = {file: _picture(meshio, problem, one) for file, one in states.items()}
     for file, picture in pictures.items():
         with writing(file, "path"):
@@ -182,7 +182,7 @@ def _space(meshio: Any, problem: ContactProblem3D, state: State) -> Any:
             raise InvalidArgumentError("problem has neither mesh nor coordinates; expected one of them for a picture")
         vertices = np.arange(problem.p)[:, None]
         return meshio.Mesh(problem.coordinates, [("vertex", vertices)], point_data=data)
-    data |= _vectors(problem, problem.mesh, data)
+    data |= _vectors(problem, data)
     u = _array(state, "u", (problem.n,))
     return _body(meshio, problem, problem.mesh, u, data)
 
@@ -214,14 +214,6 @@ def _in_space(vectors: Floats) -> Floats:
     return np.concatenate([vectors, np.zeros((len(vectors), 1))], axis=1)
 
 
-def _meshio() -> Any:
-    try:
-        import meshio  # an extra
-    except ImportError as error:
-        raise MissingDependencyError.of("VTU files", "meshio", "meshes") from error
-    return meshio
-
-
 def _array(state: State, name: str, shape: tuple[int, ...]) -> Floats:
     if not hasattr(state, name):
         raise InvalidArgumentError(
@@ -248,14 +240,12 @@ def _row_data(problem: ContactProblem3D, state: State) -> dict[str, Floats]:
     return data
 
 
-def _vectors(problem: ContactProblem3D, mesh: BodyMesh, data: dict[str, Floats]) -> dict[str, Floats]:
+def _vectors(problem: ContactProblem3D, data: dict[str, Floats]) -> dict[str, Floats]:
     """Vectors of the contact rows in global axes, each (p, 3); none where the rows do not tell their directions."""
-    sums = np.stack([mesh.directions(rows) for rows in (problem.Bt1, problem.Bt2, problem.Bn)], axis=1)
-    lengths = np.linalg.norm(sums, axis=2, keepdims=True)
-    frames = np.divide(sums, lengths, out=np.zeros_like(sums), where=lengths > 0)
+    frames = row_frames(problem)
     if np.max(np.abs(frames @ frames.transpose(0, 2, 1) - np.eye(3))) > _ORTHONORMAL:
         return {}
-    t1, t2, n = frames.transpose(1, 0, 2)
+    n, t1, t2 = frames.transpose(1, 0, 2)
 
     def along(first: str, second: str) -> Floats:
         return np.asarray(data[first][:, None] * t1 + data[second][:, None] * t2)

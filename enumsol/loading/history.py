@@ -27,6 +27,7 @@ from enumsol.roots.root_set import RootSet, SearchStats, Undecided
 from enumsol.support.arguments import file_path, positive_integer, shown
 from enumsol.support.files import reading, writing
 from enumsol.support.immutable import Immutable
+from enumsol.support.plotting import kept
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -395,12 +396,7 @@ class History(Immutable):
         """
         from enumsol.loading.history_plots import draw_history  # matplotlib comes with the first picture
 
-        figure = draw_history(self.data, x, y, ax)
-        if file is not None:
-            place = file_path(file, "file")
-            with writing(place, "file"):
-                figure.savefig(place, dpi=150)
-        return figure
+        return kept(draw_history(self.data, x, y, ax), file)
 
     def save(self, file: str | Path) -> None:
         """Write the history, with the proofs of its searches, as JSON; the problem is not part of the file.

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from contextlib import closing
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +20,6 @@ from enumsol.support.arguments import (
     alpha_interval,
     alpha_value,
     exact_number,
-    file_path,
     finite_number,
     instance_of,
     nonnegative_integer,
@@ -29,13 +29,13 @@ from enumsol.support.arguments import (
     shown,
 )
 from enumsol.support.array_arguments import vector_of
-from enumsol.support.files import writing
 from enumsol.support.immutable import Immutable
 from enumsol.support.messages import counted
-from enumsol.support.workers import Crew
+from enumsol.support.plotting import kept
+from enumsol.support.workers import spread
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
     from concurrent.futures import Executor
     from pathlib import Path
 
@@ -43,10 +43,7 @@ if TYPE_CHECKING:
 
     from enumsol.loading.strips import MapStrip
     from enumsol.support.arguments import Alpha, AlphaLike
-    from enumsol.support.workers import Job
-
-    #: A function, what makes its arguments once it is called, and what takes its result.
-    _Call = tuple[Callable[..., Any], Callable[[], tuple[Any, ...]], Callable[[Any], None]]
+    from enumsol.support.workers import Call
 
 _EXPECTED = (
     'expected {"friction": values}, {"gap": values}, {"load": (direction, values)}, or a pair of a function of a value '
@@ -153,56 +150,36 @@ class _Rows:
 
     def run(self, executor: Executor | None, progress: Callable[[int, int], object] | None) -> None:
         """All rows, then the strips between them."""
-
-        def add(place: int, row: MapRow) -> None:
-            self.done[place] = row
-            if progress is not None:
-                progress(len(self.done), len(self.values))
-
-        calls = [(map_row, partial(self._row_arguments, k), partial(add, k)) for k in range(len(self.values))]
-        self._spread(executor, calls)
+        with closing(spread(executor, self._row_calls())) as found:
+            for place, row in found:
+                self.done[place] = row
+                if progress is not None:
+                    progress(len(self.done), len(self.values))
         rows = sorted(self.done.values(), key=lambda row: row.value)
-        pairs = list(pairwise(rows)) if self.max_boxes and len(rows) == len(self.values) else []
-        self._spread(
-            executor, [(map_strip, partial(self._strip_arguments, pair), self.strips.append) for pair in pairs]
-        )
+        if self.max_boxes and len(rows) == len(self.values):
+            for _, strip in spread(executor, self._strip_calls(rows)):
+                self.strips.append(strip)
 
-    def _row_arguments(self, place: int) -> tuple[Any, ...]:
-        """Of map_row; the options have the time that is left."""
-        left = {} if self.seconds is None else {"time_limit": self._left()}
-        return self.make, self.values[place], self.interval, {**self.options, **left}
+    def _row_calls(self) -> Iterator[Call[int]]:
+        """Of map_row, while there is time; the options have what is left of it."""
+        for place, value in enumerate(self.values):
+            if (left := self._left()) == 0:
+                return
+            options = self.options if left is None else {**self.options, "time_limit": max(left, 1e-3)}
+            yield place, map_row, (self.make, value, self.interval, options)
 
-    def _strip_arguments(self, rows: tuple[MapRow, MapRow]) -> tuple[Any, ...]:
-        """Of map_strip."""
-        return self.make, (rows[0].value, rows[1].value), ranges_of_one(rows), self.max_boxes, self._left()
-
-    def _spread(self, executor: Executor | None, calls: Sequence[_Call]) -> None:
-        """Make calls while there is time: here, or by an executor, a limited number ahead of those awaited."""
-        if executor is None:
-            for function, arguments, add in calls:
-                if self._over():
-                    return
-                add(function(*arguments()))
-            return
-        crew, waiting = Crew(executor), list(calls)[::-1]
-        running: dict[Job, Callable[[Any], None]] = {}
-        try:
-            while (waiting and not self._over()) or running:
-                while waiting and crew.room > 0 and not self._over():
-                    function, arguments, add = waiting.pop()
-                    running[crew.submit(function, *arguments())] = add
-                job = crew.next()
-                if job is not None:
-                    running.pop(job)(job.result)
-        finally:
-            crew.cancel()
-
-    def _over(self) -> bool:
-        return self.seconds is not None and time.perf_counter() - self.started > self.seconds
+    def _strip_calls(self, rows: Sequence[MapRow]) -> Iterator[Call[None]]:
+        """Of map_strip, while there is time."""
+        for pair in pairwise(rows):
+            if (left := self._left()) == 0:
+                return
+            values = pair[0].value, pair[1].value
+            least = None if left is None else max(left, 1e-3)
+            yield None, map_strip, (self.make, values, ranges_of_one(pair), self.max_boxes, least)
 
     def _left(self) -> float | None:
-        """Seconds."""
-        return None if self.seconds is None else max(self.seconds - (time.perf_counter() - self.started), 1e-3)
+        """Seconds, 0 where the time is over; None without a limit."""
+        return None if self.seconds is None else max(self.seconds - (time.perf_counter() - self.started), 0.0)
 
     def result(self, reason: str | None = None) -> MultiplicityMap:
         """The map of what was done."""
@@ -385,12 +362,7 @@ class MultiplicityMap(Immutable):
         """
         from enumsol.loading.map_plots import draw_map  # matplotlib comes with the first picture
 
-        figure = draw_map(self.name, self.rows, self.strips, self.curves, self.completeness(), ax)
-        if file is not None:
-            place = file_path(file, "file")
-            with writing(place, "file"):
-                figure.savefig(place, dpi=150)
-        return figure
+        return kept(draw_map(self.name, self.rows, self.strips, self.curves, self.completeness(), ax), file)
 
     @property
     def unique_between(self) -> float:

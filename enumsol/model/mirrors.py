@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.model.shapes import body_shape
+from enumsol.model.shapes import body_shape, row_frames
 from enumsol.model.statuses import ContactStatus
 from enumsol.support.arguments import one_of
 from enumsol.support.array_arguments import real_array, short_vector
@@ -107,7 +107,7 @@ class Mirror(Sealed):
         middle = 0.5 * (np.min(places, axis=0) + np.max(places, axis=0))
         through = middle if point is None else short_vector(point, "point", d)
         reflection = np.eye(d) - 2.0 * np.outer(axis, axis)
-        frames = _frames(problem)
+        frames = row_frames(problem)
         images = through + (places - through) @ reflection
         size = max(float(np.max(np.ptp(places, axis=0))), float(np.max(np.abs(places - through))))
         return _matched(problem.node_ids, places, images, frames, frames @ reflection, size)
@@ -156,14 +156,6 @@ def _direction(normal: Any, d: int) -> Floats:
     if not length > 0:
         raise InvalidArgumentError("normal is zero; expected a direction, such as 'x'")
     return np.asarray(vector / length)
-
-
-def _frames(problem: Any) -> Floats:
-    """Unit vectors of the contact rows in global axes, (p, d, d): the normals and the tangents; zero if not known."""
-    rows = [problem.Bn, *([problem.Bt] if hasattr(problem, "Bt") else [problem.Bt1, problem.Bt2])]
-    sums = np.stack([problem.mesh.directions(matrix) for matrix in rows], axis=1)
-    lengths = np.linalg.norm(sums, axis=2, keepdims=True)
-    return np.asarray(np.divide(sums, lengths, out=np.zeros_like(sums), where=lengths > 0))
 
 
 def _matched(

@@ -112,6 +112,14 @@ def own_scales(largest: Sequence[float], size: float) -> tuple[float, ...]:
     return tuple(round_scale(value, size) if value > 0 else common for value in largest)
 
 
+def row_frames(problem: Any) -> Floats:
+    """Unit vectors of the contact rows in global axes, (p, d, d): the normals and the tangents; zero if not known."""
+    rows = [problem.Bn, *([problem.Bt] if hasattr(problem, "Bt") else [problem.Bt1, problem.Bt2])]
+    sums = np.stack([problem.mesh.directions(matrix) for matrix in rows], axis=1)
+    lengths = np.linalg.norm(sums, axis=2, keepdims=True)
+    return np.asarray(np.divide(sums, lengths, out=np.zeros_like(sums), where=lengths > 0))
+
+
 def slip_directions(problem: Any, root: Any) -> tuple[Integers, Floats]:
     """Contact rows in 3D that slip, (k,), and the unit vectors in global axes along which they do, (k, 3)."""
     axes = np.stack([problem.mesh.directions(rows) for rows in (problem.Bt1, problem.Bt2)], axis=1)

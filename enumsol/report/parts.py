@@ -42,11 +42,8 @@ def packed_plotly() -> str:
     MissingDependencyError
         plotly is not installed.
     """
-    try:
-        from plotly.offline import get_plotlyjs  # an extra
-    except ImportError as error:
-        raise MissingDependencyError.of("reports", "plotly", "report") from error
-    return base64.b64encode(gzip.compress(get_plotlyjs().encode(), 9, mtime=0)).decode()
+    script = MissingDependencyError.imported("plotly.offline", "reports", "report").get_plotlyjs()
+    return base64.b64encode(gzip.compress(script.encode(), 9, mtime=0)).decode()
 
 
 def span_words(values: Any) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -151,22 +152,12 @@ class Enumeration(ABC, Generic[_Solvers]):
         return RigidBound(problem.rigid_reach, self.certifier.certified.bounded or self.method != "tree")
 
     def _stats(self) -> SearchStats:
-        outcome = self.outcome
-        return SearchStats(
-            nodes=outcome.nodes,
-            pruned=outcome.pruned,
-            selections=outcome.selections,
-            qps=outcome.qps,
-            fallback_qps=outcome.fallback_qps,
-            seconds=time.perf_counter() - self.started,
-            escalations=self.certifier.certified.escalations,
-            presolved=outcome.presolved,
-            closed=outcome.closed,
-            resumed=outcome.resumed,
-            held=outcome.held,
-            held_open=outcome.held_open,
-            redone=outcome.redone,
-        )
+        own: dict[str, Any] = {
+            "seconds": time.perf_counter() - self.started,
+            "escalations": self.certifier.certified.escalations,
+        }
+        counts = {part.name: getattr(self.outcome, part.name) for part in fields(SearchStats) if part.name not in own}
+        return SearchStats(**own, **counts)
 
     def _proof(self, **counts: int) -> Proof | None:
         """The proof, closed; None when the search was interrupted, or there was no room or time to write its end."""

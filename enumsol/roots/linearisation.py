@@ -54,20 +54,13 @@ class SelectionTangent(Sealed):
         M = self._bordered(M, self.floats.reduced(self.codes)[0], E, 1.0 / np.sqrt(np.diagonal(self.floats.system.S)))
         return float(np.linalg.cond(M)) if len(M) else 1.0
 
-    def derivative(self) -> Array | None:
-        """d(lambda_n, lambda_t)/d alpha in the selection, shape (p, 2): M(alpha) lambda = b(alpha) differentiated.
-
-        Where a coefficient is zero but its slope is not, the branch is followed to the side on which F >= 0; None where
-        a node with such a coefficient does not slip, since the branch may then stick.
-        """
-        return None if self._rates is None else self._rates[0]
-
-    def motion(self) -> Array | None:
-        """d(u_n, u_t)/d alpha in the selection, shape (p, 2); None as ``derivative``."""
-        return None if self._rates is None else self._rates[1]
-
     @cached_property
-    def _rates(self) -> tuple[Array, Array] | None:
+    def rates(self) -> tuple[Array, Array] | None:
+        """d(lambda_n, lambda_t)/d alpha and d(u_n, u_t)/d alpha in the selection: M lambda = b differentiated.
+
+        Both have shape (p, 2). Where a coefficient is zero but its slope is not, the branch is followed to the side on
+        which F >= 0; None where a node with such a coefficient does not slip, since the branch may then stick.
+        """
         floats, condensed, p = self.floats, self.condensed, self.floats.p
         system = floats.system
         change: Array = np.zeros(2 * p)

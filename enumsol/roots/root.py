@@ -159,9 +159,7 @@ class Root(ContactState):
         InvalidArgumentError
             The problem is one in 3D.
         """
-        self._in_2d("dlambda_dalpha")
-        derivative = None if self._tangent is None else self._tangent.derivative()
-        return None if derivative is None else sealed(derivative)
+        return self._rates("dlambda_dalpha")[0]
 
     @cached_property
     def du_dalpha(self) -> NDArray[np.float64] | None:
@@ -172,9 +170,7 @@ class Root(ContactState):
         InvalidArgumentError
             The problem is one in 3D.
         """
-        self._in_2d("du_dalpha")
-        derivative = None if self._tangent is None else self._tangent.motion()
-        return None if derivative is None else sealed(derivative)
+        return self._rates("du_dalpha")[1]
 
     @property
     def u(self) -> NDArray[np.float64]:
@@ -284,6 +280,12 @@ class Root(ContactState):
             raise InvalidArgumentError(f"{name} is asked of a root in 3D; expected one in 2D")
         return cast("CondensedProblem", self._condensed)
 
+    def _rates(self, name: str) -> tuple[NDArray[np.float64], ...] | tuple[None, None]:
+        """Derivatives of forces and of displacements with respect to alpha."""
+        self._in_2d(name)
+        rates = None if self._tangent is None else self._tangent.rates
+        return (None, None) if rates is None else tuple(map(sealed, rates))
+
     def _slip_sign(self, node: int) -> int:
         sign = None if self._slips is None else self._slips.sign(node)
         return int(np.sign(self.u_t[node])) if sign is None else sign
@@ -308,10 +310,9 @@ class Root(ContactState):
                 signs[i, 0] = 0 if len(holds) > 1 else -1
                 signs[i, 1:] = self._slip_sign(i)
             else:
-                if ContactStatus.SLIP_PLUS in holds and ContactStatus.STICK in holds:
-                    signs[i, 1] = 0
-                if ContactStatus.SLIP_MINUS in holds and ContactStatus.STICK in holds:
-                    signs[i, 2] = 0
+                for k, slip in enumerate((ContactStatus.SLIP_PLUS, ContactStatus.SLIP_MINUS), start=1):
+                    if holds >= {slip, ContactStatus.STICK}:
+                        signs[i, k] = 0
         return signs
 
     def __repr__(self) -> str:

@@ -6,6 +6,8 @@ from functools import cache
 from typing import Any
 
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
+from enumsol.support.arguments import file_path
+from enumsol.support.files import writing
 
 
 def new_figure(**options: Any) -> Any:
@@ -48,6 +50,21 @@ def _figure_class() -> Any:
 def figure_of(ax: Any) -> Any:
     """The whole figure that axes belong to, through subfigures."""
     return ax.figure.canvas.figure
+
+
+def kept(figure: Any, file: Any) -> Any:
+    """The figure, written to a file as well if one is given.
+
+    Raises
+    ------
+    InvalidArgumentError, OutputError
+        ``file`` is no name, or cannot be written.
+    """
+    if file is not None:
+        place = file_path(file, "file")
+        with writing(place, "file"):
+            figure.savefig(place, dpi=150)
+    return figure
 
 
 def axes_or_none(ax: Any) -> Any:

@@ -11,12 +11,16 @@ from collections import deque
 from concurrent.futures import BrokenExecutor, CancelledError
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Generator, Iterator
     from concurrent.futures import Executor, Future
 
+    #: A key, a function that other processes can import, and its arguments.
+    Call = tuple["Key", Callable[..., Any], tuple[Any, ...]]
+
+Key = TypeVar("Key")
 #: Characters of an executor's own message that are passed on.
 _LONGEST = 160
 #: How often a task is handed to workers before it is done by the calling process, and a pool made anew.
@@ -159,6 +163,30 @@ class Crew:
         except OSError:
             return False  # the system starts no more
         return True
+
+
+def spread(executor: Executor | None, calls: Iterator[Call[Key]]) -> Generator[tuple[Key, Any]]:
+    """Results of calls with the keys of these, as workers finish them; without an executor made here, one by one.
+
+    A limited number of calls is taken and handed out ahead of those whose results are awaited.
+    """
+    if executor is None:
+        for key, function, arguments in calls:
+            yield key, function(*arguments)
+        return
+    crew = Crew(executor)
+    running: dict[Job, Key] = {}
+    try:
+        while True:
+            while crew.room > 0 and (call := next(calls, None)) is not None:
+                key, function, arguments = call
+                running[crew.submit(function, *arguments)] = key
+            if not running:
+                return
+            if (job := crew.next()) is not None:
+                yield running.pop(job), job.result
+    finally:
+        crew.cancel()
 
 
 class _Lost(Exception):  # noqa: N818 (it never leaves this module)

@@ -1,4 +1,4 @@
-import builtins
+import sys
 
 import h5py
 import numpy as np
@@ -243,14 +243,7 @@ def test_paths_over_alpha_cannot_be_written(tmp_path):
 def test_without_h5py_the_extra_is_named(tmp_path, monkeypatch):
     path = tmp_path / "p.h5"
     write_problem(constant_square(1.0), path)
-    found = builtins.__import__
-
-    def without(name, *args, **kwargs):
-        if name == "h5py":
-            raise ModuleNotFoundError(name)
-        return found(name, *args, **kwargs)
-
-    monkeypatch.setattr(builtins, "__import__", without)
+    monkeypatch.setitem(sys.modules, "h5py", None)
     with pytest.raises(MissingDependencyError, match=r'need the package h5py.*pip install "enumsol\[fclib\]"'):
         read_problem(path)
     with pytest.raises(MissingDependencyError, match="h5py"):

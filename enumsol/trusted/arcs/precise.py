@@ -236,9 +236,9 @@ class PreciseSelection:
                 (self._C[1] * radius, self._c[1] * radius, nothing),
             )
         )
-        unit = arb(0, 1)
-        values = C * z + (C1 * z + C * rise) * unit + (C1 * rise - C * bend) * arb(0.5, 0.5) - C1 * bend * unit
-        signs = signs_of(values + (C + C1 * unit) * left)
+        signs = signs_of(
+            _over_tau(C * z, C1 * z + C * rise, C1 * rise - C * bend, C1 * bend, (C + C1 * arb(0, 1)) * left)
+        )
         return NowhereHeld(first, last, signs[:-1]) if np.any(signs > 0) and np.any(signs < 0) else None
 
     def _expansion(self, first: Fraction, last: Fraction, middle: Any, radius: Any) -> PreciseExpansion | None:
@@ -266,7 +266,7 @@ class PreciseSelection:
         # C + tau C1 and powers of tau, for |tau| <= 1
         unit = arb(0, 1)
         turned = C + C1 * unit
-        values = near + steep * unit + curved * arb(0.5, 0.5) - cubic * unit + turned * left
+        values = _over_tau(near, steep, curved, cubic, turned * left)
         slopes = steep + curved * (2 * unit) - cubic * arb(1.5, 1.5) + C1 * left + turned * left_slope
         return PreciseExpansion(self, first, last, values, slopes, sign_of(M.det()), near)
 
@@ -466,6 +466,12 @@ class NowhereHeld:
         """What is known over a part of the interval."""
         unknown = np.zeros_like(self.signs)
         return OverInterval(self.signs, regular=False, none=True, index=0, ends=(unknown, unknown), slopes=unknown)
+
+
+def _over_tau(near: Any, steep: Any, curved: Any, cubic: Any, left: Any) -> Any:
+    """Values of near + tau steep + tau^2 curved - tau^3 cubic for all |tau| <= 1, and what is left besides."""
+    unit = arb(0, 1)
+    return near + steep * unit + curved * arb(0.5, 0.5) - cubic * unit + left
 
 
 def _kernel(M: Any, g: Any) -> list[Any] | None:
