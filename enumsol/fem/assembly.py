@@ -49,8 +49,8 @@ def stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, float]) ->
     points : (N, 2) array_like
         Positions of the nodes [length].
     cells : (M, k) array_like of int
-        Nodes of each cell: its corners, then those on its edges, then that inside; 3 or 6 nodes of triangles, 4, 8
-        or 9 of quadrilaterals. Edges with three nodes may be curved.
+        Nodes of each cell: its corners, then the nodes on its edges, then the one inside; triangles have 3 or 6 nodes,
+        quadrilaterals 4, 8 or 9. Edges with three nodes may be curved.
     lame : (float, float)
         Lame coefficients l, m [force / length^2]; for plane stress those of `lame`.
 
@@ -132,7 +132,7 @@ def edge_forces(points: ArrayLike, edges: ArrayLike, traction: ArrayLike) -> Flo
     points : (N, 2) array_like
         Positions of the nodes [length].
     edges : (k, 2) or (k, 3) array_like of int
-        The two ends of each loaded edge, and of an edge of second order, which may be curved, the node between them.
+        The two ends of each loaded edge and, for edges of second order, which may be curved, the node between them.
     traction : (2,) or (k, 2) array_like
         Force per length of edge in x and y, one for all or one for each edge [force / length, per unit thickness].
 
@@ -222,8 +222,8 @@ def contact_problem(
     points, cells, lame
         Mesh and Lame coefficients, see `stiffness`.
     contact : (p,) array_like of int
-        The contact nodes, in the order of the rows of Bn and Bt. None of them may be held, but for a component across
-        the normal, as on a plane of symmetry: that of a node stays in the problem, uncoupled and at rest.
+        The contact nodes, in the order of the rows of Bn and Bt. None of them may be held, except in a component across
+        the normal, as on a plane of symmetry; such a component stays in the problem, uncoupled and at rest.
     normals : (2,) or (p, 2) array_like
         Directions out of the body at the contact nodes, one for all or one each; scaled to length one.
     tangents : (2,) or (p, 2) array_like or None

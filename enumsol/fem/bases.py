@@ -64,7 +64,7 @@ class Block:
         return ours
 
     def on_facets(self, numbers: Integers, *, lumped: bool) -> Any:
-        """`facet_basis`, which is slow to make, once for all that acts on the same facets."""
+        """The `facet_basis` of these facets; it is slow to make, and so kept for everything that acts on them."""
         key = (numbers.tobytes(), lumped)
         if key not in self._on_facets:
             self._on_facets[key] = facet_basis(self.basis, numbers, lumped=lumped)
@@ -92,8 +92,8 @@ class NodalBasis:
     blocks : tuple of Block
     shape : (N, dimension)
     thickness : (M,) array or None
-        Of a plane body by cells, with which stiffness, tractions and forces per volume are multiplied; None: of one
-        [length].
+        Thickness of a plane body, cell by cell; stiffness, tractions and forces per volume are multiplied by it. None
+        stands for 1 [length].
     """
 
     blocks: tuple[Block, ...]
@@ -119,13 +119,13 @@ class NodalBasis:
     def on_part(self, facets: Integers, name: str, form: Callable[[Any, Any], Any], *, lumped: bool = False) -> Floats:
         """Integrals over facets of a linear form of scikit-fem, by nodes: (N, dimension).
 
-        ``lumped`` takes the integrals on triangles of second order by their nodes between corners, so that those of
-        1 are positive there and zero at corners.
+        With ``lumped``, integrals over triangles of second order use the nodes between corners only, so that the
+        integrals of 1 are positive there and zero at corners.
 
         Raises
         ------
         InvalidArgumentError
-            A facet is not a facet on the boundary of the body, has another number of nodes, or comes twice.
+            One of the facets is not on the boundary of the body, has another number of nodes, or is given twice.
         """
         from skfem import LinearForm  # as below
 
@@ -222,7 +222,7 @@ class NodalBasis:
 
 
 def nodal_basis(nodes: Floats, cells: Integers, degree: int = 0) -> NodalBasis:
-    """Basis of displacements, with quadrature for stiffness matrices or of a higher degree.
+    """Basis of displacements, whose quadrature is that of stiffness matrices, or of a higher degree.
 
     Raises
     ------
@@ -278,7 +278,7 @@ def between_corners(element: Any) -> bool:
 
 
 def _solid_stiffness(basis: Any, lam: Floats, mu: Floats) -> sp.coo_array:
-    """The same as of the form of the energy in 3D, for all pairs of functions of a cell at once."""
+    """The stiffness in 3D that the form of the energy gives, for all pairs of functions of a cell at once."""
     # degrees of freedom of a cell are node by node, and a gradient is that of one component
     slopes = np.stack([basis.basis[j][0].grad[0] for j in range(0, basis.Nbfun, 3)])
     nodes, _, cells, points = slopes.shape

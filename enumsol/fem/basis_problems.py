@@ -49,7 +49,7 @@ def basis_contact_problem(
     Parameters
     ----------
     basis : skfem.CellBasis
-        Of vectors by nodes, such as ``Basis(mesh, ElementVector(ElementTriP2()))``, with m degrees of freedom.
+        A basis of vectors at nodes, such as ``Basis(mesh, ElementVector(ElementTriP2()))``, with m degrees of freedom.
     stiffness : (m, m) array_like or sparse
         Of the body before its supports, with springs if there are any [force / length].
     contact : name, array of facet numbers, or callable

@@ -95,7 +95,7 @@ class Held:
         Raises
         ------
         InvalidArgumentError
-            They are not that, or differ from what holds a node already.
+            The components are not of that form, or contradict what already holds a node.
         """
         dimension = self._mesh.points.shape[1]
         name, nodes = f"displacement of {part}", self._mesh.nodes(part)
@@ -140,7 +140,7 @@ class Held:
 
 @dataclass(frozen=True)
 class Piece:
-    """A body that hangs together, and with no other.
+    """A connected body, separate from all others.
 
     Attributes
     ----------
@@ -160,9 +160,9 @@ class Piece:
         return int(np.sum(values <= _HELD * max(values[-1], np.finfo(np.float64).tiny)))
 
     def free_modes(self, points: Floats, hold: sp.csc_array) -> Floats:
-        """The rigid motions that nothing holds, (d N, r): translations and turns, as simple as may be.
+        """The rigid motions that nothing holds, (d N, r): translations and rotations, in as simple a form as possible.
 
-        Where supports or springs leave only some of them, they are combinations of a turn and translations.
+        Where supports or springs leave only some of them, they are combinations of a rotation and translations.
         """
         motions = _rigid_motions(points, self.nodes)
         count = self.free_motions(points, hold)
@@ -185,7 +185,7 @@ class Piece:
 
 
 def pieces_of(mesh: PartedMesh) -> list[Piece]:
-    """All bodies of a mesh that hang together."""
+    """All connected bodies of a mesh."""
     points, cells = mesh.points, mesh.cells
     first = np.repeat(cells[:, :1], cells.shape[1] - 1, axis=1)
     links = (np.ones(first.size), (first.ravel(), cells[:, 1:].ravel()))
@@ -213,12 +213,12 @@ def holding(supports: Supports, springs: sp.csc_array) -> sp.csc_array:
 
 
 def check_held(pieces: Sequence[Piece], points: Floats, hold: sp.csc_array) -> None:
-    """Refuse bodies of which one can move as a rigid body; ``hold`` is a stiffness of supports and springs.
+    """Refuse bodies if one of them can move as a rigid body; ``hold`` is a stiffness of supports and springs.
 
     Raises
     ------
     InvalidProblemError
-        It says which.
+        One of them can; the message says which.
     """
     for piece in pieces:
         if piece.free_motions(points, hold):
@@ -242,7 +242,7 @@ def _rigid_motions(points: Floats, inside: Mask) -> Floats:
 
 
 def rigid_motions(places: Floats) -> Floats:
-    """Translations, and turns about the origin, of nodes at these places (N, d): (d N, 3) or (d N, 6)."""
+    """Translations, and rotations about the origin, of nodes at these places (N, d): (d N, 3) or (d N, 6)."""
     count, dimension = places.shape
     motions = [np.tile(axis, (count, 1)) for axis in np.eye(dimension)]
     for one in range(dimension):

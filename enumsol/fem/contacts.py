@@ -30,7 +30,7 @@ _BEHIND = -1e-6
 
 @dataclass(frozen=True)
 class Group:
-    """Contact nodes that face one thing.
+    """Contact nodes that face the same thing.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class Group:
     normals : (k, d) array
         Of the boundary, out of the body, also where an obstacle gives the normals of the rows.
     count, missed, shared : int
-        How many there are, how many nodes of a pair face nothing, and how many belong to another contact before.
+        How many there are, how many nodes of a pair face nothing, and how many already belong to another contact.
     """
 
     parts: list[str]
@@ -93,7 +93,7 @@ def contacts_of(
     ------
     InvalidArgumentError
         There are no parts, one does not exist or is not on the boundary, or there is a node that cannot be one: held in
-        some components only, without a normal, or at the centre of an obstacle; nothing of a pair faces anything.
+        some components only, without a normal, or at the centre of an obstacle; or no node of a pair faces anything.
     """
     if not parts and not pairs:
         raise InvalidArgumentError("contact names no part; expected the contact boundary, or pairs")

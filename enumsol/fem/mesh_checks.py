@@ -94,7 +94,7 @@ def lame(young: float, poisson: float, plane: Literal["strain", "stress"] = "str
     Raises
     ------
     InvalidArgumentError
-        One is not of that form.
+        An argument is not of the stated form.
 
     Examples
     --------

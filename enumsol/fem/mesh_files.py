@@ -98,7 +98,7 @@ def read_mesh(source: str | os.PathLike[str] | Any, groups: str | None = None) -
 
 
 def read_solid(source: str | os.PathLike[str] | Any, groups: str | None = None) -> SolidMesh:
-    """As `read_mesh`, of bodies in 3D alone; triangles and quadrilaterals are facets whatever else the file holds.
+    """Like `read_mesh`, for bodies in 3D only; triangles and quadrilaterals are facets whatever else the file holds.
 
     Parameters
     ----------

@@ -63,12 +63,13 @@ def mesh_problem(
 ) -> ContactProblem | ContactProblem3D:
     """Contact problem of a body whose mesh has named parts.
 
-    `mesh_scene` tells in words and by a picture what the arguments describe.
+    `mesh_scene` describes in words and in a picture what the arguments stand for.
 
-    Contact is by nodes: every node of the contact parts that is not held has a row, in second order the nodes between
-    corners as well; of triangles with six nodes, which in 3D tetrahedra of second order have, these only, since a
-    uniform pressure on them has no part at corners. Rows are displacements of nodes, not weighted, and lambda are the
-    nodal forces that do the work on them. In 2D rows are in the order of the nodes along the boundary.
+    Contact is by nodes: every node of the contact parts that is not held has a row, including, in second order, the
+    nodes between corners. On triangles with six nodes, the facets of tetrahedra of second order, only the nodes between
+    corners have rows, since a uniform pressure has no part at the corners. Rows are displacements of nodes, not
+    weighted, and lambda are the nodal forces that do the work on them. In 2D rows are in the order of the nodes along
+    the boundary.
 
     Normals are those of the boundary, averaged around each node with its shape function as weight, or those of the
     obstacle. At nodes on a plane of symmetry they are projected on it; the component across it stays in the problem,
@@ -88,7 +89,7 @@ def mesh_problem(
         contact with the point of a facet of the second part on the line along its normal (theory, section 11.8). Nodes
         that face no facet have no contact. The gap is the distance along the normal, or the one that is given [length].
     plane : {"strain", "stress"}, or mapping of names to them
-        In 2D, of the whole body or of every part of it.
+        In 2D, whether strain or stress is plane, for the whole body or for every part of it.
     thickness : float, or mapping of names to float
         In 2D, of the whole body or of every part of it; all forces and stiffnesses are multiplied by it. By default
         they are per unit thickness [length].
@@ -114,16 +115,16 @@ def mesh_problem(
     body_force : vector, or mapping of names to vectors, optional
         Force per volume, such as the weight, on the whole body or on parts of it [force / length^3].
     gap : float, or mapping of names to float
-        Of all contact nodes or, as friction, by parts, 0 for those that are not named. Initial gap along the normals,
-        in addition to the distance to the obstacle or within a pair; negative is a press fit [length].
+        Initial gap along the normals, for all contact nodes or, like friction, by parts (0 for parts that are not
+        named), in addition to the distance to the obstacle or within a pair; a negative gap is a press fit [length].
     obstacle : mapping of one kind to numbers, optional
         The rigid foundation of the contact parts, where it does not have the shape of the body: ``{"plane": (x, y, nx,
         ny)}`` by a point and the direction from it to the body, ``{"circle": (x, y, r)}``, or ``{"hole": (x, y, r)}``,
         a circle that the body is inside of; in 3D ``plane`` with six numbers, ``sphere`` and ``hole`` with four.
     max_rigid_displacement : float, "auto" or None
-        Lets bodies move as a whole that supports and springs leave free: their rigid modes are found, and
-        solutions are sought within this bound of the rigid displacement, ten times the size of the mesh for "auto"
-        (theory, section 14) [length]. By default such a body is refused.
+        Lets bodies that supports and springs leave free move as a whole: their rigid modes are found, and solutions are
+        sought within this bound of the rigid displacement, ten times the size of the mesh for "auto" (theory, section
+        14) [length]. By default such a body is refused.
     groups : str, optional
         As in `read_mesh`.
 
@@ -131,13 +132,14 @@ def mesh_problem(
     -------
     ContactProblem or ContactProblem3D
         With ``coordinates``, ``mesh`` and, as ``node_ids``, the numbers of the nodes in the mesh; in 3D also with
-        ``areas``. What may be meant otherwise is in its ``notes``, a tuple of sentences: nodes of a pair that face
+        ``areas``. Its ``notes``, a tuple of sentences, say what may not have been intended: nodes of a pair that face
         nothing, for example, have no contact.
 
     Raises
     ------
     InvalidArgumentError
-        The mesh cannot be used, a part does not exist (those that do are listed), or an argument is not of its form.
+        The mesh cannot be used, a part does not exist (those that do are listed), or an argument is not of the stated
+        form.
     InvalidProblemError
         Nothing but contact holds the body or a part of it, or the data of the problem are not admissible.
 
@@ -158,8 +160,9 @@ def mesh_problem(
 def mesh_scene(mesh: PartedMesh | str | os.PathLike[str] | Any, **options: Any) -> Scene:
     """What a mesh and the options of `mesh_problem` describe: ``print(scene)``, ``scene.plot()``, ``scene.notes``.
 
-    The scene tells bodies, parts with their areas, the resultant of the loads, contact nodes with their gaps, which
-    bodies are free to move, and what may be meant otherwise. ``scene.problem()`` is what `mesh_problem` returns.
+    The scene lists the bodies, the parts with their areas, the resultant of the loads, the contact nodes with their
+    gaps, which bodies are free to move, and what may not have been intended. ``scene.problem()`` is what `mesh_problem`
+    returns.
 
     Parameters
     ----------
@@ -173,7 +176,7 @@ def mesh_scene(mesh: PartedMesh | str | os.PathLike[str] | Any, **options: Any) 
     Raises
     ------
     InvalidArgumentError
-        As `mesh_problem`, and an option that it does not have.
+        As in `mesh_problem`, or there is an option that it does not have.
 
     Examples
     --------
@@ -196,7 +199,7 @@ def mesh_scene(mesh: PartedMesh | str | os.PathLike[str] | Any, **options: Any) 
 def read_mesh_problem(path: str | os.PathLike[str]) -> ContactProblem | ContactProblem3D:
     r"""Contact problem that a TOML file describes: the options of `mesh_problem`, with ``mesh`` a path from its folder.
 
-    ``pairs`` are called ``contact_pair`` there, too.
+    In the file, ``pairs`` may also be called ``contact_pair``.
 
     The file may also have the ``steps`` of a history, which the command ``enumsol history`` reads.
 
@@ -207,7 +210,7 @@ def read_mesh_problem(path: str | os.PathLike[str]) -> ContactProblem | ContactP
     Raises
     ------
     InvalidProblemError
-        The file cannot be read, is no TOML, lacks a key or has one that is not known, or describes no problem. The
+        The file cannot be read, is not TOML, lacks a key or has one that is not known, or describes no problem. The
         message begins with the path.
     MissingDependencyError
         meshio is not installed.

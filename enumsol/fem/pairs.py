@@ -40,7 +40,7 @@ class Pair:
     slave : name of the part whose nodes are contact nodes
     master : name of the part whose facets these nodes face
     gap : float or None
-        Given in place of that of the geometry [length].
+        Replaces the gap of the geometry [length].
     """
 
     slave: str
@@ -49,12 +49,12 @@ class Pair:
 
     @classmethod
     def of(cls, value: Any) -> Pair:
-        """The pair that two names, or two names and a gap, are.
+        """The pair given by two names, or by two names and a gap.
 
         Raises
         ------
         InvalidArgumentError
-            They are not that.
+            The value is neither.
         """
         names = value[:2] if isinstance(value, (list, tuple)) and len(value) in (2, 3) else ()
         if not names or not all(isinstance(name, str) for name in names):
@@ -74,7 +74,7 @@ class Pair:
         Raises
         ------
         InvalidArgumentError
-            It is not a list of pairs, or has one twice.
+            The value is not a list of pairs, or one is given twice.
         """
         if not isinstance(value, (list, tuple)) or (value and all(isinstance(entry, str) for entry in value)):
             raise InvalidArgumentError(

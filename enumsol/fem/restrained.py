@@ -1,4 +1,4 @@
-"""What holds a body: degrees of freedom with given displacements are eliminated, at contact nodes set apart.
+"""What holds a body: degrees of freedom with given displacements are eliminated, or set apart at contact nodes.
 
 A contact row needs both components of its node. Where one of them is held at zero, as on a plane of symmetry, it stays
 in the problem as a degree of freedom of its own that nothing moves: it is uncoupled from the body, its displacement is

@@ -1,4 +1,4 @@
-"""What catches a wrong scene: refusals and notes, each in one sentence."""
+"""What reveals a wrong scene: refusals and notes, each in one sentence."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def _refuse_cracks(scene: Any, nodes: Any, parts: list[str]) -> None:
 
 
 def scene_notes(scene: Any) -> list[str]:
-    """What may be meant otherwise."""
+    """What may not have been intended."""
     checks = (_unfaced, _shared, _alone, _rest, _loaded_contact, _reach, _units, _friction, _held)
     with np.errstate(over="ignore"):  # what overflows is out of proportion, and told as such
         return [note for check in checks for note in check(scene)]

@@ -70,7 +70,7 @@ class Scene:
     springs : (d N, d N) csc_array
     lame : (2,) or (M, 2) array
     pieces : list of Piece
-        The bodies that hang together.
+        The connected bodies.
     """
 
     mesh: PartedMesh
@@ -133,7 +133,7 @@ class Scene:
 
     @cached_property
     def notes(self) -> list[str]:
-        """What may be meant otherwise, each in a sentence."""
+        """What may not have been intended, each in a sentence."""
         return scene_notes(self)
 
     @property

@@ -19,7 +19,7 @@ def cell_stresses(problem: ContactProblem | ContactProblem3D, u: ArrayLike) -> F
     """Mean stress of every cell of the body, (M, d, d), for displacements u of shape (n,) [force / length^2].
 
     ``sigma = lambda tr(epsilon) I + 2 mu epsilon`` with the Lame coefficients that the problem was made with. In 2D
-    these are the components in the plane, [force / length^2] too.
+    these are the components in the plane.
 
     Parameters
     ----------

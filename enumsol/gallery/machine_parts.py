@@ -75,7 +75,8 @@ def dovetail(
     flank_angle : float
         Angle between a flank and the direction of the blade, between 5 and 85 [degrees].
     friction : float or (F0, F1)
-        Coefficient F0 + alpha F1 of all contact nodes, a number is constant; default F(alpha) = alpha.
+        Coefficient F0 + alpha F1 of all contact nodes; a single number is a constant coefficient; default F(alpha) =
+        alpha.
 
     Raises
     ------
@@ -139,7 +140,8 @@ def brake_shoe(
     turn : float
         By how much the drum has turned, on its rim [mm].
     friction : float or (F0, F1)
-        Coefficient F0 + alpha F1 of all contact nodes, a number is constant; default F(alpha) = alpha.
+        Coefficient F0 + alpha F1 of all contact nodes; a single number is a constant coefficient; default F(alpha) =
+        alpha.
 
     Raises
     ------
@@ -203,7 +205,8 @@ def clip(
     press : float
         By how much the radius of the clip is smaller than that of the bar [mm].
     friction : float or (F0, F1)
-        Coefficient F0 + alpha F1 of all contact nodes, a number is constant; default F(alpha) = alpha.
+        Coefficient F0 + alpha F1 of all contact nodes; a single number is a constant coefficient; default F(alpha) =
+        alpha.
 
     Raises
     ------
@@ -266,7 +269,8 @@ def pressed_rings(
     press : float
         Interference of the radii [mm].
     friction : float or (F0, F1)
-        Coefficient F0 + alpha F1 of all contact nodes, a number is constant; default F(alpha) = alpha.
+        Coefficient F0 + alpha F1 of all contact nodes; a single number is a constant coefficient; default F(alpha) =
+        alpha.
 
     Raises
     ------
@@ -313,8 +317,8 @@ def lap_joint(
 
     Plates of steel, 60 mm long, 4 mm thick and 20 mm wide, overlap by 30 mm; plane stress. The left end of the lower
     plate is clamped, and a testing machine moves the right end of the upper one to the right, by ``stretch``.
-    Bolts press on both plates evenly along the overlap, with the force ``clamping`` in sum. The nodes of the upper
-    plate on the overlap are the contact nodes, p = 2 nx + 1, and the meshes of both plates match.
+    Bolts press on both plates evenly along the overlap, with the total force ``clamping``. The nodes of the upper plate
+    on the overlap are the contact nodes, p = 2 nx + 1, and the meshes of both plates match.
 
     Friction transmits at most F times the force that presses the plates together. Where all nodes stick, the joint is
     as stiff as if the plates were one body.
@@ -328,7 +332,8 @@ def lap_joint(
     clamping : float
         Force of all bolts, > 0 [N].
     friction : float or (F0, F1)
-        Coefficient F0 + alpha F1 of all contact nodes, a number is constant; default F(alpha) = alpha.
+        Coefficient F0 + alpha F1 of all contact nodes; a single number is a constant coefficient; default F(alpha) =
+        alpha.
 
     Raises
     ------

@@ -216,7 +216,7 @@ def block_on_table(
 
     The rectangle (0, 2) x (0, 1) is meshed as that of `clamped_block`. All nodes along the bottom touch the table:
     p = nx + 1. The top is pressed down; forces on the bottom push the block to the right. Below ``push`` = 1 it has one
-    solution, at 1 it slides as far as one likes, and above it has none.
+    solution, at 1 it may slide any distance, and above it has none.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def block_on_table(
     pressure : float
         Force per length of the top [force / length].
     push : float
-        Sum of the pushing forces, in parts of what friction can hold [-].
+        Sum of the pushing forces, as a fraction of what friction can hold [-].
     friction : float
         Constant coefficient.
     max_rigid_displacement : float or None
@@ -399,7 +399,7 @@ def chain(p: int, coupling: float = 0.0, f: Pair = (1.5, -4.0), lame: Pair = (1.
     Each of the p triangles is `one_node_triangle`; springs of stiffness ``coupling`` join the free nodes of neighbours
     in both directions. Friction is F(alpha) = alpha. Without coupling the nodes choose independently, and with the
     default load every node has three roots for alpha > 8/3: 3^p together. At alpha = 5 this is still so with
-    coupling = 0.05 (counted up to p = 8; for p up to 5 couplings to 0.2 too).
+    coupling = 0.05 (counted up to p = 8; for p up to 5 also with couplings up to 0.2).
 
     Parameters
     ----------

@@ -26,9 +26,9 @@ _FREE_DISPLACEMENT = (-1.0, 2.0, 3.0)
 def one_node_3d(W: ArrayLike = _COMPLIANCE, q: ArrayLike = _FREE_DISPLACEMENT, friction: Any = 0.1) -> ContactProblem3D:
     """One contact node by its compliance: u = W r + q with u_n >= 0, r_n >= 0, u_n r_n = 0, and friction against u_t.
 
-    In (normal, first tangent, second tangent), with the signs of contact solvers: u_n is the distance that opens, r_n
-    the force that presses. Ours are lambda = r and w = -u, so that S = W and g = -q. No displacement of a body is
-    known: A = [Bn; Bt1; Bt2] = W and f = -q give these numbers without inverting W, and u of the problem means nothing.
+    In (normal, first tangent, second tangent), with the signs of contact solvers: u_n is the opening, r_n the pressing
+    force. Ours are lambda = r and w = -u, so that S = W and g = -q. No displacement of a body is known: A = [Bn; Bt1;
+    Bt2] = W and f = -q give these numbers without inverting W, and u of the problem has no meaning.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def one_node_3d(W: ArrayLike = _COMPLIANCE, q: ArrayLike = _FREE_DISPLACEMENT, f
     Raises
     ------
     InvalidArgumentError
-        W is no symmetric positive definite matrix of this shape, or q is not three numbers.
+        W is not a symmetric positive definite matrix of this shape, or q is not three numbers.
     InvalidProblemError
         friction cannot be used.
 
@@ -154,7 +154,7 @@ def block_on_table3d(
 
     All nodes of the bottom (z = 0) touch the table: p = (nx + 1) (ny + 1). The normal is (0, 0, -1), the tangents are x
     and -y. The top is pressed down; a traction on the bottom pushes the block. While ``push`` is shorter than 1 it has
-    one solution, at 1 it slides as far as one likes, and above it has none.
+    one solution, at 1 it may slide any distance, and above it has none.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def block_on_table3d(
     pressure : float
         Force per area of the top [force / length^2].
     push : (2,) array_like
-        Sum of the pushing forces along x and y, in parts of what friction can hold [-].
+        Sum of the pushing forces along x and y, as a fraction of what friction can hold [-].
     friction : float
         Constant coefficient.
     max_rigid_displacement : float or None

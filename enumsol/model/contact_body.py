@@ -68,7 +68,7 @@ class ContactBody(Immutable):
     rigid_modes: Floats | None = None
     max_rigid_displacement: float | None = None
     mesh: BodyMesh | None = None
-    #: What of a scene (``fem.mesh_problem``) may be meant otherwise; copies with other data have none.
+    #: What of a scene (``fem.mesh_problem``) may not have been intended; copies with other data have none.
     notes: tuple[str, ...] = ()
     __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
 
