@@ -125,6 +125,17 @@ class FixedPoint(TrescaState):
         return self.outcome is Outcome.CONVERGED
 
     @property
+    def beyond_bound(self) -> bool:
+        """Whether a body that nothing holds has moved as a whole beyond the bound of its rigid displacement.
+
+        `enumerate_roots` lists solutions within this bound, and so not this one (theory, section 14.2).
+        """
+        q, body = self.rigid_coordinates, self.problem
+        if q is None or body.modes is None:
+            return False
+        return bool(np.any(np.abs(q) > body.modes.reach(body.rigid_reach)))
+
+    @property
     def contraction(self) -> Vector:
         """Ratios of successive increments of the sum of both norms, relative to the load, shape (iterations - 1,) [-].
 
@@ -159,14 +170,16 @@ class FixedPoint(TrescaState):
         body: Any = self.problem
         motion = self.free_motion
         match self.outcome:
-            case Outcome.CONVERGED if motion is None:
-                return f"converged after {solved} ({last})"
             case Outcome.CONVERGED:
-                modes = modes_of(body.rigid_modes, motion)
-                return (
-                    f"converged after {solved} ({last}); the body may move on along {modes} with the same forces: its "
-                    "rigid displacement is not unique"
-                )
+                text = f"converged after {solved} ({last})"
+                if motion is not None:
+                    modes = modes_of(body.rigid_modes, motion)
+                    text += f"; the body may move on along {modes} with the same forces: "
+                    text += "its rigid displacement is not unique"
+                if self.beyond_bound:
+                    text += f"; it is beyond the bound {body.rigid_reach:g} of rigid displacements, where no roots are "
+                    text += "listed"
+                return text
             case Outcome.NOT_HELD if depends:
                 return (
                     "no contact forces hold the body with the coefficients of friction at zero slip, along "

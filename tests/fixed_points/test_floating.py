@@ -60,7 +60,7 @@ def kept_of(seed):
         assert fixed_point_residual(problem, root) < 1e-9
     if found.converged:
         checked(problem, alpha, found)
-        if not oracle.families and np.max(np.abs(found.rigid_displacement)) <= problem.rigid_reach:
+        if not oracle.families and not found.beyond_bound:
             assert found.free_motion is None
             here = np.concatenate([found.lambda_n, found.lambda_t, found.u])
             away = np.max(np.abs(np.hstack([forces, u]) - here), axis=1)
@@ -171,6 +171,20 @@ def test_a_block_that_slides_or_is_lifted():
     found = enumsol.successive_approximations(smooth, 0)
     assert found.outcome is Outcome.NOT_HELD
     assert "with the coefficients of friction at zero slip" in found.why
+
+
+def test_a_limit_beyond_the_bound_is_told():
+    problem = random_body(60_135)
+    found = enumsol.successive_approximations(problem, 0.25)
+    assert found.converged
+    assert found.beyond_bound
+    assert "beyond the bound 8 of rigid displacements" in found.why
+    checked(problem, 0.25, found)
+    assert len(enumsol.enumerate_roots(problem, 0.25)) == 0
+    wider = problem.replace(max_rigid_displacement=16.0)
+    (root,) = enumsol.enumerate_roots(wider, 0.25)
+    np.testing.assert_allclose(root.u, found.u, atol=1e-7)
+    assert not enumsol.successive_approximations(wider, 0.25).beyond_bound
 
 
 def test_without_friction_it_may_move_on():
