@@ -81,7 +81,7 @@ def branch_graph(
         seconds at most.
     executor : concurrent.futures.Executor, optional
         Searches the pieces of the interval, and parts of large ones, in its workers. The graph and its proof are those
-        found without it. Not used in 3D.
+        found without it. Must be None in 3D.
 
     Returns
     -------
@@ -91,7 +91,7 @@ def branch_graph(
     ------
     InvalidArgumentError
         The interval or another argument is out of range, friction is negative somewhere in the interval (the node
-        and the alpha are named), or the arithmetic of a problem in 3D is not "verified".
+        and the alpha are named), or a problem in 3D has an executor or another arithmetic than "verified".
     TooLargeError
         Exact arithmetic was asked for and the problem is too large for it.
     MissingDependencyError
@@ -118,6 +118,8 @@ def branch_graph(
     started = time.perf_counter()
     limits = Deadline.after(started, time_limit)
     if not isinstance(problem, ContactProblem):
+        if executor is not None:
+            raise InvalidArgumentError("executor is given for a problem in 3D; expected None: one process follows it")
         return _in_space(problem, (a, b), arithmetic, progress, max_nodes, limits)
     if problem.modes is not None:
         _check_floating(problem, arithmetic)

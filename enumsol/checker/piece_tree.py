@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.enclosure import CondensedEnclosure
-    from enumsol.trusted.space.solution_curve import CurveBox
+    from enumsol.trusted.space.solution_curve import AlphaProblem, CurveBox
 
     Array = NDArray[np.float64]
     Codes = tuple[int, ...]
@@ -50,6 +50,8 @@ class PieceTreeChecker:
     ----------
     enclosure : CondensedEnclosure
     units : force and length, (p,) arrays of powers of two
+    given : AlphaProblem
+        By which boxes are given.
     boxes : sequence of CurveBox
         Each is proven to hold one curve.
     fail : called with what a leaf does not prove
@@ -61,6 +63,7 @@ class PieceTreeChecker:
 
     enclosure: CondensedEnclosure
     units: tuple[Array, Array]
+    given: AlphaProblem
     boxes: Sequence[CurveBox]
     fail: Callable[[str], object]
     leaves: int = 0
@@ -131,9 +134,9 @@ class PieceTreeChecker:
         if isinstance(leaf, NoRoot):
             return None if piece.held(codes) is None else "it is not proven to hold no root"
         if isinstance(leaf, InCurveBox):
-            inside = piece.holds_all(codes, self.boxes[leaf.box])
+            inside = piece.holds_all(codes, self.given, self.boxes[leaf.box])
             return None if inside else "its roots are not proven to lie in its box"
         if isinstance(leaf, ThroughCurveBox):
-            met = piece.meets(codes, self.boxes[leaf.box])
+            met = piece.meets(codes, self.given, self.boxes[leaf.box])
             return None if met else "its roots are not proven to be an arc through its box"
         raise AssertionError(leaf)

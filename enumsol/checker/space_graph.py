@@ -1,10 +1,11 @@
 """Checker of a branch graph in 3D: every solution over an interval lies on curves, each given by boxes.
 
 Records: a header ``{"format": "enumsol-proof", "version": 1, "kind": "graph", "problem": <fingerprint>, "interval":
-[a, b], "p": p, "data": "problem", "force", "length"}``; for every curve ``{"curve": n}`` with n boxes, and these as
-``["w", centre, direction, border, radius, rho, half]`` between n + 1 boxes without length around the points that they
-share (see ``trusted.space.curve_chains``); ``{"tree": true}`` and the records of a tree (see ``checker.piece_tree``),
-whose boxes are numbered in the order of the curves, points left out; at the end ``{"curves", "leaves", "gaps"}``.
+[a, b], "p": p, "data": "problem", "force", "length", "steps"}`` with the steps of the coordinates (see AlphaProblem);
+for every curve ``{"curve": n}`` with n boxes, and these as ``["w", centre, direction, border, radius, rho, half]``
+between n + 1 boxes without length around the points that they share (see ``trusted.space.curve_chains``);
+``{"tree": true}`` and the records of a tree (see ``checker.piece_tree``), whose boxes are numbered in the order of the
+curves, points left out; at the end ``{"curves", "leaves", "gaps"}``.
 
 What is checked: every curve is one, and leaves the interval at both ends or is closed; no two are the same; the leaves
 of the tree cover all solutions, and those of a leaf lie on one of the curves or are alone at their alphas.
@@ -21,7 +22,7 @@ from enumsol.checker.reports import MAX_FAILURES, GraphVerificationReport
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.proof.reading import RefusedError, data_of, exponents_from, quoted, rational_from, same
+from enumsol.proof.reading import RefusedError, data_of, exponents_from, numbers_from, quoted, rational_from, same
 from enumsol.proof.records import Limits
 from enumsol.proof.space_records import CurveBoxRecord
 from enumsol.trusted.space.curve_chains import apart, whole_chain
@@ -32,8 +33,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from fractions import Fraction
 
+    from numpy.typing import NDArray
+
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.trusted.space.curve_chains import CurveChain
+
+    Array = NDArray[np.float64]
 
 #: More boxes of one curve than this are no honest proof's.
 _MOST_BOXES = 1 << 20
@@ -88,9 +93,9 @@ class SpaceGraphChecker:
             raise RefusedError(f"the check ends after {MAX_FAILURES} failures")
 
     def _check(self, records: Iterator[Any]) -> None:
-        units = self._read_header()
+        units, steps = self._read_header()
         enclosure = CondensedEnclosure.from_problem(self.problem)
-        given = AlphaProblem.of(enclosure)
+        given = AlphaProblem.of(enclosure, steps)
         record = next(records, None)
         while isinstance(record, dict) and record.keys() == {"curve"}:
             self._curve(given, record["curve"], records)
@@ -99,7 +104,7 @@ class SpaceGraphChecker:
         if record != {"tree": True}:
             raise RefusedError("the tree over alpha is missing")
         assert self.interval is not None
-        tree = PieceTreeChecker(enclosure, units, self.boxes, self._fail)
+        tree = PieceTreeChecker(enclosure, units, given, self.boxes, self._fail)
         tree.run(*self.interval, records)
         self.leaves, self.single, self.gaps = tree.leaves, tree.single, tree.gaps
         if self.progress is not None:
@@ -111,14 +116,14 @@ class SpaceGraphChecker:
         if next(records, None) is not None:
             self._fail("records follow after the end of the proof")
 
-    def _read_header(self) -> tuple[Any, Any]:
+    def _read_header(self) -> tuple[Any, Array]:
         if data_of(self.header, cast("Any", self.problem), "graph") != "problem":
             raise RefusedError("a proof about a problem in 3D certifies the problem's own data only")
         try:
-            self.interval, units = _read(self.header, self.problem)
+            self.interval, units, steps = _read(self.header, self.problem)
         except ValueError as error:
             raise RefusedError(f"the header cannot be read: {error}") from None
-        return units
+        return units, steps
 
     def _curve(self, given: AlphaProblem, count: Any, records: Iterator[Any]) -> None:
         number = len(self.curves) + 1
@@ -148,8 +153,10 @@ class SpaceGraphChecker:
                     self._fail("two curves may be the same")
 
 
-def _read(header: dict[str, Any], problem: ContactProblem3D) -> tuple[tuple[Fraction, Fraction], tuple[Any, Any]]:
-    """The interval, and units of forces and displacements."""
+def _read(
+    header: dict[str, Any], problem: ContactProblem3D
+) -> tuple[tuple[Fraction, Fraction], tuple[Any, Any], Array]:
+    """The interval, units of forces and displacements, and steps of the coordinates."""
     ends = header.get("interval")
     if not isinstance(ends, list) or len(ends) != 2:
         raise ValueError("there is no interval")
@@ -162,7 +169,10 @@ def _read(header: dict[str, Any], problem: ContactProblem3D) -> tuple[tuple[Frac
     for pair in zip(problem.friction, problem.friction_slope, strict=True):
         if min(min(exactly_at(end, *pair)) for end in (low, high)) < 0:
             raise ValueError("friction is negative in the interval")
-    return (low, high), (np.ldexp(1.0, np.array(force)), np.ldexp(1.0, np.array(length)))
+    steps = numbers_from(header.get("steps"), 3 * problem.p)
+    if not np.all(steps > 0):
+        raise ValueError("a step is not positive")
+    return (low, high), (np.ldexp(1.0, np.array(force)), np.ldexp(1.0, np.array(length))), steps
 
 
 def _box_from(record: Any, limits: Limits) -> CurveBoxRecord:

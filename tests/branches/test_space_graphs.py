@@ -1,21 +1,22 @@
 """Branch graphs of problems in 3D (theory, sections 12.9 and 12.10)."""
 
 import re
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from fractions import Fraction
 from math import sqrt
 
 import numpy as np
 import pytest
-from problems3d import SLIDING, OneNode, random_over_alpha, sliding_node
+from problems3d import SLIDING, OneNode, forces, random_over_alpha, sliding_node
 
 import enumsol
 from enumsol.branches.elements import VertexKind
 from enumsol.branches.space.chains import chain_through
 from enumsol.branches.space.make_curved import unordered
-from enumsol.branches.space.pieces import Run, Turn, runs_and_turns
+from enumsol.branches.space.pieces import Run, Turn, orders, runs_and_turns
 from enumsol.trusted.space.curve_events import CurveMotion
-from enumsol.trusted.space.sector_rows import STICK
+from enumsol.trusted.space.sector_rows import OPEN, STICK
 from enumsol.trusted.space.solution_curve import SLIP, AlphaProblem
 
 #: SLIDING sticks as soon as alpha is the length of (3/2, 1).
@@ -133,6 +134,11 @@ def test_what_was_found_is_kept_when_the_time_is_over_or_somebody_interrupts():
 def test_what_is_refused():
     with pytest.raises(enumsol.InvalidArgumentError, match='arithmetic is "fast" for a problem in 3D'):
         enumsol.branch_graph(SLIDING, (1, 2), "fast")
+    with (
+        ThreadPoolExecutor(1) as workers,
+        pytest.raises(enumsol.InvalidArgumentError, match="executor is given for a problem in 3D"),
+    ):
+        enumsol.branch_graph(SLIDING, (1, 2), executor=workers)
     with pytest.raises(enumsol.InvalidArgumentError, match="expected F >= 0"):
         enumsol.branch_graph(SLIDING, (-1, 2))
     with pytest.raises(enumsol.NotHeldError):
@@ -160,9 +166,8 @@ def test_motion_is_that_of_differences(sliding):
         alpha, border = joint.at(0.0).mid[-1], np.array([0.0, 0.0, 0.0, 1.0])
         speed = CurveMotion(given, joint, border).speed((SLIP,))
         step = 1e-5
-        change = (sliding_node(alpha + step) - sliding_node(alpha - step)) / (2 * step)
-        unit = given.force
-        assert speed.mid[:3] * unit == pytest.approx(change, abs=1e-8)
+        there, here = (given.placed(np.append(sliding_node(a), a)) for a in (alpha + step, alpha - step))
+        assert speed.mid[:3] * given.force == pytest.approx((there - here)[:3] / (2 * step), abs=1e-8)
         assert np.all(speed.rad < 1e-6)
         assert speed.mid[3] == pytest.approx(1.0)
 
@@ -177,6 +182,7 @@ def test_second_derivatives_are_those_of_differences(sliding, row):
     steps = np.array([-1e-3, 0.0, 1e-3])
     force = np.array([sliding_node(alpha + s)[1 + row] for s in steps])
     first = np.polyfit(force - force[1], steps, 2)
+    border = given.border_of_zeta(border)
     assert np.sign(first[0]) == CurveMotion(given, joint, border).bends((SLIP,))
     assert CurveMotion(given, joint, border).speed((SLIP,)).mid[3] == pytest.approx(first[1], rel=1e-4)
 
@@ -217,6 +223,33 @@ def test_runs_and_turns_alternate(sliding):
     assert [type(part) for part in parts] == [Run]
     assert not any(isinstance(part, Turn) for part in parts)
     assert parts[0].index == 1
+
+
+@pytest.mark.slow
+def test_both_nodes_of_a_symmetric_wedge_change_their_status_at_one_fold():
+    problem = enumsol.gallery.wedge3d(2, 1, 2)
+    given, interval = AlphaProblem.of(problem.enclosure), (Fraction(844, 1000), Fraction(849, 1000))
+    root = enumsol.enumerate_roots(problem, 0.8485)[0]
+    chain = chain_through(given, problem, np.append(forces(root), 0.8485), interval)
+    assert chain.whole
+    parts = runs_and_turns(given, chain)
+    assert [type(part) for part in parts] == [Run, Turn, Run]
+    low, high = parts[1].alphas
+    assert parts[1].settled
+    assert set(parts[1].selections) == {(SLIP, SLIP), (STICK, STICK)}
+    assert high - low < 1e-8
+    away = Fraction(1, 10**5)
+    counts = [len(enumsol.enumerate_roots(problem, alpha)) for alpha in (low - away, high + away)]
+    assert counts == [1, 3]
+    assert sorted((parts[0].index, parts[2].index)) == [-1, 1]
+
+
+def test_orders_of_changes_lead_from_one_selection_to_the_other():
+    ways = orders((STICK, SLIP, STICK), (SLIP, SLIP, OPEN))
+    assert sorted(ways) == [
+        [(STICK, SLIP, STICK), (STICK, SLIP, OPEN), (SLIP, SLIP, OPEN)],
+        [(STICK, SLIP, STICK), (SLIP, SLIP, STICK), (SLIP, SLIP, OPEN)],
+    ]
 
 
 # -- folds -------------------------------------------------------------------------------------------------------------

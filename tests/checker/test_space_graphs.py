@@ -12,7 +12,7 @@ from proof_tools import proof_of, records_of
 from enumsol import enumerate_roots, gallery, verify
 from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space.cover import SpaceCover
-from enumsol.trusted.space.solution_curve import lies_in
+from enumsol.trusted.space.solution_curve import AlphaProblem, lies_in
 
 INTERVAL = Fraction(0), Fraction(1)
 
@@ -35,6 +35,7 @@ def test_a_proof_says_that_all_solutions_lie_on_its_curves(p, seed):
     assert f"every solution for every alpha in [0, 1] lies on {report.curves} curve" in repr(report)
     assert report.curves == len(cover.chains)
     boxes = [box for chain in cover.chains for box in chain.boxes]
+    given = AlphaProblem.of(cover.problem.enclosure)
     for alpha in np.linspace(0.01, 0.99, 7):
         roots = enumerate_roots(cover.problem, alpha)
         assert roots.complete
@@ -44,7 +45,7 @@ def test_a_proof_says_that_all_solutions_lie_on_its_curves(p, seed):
             crossed += int(np.sum(at[1:] * at[:-1] < 0))
         assert crossed == len(roots)
         for root in roots:
-            x = np.concatenate([root.lambda_n, *root.lambda_t.T, [alpha]])
+            x = given.placed(np.concatenate([root.lambda_n, *root.lambda_t.T, [alpha]]))
             assert any(lies_in(box, Ball(x, 1e-12 * np.abs(x) + 1e-13)) for box in boxes)
 
 

@@ -10,6 +10,7 @@ from enumsol import enumerate_roots
 from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space.cover import SpaceCover
 from enumsol.model.sectors import SECTORS, nearest, start_of
+from enumsol.search.space.piece_multipliers import balanced
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space.leaves import Open, SpaceRoot
 from enumsol.trusted.space.pieces import AlphaPiece
@@ -108,6 +109,25 @@ def test_multipliers_prove_the_least_minimum_over_a_piece(seed):
         assert (piece.margin(codes, rows, values) > 0) == (min(ends) > 0)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_multipliers_for_both_ends_serve_wherever_others_do(seed):
+    """Where some multipliers of rows prove a bound at both ends, those that are sought for them do so, too."""
+    rng = np.random.default_rng([seed, 1])
+    problem = changing_problem(2, seed)
+    piece = piece_of(problem, LOW, LOW + (HIGH - LOW) / 64)
+    served = 0
+    for codes in [(OPEN, STICK), (STICK, STICK), (SECTORS + 9, SECTORS + 70), (STICK, SECTORS + 5), (OPEN, OPEN)]:
+        for _ in range(20):
+            rows, values = rows_of(codes, rng)
+            found = balanced(piece, codes, rows)
+            if found is None:
+                assert max(piece.margin(codes, rows, scale * values) for scale in (0.3, 1.0, 3.0)) <= 1e-4
+                continue
+            assert min(least_at(problem, piece, alpha, rows, found) for alpha in (piece.low, piece.high)) > 0
+            served += 1
+    assert served
+
+
 #: Nodes and seeds.
 LARGER = [
     pytest.param(2, 0, marks=pytest.mark.slow),
@@ -132,6 +152,9 @@ def test_no_root_over_a_piece_is_missed(p, seed):
                     forces = piece.forces(found.y)
                     near = np.concatenate([root.lambda_n, *root.lambda_t.T])
                     assert np.all(np.abs(forces.mid - near) <= forces.rad + 1e-9 * np.max(np.abs(near)))
+                    w = piece.displacements(found.y, found.w)
+                    moved = problem.condensed.free_displacements(float(alpha)) - problem.condensed.S @ near
+                    assert np.all(np.abs(w.mid - moved) <= w.rad + 1e-9 * np.max(np.abs(moved)))
                 settled += isinstance(found, SpaceRoot)
     assert settled
 
@@ -165,13 +188,12 @@ def test_points_of_a_piece_are_in_a_box_if_all_corners_are():
     piece = piece_of(problem)
     said = {True: 0, False: 0}
     for _ in range(200):
-        y = Ball(rng.standard_normal(3), rng.exponential(size=3) * 0.2)
-        forces = piece.forces(y)
+        forces = Ball(rng.standard_normal(3), rng.exponential(size=3) * 0.2)
         d, e = rng.standard_normal(4), rng.standard_normal(4)
         d = d / (e @ d)
         centre = np.append(forces.mid, 0.375) + 0.1 * rng.standard_normal(4)
         box = CurveBox(centre, d, e, float(rng.exponential() * 4), rng.exponential(size=4) * 4, np.ones(3))
-        inside = piece.lies_in(y, box)
+        inside = piece.lies_in(Ball.joined(forces, piece.alphas[None]), box)
         said[inside] += 1
         corners = (
             np.append(forces.mid + s[:3] * forces.rad, float(HIGH if s[3] > 0 else LOW)) - centre
@@ -181,6 +203,23 @@ def test_points_of_a_piece_are_in_a_box_if_all_corners_are():
         really = all(abs(k) <= box.half and np.all(np.abs(x - k * d) <= box.radius) for k, x in t)
         assert inside == really
     assert min(said.values()) > 20
+
+
+def test_displacements_of_nodes_without_friction_follow_from_the_forces():
+    problem = changing_problem(2, 1)
+    none = np.array([0.0, 1.0])
+    coefficients = (tuple(np.array(pair) * none) for pair in (problem.friction, problem.friction_slope))
+    problem = problem.replace(**dict(zip(("friction", "friction_slope"), coefficients, strict=True)))
+    piece = piece_of(problem, Fraction(3, 8), Fraction(3, 8) + Fraction(1, 1024))
+    rng = np.random.default_rng(3)
+    y = rng.standard_normal(4)
+    forces = piece.forces(Ball.exact(y)).mid
+    assert np.all(forces.reshape(3, 2)[1:, 0] == 0)
+    for alpha in (piece.low, piece.middle, piece.high):
+        scaled = piece.at(alpha, alpha)
+        w = piece.displacements(Ball.exact(y), Ball.exact(scaled.g - scaled.S @ y))
+        moved = problem.condensed.free_displacements(float(alpha)) - problem.condensed.S @ forces
+        assert np.all(np.abs(w.mid - moved) <= w.rad + 1e-12 * np.max(np.abs(moved)))
 
 
 def test_what_is_not_proven_over_a_piece_is_left_open():

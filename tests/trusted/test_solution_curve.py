@@ -20,11 +20,51 @@ from enumsol.trusted.space.solution_curve import (
 
 
 def box_of(given, x, half, roomy=True):
+    x = given.placed(x)
     border = np.eye(len(x))[-1]
     point = curve_point(given, x, border)
     border = point.direction / (point.direction @ point.direction)
     curve = curve_around(given, point.x, point.direction, border, half, roomy=roomy)
     return None if curve is None else curve.box
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_coordinates_are_those_of_forces_and_displacements(seed):
+    """Against their definition, with the compliance as the problem has it; the second axis has half the friction."""
+    rng = np.random.default_rng(seed)
+    S, g = random_compliance(rng, 2), 100.0 * rng.normal(size=6)
+    problem = from_compliance(S, g, 0.0, friction_slope=(1.0, 0.5), load_slope=rng.normal(size=6))
+    given, alpha = AlphaProblem.of(problem.enclosure), 0.7
+    y, q = rng.normal(size=6), np.array([1.0, 1.0, 1.0, 1.0, 0.5, 0.5])
+    w = problem.condensed.free_displacements(alpha) - problem.condensed.S @ y
+    expected = y / q - given.rho * (q * w / given.length) * given.force
+    x = np.append(y, alpha)
+    assert given.placed(x) == pytest.approx(np.append(expected, alpha), rel=1e-12)
+    assert given.unplaced(given.placed(x)) == pytest.approx(x, rel=1e-11)
+    ball = given.coordinates(Ball.exact(y), Ball.exact(w))
+    assert np.all(np.abs(ball.mid - expected) <= 1e-12 * np.max(np.abs(expected)))
+    border, step = rng.normal(size=7), rng.normal(size=7)
+    change = given.placed(x + step) - given.placed(x)
+    assert given.border_of_forces(border) @ step == pytest.approx(border @ change, rel=1e-10)
+    assert given.border_of_zeta(given.border_of_forces(border)) == pytest.approx(border, rel=1e-10)
+
+
+def test_what_is_past_the_limit_of_stick_is_bounded_along_a_direction():
+    """|z_t| - F z_n at points of a tube lies in its bounds, which no product of intervals reaches."""
+    rng = np.random.default_rng(2)
+    given = AlphaProblem.of(SLIDING.enclosure)
+    z, along, half, side = np.array([1.0, 0.3, 0.4, 0.5]), np.array([2.0, 0.6, 0.8, 0.0]), 0.05, np.full(4, 1e-3)
+    bounds = given.past(Ball.exact(z), Ball.exact(along), half, side)
+    seen = []
+    for t, s in zip(rng.uniform(-half, half, 500), rng.uniform(-1, 1, (500, 4)) * side, strict=True):
+        n, *tangent, alpha = z + t * along + s
+        seen.append(np.hypot(*tangent) - (given.F0[0] + alpha * given.F1[0]) * n)
+    low, high = bounds.mid[0] - bounds.rad[0], bounds.mid[0] + bounds.rad[0]
+    assert low <= min(seen)
+    assert max(seen) <= high
+    # |z_t| alone changes by 0.1
+    assert high - low < 0.02
+    assert np.isinf(given.past(Ball.exact(np.array([1.0, 0.0, 0.0, 0.5])), Ball.exact(along), half, side).rad[0])
 
 
 def test_the_curve_is_that_of_the_closed_form():
@@ -33,7 +73,7 @@ def test_the_curve_is_that_of_the_closed_form():
     curve = only_curve(given, box)
     assert (curve.index, curve.rises, len(curve.statuses)) == (1, 1, 1)
     for alpha in np.linspace(0.49, 0.51, 9):
-        x = Ball.exact(np.append(sliding_node(alpha), alpha))
+        x = Ball.exact(given.placed(np.append(sliding_node(alpha), alpha)))
         assert lies_in(box, x)
         at = curve.at(parameter_in(box, x))
         assert np.all(np.abs(at.mid - x.mid) <= at.rad + 1e-12)
@@ -42,7 +82,7 @@ def test_the_curve_is_that_of_the_closed_form():
 def test_slopes_are_those_between_points_of_the_curve():
     given = AlphaProblem.of(SLIDING.enclosure)
     curve = only_curve(given, box_of(given, np.append(sliding_node(0.5), 0.5), 0.02))
-    one, other = (np.append(sliding_node(alpha), alpha) for alpha in (0.495, 0.505))
+    one, other = (given.placed(np.append(sliding_node(alpha), alpha)) for alpha in (0.495, 0.505))
     change = other - one
     slope = change / (curve.box.border @ change)
     assert np.all(np.abs(slope - curve.slope.mid) <= curve.slope.rad + 1e-9)
@@ -53,7 +93,7 @@ def test_friction_may_be_negative_beside_the_interval():
     curve = only_curve(given, box_of(given, np.array([1.0, 0.0, 0.0, 0.0]), 0.01))
     assert curve.alphas[0] < 0 < curve.alphas[1]
     at = curve.at(0.0)
-    assert np.all(np.abs(at.mid - [1.0, 0.0, 0.0, 0.0]) <= at.rad + 1e-14)
+    assert np.all(np.abs(at.mid - given.placed(np.array([1.0, 0.0, 0.0, 0.0]))) <= at.rad + 1e-14)
 
 
 @pytest.mark.slow
@@ -73,7 +113,7 @@ def test_solutions_in_a_box_are_those_of_its_curve(seed):
     seen = 0
     for alpha in np.linspace(low, high, 9):
         for other in enumsol.enumerate_roots(problem, Fraction(float(alpha))):
-            x = Ball(np.append(forces(other), alpha), np.full(7, 1e-12))
+            x = Ball(given.placed(np.append(forces(other), alpha)), np.full(7, 1e-12))
             if lies_in(box, x):
                 at = curve.at(parameter_in(box, x))
                 assert np.all(np.abs(at.mid - x.mid) <= at.rad + x.rad)
@@ -108,6 +148,7 @@ def test_a_fold_lies_in_a_box():
     (fold,) = path.folds
     k = fold.point
     line = np.column_stack([path.lambda_n, path.lambda_t[:, :, 0], path.lambda_t[:, :, 1], path.alpha])
+    line = given.placed(line)
     before, after = (line[k] + 1e-3 * (line[n] - line[k]) for n in (k - 1, k + 1))
     ahead, behind = (one / np.linalg.norm(one) for one in (line[k] - before, after - line[k]))
     border = (ahead + behind) / np.linalg.norm(ahead + behind)
@@ -120,6 +161,6 @@ def test_a_fold_lies_in_a_box():
     counts = []
     for alpha in (fold.alpha + side, fold.alpha - side):
         roots = enumsol.enumerate_roots(problem, Fraction(alpha))
-        inside = [root for root in roots if lies_in(box, Ball.exact(np.append(forces(root), alpha)))]
+        inside = [root for root in roots if lies_in(box, Ball.exact(given.placed(np.append(forces(root), alpha))))]
         counts.append(len(inside))
     assert counts == [2, 0]

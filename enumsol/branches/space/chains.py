@@ -5,7 +5,7 @@ Where to put the boxes is told by paths of continuation, in floats; what a chain
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -35,6 +35,10 @@ _LONGER, _SHORTEST, _GROWTH = 1.05, 1e-7, 2.0
 _WIDEST, _NARROWER = 0.4, 0.3
 #: Joints this near to a point of the skeleton are put by this share of the way before it.
 _BESIDE, _ASIDE = 1e-3, 0.1
+#: Edges beside a corner are at least this long relative to each other.
+_EVEN = 0.125
+#: Where directions at the ends of an edge of the skeleton are taken, relative to the edge: not at a corner itself.
+_INSIDE = 2.0**-10
 #: How far a skeleton is prolonged beyond the interval, relative to its last step.
 _BEYOND = 0.05
 
@@ -64,6 +68,7 @@ class Skeleton:
     Attributes
     ----------
     points : (N, 3p + 1) array
+        Forces and alpha.
     corners : sequence of int
         Points at which a status changes.
     closed : bool
@@ -120,10 +125,13 @@ class ChainBuilder:
     def __init__(self, problem: AlphaProblem) -> None:
         self.problem = problem
         self.unit = np.append(problem.force, 1.0)
+        self._ends: dict[int, tuple[Array, ...]] = {}
 
     def chain(self, skeleton: Skeleton) -> Chain | None:
         """A chain along a skeleton, as far as it is proven."""
+        skeleton = self._thinned(replace(skeleton, points=self.problem.placed(skeleton.points)))
         line = skeleton.points
+        self._ends = {}
         first = self.joint(*self._at(line, 0.0))
         if first is None:
             return None
@@ -144,6 +152,22 @@ class ChainBuilder:
         whole = place == last
         closed = skeleton.closed and whole and bool(links) and goes_on(links[-1], links[0], first)
         return Chain(links, joints, closed, whole) if links else None
+
+    def _thinned(self, skeleton: Skeleton) -> Skeleton:
+        """Without points close to a corner, so that the edges on both sides of it have about the same length."""
+        line, places = skeleton.points / self.unit, set(skeleton.corners)
+        kept = list(range(len(line)))
+        for corner in skeleton.corners:
+            at = kept.index(corner)
+            while 0 < at < len(kept) - 1:
+                before, after = (float(np.linalg.norm(line[kept[k]] - line[corner])) for k in (at - 1, at + 1))
+                k, near = (at - 1, before < _EVEN * after) if before < after else (at + 1, after < _EVEN * before)
+                if not near or kept[k] in places or k in (0, len(kept) - 1):
+                    break
+                del kept[k]
+                at = kept.index(corner)
+        corners = [kept.index(corner) for corner in skeleton.corners]
+        return Skeleton(skeleton.points[kept], corners, skeleton.closed)
 
     def _around(self, skeleton: Skeleton) -> list[tuple[float, float]]:
         """Places before and after every corner between which one box is proven."""
@@ -211,10 +235,20 @@ class ChainBuilder:
         return np.asarray(scaled / (scaled @ scaled) / self.unit)
 
     def _at(self, line: Array, place: float) -> tuple[Array, Array]:
-        """A point of the polygon, and the direction of its edge there."""
+        """A point near the curve between two points of a skeleton, and a direction there.
+
+        On the cubic with the curve's directions at both: where it bends, the chord may lead to another solution.
+        """
         k = min(int(place), len(line) - 2)
-        edge = line[k + 1] - line[k]
-        return line[k] + (place - k) * edge, edge
+        edge, t = line[k + 1] - line[k], place - k
+        if k not in self._ends:
+            border = self.across(edge)
+            near = [curve_point(self.problem, line[k] + share * edge, border) for share in (_INSIDE, 1.0 - _INSIDE)]
+            self._ends[k] = tuple(edge if one is None else one.direction for one in near)
+        # beside the chord; both directions have the product 1 with the border, as the edge has
+        begin, end = (direction - edge for direction in self._ends[k])
+        point = line[k] + t * edge + t * (1.0 - t) * ((1.0 - t) * begin - t * end)
+        return point, edge + (1.0 - t) * (1.0 - 3.0 * t) * begin + t * (3.0 * t - 2.0) * end
 
     def _link(
         self,
@@ -250,6 +284,5 @@ class ChainBuilder:
         total = np.zeros_like(chord)
         for joint in (one, other):
             scaled = joint.box.direction / self.unit
-            scaled = scaled / np.linalg.norm(scaled)
-            total += scaled * np.sign(scaled @ (chord / self.unit))
+            total += scaled / np.linalg.norm(scaled)
         return np.asarray(total / np.linalg.norm(total) / self.unit)

@@ -149,6 +149,7 @@ class SpaceCover:
                 "p": self.problem.p,
                 "data": "problem",
                 **unit_exponents(*self._units()),
+                "steps": AlphaProblem.of(self.problem.enclosure).steps.tolist(),
             }
         )
         for chain in self.chains:

@@ -47,7 +47,7 @@ class CurvedArcValues(ArcValues):
     knots : (K + 1, 3p + 1) array
         Points (lambda_n, both lambda_t, alpha) in the order of alpha.
     borders : (K, 3p + 1) array
-        Rows of the parameter between two of them.
+        Rows of the parameter between two of them, by forces and alpha.
     """
 
     given: AlphaProblem
@@ -62,13 +62,14 @@ class CurvedArcValues(ArcValues):
         if not 0 <= k < len(self.borders):
             return np.asarray(self.knots[max(0, min(k, len(self.borders)))])
         start, end, border = self.knots[k], self.knots[k + 1], self.borders[k]
+        row = self.given.border_of_zeta(border)
         low, high, share = 0.0, 1.0, float((alpha - start[-1]) / (end[-1] - start[-1]))
         x: Array = start + share * (end - start)
         for _ in range(_STEPS):
-            found = curve_point(self.given, start + share * (end - start), border)
+            found = curve_point(self.given, self.given.placed(start + share * (end - start)), row)
             if found is None:
                 break
-            x, off = found.x, float(found.x[-1] - alpha)
+            x, off = self.given.unplaced(found.x), float(found.x[-1] - alpha)
             if abs(off) <= _NEAR * max(1.0, abs(alpha)):
                 break
             low, high = (share, high) if off < 0 else (low, share)
@@ -215,11 +216,12 @@ class CurvedGraph:
                 f"whether a change between alpha = {low!r} and {high!r} lies inside the interval stayed open; "
                 f"{END_ELSEWHERE}"
             )
-        self._places.append(_Place(alphas, turn.x, turn.selections, border=False, settled=settled))
+        self._places.append(_Place(alphas, self.given.unplaced(turn.x), turn.selections, border=False, settled=settled))
         return len(self._places) - 1
 
     def _values(self, run: Run) -> CurvedArcValues:
-        knots, borders = np.array(run.knots)[:: run.rises], np.array(run.borders)[:: run.rises]
+        knots = self.given.unplaced(np.array(run.knots)[:: run.rises])
+        borders = self.given.border_of_forces(np.array(run.borders)[:: run.rises])
         return CurvedArcValues(self.given, self.problem, run.codes, knots, borders)
 
     # -- in the user's terms ---------------------------------------------------------------------------------------

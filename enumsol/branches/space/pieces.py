@@ -1,7 +1,7 @@
 """What a whole curve in 3D says over alpha: runs on which statuses hold and alpha goes one way, and turns between them.
 
-A turn is where exactly one condition changes its sign, or where alpha turns back, once; a part of the curve of which
-neither could be shown is left open (theory, section 12.10).
+A turn is where one condition changes its sign, or a few do too near to each other to be told apart, or where alpha
+turns back, once; a part of the curve of which nothing of this could be shown is left open (theory, section 12.10).
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
+from itertools import pairwise, permutations, product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +19,7 @@ from enumsol.trusted.space.curve_events import CurveMotion
 from enumsol.trusted.space.solution_curve import curve_around, curve_point, lies_in, only_curve, parameter_in
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -36,6 +37,8 @@ _BESIDE, _FARTHER, _TRIALS = 2.0**-44, 8.0, 12
 _BESIDE_FOLD = 2.0**-24
 #: Parts are longer than the way between their ends by this, and wider than their ends are known.
 _LONGER, _ROUNDED = 1.05, 16.0
+#: So many nodes at most may change their statuses too near to each other to be told apart.
+_AT_ONCE = 3
 #: Where a part is cut: at the first of these shares where the solution is regular.
 _CUTS = (0.5, 0.4375, 0.59375)
 
@@ -120,7 +123,8 @@ class Turn:
         A point of it, in floats.
     selections : statuses on both sides, one or two
     settled : bool
-        One condition changes its sign once, or alpha turns back once, and nothing else happens.
+        Conditions change their sign once each, or alpha turns back once, and nothing else happens. Where several do,
+        alpha goes one way or turns back once in whichever order they do.
     """
 
     alphas: tuple[Fraction, Fraction]
@@ -163,6 +167,21 @@ def _append(found: list[Run | Turn], part: Run | Turn) -> None:
         found.append(Turn((min(ends), max(ends)), part.x, selections, settled=False))
 
 
+def changed(codes: Codes, nodes: Sequence[int], to: Sequence[int]) -> Codes:
+    """Codes with those of some nodes replaced."""
+    new = dict(zip(nodes, to, strict=True))
+    return tuple(new.get(i, code) for i, code in enumerate(codes))
+
+
+def orders(one: Codes, other: Codes) -> list[list[Codes]]:
+    """The ways from some statuses to others along which the nodes change one by one."""
+    nodes = [i for i, pair in enumerate(zip(one, other, strict=True)) if pair[0] != pair[1]]
+    return [
+        [changed(one, order[:k], [other[i] for i in order[:k]]) for k in range(len(order) + 1)]
+        for order in permutations(nodes)
+    ]
+
+
 class LinkCutter:
     """Cuts the curve of a link into runs and turns.
 
@@ -195,17 +214,17 @@ class LinkCutter:
         curve = self._between(start, end) if curve is None else curve
         if curve is not None:
             motion = CurveMotion(self.problem, curve)
-            corner = None
+            changing: Sequence[int] = ()
             if codes is None:
-                codes, corner = self._statuses(motion, start, end)
+                codes, changing = self._statuses(motion, start, end)
             found = None
-            if corner is not None:
-                found = self._corner(motion, start, end, corner, times)
+            if changing:
+                found = self._corner(motion, start, end, changing, times)
             elif codes is not None:
                 found = self._smooth(motion, start, end, codes)
             if found is not None:
                 return found
-        middle = self._middle(start, end) if times else None
+        middle = self._middle(start, end) if times > 0 else None
         if middle is None:
             return [self._left_open(curve, start, end)]
         halves = (start, middle), (middle, end)
@@ -215,19 +234,23 @@ class LinkCutter:
                 _append(found, part)
         return found
 
-    def _statuses(self, motion: CurveMotion, start: Place, end: Place) -> tuple[Codes | None, int | None]:
-        """The statuses that hold all along, or the node that changes its status exactly once, or neither."""
+    def _statuses(self, motion: CurveMotion, start: Place, end: Place) -> tuple[Codes | None, list[int]]:
+        """The statuses that hold all along, or the nodes that change their status exactly once, or neither."""
         loose = [i for i, codes in enumerate(motion.possible) if len(codes) > 1]
+        here = start.codes
         if not loose:
-            return start.codes, None
-        if len(loose) > 1 or len(motion.possible[loose[0]]) > 2:
-            return None, None
-        i, here = loose[0], start.codes
-        other = next((code for code in motion.possible[i] if code != here[i]), here[i])
-        # the condition passes zero once at most
-        if not motion.decides(here, i, other):
-            return None, None
-        return (here, None) if here == end.codes else (None, i)
+            return here, []
+        if len(loose) > _AT_ONCE or any(len(motion.possible[i]) > 2 for i in loose):
+            return None, []
+        pairs = [(here[i], next((code for code in motion.possible[i] if code != here[i]), here[i])) for i in loose]
+        # every condition passes zero once at most, whatever the statuses of the other nodes are
+        for i, pair in zip(loose, pairs, strict=True):
+            beside = product(*(pair[:1] if j == i else ends for j, ends in zip(loose, pairs, strict=True)))
+            signs = {motion.decides(changed(here, loose, codes), i, pair[1]) for codes in beside}
+            if len(signs) > 1 or 0 in signs:
+                return None, []
+        nodes = [i for i in loose if here[i] != end.codes[i]]
+        return (None, nodes) if nodes else (here, [])
 
     def _smooth(self, motion: CurveMotion, start: Place, end: Place, codes: Codes) -> list[Run | Turn] | None:
         """Where the statuses do not change: one run, or two with a fold between them."""
@@ -247,19 +270,27 @@ class LinkCutter:
         before, after = self._run(start, sides[0], codes, start.rises), self._run(sides[1], end, codes, end.rises)
         return [before, turn, after]
 
-    def _corner(self, motion: CurveMotion, start: Place, end: Place, i: int, times: int) -> list[Run | Turn] | None:
-        """Where one node changes its status once."""
-        one, other = start.codes, end.codes
-        sides = self._beside(start, end, lambda point: point.statuses[i] == one[i], _BESIDE)
-        if sides is None or (sides[0].codes, sides[1].codes) != (one, other):
+    def _corner(
+        self, motion: CurveMotion, start: Place, end: Place, nodes: Sequence[int], times: int
+    ) -> list[Run | Turn] | None:
+        """Where nodes change their statuses, each of them once: the first change, and what follows."""
+        one = start.codes
+        sides = self._beside(start, end, lambda point: all(point.statuses[i] == one[i] for i in nodes), _BESIDE)
+        if sides is None or sides[0].codes != one:
             return None
+        other = sides[1].codes
         near = self._between(*sides)
         motion = motion if near is None else CurveMotion(self.problem, near)
-        if not (motion.rises(one) and motion.rises(other)):
+        between = list(orders(one, other))
+        passed = dict.fromkeys(codes for order in between for codes in order)
+        rises = {codes: motion.rises(codes) for codes in passed}
+        # in any order of the changes alpha turns back once, or never
+        turned = {sum(rises[x] != rises[y] for x, y in pairwise(order)) for order in between}
+        if not all(rises.values()) or turned not in ({0}, {1}):
             return None
         step = self._step(*sides)
         reach = Fraction(0)
-        for codes in (one, other):
+        for codes in passed:
             speed = motion.speed(codes)
             if speed is None:
                 return None
@@ -267,10 +298,11 @@ class LinkCutter:
         alphas = sides[0].alphas[0] - reach, sides[0].alphas[1] + reach
         turn = Turn(alphas, 0.5 * (sides[0].x + sides[1].x), (one, other), settled=True)
         found: list[Run | Turn] = []
+        rest = (self.curve, other) if other == end.codes else (None, None)
         for part in (
             *self._cut(self.curve, start, sides[0], one, times - 1),
             turn,
-            *self._cut(self.curve, sides[1], end, other, times - 1),
+            *self._cut(rest[0], sides[1], end, rest[1], times - 1),
         ):
             _append(found, part)
         return found

@@ -18,6 +18,7 @@ from enumsol.proof.space_records import CutPiece, ExcludedInSpace, InCurveBox, O
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.outcome import StopReason
+from enumsol.search.space.piece_multipliers import balanced
 from enumsol.search.space.space_fathoming import Point
 from enumsol.search.space.space_newton import Isotropic
 from enumsol.search.space.space_search import SpaceSplitting
@@ -25,6 +26,7 @@ from enumsol.search.splitting import ImposedRows
 from enumsol.support.deadlines import TimeOverError, look
 from enumsol.trusted.space.leaves import Open, SpaceRoot
 from enumsol.trusted.space.pieces import AlphaPiece
+from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -48,6 +50,8 @@ _WIDER = 0.1
 _DEFINITE, _MANY = 1e-9, 8
 #: Leaves are tested from this level of their sectors on.
 _TRIED = 3
+#: Sectors above this level are halved, rather than alpha, where a leaf is settled in the middle only.
+_WIDE = 6
 
 
 @dataclass(frozen=True)
@@ -139,6 +143,7 @@ class PieceTree:
         alone: bool = False,
     ) -> None:
         self._enclosure, self._units, self.interval = enclosure, units, interval
+        self._given = AlphaProblem.of(enclosure)
         self._more, self._most, self._tick, self._seeks = more, max_nodes, tick, alone
         self._least = Fraction(smallest) * (interval[1] - interval[0])
         self._pieces: OrderedDict[tuple[Fraction, Fraction], _Examined] = OrderedDict()
@@ -215,11 +220,8 @@ class PieceTree:
         else:
             relaxation = parent[1].child(*at.rows.of(changed, codes[changed]), last=last)
         if relaxation.pruned and relaxation.bound > PRUNE_MARGIN:
-            numbers, values = relaxation.multipliers()
-            rows = [at.engine.rows[number] for number in numbers.tolist()]
-            if at.piece.margin(codes, rows, values, 2.0) > 0:
-                return ExcludedInSpace(rows, values), []
-            return self._halved(at, codes)
+            done = self._excluded(at, codes, relaxation)
+            return self._halved(at, codes) if done is None else done
         if final and all(code < SECTORS or width_level(code - SECTORS) >= _TRIED for code in codes):
             done = self._leaf(at, codes) if parent is not None else None
             if done is not None:
@@ -233,10 +235,29 @@ class PieceTree:
         return self._branched(at, codes, node, relaxation)
 
     @staticmethod
+    def _excluded(at: _Examined, codes: Codes, relaxation: Any) -> tuple[Any, list[Any]] | None:
+        """By multipliers of the middle, or else by some that serve both ends of the piece."""
+        numbers, values = relaxation.multipliers()
+        rows = [at.engine.rows[number] for number in numbers.tolist()]
+        if at.piece.margin(codes, rows, values, 2.0) > 0:
+            return ExcludedInSpace(rows, values), []
+        imposed = [at.engine.rows[k] for i, code in enumerate(codes) for k in at.engine.imposed(i, code)[0]]
+        rows = list(dict.fromkeys([*rows, *imposed]))
+        both = balanced(at.piece, codes, rows)
+        if both is None or not at.piece.margin(codes, rows, both, 2.0) > 0:
+            return None
+        used = np.flatnonzero(both)
+        return ExcludedInSpace([rows[k] for k in used], both[used]), []
+
+    @staticmethod
     def _widest(codes: Codes) -> int:
         """The node with the widest sector that can be halved; -1 if there is none."""
         sectors = [i for i, code in enumerate(codes) if code > SECTORS and level_of(code - SECTORS) < DEEPEST]
         return min(sectors, key=lambda i: width_level(codes[i] - SECTORS)) if sectors else -1
+
+    @staticmethod
+    def _is_wide(codes: Codes) -> bool:
+        return any(code > SECTORS and width_level(code - SECTORS) < _WIDE for code in codes)
 
     def _branched(self, at: _Examined, codes: Codes, node: int, relaxation: Any) -> tuple[Any, list[Any]]:
         children = at.splitting.children(codes, node, relaxation)
@@ -286,34 +307,33 @@ class PieceTree:
             return NoRoot(), []
         if (number := self._box(piece, found)) is not None:
             return InCurveBox(number), []
-        # is it the piece or the sectors that are too wide?
+        # is it the piece or the sectors that are too wide? slip directions first: near a corner all are left open
         there = piece.point.held(codes)
         if there is None:
-            return self._halved(at, codes)
+            return None if self._is_wide(codes) else self._halved(at, codes)
         if isinstance(there, SpaceRoot):
             number = self._met(piece.point, there)
             if number is None:
                 return self._open(at, codes, piece.forces(there.y).mid), []
             if isinstance(found, SpaceRoot):
                 return ThroughCurveBox(number), []
-            return self._halved(at, codes)
+            return None if self._is_wide(codes) else self._halved(at, codes)
         return None if self._box(piece.point, there) is None else self._halved(at, codes)
 
     def _box(self, piece: AlphaPiece, found: SpaceRoot | Open) -> int | None:
         """The box in which forces lie."""
-        if not self.boxes or found.y is None:
+        place = piece.place(found, self._given) if self.boxes else None
+        if place is None:
             return None
-        forces = piece.forces(found.y)
         near = np.flatnonzero((self._low <= float(piece.low)) & (float(piece.high) <= self._high))
         if not len(near):
             return None
-        x = np.append(forces.mid, float(piece.middle)) - self._c[near]
-        rad = np.append(forces.rad, float(piece.high - piece.low) / 2)
+        x, rad = place.mid - self._c[near], place.rad
         t = np.sum(self._e[near] * x, axis=1)
         inside = np.abs(t) + np.abs(self._e[near]) @ rad <= self._h[near]
         beside = np.abs(x - t[:, None] * self._d[near])
         inside &= np.all(beside <= self._b[near], axis=1)
         for k in near[inside].tolist():
-            if piece.lies_in(found.y, self.boxes[k], 2.0):
+            if piece.lies_in(place, self.boxes[k], 2.0):
                 return int(k)
         return None

@@ -46,16 +46,16 @@ class CurveMotion:
 
     def __init__(self, problem: AlphaProblem, curve: SolutionCurve, border: Array | None = None) -> None:
         self.problem = problem
-        unit, box, m = np.append(problem.force, 1.0), curve.box, 3 * problem.p
-        self._border = (box.border if border is None else border) * unit
-        self._Z = problem.moves(problem.rho)
+        unit, box = np.append(problem.force, 1.0), curve.box
+        self._border, steps = (box.border if border is None else border) * unit, np.ones(3 * problem.p)
+        self._Z = problem.moves(steps)
         centre, spread = Ball.exact(box.centre / unit), curve.spread / unit
-        moved = (self._Z @ Ball.exact(box.direction / unit)[:, None])[:, 0].size * box.half
-        w = problem.g0 + centre[m] * problem.g1 - (problem.S @ centre[:m, None])[:, 0]
-        z = Ball.joined(problem.inverse * centre[:m] + Ball.exact(problem.rho) * w, centre[m][None])
+        along, side = (self._Z @ Ball.exact(box.direction / unit)[:, None])[:, 0], upper_product(self._Z.size, spread)
+        z = Ball.joined(problem.arguments(centre, problem.forces_at(centre), steps), centre[-1:])
         #: (z, alpha) at all points of the curve.
-        self.z = Ball(z.mid, (z.rad + moved + upper_product(self._Z.size, spread)) * SAFE + TINY)
-        self._F = problem.friction(self.z[m])
+        self.z = Ball(z.mid, (z.rad + along.size * box.half + side) * SAFE + TINY)
+        self._past = problem.past(z, along, box.half, side * SAFE)
+        self._F = problem.friction(self.z[-1])
         self._speeds: dict[tuple[int, ...], Ball | None] = {}
 
     # -- statuses --------------------------------------------------------------------------------------------------
@@ -74,9 +74,10 @@ class CurveMotion:
             return frozenset(found | {FRICTIONLESS})
         least, most = self._lengths(i)
         F_low, F_high = _ends(self._F[i])
-        if F_high >= 0 and least <= F_high * high * SAFE + TINY:
+        past = _sign(self._past[i])
+        if past <= 0 and F_high >= 0 and least <= F_high * high * SAFE + TINY:
             found.add(STICK)
-        if F_low < 0 or most >= F_low * max(low, 0.0) / SAFE - TINY:
+        if past >= 0 and (F_low < 0 or most >= F_low * max(low, 0.0) / SAFE - TINY):
             found.add(SLIP)
         return frozenset(found)
 
@@ -110,12 +111,8 @@ class CurveMotion:
 
     def _bordered(self, codes: Sequence[int]) -> Ball | None:
         """The derivatives of the natural map and the border, (3p + 1, 3p + 1)."""
-        m, D = 3 * self.problem.p, self._derivative(codes)
-        if D is None:
-            return None
-        M = Ball(np.zeros((m, m + 1)), np.zeros((m, m + 1)))
-        M[:, :m] = self.problem.part
-        return Ball.joined(M - D @ self._Z, Ball.exact(self._border[None]))
+        D = self._derivative(codes)
+        return None if D is None else Ball.joined(self.problem.part - D @ self._Z, Ball.exact(self._border[None]))
 
     def _derivative(self, codes: Sequence[int]) -> Ball | None:
         """That of the projection P with respect to (z, alpha), by (12.17)."""

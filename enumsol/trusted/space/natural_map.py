@@ -81,8 +81,10 @@ class Discs:
         has = self.tau >= 0
         return Ball(np.where(has, z.mid[self.tau], 0.0), np.where(has, z.rad[self.tau], 0.0))
 
-    def corners(self, z: Ball) -> Corners | None:
+    def corners(self, z: Ball, past: Ball | None = None) -> Corners | None:
         """All derivatives of P at points of a box, and their convex hull; None where there is no bound.
+
+        ``past``: bounds of |z_t| - F z_n of every node at these points, if more is known than the box tells.
 
         ``core`` has a column more than rows, for the derivative with respect to the argument of F, if there is one.
         """
@@ -90,7 +92,7 @@ class Discs:
             return None
         m, width = len(z.mid), len(z.mid) + (self.slope is not None)
         core = Ball(np.zeros((m, width)), np.zeros((m, width)))
-        found = _Blocks.of(self, z)
+        found = _Blocks.of(self, z, past)
         if found is None:
             return None
         block, u, v = found.middle, found.u, found.v
@@ -134,8 +136,8 @@ class _Blocks:
         return Ball(mid, self.rad + 2 * UNIT * np.abs(mid) * (added != 0))
 
     @classmethod
-    def of(cls, discs: Discs, z: Ball) -> Self | None:
-        """Of all points of a box; None where there is no bound."""
+    def of(cls, discs: Discs, z: Ball, past: Ball | None = None) -> Self | None:
+        """Of all points of a box; None where there is no bound. ``past`` as for ``Discs.corners``."""
         p, width = len(discs.tau), 3 if discs.slope is None else 4
         low, high = _outwards(z.mid[:p], z.rad[:p])
         F_low, F_high = _outwards(discs.F.mid, discs.F.rad)
@@ -144,6 +146,9 @@ class _Blocks:
         least, most = np.where(least > 0, least / SAFE, least * SAFE), np.maximum(F_high, 0.0) * high * SAFE + TINY
         at = Directions.of(discs.tangents(z))
         touches, loose, sticks, slips = high >= 0, low <= 0, at.least <= most, at.most >= least
+        if past is not None:
+            sticks &= ~(past.mid > past.rad * SAFE)
+            slips &= ~(past.mid < -past.rad * SAFE)
         rubs = np.any(discs.tau >= 0, axis=1) & touches
         unknown = rubs & slips & (~(at.least > 0) | (loose & sticks))
         if np.any(unknown & (F_low < 0)):
@@ -174,8 +179,10 @@ class _Blocks:
         # times the direction, by lambda_n and by the argument of F where the node slips
         normal, normal_rad = 0.5 * (np.maximum(low, 0.0) + high), 0.5 * (high - np.maximum(low, 0.0)) * SAFE
         pushed = change * Ball(normal, normal_rad + 4 * UNIT * normal)
-        along = (F_size[:, None] * at.turn + (discs.F.rad + 4 * UNIT * F_size)[:, None]) * SAFE
-        also = (pushed.size[:, None] * at.turn + (pushed.rad + 4 * UNIT * pushed.size)[:, None]) * SAFE
+        along, also = (
+            (x[:, None] * (at.turn + 4 * UNIT) + rad[:, None] * np.abs(at.e)) * SAFE
+            for x, rad in ((F_size, discs.F.rad), (pushed.size, pushed.rad))
+        )
         blocks.rad[sliding, 1:, 0] = along[sliding]
         blocks.rad[sliding, 1:, 3:] = np.where(loose[:, None], widest, also)[sliding, :, None]
         ratio_low = np.where(least >= 0, least / at.most / SAFE, least / at.least * SAFE)

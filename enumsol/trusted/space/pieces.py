@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.trusted.space.sector_rows import Row
-    from enumsol.trusted.space.solution_curve import CurveBox
+    from enumsol.trusted.space.solution_curve import AlphaProblem, CurveBox
 
     Array = NDArray[np.float64]
 
@@ -89,6 +89,34 @@ class AlphaPiece:
             found[(1 + k) * p + nodes] = Ball(part.mid * force[nodes], part.rad * force[nodes] + TINY)
         return found
 
+    def displacements(self, y: Ball, w: Ball) -> Ball:
+        """The same of displacements w, (3p,), at all alpha of the piece."""
+        system, (_, length), p = self.whole, self.units, len(self.units[0])
+        found = Ball(np.zeros(3 * p), np.zeros(3 * p))
+        found[:p] = Ball(w.mid[:p] * length, w.rad[:p] * length + TINY)
+        for k in (0, 1):
+            nodes = np.flatnonzero(system.tau[:, k] >= 0)
+            F = Ball(system.F[nodes, k], system.F_rad[nodes, k])
+            size = length[nodes]
+            part = w[system.tau[nodes, k]] * _inverse(F)
+            found[(1 + k) * p + nodes] = Ball(part.mid * size, part.rad * size + TINY)
+        # where there is no friction they follow from the forces
+        missing = np.concatenate([(1 + k) * p + np.flatnonzero(system.tau[:, k] < 0) for k in (0, 1)])
+        if len(missing):
+            data = self.enclosure
+            S, g0, g1 = Ball(data.S, data.S_rad), Ball(data.g0, data.g0_rad), Ball(data.g1, data.g1_rad)
+            pushed = (S[missing] @ self.forces(y)[:, None])[:, 0]
+            found[missing] = g0[missing] + self.alphas * g1[missing] - pushed
+        return found
+
+    @cached_property
+    def alphas(self) -> Ball:
+        """All alpha of the piece."""
+        middle = float(self.middle)
+        # the middle as a float, and ends rounded outwards
+        off = max(self.high - Fraction(middle), Fraction(middle) - self.low)
+        return Ball(np.array(middle), np.array(float(off) * (1.0 + 4 * UNIT) + TINY))
+
     def held(self, codes: Sequence[int]) -> SpaceRoot | Open | None:
         """What a leaf holds at every alpha of the piece: exactly one root, none (None), or it is not settled."""
         return settle(self.whole, codes)
@@ -112,28 +140,34 @@ class AlphaPiece:
         """The middle alone."""
         return AlphaPiece(self.enclosure, self.middle, self.middle, self.units)
 
-    def meets(self, codes: Sequence[int], box: CurveBox, errors: float = 1.0) -> bool:
+    def meets(self, codes: Sequence[int], given: AlphaProblem, box: CurveBox, errors: float = 1.0) -> bool:
         """Whether the roots of a leaf, one at every alpha, are an arc that is in a box at the middle of the piece."""
         if not isinstance(self.held(codes), SpaceRoot):
             return False
         there = self.point.held(codes)
-        return isinstance(there, SpaceRoot) and self.point.lies_in(there.y, box, errors)
+        return isinstance(there, SpaceRoot) and self.point.lies_in(self.point.place(there, given), box, errors)
 
-    def holds_all(self, codes: Sequence[int], box: CurveBox, errors: float = 1.0) -> bool:
+    def holds_all(self, codes: Sequence[int], given: AlphaProblem, box: CurveBox, errors: float = 1.0) -> bool:
         """Whether all roots of a leaf are in a box, at every alpha of the piece."""
         found = self.held(codes)
-        return found is None or (found.y is not None and self.lies_in(found.y, box, errors))
+        place = None if found is None else self.place(found, given)
+        return found is None or self.lies_in(place, box, errors)
 
-    def lies_in(self, y: Ball, box: CurveBox, errors: float = 1.0) -> bool:
-        """Whether all points with these scaled forces and an alpha of the piece lie in a box around a curve.
+    def place(self, found: SpaceRoot | Open, given: AlphaProblem) -> Ball | None:
+        """Bounds of (zeta, alpha) of what a leaf holds, (3p + 1,); None where there are none."""
+        if found.y is None or found.w is None:
+            return None
+        zeta = given.coordinates(self.forces(found.y), self.displacements(found.y, found.w))
+        return Ball.joined(zeta, self.alphas[None])
+
+    def lies_in(self, place: Ball | None, box: CurveBox, errors: float = 1.0) -> bool:
+        """Whether all points within bounds lie in a box around a curve.
 
         A point x lies in it if |t| <= h and |x - c - t d| <= b, t = e'(x - c); see ``CurveBox``.
         """
-        middle = float(self.middle)
-        # the middle as a float, and ends rounded outwards
-        off = max(self.high - Fraction(middle), Fraction(middle) - self.low)
-        alpha = Ball(np.array([middle]), np.array([float(off) * (1.0 + 4 * UNIT) + TINY]))
-        x = Ball.joined(self.forces(y), alpha) - Ball.exact(box.centre)
+        if place is None:
+            return False
+        x = place - Ball.exact(box.centre)
         share = 1.0 - (errors - 1.0) * _MARGIN
         d, e, n = box.direction, box.border, len(box.centre)
         along = (Ball.exact(e[None, :]) @ x[:, None])[0, 0]
@@ -143,3 +177,10 @@ class AlphaPiece:
         turn = Ball.exact(np.eye(n)) - Ball.exact(d[:, None]) * Ball.exact(e[None, :])
         beside = (turn @ x[:, None])[:, 0]
         return bool(np.all(beside.size * SAFE <= share * box.radius))
+
+
+def _inverse(F: Ball) -> Ball:
+    """1 / F of positive numbers."""
+    inverse = 1.0 / F.mid
+    # |1 / x - 1 / m| = |x - m| / (x m)
+    return Ball(inverse, (F.rad / (F.mid - F.rad) * inverse + 4 * UNIT * inverse) * SAFE)

@@ -39,7 +39,7 @@ OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS, CONTACT, UNDECIDED = range(7)
 #: Kinds of rows (theory, section 12.2); a row is (kind, node, number), the number that of a direction or sector.
 GAP, FORCE, TAU, SLIP, END, ALONG, TANGENT, CHORD, LEFT, RIGHT = range(10)
 #: Rows in which lambda_n has the radius of the disc as a factor.
-_OF_DISCS = END, TANGENT, CHORD
+OF_DISCS = END, TANGENT, CHORD
 FORBIDDEN, NONNEGATIVE, FREE = range(3)
 Row = tuple[int, int, int]
 #: Rows whose terms and signs are kept: the same ones occur in many exclusions.
@@ -173,7 +173,7 @@ class Multiplied:
             for i, coefficient in zip(*_terms(row, *tau[node], size), strict=True):
                 # a power of two: nothing is rounded but what underflows, which is less than TINY
                 factor = coefficient * units[i]
-                if i == node and row[0] in _OF_DISCS:
+                if i == node and row[0] in OF_DISCS:
                     unsure[i] += abs(value * factor) * known[node]
                     factor *= discs[node]
                 term = value * factor

@@ -13,11 +13,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, determinant_sign, upper_norm
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, determinant_sign, solution, upper_norm
 from enumsol.condensation.condensed import node_units
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.model.sectors import SECTORS
-from enumsol.trusted.space.natural_map import MARGIN, Corners, Discs, Step, middle_inverse, split_off, upper_product
+from enumsol.trusted.space.natural_map import (
+    MARGIN,
+    Corners,
+    Directions,
+    Discs,
+    Step,
+    middle_inverse,
+    split_off,
+    upper_product,
+)
 from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, STICK
 
 if TYPE_CHECKING:
@@ -41,17 +50,19 @@ _ROOMS, _LEAST, _STEPS = (1.2, 1.3, 1.5, 1.5, 1.5, 1.5, 1.5), 1e-3, 8
 #: Radii that are as large as they may be are sought between those that are needed and the box's length: shares of the
 #: logarithm.
 _SHARES = (1.0, 0.5, 0.25, 0.0)
+#: Loads whose exponents are larger have no unit of their own.
+_LARGEST = 200
 #: Factors of the steps of the natural map at a node that changes its status.
 _FACTORS = (1.0, 4.0, 16.0, 64.0, 256.0, 0.25, 0.0625, 0.015625)
 
 
 @dataclass(frozen=True, eq=False)
 class CurveBox:
-    """All x = (lambda_n, both lambda_t, alpha) with |t| <= half and |x - centre - t direction| <= radius.
+    """All x = (zeta, alpha) with |t| <= half and |x - centre - t direction| <= radius.
 
-    Here t = border (x - centre). All arrays have shape (3p + 1,), in the problem's units, all normals first, but for
-    ``rho``, (3p,): steps of the natural map relative to those of AlphaProblem, positive. What is said does not depend
-    on them.
+    zeta are the coordinates of AlphaProblem and t = border (x - centre). All arrays have shape (3p + 1,), in the units
+    of forces, all normals first, but for ``rho``, (3p,): steps of the natural map relative to those of AlphaProblem,
+    positive. What is said does not depend on them.
     """
 
     centre: Array
@@ -67,18 +78,25 @@ class AlphaProblem:
     """A problem in 3D for all alpha, as balls: q w = g0 + alpha g1 - S y, and y / q in discs (F0 + alpha F1) lambda_n.
 
     q is 1 but for the second component of nodes with two coefficients that are not the same: then it is their ratio,
-    which must not depend on alpha.
+    which must not depend on alpha. Solutions are looked for in the coordinates zeta = y / q - rho q w, with the steps
+    rho of the natural map (theory, section 12.8).
 
     Attributes
     ----------
     S, g0, g1 : Balls of shapes (3p, 3p), (3p,) and (3p,), in units of the nodes
     F0, F1 : (p,) arrays
         Exact, those of the first component that has friction.
-    inverse : Ball of shape (3p,)
-        1 / q.
+    ratio, inverse : Balls of shape (3p,)
+        q and 1 / q.
     tau : places of the tau of every node, none, one or two
-    force : (3p,) array, powers of two
-        Forces of the problem are as many times those here.
+    force, length : (3p,) arrays, powers of two
+        Forces and displacements of the problem are as many times those here.
+    rho : (3p,) array
+        Steps of the natural map: one for lambda_n and one for tau of every node.
+    turned : Ball of shape (3p, 3p)
+        1 + rho S q, by which y / q is multiplied in zeta.
+    part, offset : Balls of shapes (3p, 3p + 1) and (3p,)
+        y / q is part (zeta, alpha) + offset.
     """
 
     S: Ball
@@ -86,13 +104,21 @@ class AlphaProblem:
     g1: Ball
     F0: Array
     F1: Array
+    ratio: Ball
     inverse: Ball
     tau: Sequence[NDArray[np.intp]]
     force: Array
+    length: Array
+    rho: Array
+    turned: Ball
+    part: Ball
+    offset: Ball
 
     @classmethod
-    def of(cls, enclosure: CondensedEnclosure) -> AlphaProblem:
+    def of(cls, enclosure: CondensedEnclosure, steps: Array | None = None) -> AlphaProblem:
         """Of a problem whose nodes have coefficients with the same ratio for all alpha.
+
+        ``steps``: positive, (3p,), rho in the units of the problem (force / length); by default some that serve.
 
         Raises
         ------
@@ -114,8 +140,8 @@ class AlphaProblem:
             ratio.mid[2 * p + i], ratio.rad[2 * p + i] = float(q), 0.0 if exact else 2 * UNIT * abs(float(q))
         first = np.where(occurs[0], 0, 1), np.arange(p)
         factor = np.tile(node_units(enclosure.S, p), 3)
-        # the size of the load does not matter
-        force, length = factor, 1.0 / factor
+        size = _power(np.max(np.maximum(np.abs(enclosure.g0), np.abs(enclosure.g1)) * factor))
+        force, length = factor * size, size / factor
         with np.errstate(over="ignore", invalid="ignore"):
             pair = force[:, None] / length[None, :]
             S = ratio[:, None] * Ball(enclosure.S * pair, enclosure.S_rad * pair + TINY)
@@ -126,21 +152,25 @@ class AlphaProblem:
         if not (S.finite and g0.finite and g1.finite):
             raise NotEnclosedError("the condensed problem over- or underflows float64; expected data in other units")
         tau = [np.array([(1 + k) * p + i for k in range(2) if occurs[k, i]], dtype=np.intp) for i in range(p)]
-        return cls(S, g0, g1, coefficients[first], slopes[first], inverse, tau, force)
+        rho = _steps(S.mid / inverse.mid, tau) if steps is None else steps / (force / length)
+        turned = Ball.exact(rho[:, None]) * S * ratio + Ball.exact(np.eye(3 * p))
+        right = Ball.exact(rho)[:, None] * Ball(np.column_stack([g1.mid, g0.mid]), np.column_stack([g1.rad, g0.rad]))
+        found = solution(turned, _beside(Ball.exact(np.eye(3 * p)), right))
+        if found is None:
+            raise NotEnclosedError("forces and displacements of the condensed problem cannot be told apart")
+        part, offset = found[:, : 3 * p + 1], found[:, 3 * p + 1]
+        F0, F1 = coefficients[first], slopes[first]
+        return cls(S, g0, g1, F0, F1, ratio, inverse, tau, force, length, rho, turned, part, offset)
 
     @property
     def p(self) -> int:
         """Number of contact nodes."""
         return len(self.F0)
 
-    @cached_property
-    def rho(self) -> Array:
-        """Steps of the natural map, (3p,): one for lambda_n and one for tau of every node."""
-        S = self.S.mid / self.inverse.mid
-        rho = np.sqrt(np.diagonal(np.linalg.inv(S)) / np.diagonal(S))
-        for t in self.tau:
-            rho[t] = np.min(rho[t], initial=np.inf)
-        return rho
+    @property
+    def steps(self) -> Array:
+        """rho in the units of the problem, (3p,), which are powers of two times those here."""
+        return np.asarray(self.rho * (self.force / self.length))
 
     @cached_property
     def places(self) -> NDArray[np.intp]:
@@ -148,26 +178,98 @@ class AlphaProblem:
         return np.array([[*t, -1, -1][:2] for t in self.tau], dtype=np.intp)
 
     @cached_property
-    def part(self) -> Ball:
-        """The derivative of y / q, (3p, 3p)."""
-        return Ball(np.diag(self.inverse.mid), np.diag(self.inverse.rad))
-
-    @cached_property
     def plain_moves(self) -> Array:
         """Middle of ``moves`` for the steps of the natural map as they are."""
-        return self.moves(self.rho).mid
+        return self.moves(np.ones(3 * self.p)).mid
 
     def moves(self, rho: Array) -> Ball:
-        """The derivative of (z, alpha) with respect to (y, alpha), (3p + 1, 3p + 1)."""
+        """The derivative of (z, alpha) with respect to (zeta, alpha), (3p + 1, 3p + 1), for steps relative to its own.
+
+        z = y / q + rho' q w is (1 + r) y / q - r zeta where rho' is r times the step of zeta.
+        """
         m = 3 * self.p
         out = Ball(np.eye(m + 1), np.zeros((m + 1, m + 1)))
-        out[:m, :m] = self.part - self.S * Ball.exact(rho[:, None])
-        out[:m, m] = Ball.exact(rho) * self.g1
+        out[:m] = Ball.exact(1.0 + rho)[:, None] * self.part - Ball.exact(rho[:, None] * np.eye(m, m + 1))
         return out
+
+    def forces_at(self, x: Ball) -> Ball:
+        """y / q at points (zeta, alpha)."""
+        m = 3 * self.p
+        near = Ball.exact(self.part.mid @ x.mid + self.offset.mid)
+        # with what is rounded there as the right-hand side
+        missing = x[:m] + Ball.exact(self.rho) * (self.g0 + x[m] * self.g1) - (self.turned @ near[:, None])[:, 0]
+        return near + (self.part[:, :m] @ missing[:, None])[:, 0]
+
+    def arguments(self, x: Ball, y: Ball, rho: Array) -> Ball:
+        """z at points (zeta, alpha) with forces y / q, for steps relative to its own."""
+        return Ball.exact(1.0 + rho) * y - Ball.exact(rho) * x[: len(rho)]
+
+    # -- coordinates -----------------------------------------------------------------------------------------------
+
+    def coordinates(self, forces: Ball, w: Ball) -> Ball:
+        """zeta of forces and displacements, all in the units of the problem."""
+        force, step = Ball.exact(self.force), Ball.exact(self.rho)
+        y, v = forces * Ball.exact(1.0 / self.force), w * Ball.exact(1.0 / self.length)
+        return force * (self.inverse * y - step * (self.ratio * v))
+
+    def placed(self, x: Array) -> Array:
+        """(zeta, alpha) of forces and alpha, (..., 3p + 1), in floats."""
+        y = x[..., :-1] / self.force
+        w = self.g0.mid + x[..., -1:] * self.g1.mid - y @ self.S.mid.T
+        return np.append((self.inverse.mid * y - self.rho * w) * self.force, x[..., -1:], axis=-1)
+
+    def unplaced(self, x: Array) -> Array:
+        """Forces and alpha of (zeta, alpha), (..., 3p + 1), in floats."""
+        q, unit = self.ratio.mid, np.append(self.force, 1.0)
+        y = (x / unit) @ self.part.mid.T + self.offset.mid
+        return np.append(y * q * self.force, x[..., -1:], axis=-1)
+
+    @cached_property
+    def _turn(self) -> Array:
+        """The derivative of (zeta, alpha) with respect to forces and alpha, in floats."""
+        force, m = self.force, 3 * self.p
+        J = np.eye(m + 1)
+        S = self.S.mid * (self.rho * force)[:, None] / force
+        J[:m, :m], J[:m, m] = np.diag(self.inverse.mid) + S, -self.rho * self.g1.mid * force
+        return J
+
+    def border_of_forces(self, border: Array) -> Array:
+        """The row by (forces, alpha) of one by (zeta, alpha), (..., 3p + 1), in floats."""
+        return np.asarray(border @ self._turn)
+
+    def border_of_zeta(self, border: Array) -> Array:
+        """The row by (zeta, alpha) of one by (forces, alpha), (3p + 1,), in floats."""
+        return np.asarray(np.linalg.solve(self._turn.T, border))
 
     def friction(self, alpha: Ball) -> Ball:
         """Coefficients for all alpha of a ball, (p,)."""
         return Ball.exact(self.F0) + alpha * Ball.exact(self.F1)
+
+    def past(self, z: Ball, along: Ball, half: float, side: Array) -> Ball:
+        """Bounds of |z_t| - F z_n of every node, (p,), at all (z, alpha) + t along + s with |t| <= half, |s| <= side.
+
+        By derivatives, so that changes of |z_t| and of F z_n along t cancel; without bounds where z_t may vanish.
+        """
+        p, m = self.p, 3 * self.p
+        near = Ball(z.mid, (z.rad + along.size * half + side) * SAFE)
+        plain = Discs(self.places, self.friction(near[m]), Ball.exact(self.F1))
+        F1 = Ball.exact(self.F1)
+        with np.errstate(all="ignore"):
+            at = Directions.of(plain.tangents(near[:m]))
+        known = (at.least > 0) & (plain.F.mid > plain.F.rad * SAFE)
+        e, pushed = Ball(at.e, np.where(known[:, None], at.turn, 0.0)), F1 * near[:p]
+        slope = -(plain.F * along[:p]) - pushed * along[m]
+        moved = plain.F.size * side[:p] + pushed.size * side[m]
+        for k in (0, 1):
+            has = self.places[:, k] >= 0
+            there, rate = self.places[has, k], e[has, k]
+            slope[has] = slope[has] + rate * along[there]
+            moved[has] += rate.size * side[there]
+        tangent = plain.tangents(z[:m])
+        length = np.linalg.norm(tangent.mid, axis=1)
+        length = Ball(length, (upper_norm(tangent.rad, axis=1) + 8 * UNIT * length) * SAFE + TINY)
+        here = length - self.friction(z[m]) * z[:p] + Ball(np.zeros(p), np.full(p, half)) * slope
+        return Ball(here.mid, np.where(known & np.isfinite(here.mid), (here.rad + moved) * SAFE + TINY, np.inf))
 
     def status(self, z: Ball, i: int) -> int | None:
         """The status that a node has strictly at all arguments (z, alpha) of P, if it has one."""
@@ -185,6 +287,23 @@ class AlphaProblem:
         if F_low > 0 and most < F_low * low / SAFE:
             return STICK
         return SLIP if least > max(F_high, 0.0) * high * SAFE else None
+
+
+def _steps(S: Array, tau: Sequence[NDArray[np.intp]]) -> Array:
+    rho = np.sqrt(np.diagonal(np.linalg.inv(S)) / np.diagonal(S))
+    for t in tau:
+        rho[t] = np.min(rho[t], initial=np.inf)
+    return rho
+
+
+def _power(size: float) -> float:
+    """The power of two next to a size; 1 where a load of it may over- or underflow with others."""
+    exponent = float(np.round(np.log2(size))) if size > 0 else 0.0
+    return float(2.0**exponent) if abs(exponent) < _LARGEST else 1.0
+
+
+def _beside(one: Ball, other: Ball) -> Ball:
+    return Ball(np.hstack([one.mid, other.mid]), np.hstack([one.rad, other.rad]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -301,10 +420,14 @@ def curve_around(
     """
     with np.errstate(all="ignore"):
         rho = np.ones(3 * problem.p)
-        for i in changing:
+        # all nodes alike, then each of them by itself
+        for nodes in [changing, *([[i] for i in changing] if len(changing) > 1 else [])]:
+            if not len(nodes):
+                continue
+            tau = [int(t) for i in nodes for t in problem.tau[i]]
             found: list[tuple[float, Array]] = []
             for factor in _FACTORS:
-                for places in ([i], problem.tau[i], [i, *problem.tau[i]]):
+                for places in (list(nodes), tau, [*nodes, *tau]):
                     other = rho.copy()
                     other[places] *= factor
                     found.append((_CurveMap(problem, x, direction, border, half, other).turned(), other))
@@ -331,15 +454,15 @@ def curve_point(problem: AlphaProblem, x: Array, border: Array) -> CurvePoint | 
     asked[m, 1] = 1.0
     with np.errstate(all="ignore"):
         for _ in range(_STEPS):
-            y, alpha = problem.inverse.mid * x[:m], Ball.exact(x[m])
-            z = Ball.exact(y + problem.rho * (problem.g0.mid + x[m] * problem.g1.mid - problem.S.mid @ x[:m]))
+            y, alpha = problem.part.mid @ x + problem.offset.mid, Ball.exact(x[m])
+            z = Ball.exact(2.0 * y - x[:m])
             discs = Discs(problem.places, Ball.exact(problem.friction(alpha).mid), Ball.exact(problem.F1))
             corners = discs.corners(z)
             if corners is None:
                 return None
             M = problem.plain_moves
             asked[:m, 0] = discs.projected(z).mid - y
-            B = np.vstack([np.eye(m, m + 1) * np.append(problem.inverse.mid, 1.0) - corners.core.mid @ M, row])
+            B = np.vstack([problem.part.mid - corners.core.mid @ M, row])
             try:
                 found = np.linalg.solve(B, asked)
             except np.linalg.LinAlgError:
@@ -415,16 +538,13 @@ class _CurveMap:
         self, problem: AlphaProblem, centre: Array, direction: Array, border: Array, half: float, rho: Array
     ) -> None:
         self.problem, self.half, self.rho = problem, half, rho
-        steps = problem.rho * rho
         self.unit = np.append(problem.force, 1.0)
         self.c, self.d, self.e = centre / self.unit, direction / self.unit, border * self.unit
-        m = 3 * problem.p
-        self.Z = problem.moves(steps)
-        y = problem.inverse * Ball.exact(self.c[:m])
-        self.alpha = Ball.exact(self.c[m])
-        w = problem.g0 + self.alpha * problem.g1 - (problem.S @ Ball.exact(self.c[:m, None]))[:, 0]
-        self.z = y + Ball.exact(steps) * w
-        self.y = y
+        self.Z = problem.moves(rho)
+        x = Ball.exact(self.c)
+        self.alpha = x[-1]
+        self.y = problem.forces_at(x)
+        self.z = problem.arguments(x, self.y, rho)
         self.zd = (self.Z @ Ball.exact(self.d)[:, None])[:, 0]
 
     # -- boxes -----------------------------------------------------------------------------------------------------
@@ -432,7 +552,9 @@ class _CurveMap:
     def turned(self) -> float:
         """How far corners are from being too wide for the test: less than 1 where they are not."""
         step = self.step(self.zd.size * self.half)
-        return np.inf if step is None else float(np.max(step.slopes, initial=0.0))
+        if step is None or not np.all(np.isfinite(step.slopes)):
+            return np.inf
+        return float(np.max(np.abs(np.linalg.eigvals(step.slopes)), initial=0.0))
 
     def proposed(self, *, roomy: bool) -> SolutionCurve | None:
         """The curve in a box with radii of about what it needs, or as large as they may be."""
@@ -498,6 +620,12 @@ class _CurveMap:
         z = Ball.joined(self.z, self.alpha[None])
         return Ball(z.mid, (z.rad + wide) * SAFE)
 
+    def past(self, wide: Array) -> Ball:
+        """Bounds of |z_t| - F z_n at c + t d + b where ``wide`` bounds what both change of (z, alpha)."""
+        straight = self.zd.size * self.half
+        side = np.maximum(wide - straight, 0.0) + 4 * UNIT * (wide + straight)
+        return self.problem.past(Ball.joined(self.z, self.alpha[None]), self.zd, self.half, side)
+
     def step(self, wide: Array) -> Step | None:
         """Krawczyk's operator where (z, alpha) is no farther from that of c.
 
@@ -506,7 +634,8 @@ class _CurveMap:
         m = len(self.c) - 1
         near = self.along(wide)
         F1 = Ball.exact(self.problem.F1)
-        corners = Discs(self.problem.places, self.problem.friction(near[m]), F1).corners(near[:m])
+        past = self.past(wide)
+        corners = Discs(self.problem.places, self.problem.friction(near[m]), F1).corners(near[:m], past)
         if corners is None:
             return None
         B = self._bordered(corners)
@@ -527,8 +656,4 @@ class _CurveMap:
         return Step(move, E, G, V, Y, rest.size, first, (np.abs(along) + pushed) * SAFE)
 
     def _bordered(self, corners: Corners) -> Ball:
-        m = len(self.c) - 1
-        M = Ball(np.zeros((m, m + 1)), np.zeros((m, m + 1)))
-        M[:, :m] = self.problem.part
-        M = M - corners.core @ self.Z
-        return Ball.joined(M, Ball.exact(self.e[None]))
+        return Ball.joined(self.problem.part - corners.core @ self.Z, Ball.exact(self.e[None]))
