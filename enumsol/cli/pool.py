@@ -6,16 +6,27 @@ import multiprocessing
 import os
 import signal
 import threading
+import time
 from concurrent.futures import BrokenExecutor, Executor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from multiprocessing.connection import wait as wait_for
 from typing import TYPE_CHECKING, Any
 
 import loky
 
+from enumsol.support.deadlines import heard_by, listening
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from concurrent.futures import Future
+    from multiprocessing.connection import Connection
+
+    from enumsol.support.deadlines import Listener
+
+#: A task tells what it is at once it has taken so long, and no more often than this [seconds].
+_QUIET, _PAUSE = 2.0, 1.0
+#: Characters of what a task tells: a message is written to the pipe in one piece.
+_LONGEST = 200
 
 
 class RenewedPool(Executor):
@@ -30,6 +41,10 @@ class RenewedPool(Executor):
     def __init__(self, jobs: int) -> None:
         self._max_workers = jobs
         self._pool: Any = None
+        #: What workers tell, and who hears it: whoever listened when the last task was submitted.
+        self._told, self._channel = multiprocessing.Pipe(duplex=False)
+        self._listener: Listener | None = None
+        threading.Thread(target=self._hear, daemon=True).start()
 
     def renew(self) -> None:
         """Start the processes, in the place of those that were there.
@@ -44,7 +59,9 @@ class RenewedPool(Executor):
         with _ignoring_interrupts():
             # spawned, not forked: a progress bar runs in a thread of its own
             context = multiprocessing.get_context("spawn")
-            self._pool = loky.ProcessPoolExecutor(self._max_workers, context=context, initializer=_end_with_parent)
+            self._pool = loky.ProcessPoolExecutor(
+                self._max_workers, context=context, initializer=_begin, initargs=(self._channel,)
+            )
             try:
                 self._pool.submit(int)  # all start with the first task
             except BrokenExecutor:
@@ -65,8 +82,24 @@ class RenewedPool(Executor):
         """
         if self._pool is None:
             raise BrokenExecutor("there are no processes")
-        future: Future[Any] = self._pool.submit(function, *arguments, **named)
+        self._listener = listening()
+        future: Future[Any] = self._pool.submit(_telling, function, *arguments, **named)
         return future
+
+    def _hear(self) -> None:
+        """Pass on what workers tell, so that their pipe never fills, until the pool is shut down."""
+        while (message := self._told.recv()) is not None:
+            listener = self._listener
+            if listener is not None:
+                listener(*message)
+        self._told.close()
+
+    def __exit__(self, *error: object) -> None:
+        """Shut down for good."""
+        self.shutdown()
+        self._listener = None
+        self._channel.send(None)
+        self._channel.close()
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = True) -> None:
         """End the processes at once, whatever they do."""
@@ -75,11 +108,30 @@ class RenewedPool(Executor):
             self._pool = None
 
 
-def _end_with_parent() -> None:
-    """In a worker: do not outlive the process that started it, which may be killed."""
+#: In a worker: where it tells what it is at.
+_to_parent: list[Connection] = []
+
+
+def _begin(channel: Connection) -> None:
+    """In a worker: tell the process that started it, and do not outlive it, which may be killed."""
+    _to_parent.append(channel)
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_wait_and_end, args=(parent.sentinel,), daemon=True).start()
+
+
+def _telling(function: Callable[..., Any], *arguments: Any, **named: Any) -> Any:
+    """In a worker: a task, which tells what it is at if it takes long."""
+    due = [time.monotonic() + _QUIET]
+
+    def told(work: str, done: int, of: int) -> None:
+        if time.monotonic() >= due[0]:
+            due[0] = time.monotonic() + _PAUSE
+            with suppress(OSError):  # the process that listened has ended
+                _to_parent[0].send((f"{work[:_LONGEST]} in a worker", done, of))
+
+    with heard_by(told if _to_parent else None):
+        return function(*arguments, **named)
 
 
 def _wait_and_end(sentinel: int) -> None:

@@ -28,7 +28,7 @@ from enumsol.search.form_policy import Forms
 from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
 from enumsol.search.splitting import ImposedRows, PlaneSplitting, Splitting, branching_node
 from enumsol.selections.solution import Codes
-from enumsol.support.deadlines import Deadline, TimeOverError, over, within
+from enumsol.support.deadlines import Deadline, TimeOverError, over, tell, within
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -386,9 +386,12 @@ class TreeSearch:
         return outcome.stopped is not None
 
     def report(self, covered: float) -> None:
-        """Call the progress callback."""
-        if self.progress is not None:
-            outcome, seconds = self.outcome, time.perf_counter() - self._start
+        """Call the progress callback; without one, tell how many nodes were examined."""
+        outcome = self.outcome
+        if self.progress is None:
+            tell(f"{outcome.nodes:,} nodes")
+        else:
+            seconds = time.perf_counter() - self._start
             self.progress(SearchProgress(outcome.nodes, covered, len(outcome.solutions), seconds, outcome.resumed))
 
     # -- relaxations -----------------------------------------------------------------------------------------------

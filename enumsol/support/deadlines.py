@@ -155,6 +155,11 @@ def tell(work: str, done: int = 0, of: int = 0) -> None:
         listener(work, done, of)
 
 
+def listening() -> Listener | None:
+    """Whoever hears what is told here, for work that is done elsewhere."""
+    return _listener.get()
+
+
 def tell_part(part: str) -> Listener | None:
     """A listener for a part of the work, which puts the part's name behind what it hears; None where nobody listens."""
     listener = _listener.get()

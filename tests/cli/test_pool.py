@@ -36,6 +36,40 @@ def test_leaving_never_waits(call, wait, tmp_path):
     assert done.returncode == 0, done.stderr
 
 
+TOLD = """
+import time
+from enumsol.cli.common import workers
+from enumsol.support.deadlines import heard_by, tell
+
+def work(seconds):
+    start = time.monotonic()
+    while time.monotonic() < start + seconds:
+        tell("columns", 3, 40)
+        time.sleep(0.05)
+
+if __name__ == "__main__":
+    heard = []
+    with workers(2) as pool:
+        pool.submit(work, 2.5).result()  # nobody listens
+        with heard_by(lambda *told: heard.append(told)):
+            pool.submit(work, 0.5).result()
+            assert not heard
+            pool.submit(work, 4.5).result()
+    print(set(heard), len(heard))
+"""
+
+
+@pytest.mark.slow
+def test_what_a_worker_is_at_is_heard_if_it_takes_long(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text(TOLD)
+    done = subprocess.run([sys.executable, script], capture_output=True, timeout=100, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    what, count = done.stdout.rsplit(" ", 1)
+    assert what == "{('columns in a worker', 3, 40)}"
+    assert 1 <= int(count) <= 3
+
+
 def test_a_system_that_starts_no_more_processes(monkeypatch):
     started = multiprocessing.popen_spawn_posix.Popen.__init__
     processes = []
