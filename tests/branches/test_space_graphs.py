@@ -11,13 +11,14 @@ import pytest
 from problems3d import SLIDING, OneNode, forces, random_over_alpha, sliding_node
 
 import enumsol
+from enumsol.arithmetic.balls import Ball
 from enumsol.branches.elements import VertexKind
 from enumsol.branches.space.chains import chain_through
 from enumsol.branches.space.make_curved import unordered
 from enumsol.branches.space.pieces import Run, Turn, orders, runs_and_turns
 from enumsol.trusted.space.curve_events import CurveMotion
 from enumsol.trusted.space.sector_rows import OPEN, STICK
-from enumsol.trusted.space.solution_curve import SLIP, AlphaProblem
+from enumsol.trusted.space.solution_curve import SLIP, AlphaProblem, curve_point
 
 #: SLIDING sticks as soon as alpha is the length of (3/2, 1).
 STUCK = sqrt(3.25)
@@ -238,6 +239,11 @@ def test_both_nodes_of_a_symmetric_wedge_change_their_status_at_one_fold():
     assert parts[1].settled
     assert set(parts[1].selections) == {(SLIP, SLIP), (STICK, STICK)}
     assert high - low < 1e-8
+    # the box of the corner: its curve bends away from the line in its middle, and what is beside it is not held
+    corner = next(link.curve for link in chain.links if None in link.curve.statuses)
+    point = curve_point(given, corner.at(0.0).mid, corner.box.border)
+    assert corner.holds(Ball.exact(point.x))
+    assert not corner.holds(Ball.exact(point.x + 0.1 * given.unplaced(point.x)))
     away = Fraction(1, 10**5)
     counts = [len(enumsol.enumerate_roots(problem, alpha)) for alpha in (low - away, high + away)]
     assert counts == [1, 3]

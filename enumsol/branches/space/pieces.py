@@ -319,7 +319,7 @@ class LinkCutter:
         if near is None:
             return None
         point = curve_around(self.problem, near.x, near.direction, self.border, 0.0, roomy=False)
-        if point is None or None in point.statuses or not lies_in(self.curve.box, point.at(0.0)):
+        if point is None or None in point.statuses or not self.curve.holds(point.at(0.0)):
             return None
         return self._place(point)
 

@@ -343,6 +343,22 @@ class SolutionCurve:
         point = Ball.exact(self.box.centre) + where * Ball.exact(self.box.direction)
         return Ball(point.mid, (point.rad + self.spread) * SAFE)
 
+    def holds(self, x: Ball) -> bool:
+        """Whether all points of a ball lie in the set in which the curve has the only solution for every t.
+
+        It is larger than the box where nodes change their status: the curve bends there by more than the radius.
+        """
+        if lies_in(self.box, x):
+            return True
+        found, t = self.found, self.parameter(x)
+        G, unit = found.step.G.mid, Ball.exact(1.0 / found.near.unit)
+        if not (G.shape[1] and t.size <= self.box.half):
+            return False
+        beside = unit * ((x - Ball.exact(self.box.centre)) - t * Ball.exact(self.box.direction))
+        shares = np.clip(np.linalg.lstsq(G, beside.mid)[0], -found.shares, found.shares)
+        rest = beside - (Ball.exact(G) @ Ball.exact(shares[:, None]))[:, 0]
+        return bool(np.all(rest.size <= found.radius))
+
     def parameter(self, x: Ball) -> Ball:
         """Bounds of t at points within a ball."""
         return parameter_in(self.box, x)
