@@ -55,7 +55,7 @@ def beyond_rationals():
 
 def nearly_singular():
     A = np.array([[1.0, 1.0 - 2.0**-46], [1.0 - 2.0**-46, 1.0]])
-    return ContactProblem(A, [[1, 0]], [[0, 1]], [1.5, -4.0], friction=0.5), 0.0
+    return ContactProblem(A, [[1, 0]], [[0, 1]], [1.0, -1.0], friction=0.5), 0.0
 
 
 PROBLEMS = {
