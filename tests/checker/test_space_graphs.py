@@ -108,6 +108,8 @@ def mutants(records, rng, count):
             found[k] = found[k][:1] if found[k][0] == "n" else found[k]
         elif isinstance(found[k], list) and found[k][0] == "b":
             found[k][2] = [code + int(rng.integers(-1, 2)) for code in found[k][2]]
+        elif rng.random() < 0.5:
+            found[0]["steps"][int(rng.integers(len(found[0]["steps"])))] *= float(10 ** rng.uniform(-2, 2))
         else:
             found[0]["interval"] = [
                 str(Fraction(int(rng.integers(-3, 1)), 2)),
