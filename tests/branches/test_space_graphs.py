@@ -13,6 +13,7 @@ from problems3d import SLIDING, OneNode, forces, random_over_alpha, sliding_node
 import enumsol
 from enumsol.arithmetic.balls import Ball
 from enumsol.branches.elements import VertexKind
+from enumsol.branches.space import cover
 from enumsol.branches.space.chains import chain_through
 from enumsol.branches.space.make_curved import unordered
 from enumsol.branches.space.pieces import Run, Turn, orders, runs_and_turns
@@ -74,6 +75,30 @@ def test_roots_within_the_bounds_of_a_vertex_are_undecided(graph):
     assert not found.complete
     assert len(found.undecided) == 1
     assert found.at_least == 1
+
+
+@pytest.mark.slow
+def test_the_only_solutions_of_pieces_lie_on_a_curve_that_passes_all_of_them():
+    problem = enumsol.gallery.block3d(1, 1, 1)
+    graph = enumsol.branch_graph(problem, (0.5, 1.0))
+    report = enumsol.verify(problem, graph.proof)
+    assert graph.complete
+    assert report.complete
+    assert (report.curves, len(graph.branches)) == (1, 1)
+    assert report.single > 0
+    for alpha in (0.5, 0.7, 1.0):
+        found, known = graph.roots_at(alpha), enumsol.enumerate_roots(problem, alpha)
+        assert found.complete
+        assert [root.statuses for root in found] == [root.statuses for root in known]
+        assert found[0].lambda_t == pytest.approx(known[0].lambda_t, abs=1e-9)
+
+
+def test_without_such_a_curve_that_they_are_the_only_ones_makes_no_graph(monkeypatch):
+    problem = enumsol.gallery.block3d(1, 1, 1)
+    monkeypatch.setattr(cover, "chain_through", lambda *_: None)
+    graph = enumsol.branch_graph(problem, (0.5, 1.0), max_nodes=40)
+    assert not graph.complete
+    assert (graph.arcs, graph.at_least(0.75)) == ((), 1)
 
 
 def test_its_proof_is_verified(graph):

@@ -50,11 +50,11 @@ class SpaceCover:
     problem : ContactProblem3D
     interval : first and last alpha
     alone : bool
-        Whether pieces of alpha with one solution at every alpha are sought, by one certificate each.
+        Whether solutions that one certificate proves to be the only ones at their alphas need no curve.
     chains : list of Chain
         Whole curves.
     single : list of (low, high)
-        Such pieces: their solutions lie on no curve unless other pieces asked for it.
+        Pieces of alpha with one solution at every alpha, by one certificate each.
     records : list
         Of the tree, in the order of a walk; open leaves among them.
     failed : int
@@ -125,6 +125,7 @@ class SpaceCover:
             max_nodes=max_nodes,
             tick=tick,
             alone=self.alone,
+            spanned=None if self.alone else self._spans,
         )
         self.records = tree.run()
         self.single, self.nodes, self.stopped = tree.single, tree.nodes, tree.stopped
@@ -135,6 +136,14 @@ class SpaceCover:
         return whole and all(
             other.closed != chain.closed or apart(chain.joints, other.links, self.interval) for other in self.chains
         )
+
+    def _spans(self) -> bool:
+        """Whether a curve passes every alpha: its ends lie beyond the interval on either side."""
+        ends = (
+            [joint.alphas[0] > self.interval[0] for joint in (chain.joints[0], chain.joints[-1])]
+            for chain in self.chains
+        )
+        return any(one != other for one, other in ends)
 
     def proof(self) -> Proof:
         """Curves and tree for ``enumsol.verify``."""

@@ -117,7 +117,10 @@ class PieceTree:
     max_nodes : int, optional
     tick : callable, optional
         Called with the share of the tree that is done, every child of a node being as large as the others.
-    alone : whether pieces with one solution at every alpha are sought, which need no box
+    alone : whether pieces with one solution at every alpha need no box
+    spanned : callable, optional
+        Tells whether a curve in ``boxes`` passes every alpha of the interval: then those of such pieces lie on it.
+        Without either such pieces are not sought.
     smallest : pieces are cut down to this share of the interval
 
     Attributes
@@ -141,10 +144,12 @@ class PieceTree:
         smallest: float = 2.0**-30,
         *,
         alone: bool = False,
+        spanned: Callable[[], bool] | None = None,
     ) -> None:
         self._enclosure, self._units, self.interval = enclosure, units, interval
         self._given = AlphaProblem.of(enclosure)
-        self._more, self._most, self._tick, self._seeks = more, max_nodes, tick, alone
+        self._more, self._most, self._tick = more, max_nodes, tick
+        self._needs_none, self._spanned = alone, spanned
         self._least = Fraction(smallest) * (interval[1] - interval[0])
         self._pieces: OrderedDict[tuple[Fraction, Fraction], _Examined] = OrderedDict()
         self.nodes = 0
@@ -208,7 +213,8 @@ class PieceTree:
         self, low: Fraction, high: Fraction, codes: Codes, parent: Any, changed: int, last: bool
     ) -> tuple[Any, list[Any]]:
         at = self._examined(low, high) if parent is None else parent[0]
-        if self._seeks and set(codes) == {UNDECIDED} and (done := self._alone(at, codes)) is not None:
+        seeks = self._needs_none or self._spanned is not None
+        if seeks and set(codes) == {UNDECIDED} and (done := self._alone(at, codes)) is not None:
             return done
         final = not {CONTACT, UNDECIDED} & set(codes)
         if final and parent is None:
@@ -295,9 +301,18 @@ class PieceTree:
         numbers, leaf, normal = found
         for held in (leaf, ()) if leaf else ((),):
             if piece.has_one(numbers, held, _WIDER, normal, 2.0):
+                if not self._on_curve(piece, leaf):
+                    return None
                 self.single.append((piece.low, piece.high))
                 return OnlyOverPiece(numbers, held, _WIDER, normal), []
         return self._halved(at, codes) if piece.point.has_one(numbers, (), 0.0, normal, 2.0) else None
+
+    def _on_curve(self, piece: AlphaPiece, leaf: Codes) -> bool:
+        """Whether solutions that are the only ones over a piece lie on a curve, as far as they have to."""
+        if self._spanned is None or self._spanned():
+            return True
+        there = piece.point.held(leaf) if leaf else None
+        return isinstance(there, SpaceRoot) and self._met(piece.point, there) is not None and self._spanned()
 
     def _leaf(self, at: _Examined, codes: Codes) -> tuple[Any, list[Any]] | None:
         """A leaf that is decided, or halved; None where statuses are to be split further."""
