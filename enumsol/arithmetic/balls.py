@@ -232,6 +232,11 @@ class Ball:
         """One below the other."""
         return cls(np.concatenate([part.mid for part in parts]), np.concatenate([part.rad for part in parts]))
 
+    @classmethod
+    def beside(cls, *parts: Ball) -> Ball:
+        """One to the right of the other, (n, m)."""
+        return cls(np.hstack([part.mid for part in parts]), np.hstack([part.rad for part in parts]))
+
     def __matmul__(self, other: Ball) -> Ball:
         k = gamma(self.mid.shape[-1] + 4)
         left, right = np.abs(self.mid), np.abs(other.mid)

@@ -204,8 +204,7 @@ def _values(coefficients: Array, tau: float) -> Array:
 
 def _longer(polynomials: Ball) -> Ball:
     """The same with one coefficient more."""
-    none = np.zeros((len(polynomials.mid), 1))
-    return Ball(np.hstack([polynomials.mid, none]), np.hstack([polynomials.rad, none]))
+    return Ball.beside(polynomials, Ball.exact(np.zeros((len(polynomials.mid), 1))))
 
 
 def _turned(constant: Ball, slope: Ball, polynomials: Ball) -> Ball:

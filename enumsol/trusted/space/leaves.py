@@ -474,7 +474,7 @@ class _Leaf:
             G = Ball.joined(G, w)
             across = Ball.joined(s1 * d2[:, None] - s2 * d1[:, None], box.ds[self.free])
             along = Ball.joined(J, box.dw[self.free])
-            J = Ball(np.hstack([along.mid, across.mid]), np.hstack([along.rad, across.rad]))
+            J = Ball.beside(along, across)
         return _State(box.y, box.w, G, J, box)
 
     def _bends(self, state: _State, angle: Array, radius: Array) -> Ball:

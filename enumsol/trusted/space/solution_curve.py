@@ -154,8 +154,8 @@ class AlphaProblem:
         tau = [np.array([(1 + k) * p + i for k in range(2) if occurs[k, i]], dtype=np.intp) for i in range(p)]
         rho = _steps(S.mid / inverse.mid, tau) if steps is None else steps / (force / length)
         turned = Ball.exact(rho[:, None]) * S * ratio + Ball.exact(np.eye(3 * p))
-        right = Ball.exact(rho)[:, None] * Ball(np.column_stack([g1.mid, g0.mid]), np.column_stack([g1.rad, g0.rad]))
-        found = solution(turned, _beside(Ball.exact(np.eye(3 * p)), right))
+        right = Ball.exact(rho)[:, None] * Ball.beside(g1[:, None], g0[:, None])
+        found = solution(turned, Ball.beside(Ball.exact(np.eye(3 * p)), right))
         if found is None:
             raise NotEnclosedError("forces and displacements of the condensed problem cannot be told apart")
         part, offset = found[:, : 3 * p + 1], found[:, 3 * p + 1]
@@ -300,10 +300,6 @@ def _power(size: float) -> float:
     """The power of two next to a size; 1 where a load of it may over- or underflow with others."""
     exponent = float(np.round(np.log2(size))) if size > 0 else 0.0
     return float(2.0**exponent) if abs(exponent) < _LARGEST else 1.0
-
-
-def _beside(one: Ball, other: Ball) -> Ball:
-    return Ball(np.hstack([one.mid, other.mid]), np.hstack([one.rad, other.rad]))
 
 
 @dataclass(frozen=True, eq=False)

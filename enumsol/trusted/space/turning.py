@@ -154,7 +154,7 @@ class Turning:
         loads = [system.balls[1]] if piece is None else [piece.g, piece.g_turn]
         if not len(rows):  # every node is open
             none = Ball.exact(np.zeros((0, len(loads) - 1)))
-            start, *others = (_stacked(Ball.exact(np.zeros_like(load.mid)), load) for load in loads)
+            start, *others = (Ball.joined(Ball.exact(np.zeros_like(load.mid)), load) for load in loads)
             change = Ball.exact(np.zeros((len(start.mid), len(others))))
             for k, other in enumerate(others):
                 change[:, k] = other
@@ -183,13 +183,13 @@ class Turning:
         k = len(loads)
         unit_forces = np.zeros_like(y.mid[:, k:])
         unit_forces[both, np.arange(len(both))] = 1.0
-        start, change = _stacked(y[:, 0], w[:, 0]), _stacked(Ball.exact(unit_forces) - y[:, k:], w[:, k:])
+        start, change = Ball.joined(y[:, 0], w[:, 0]), Ball.joined(Ball.exact(unit_forces) - y[:, k:], w[:, k:])
         change = Ball(np.where(np.arange(len(change.mid))[:, None] < len(y.mid), 1.0, -1.0) * change.mid, change.rad)
         x = x[list(column)]
         B = x[:, k:]
         if piece is not None:
             # s is what is left free
-            change, B = _beside(change, _stacked(y[:, 1:2], w[:, 1:2])), _beside(B, -x[:, 1:2])
+            change, B = Ball.beside(change, Ball.joined(y[:, 1:2], w[:, 1:2])), Ball.beside(B, -x[:, 1:2])
         off = (LIBRARY * (discs.mid + discs.rad) + discs.rad * (1.0 + LIBRARY)) / np.min(units, axis=1)
         if share is not None:
             off = off * (1.0 + share.size) * SAFE
@@ -258,9 +258,8 @@ class Turning:
             inverse = Inverse.of(Ball.exact(np.eye(q)) + B_moved)
             if inverse is None:
                 return None
-            parts = B_push, B_ahead, self.B[:, 2 * q :]
-            both = Ball(np.hstack([part.mid for part in parts]), np.hstack([part.rad for part in parts]))
-            both, x = inverse.solve(both), inverse.solve(base[:, None])[:, 0]
+            both = inverse.solve(Ball.beside(B_push, B_ahead, self.B[:, 2 * q :]))
+            x = inverse.solve(base[:, None])[:, 0]
             z, straight, shift = both[:, :q], both[:, q : 2 * q], both[:, 2 * q :]
         span, beside = Ball(np.zeros((q, 1)), radius[:, None]), Ball(np.zeros_like(free.mid), free.rad)[:, None]
         if point is not None:
@@ -276,18 +275,10 @@ class Turning:
         if point is not None:
             moves = slope @ span
             moves = moves + lone @ beside if len(free.mid) else moves
-            value = smaller(value, _stacked(point.y, point.w) + moves[:, 0])
+            value = smaller(value, Ball.joined(point.y, point.w) + moves[:, 0])
         w = value[m:]
         w.mid[self.rows], w.rad[self.rows] = 0.0, 0.0
         return Box(value[:m], w, slope[m:], lone[m:], x, z, along[m:], across[m:])
-
-
-def _stacked(upper: Ball, lower: Ball) -> Ball:
-    return Ball(np.concatenate([upper.mid, lower.mid]), np.concatenate([upper.rad, lower.rad]))
-
-
-def _beside(left: Ball, right: Ball) -> Ball:
-    return Ball(np.hstack([left.mid, right.mid]), np.hstack([left.rad, right.rad]))
 
 
 def _quotient_error(one: Ball, other: Ball) -> Array:
