@@ -120,10 +120,14 @@ def row_frames(problem: Any) -> Floats:
     return np.asarray(np.divide(sums, lengths, out=np.zeros_like(sums), where=lengths > 0))
 
 
+def row_tangents(problem: Any) -> Floats:
+    """Both tangents of the contact rows in 3D, summed over the nodes of a row, in global axes, (p, 2, 3)."""
+    return np.stack([problem.mesh.directions(rows) for rows in (problem.Bt1, problem.Bt2)], axis=1)
+
+
 def slip_directions(problem: Any, root: Any) -> tuple[Integers, Floats]:
     """Contact rows in 3D that slip, (k,), and the unit vectors in global axes along which they do, (k, 3)."""
-    axes = np.stack([problem.mesh.directions(rows) for rows in (problem.Bt1, problem.Bt2)], axis=1)
-    moves = np.einsum("pk,pkc->pc", root.u_t, axes)
+    moves = np.einsum("pk,pkc->pc", root.u_t, row_tangents(problem))
     size = np.linalg.norm(moves, axis=1)
     slips = np.array([status is ContactStatus.SLIP for status in root.statuses])
     slides = np.flatnonzero(slips & (size > 0))

@@ -1,4 +1,4 @@
-"""The body of a problem for the page: displacements of its nodes as a linear function of alpha and contact forces."""
+"""The body of a problem for the page; of a graph its displacements as a linear function of alpha and contact forces."""
 
 from __future__ import annotations
 
@@ -7,19 +7,23 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.model.cells import KINDS
-from enumsol.model.shapes import BodyShape, body_shape
+from enumsol.model.cells import KINDS, boundary_facets, facet_outlines, outline_edges
+from enumsol.model.shapes import BodyShape, body_shape, row_tangents
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.fem import Scene
     from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import ContactProblem3D
 
     Floats = NDArray[np.float64]
+    Integers = NDArray[np.int64]
 
-#: Most numbers of displacements; a mesh with more is drawn by its boundary, or not at all.
+#: Most numbers of displacements, about ten characters each; a mesh with more is drawn by its boundary, or not at all.
 _MOST_NUMBERS = 150_000
+#: Boundary facets of a solid whose edges are all drawn; of more only those at which the surface bends.
+_MOST_EDGES = 2_000
 #: Of more loaded nodes than this the resultant is drawn.
 _MOST_LOADED = 150
 _DIGITS = 7
@@ -27,61 +31,112 @@ _DIGITS = 7
 _ROUNDING = 1e-9
 
 
-def body_record(problem: ContactProblem, scene: Scene | None = None) -> dict[str, Any] | str:
-    """Nodes, cells or boundary edges, what moves them and what is around; or why the body cannot be drawn.
+def body_record(
+    problem: ContactProblem | ContactProblem3D, scene: Scene | None = None
+) -> tuple[dict[str, Any] | None, str]:
+    """What is drawn of a body of d dimensions and what moves it; and why it is not all of it, empty if it is.
 
-    Displacements of the nodes, x and y in turn, are ``u0 + alpha u1 - sum_k f_k c[k]`` over the 2p contact forces; a
-    unit of force k acts on nodes as ``acts[k]``, triples (node, x, y); contact row i stands at the mean of nodes
-    ``rows[i]``, pairs (node, weight).
+    Displacements of the nodes, d components in turn, are ``u0 + alpha u1 - sum_k f_k c[k]`` over the d p contact
+    forces; a unit of force k acts on nodes as ``acts[k]``, each the node and d components.
     """
     if problem.mesh is None:
-        return "The problem has no mesh"
+        body, why = bare_nodes(problem)
+        if body is None:
+            return None, why
+        still = [0] * (3 * problem.p)
+        return body | {"u0": still, "u1": still, "c": [[]] * len(still), "acts": [[]] * len(still)}, why
     if problem.modes is not None:
-        return "Nothing holds the body, and arcs do not say how far it moves as a whole; graph.roots_at(alpha) does"
+        return None, "Nothing holds the body, and arcs do not say how far it moves as a whole; roots_at(alpha) does"
     shape = body_shape(problem)
-    columns = 2 * problem.p + 2
-    cells = shape.cells[:, KINDS[2, shape.cells.shape[1]].outline]
-    lines = None
-    nodes = np.arange(len(shape.points))
-    if shape.points.size * columns > _MOST_NUMBERS:
-        lines = boundary_edges(cells)
-        nodes = np.unique(lines)
-    if 2 * len(nodes) * columns > _MOST_NUMBERS:
-        return (
+    d = shape.points.shape[1]
+    columns = d * problem.p + 2
+    body, nodes = drawn_body(problem, shape, columns, scene)
+    if columns > most_fields(len(nodes), d):
+        return None, (
             f"The mesh is too large to draw: the displacements of {len(nodes):,} nodes on its boundary by "
-            f"{2 * problem.p:,} contact forces and the load are {2 * len(nodes) * columns:,} numbers, and a page holds "
+            f"{d * problem.p:,} contact forces and the load are {d * len(nodes) * columns:,} numbers, and a page holds "
             f"at most {_MOST_NUMBERS:,}"
         )
-    new = np.full(len(shape.points), -1)
-    new[nodes] = np.arange(len(nodes))
-    rows = sp.csr_array(shape.weights)
-    acts = _forces(problem, shape)
-    if np.any(new[rows.indices] < 0) or any(new[node] < 0 for row in acts for node, _, _ in row):
-        return "The mesh is drawn by its boundary, as large as it is, and some contact nodes are not on it"
-    dofs = np.stack([2 * nodes, 2 * nodes + 1], axis=1).ravel()
-    motion = sp.csr_array(shape.motion[dofs])
+    motion = sp.csr_array(shape.motion[(d * nodes[:, None] + np.arange(d)).ravel()])
     moved = [motion @ problem.factorization.solve(np.asarray(column)) for column in _loads(problem)]
     moved[0] = moved[0] + shape.offset[nodes].ravel()
-    return {
+    forces = -sp.csr_array(problem.contact_rows @ shape.motion.T).toarray().reshape(d * problem.p, -1, d)
+    return body | {
+        "u0": short_list(moved[0]),
+        "u1": short_list(moved[1]),
+        "c": [short_list(column) for column in moved[2:]],
+        "acts": [vectors(force, nodes) for force in forces],
+    }, ""
+
+
+def most_fields(nodes: int, d: int) -> int:
+    """How many fields of displacements of d components of so many nodes a page holds."""
+    return _MOST_NUMBERS // (d * nodes)
+
+
+def drawn_body(
+    problem: ContactProblem | ContactProblem3D, shape: BodyShape, columns: int, scene: Scene | None = None
+) -> tuple[dict[str, Any], Integers]:
+    """What is drawn of a body whatever its solution, and which nodes of its mesh the drawn ones are.
+
+    ``points`` are the drawn nodes; contact row i stands at the mean of nodes ``rows[i]``, pairs (node, weight). Of a
+    plane body there are cells, or the edges of its boundary if ``columns`` numbers for every component of every node
+    are more than the page holds, and what `surroundings` gives; of a solid triangles and edges of its surface, and the
+    ``tangents`` of the contact rows, two vectors each.
+    """
+    cells, d, new = shape.cells, shape.points.shape[1], np.full(len(shape.points), -1)
+    touched = np.unique(sp.csr_array(problem.contact_rows @ shape.motion.T).indices // d)
+    if d == 3:
+        faces = facet_outlines(boundary_facets(3, cells))
+        nodes = np.union1d(faces, touched)
+    else:
+        cells = cells[:, KINDS[2, cells.shape[1]].outline]
+        edges, nodes = boundary_edges(cells), np.arange(len(new))
+        if columns > most_fields(len(new), d):
+            nodes = np.union1d(edges, touched)
+    new[nodes] = np.arange(len(nodes))
+    body = {"points": short_list(shape.points[nodes]), "rows": _rows(shape, nodes), "size": shape.size}
+    if d == 3:
+        return body | _surface(shape, faces, new) | {"tangents": short_list(row_tangents(problem))}, nodes
+    whole = len(nodes) == len(new)
+    return body | {
+        "cells": new[cells].tolist() if whole else None,
+        "lines": None if whole else new[edges].tolist(),
+        "rim": new[edges].tolist(),
         **surroundings(problem, shape, new, scene),
-        "points": _short(shape.points[nodes]),
-        "cells": None if lines is not None else new[cells].tolist(),
-        "lines": None if lines is None else new[lines].tolist(),
-        "rim": new[boundary_edges(cells) if lines is None else lines].tolist(),
-        "u0": _short(moved[0]),
-        "u1": _short(moved[1]),
-        "c": [_short(column) for column in moved[2:]],
-        "acts": [[[int(new[node]), x, y] for node, x, y in row] for row in acts],
-        "rows": [
-            [[int(new[node]), float(f"{weight:.6g}")] for node, weight in zip(*_row(rows, i), strict=True)]
-            for i in range(problem.p)
-        ],
-        "size": shape.size,
+    }, nodes
+
+
+def _surface(shape: BodyShape, faces: Integers, new: Integers) -> dict[str, Any]:
+    """Triangles and edges of the surface of a solid."""
+    outline = outline_edges(shape.points, faces)
+    after = np.roll(faces, -1, axis=1)
+    edges = np.unique(np.sort(np.stack([faces, after], axis=2).reshape(-1, 2), axis=1), axis=0)
+    fan = [faces[:, [0, k, k + 1]] for k in range(1, faces.shape[1] - 1)]
+    return {
+        "triangles": new[np.concatenate(fan)].T.tolist(),
+        "edges": new[edges if len(faces) <= _MOST_EDGES else outline].tolist(),
+        "outline": new[outline].tolist(),
     }
 
 
+def bare_nodes(problem: ContactProblem | ContactProblem3D) -> tuple[dict[str, Any] | None, str]:
+    """Of a problem without a mesh: in 3D the contact nodes at their coordinates, and what is not drawn."""
+    places = problem.coordinates
+    if not hasattr(problem, "Bt2"):
+        return None, "The problem has no mesh, so no body is drawn"
+    if places is None:
+        return None, "The problem has no mesh and no coordinates, so no body is drawn"
+    size = float(np.max(np.ptp(places, axis=0)))
+    if not size > 0:
+        return None, "The problem has no mesh, and all its contact nodes are at one place: no body is drawn"
+    rows = [[[k, 1]] for k in range(len(places))]
+    body = {"points": short_list(places), "rows": rows, "size": size, "triangles": None, "edges": [], "outline": []}
+    return body, "The problem has no mesh: its contact nodes are drawn at their coordinates, without forces"
+
+
 def surroundings(
-    problem: ContactProblem, shape: BodyShape, new: NDArray[np.int64], scene: Scene | None = None
+    problem: ContactProblem | ContactProblem3D, shape: BodyShape, new: NDArray[np.int64], scene: Scene | None = None
 ) -> dict[str, Any]:
     """Load, supports, springs, foundation and material of a plane body, for the page.
 
@@ -104,12 +159,12 @@ def surroundings(
     # of a node that moves along one direction (a, b), the square of what it is held across is 1 - a a, 1 - b b, - a b
     guided = (np.abs(xx * yy - xy**2) < _ROUNDING) & (np.abs(xx + yy - 1.0) < _ROUNDING) & drawn
     held += [
-        [int(new[k]), *_short([np.sqrt(max(1 - xx[k], 0)), -np.sign(xy[k] or 1) * np.sqrt(max(1 - yy[k], 0))])]
+        [int(new[k]), *short_list([np.sqrt(max(1 - xx[k], 0)), -np.sign(xy[k] or 1) * np.sqrt(max(1 - yy[k], 0))])]
         for k in np.flatnonzero(guided)
     ]
     normals = np.asarray(problem.Bn @ motion.T @ np.tile(np.eye(2), (len(shape.points), 1)))
     walls = [
-        [k, *_short([*normal, problem.gap[k]])]
+        [k, *short_list([*normal, problem.gap[k]])]
         for k, normal in enumerate(normals)
         if abs(normal @ normal - 1.0) < _ROUNDING  # rows of two bodies add up to nothing
     ]
@@ -118,31 +173,35 @@ def surroundings(
     if lame is not None and np.all(lame == lame[0]):
         lame = lame[:1]
     return {
-        "load": _short(load),
+        "load": short_list(load),
         "held": held,
         "springs": [int(new[node]) for node in springs if drawn[node]],
         "walls": walls,
-        "lame": None if lame is None else _short(lame),
+        "lame": None if lame is None else short_list(lame),
     }
 
 
-def _loads(problem: ContactProblem) -> list[Floats]:
+def _loads(problem: ContactProblem | ContactProblem3D) -> list[Floats]:
     slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
     return [problem.f, slope, *problem.contact_rows.toarray()]
 
 
-def _forces(problem: ContactProblem, shape: BodyShape) -> list[list[tuple[int, float, float]]]:
-    """What a unit of every contact force does to the nodes of the body."""
-    forces = -sp.csr_array(problem.contact_rows @ shape.motion.T).toarray().reshape(2 * problem.p, -1, 2)
+def _rows(shape: BodyShape, nodes: Integers) -> list[list[list[float]]]:
+    """At which mean of drawn nodes every contact row stands: pairs (node, weight)."""
+    weights = sp.csr_array(shape.weights[:, nodes])
+    parts = zip(weights.indptr[:-1], weights.indptr[1:], strict=True)
     return [
-        [(int(node), float(f"{row[node, 0]:.9g}"), float(f"{row[node, 1]:.9g}")) for node in np.flatnonzero(row.any(1))]
-        for row in forces
+        [
+            [int(node), float(f"{weight:.6g}")]
+            for node, weight in zip(weights.indices[a:b], weights.data[a:b], strict=True)
+        ]
+        for a, b in parts
     ]
 
 
-def _row(matrix: sp.csr_array, i: int) -> tuple[Any, Any]:
-    part = slice(matrix.indptr[i], matrix.indptr[i + 1])
-    return matrix.indices[part], matrix.data[part]
+def vectors(forces: Floats, nodes: Integers) -> list[list[float]]:
+    """Forces that are not zero on drawn nodes: node and components."""
+    return [[int(k), *short_list(forces[nodes[k]])] for k in np.flatnonzero(np.any(forces[nodes] != 0, axis=1))]
 
 
 def boundary_edges(outlines: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -153,9 +212,9 @@ def boundary_edges(outlines: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.asarray(edges[first[count == 1]])
 
 
-def _short(values: Any) -> Any:
-    return (
-        [[float(f"{x:.{_DIGITS}g}") for x in row] for row in values]
-        if np.ndim(values) == 2
-        else [float(f"{x:.{_DIGITS}g}") for x in values]
-    )
+def short_list(values: Any) -> Any:
+    """Numbers to seven digits, as lists; zeros lose their sign and integers their point."""
+    array = np.asarray(values)
+    if array.ndim > 1:
+        return [short_list(row) for row in array]
+    return [int(x) if x == int(x) and abs(x) < 1e15 else float(f"{x:.{_DIGITS}g}") for x in array.tolist()]

@@ -11,8 +11,9 @@ from enumsol.branches.elements import VertexKind
 from enumsol.branches.figures.curves import QUANTITIES, Curve, curves, side_by_side
 from enumsol.branches.figures.marks import colour_of
 from enumsol.branches.figures.panels import family_states
-from enumsol.model.statuses import STATUSES
+from enumsol.model.problem import ContactProblem
 from enumsol.report.body import body_record
+from enumsol.report.parts import STATUS_NAMES, status_codes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from enumsol.branches import BranchGraph
     from enumsol.branches.elements import Arc, Vertex
     from enumsol.fem import Scene
-    from enumsol.model.statuses import ContactStatus
 
 #: Distance of drawn curves from the arcs, relative to the picture; coarser until the page is small enough.
 _TOLERANCE, _COARSEST = 1e-3, 2e-2
@@ -37,17 +37,18 @@ _COMPARED = 300
 def report_content(graph: BranchGraph, scene: Scene | None = None) -> dict[str, Any]:
     """Everything that the script needs: nodes, quantities, arcs with points along them, vertices, steps, the body.
 
-    Statuses are texts of one digit per node, the codes of `enumsol.model.statuses`. ``f`` and ``w`` are forces and
-    displacements, normal ones first, at the points ``a`` of an arc.
+    Statuses are texts of one digit per node, places in ``statuses``. ``f`` and ``w`` are forces and displacements of
+    the contact nodes, all normal ones, then those along each tangent; of an arc at its points ``a``.
     """
     drawn, tolerance = _sampled(graph)
-    steps, body = graph.claims.steps(), body_record(graph.problem, scene)
+    steps, (body, missing) = graph.claims.steps(), body_record(graph.problem, scene)
     return {
         "interval": list(graph.interval),
         "complete": graph.complete,
         "exact_counts": steps.exact,
         "nodes": [str(label) for label in graph.problem.node_ids],
-        "statuses": [status.value for status in STATUSES],
+        "statuses": STATUS_NAMES,
+        "tangents": 2 if _in_space(graph) else 1,
         "quantities": [item._asdict() for item in QUANTITIES.values()],
         "tolerance": tolerance,
         "arcs": [_arc(arc, graph.branch_of[arc.number], drawn.get(arc.number)) for arc in graph.arcs],
@@ -63,14 +64,9 @@ def report_content(graph: BranchGraph, scene: Scene | None = None) -> dict[str, 
         },
         "beside": _beside(graph, drawn),
         "slider": slider_alphas([v.alpha for v in graph.vertices], graph.interval),
-        "body": None if isinstance(body, str) else body,
-        "no_body": body if isinstance(body, str) else "",
+        "body": body,
+        "no_body": missing,
     }
-
-
-def codes(statuses: Sequence[ContactStatus]) -> str:
-    """One digit per node."""
-    return "".join(str(STATUSES.index(status)) for status in statuses)
 
 
 def rounded_list(values: Any) -> Any:
@@ -96,12 +92,16 @@ def slider_alphas(critical: Sequence[float], interval: tuple[float, float]) -> l
     return found
 
 
+def _in_space(graph: BranchGraph) -> bool:
+    return not isinstance(graph.problem, ContactProblem)
+
+
 def _sampled(graph: BranchGraph) -> tuple[dict[int, Curve], float]:
     """Points along all arcs that are no sheets, and the tolerance to which they are near."""
     arcs = [arc for arc in graph.arcs if not arc.dimension]
     width, tolerance = graph.interval[1] - graph.interval[0], _TOLERANCE
     while True:
-        drawn = curves(arcs, tuple(QUANTITIES), width, tolerance)
+        drawn = curves(arcs, tuple(QUANTITIES), width, tolerance, components=_in_space(graph))
         numbers = sum(curve.forces.size + curve.moves.size for curve in drawn.values())
         if numbers <= _MOST_NUMBERS or tolerance >= _COARSEST:
             return drawn, tolerance
@@ -115,7 +115,7 @@ def _arc(arc: Arc, branch: int, curve: Curve | None) -> dict[str, Any]:
         "tail": arc.tail,
         "head": arc.head,
         "index": arc.index,
-        "statuses": codes(arc.statuses),
+        "statuses": status_codes(arc.statuses),
         "dimension": arc.dimension,
         "grazing": arc.grazing,
         "lo": arc.lo,
@@ -132,10 +132,10 @@ def _vertex(v: Vertex, graph: BranchGraph) -> dict[str, Any]:
         "alpha": v.alpha,
         "kind": v.kind.value,
         "border": v.border,
-        "statuses": codes(v.statuses),
+        "statuses": status_codes(v.statuses),
         "several": [k for k, holds in enumerate(v.active) if len(holds) > 1],
-        "f": rounded_list(np.concatenate([v.lambda_n, v.lambda_t])),
-        "w": rounded_list(np.concatenate([v.u_n, v.u_t])),
+        "f": rounded_list(np.concatenate([v.lambda_n, v.lambda_t.ravel(order="F")])),
+        "w": rounded_list(np.concatenate([v.u_n, v.u_t.ravel(order="F")])),
         "family": None,
     }
     if v.family is not None:
@@ -148,8 +148,8 @@ def _beside(graph: BranchGraph, drawn: Mapping[int, Curve]) -> dict[str, dict[st
     """By columns of the quantities, arcs that coincide with others: rank among them, and how many they are."""
     if not drawn:
         return {}
-    columns = next(iter(drawn.values())).values.shape[1]
     overviews = sum(not item.by_node for item in QUANTITIES.values())
+    columns = overviews + graph.problem.p * (len(QUANTITIES) - overviews)
     found = {}
     for column in range(columns if len(drawn) <= _COMPARED else overviews):
         places = side_by_side(drawn, graph.branch_of, column)

@@ -41,6 +41,7 @@ function prepare(items) {
 const enlargement = (item) => given.get(item.key) ?? Number(((look.same || !item.own ? look.common : item.own) * look.factor).toPrecision(3));
 
 function lookControls(redraw) {
+  if (!data.body || nodesOnly) return;
   const names = ["none", "moved"];
   if (dimension === 2 && data.body.cells && data.body.lame) names.push("shear", "mean");
   const option = ([value, text]) => element("option", { value }, text);
@@ -314,35 +315,12 @@ const keyEntry = (kind, text) =>
 function bodyKeys(items) {
   const used = data.statuses.filter((_, code) => items.some((item) => item.statuses.includes(String(code))));
   const keys = used.map((name) => element("span", {}, svg("svg", { width: 14, height: 14 }, marker(name, 7, 7, 5, name)), name));
-  if (dimension !== 2) return keys;
+  if (!data.body || nodesOnly) return keys;
   keys.push(keyEntry("force", "contact force on the body"), keyEntry("before", "undeformed body"));
+  if (dimension === 3) return used.includes("slip") ? [...keys, keyEntry("load", "direction of slip")] : keys;
   if (data.body.load.length) keys.push(keyEntry("load", data.body.load.length === 1 ? "load, the resultant" : "load"));
   if (data.body.walls.length) keys.push(keyEntry("wall", "foundation (gaps are enlarged as displacements are)"));
   if (data.body.held.length) keys.push(element("span", {}, svg("svg", { width: 12, height: 12 }, svg("rect", { class: "held", x: 2, y: 2, width: 8, height: 8 })), "support"));
   if (data.body.springs.length) keys.push(element("span", {}, svg("svg", { width: 30, height: 12 }, svg("polyline", { class: "wall", points: "0,6 4,1 10,11 16,1 22,11 26,6 30,6" })), "spring"));
   return keys;
 }
-
-// -- where there is no body: forces and displacements of the nodes ------------------------------------------------------
-
-function drawBars(item, scales) {
-  const step = Math.max(8, 280 / p), width = step * p, half = 55, height = 4 * half + 34;
-  const picture = svg("svg", { viewBox: `0 0 ${width} ${height}`, role: "img", class: "bars", "aria-label": `forces and displacements of the contact nodes, statuses ${runs(item.statuses)}` });
-  [["f", half + 4], ["w", 3 * half + 26]].forEach(([key, zero]) => {
-    picture.append(svg("line", { x1: 0, x2: width, y1: zero, y2: zero, class: "axis" }));
-    for (let k = 0; k < 2 * p; k += 1) {
-      const tangential = k >= p, node = k % p, value = item[key][k], size = (half - 3) * Math.abs(value) / scales[key];
-      const name = `${key === "f" ? "lambda" : "u"}_${tangential ? "t" : "n"}`;
-      picture.append(svg("rect", {
-        x: step * (node + (tangential ? 0.52 : 0.14)), width: 0.34 * step, y: value > 0 ? zero - size : zero, height: size,
-        fill: tangential ? "#d9730d" : "#1f5fa8",
-      }, tip(`node ${data.nodes[node]}: ${name} ${short(value)}`)));
-    }
-  });
-  for (let k = 0; k < p; k += 1) {
-    const name = status(item.statuses, k);
-    picture.append(marker(name, step * (k + 0.5), 2 * half + 15, Math.min(5, 0.4 * step), `node ${data.nodes[k]}: ${name}`));
-  }
-  return picture;
-}
-

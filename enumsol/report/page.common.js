@@ -1,12 +1,14 @@
 // Texts of the problem (names, labels) reach the page by textContent, and Plotly with "<" and "&" escaped.
 const data = JSON.parse(document.getElementById("data").textContent);
 const byId = (id) => document.getElementById(id);
-const p = data.nodes.length;
+const p = data.nodes.length, { tangents } = data;
 const COLOURS = { open: "#ffffff", stick: "#1f5fa8", "slip+": "#d9730d", "slip-": "#2a8a4a", slip: "#c23b4b" };
 
 const safe = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
 const short = (x) => (x === null || x === undefined ? "?" : Number(x.toPrecision(6)).toString().replace("-", "\u2212"));
 const signed = (k) => (k === null ? "unknown" : k > 0 ? `+${k}` : String(k).replace("-", "\u2212"));
+// of node k among n, in 3D the length of a vector
+const tangentialOf = (v, k, n = p) => (tangents === 1 ? v[n + k] : Math.hypot(v[n + k], v[2 * n + k]));
 const status = (codes, k) => data.statuses[Number(codes[k])];
 
 function element(name, properties = {}, ...children) {

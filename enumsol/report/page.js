@@ -1,5 +1,5 @@
 // All solutions over an interval: the diagram.
-const STATUS_DASH = { open: "solid", stick: "dash", "slip+": "dashdot", "slip-": "dot" };
+const STATUS_DASH = { open: "solid", stick: "dash", "slip+": "dashdot", "slip-": "dot", slip: "dashdot" };
 const SYMBOLS = {
   transition: ["circle-open", "transition"], fold: ["square-open", "fold"], bifurcation: ["diamond-open", "bifurcation"],
   touch: ["triangle-down-open", "status met and left again"], point: ["x-thin-open", "single point"],
@@ -7,7 +7,8 @@ const SYMBOLS = {
   bound: ["line-ew-open", "at the bound of rigid displacements"],
   broken: ["x", "degrees differ, something is missing"], unsettled: ["y-right-open", "not followed further"],
 };
-const CARDS = 12;
+// a browser keeps about sixteen scenes alive
+const CARDS = solid ? 6 : 12;
 const arcs = new Map(data.arcs.map((arc) => [arc.number, arc]));
 const branches = new Map(data.branches.map((branch) => [branch.number, branch]));
 const state = { quantity: data.quantities[0], node: 0, branch: null, alpha: data.slider[0], page: 0 };
@@ -16,11 +17,12 @@ let plotted = null;
 // -- quantities ---------------------------------------------------------------------------------------------------
 
 function valueOf(f, w) {
-  const item = state.quantity, tangential = item.name.endsWith("_t") ? p : 0;
-  if (item.name === "norm") return Math.sqrt(f.reduce((sum, x) => sum + x * x, 0));
+  const item = state.quantity;
+  if (item.name === "norm") return Math.hypot(...f);
   const part = item.dimension === "length" ? w : f;
-  if (item.by_node) return part[tangential + state.node];
-  return part.slice(tangential, tangential + p).reduce((sum, x) => sum + x, 0);
+  // of a node, or sums over all; then normal ones, or all tangential ones
+  const parts = item.by_node ? PARTS.map((_, j) => part[j * p + state.node]) : PARTS.map((_, j) => part.slice(j * p, j * p + p).reduce((sum, x) => sum + x, 0));
+  return item.name.endsWith("_t") ? tangentialOf(parts, 0, 1) : parts[0];
 }
 
 function columnOf() {
@@ -217,16 +219,14 @@ function start() {
   byId("previous").addEventListener("click", () => turn(-1));
   byId("next").addEventListener("click", () => turn(1));
   byId("alpha").addEventListener("change", (event) => { const x = Number(event.target.value); showAlpha(Number.isFinite(x) && event.target.value.trim() ? x : state.alpha); });
-  const page = (by) => { state.page = Math.max(0, Math.min(state.page + by, Math.ceil(solutionsAt(state.alpha).length / CARDS) - 1)); drawCards(); };
-  byId("fewer").addEventListener("click", () => page(-1));
-  byId("more").addEventListener("click", () => page(1));
+  pageButtons(drawCards);
   for (const row of document.querySelectorAll("tr[tabindex]")) {
     const act = () => (row.dataset.branch === undefined ? showAlpha(Number(row.dataset.alpha)) : selectBranch(Number(row.dataset.branch)));
     row.addEventListener("click", act);
     row.addEventListener("keydown", (event) => { if (event.key === "Enter" || event.key === " ") { event.preventDefault(); act(); } });
   }
   byId("marks").append(...bodyKeys([...data.arcs, ...data.vertices]));
-  if (data.body) lookControls(drawCards);
+  lookControls(drawCards);
   repaints.push(drawDiagram);
   drawDiagram();
   // where most solutions are

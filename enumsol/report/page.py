@@ -16,6 +16,7 @@ from enumsol.report.content import listed, report_content
 from enumsol.report.given import given_section, with_unit
 from enumsol.report.history_page import history_page
 from enumsol.report.parts import (
+    DRAWING,
     fact_list,
     filled_page,
     packed_plotly,
@@ -36,8 +37,9 @@ if TYPE_CHECKING:
 
     from enumsol.branches.elements import Vertex
     from enumsol.fem import Scene
+    from enumsol.model.problem3d import ContactProblem3D
 
-#: Powers of four that are written out, and that floats can hold.
+#: Powers that are written out, and that floats can hold.
 _EXACTLY, _AS_FLOAT = 10, 500
 
 
@@ -54,19 +56,20 @@ def write_report(
 
     It needs no network.
 
-    The page of a graph in 2D has the branches against alpha (pointing shows values and statuses, a click on a branch
-    its arcs), the number of solutions, a slider over alpha with the deformed bodies of all solutions (without a mesh:
-    forces and displacements of the contact nodes), tables of branches, transitions and folds, and what is certified. It
-    says "complete" only where ``graph.complete`` does; of a graph that was cut short it says what is missing.
+    The page of a graph, in 2D or 3D, has the branches against alpha (pointing shows values and statuses, a click on a
+    branch its arcs), the number of solutions, a slider over alpha with the deformed bodies of all solutions, tables of
+    branches, transitions and folds, and what is certified. It says "complete" only where ``graph.complete`` does; of a
+    graph that was cut short it says what is missing.
 
-    Bodies in the plane can be zoomed, enlarged in their displacements one by one or all at once, and coloured by
-    displacement or stress; load, supports, foundation and contact forces are drawn, the latter with a scale, and the
-    statuses along the boundary in a strip. Pages follow the light or dark setting of the browser and print on A4.
+    Bodies can be enlarged in their displacements one by one or all at once, and coloured by displacement. In the plane
+    they can be zoomed, and coloured by stress; load, supports, foundation and contact forces are drawn, the latter with
+    a scale, and the statuses along the boundary in a strip. In 3D they can be turned; contact forces and directions of
+    slip are drawn. Without a mesh there are bars of the forces and displacements of the contact nodes, and in 3D these
+    nodes at their coordinates. Pages follow the light or dark setting of the browser and print on A4.
 
-    The page of a RootSet, in 2D or 3D, has a card for each root with the deformed body (in 3D it can be turned),
-    contact forces, statuses, directions of slip and a table over the contact nodes; tables of roots, continua and
-    undecided parts; and what is certified. Without a mesh there are in 3D the contact nodes at their coordinates, in 2D
-    bars of forces and displacements, and otherwise the tables alone.
+    The page of a RootSet, in 2D or 3D, has a card for each root with the deformed body, contact forces, statuses,
+    directions of slip and a table over the contact nodes; tables of roots, continua and undecided parts; and what is
+    certified.
 
     The page of a History has a table of the steps, the tree of the roots, figures of load, displacement and work of
     friction, the deformed bodies of all roots of a step that is chosen (with a mesh), and what is certified.
@@ -112,8 +115,6 @@ def write_report(
     place = file_path(file, "file")
     words = (instance_of(title, str, "title"), checked_units(units), tuple(commands), _checked_scene(scene))
     if isinstance(solutions, BranchGraph):
-        if not isinstance(solutions.problem, ContactProblem):
-            raise InvalidArgumentError("solutions is a graph of a problem in 3D; expected one in 2D, or a RootSet")
         page = report_page(solutions, *words)
     elif isinstance(solutions, RootSet):
         page = roots_page(solutions, *words)
@@ -149,9 +150,7 @@ def report_page(
         "vertices": _vertices(graph),
         "certified": _certified(graph, commands),
     }
-    return filled_page(
-        "graph", ("page.theme.js", "page.common.js", "page.body.js", "page.js", "page.solutions.js"), content, words
-    )
+    return filled_page("graph", (*DRAWING, "page.js", "page.solutions.js"), content, words)
 
 
 def _reasons(reasons: Sequence[str]) -> str:
@@ -166,13 +165,12 @@ def _reasons(reasons: Sequence[str]) -> str:
 
 def _facts(graph: BranchGraph, units: tuple[str, str] | None) -> str:
     problem, (a, b) = graph.problem, graph.interval
-    F0, F1 = problem.friction
     load = "constant" if problem.load_slope is None else "f + alpha load_slope"
     facts = (
         ("contact nodes", str(problem.p)),
         ("degrees of freedom", f"{problem.n:,}"),
-        ("combinations of statuses", _power_of_four(problem.p)),
-        ("friction", f"F0 + alpha F1, F0 = {span_words(F0)}, F1 = {span_words(F1)}"),
+        ("combinations of statuses", _combinations(problem)),
+        ("friction", _friction(problem)),
         ("load", with_unit(f"{load}, max |f| = {np.max(np.abs(problem.f)):.4g}", units, 1, 0)),
         ("gap", with_unit(span_words(problem.gap), units, 0, 1)),
         ("alpha", f"from {a:.10g} to {b:.10g}"),
@@ -183,11 +181,21 @@ def _facts(graph: BranchGraph, units: tuple[str, str] | None) -> str:
     return fact_list(facts)
 
 
-def _power_of_four(p: int) -> str:
-    """4^p and its value, rounded where it is long."""
-    if p <= _EXACTLY:
-        return f"4^{p} = {4**p:,}"
-    return f"4^{p}, about {4**p:.3g}" if p < _AS_FLOAT else f"4^{p}"
+def _combinations(problem: ContactProblem | ContactProblem3D) -> str:
+    """4^p and its value, rounded where it is long; in 3D 3^p, and what they do not tell."""
+    base, p = (4 if isinstance(problem, ContactProblem) else 3), problem.p
+    value = f" = {base**p:,}" if p <= _EXACTLY else f", about {base**p:.3g}" if p < _AS_FLOAT else ""
+    return f"{base}^{p}{value}" + ("" if base == 4 else ", and a direction for every node that slips")
+
+
+def _friction(problem: ContactProblem | ContactProblem3D) -> str:
+    """The coefficients as functions of alpha."""
+    if isinstance(problem, ContactProblem):
+        F0, F1 = problem.friction
+        return f"F0 + alpha F1, F0 = {span_words(F0)}, F1 = {span_words(F1)}"
+    slopes = (f" + alpha {span_words(slope)}" if np.any(slope) else "" for slope in problem.friction_slope)
+    pairs = enumerate(zip(problem.friction, slopes, strict=True), 1)
+    return ", ".join(f"F{k} = {span_words(F)}{slope}" for k, (F, slope) in pairs)
 
 
 def _branches(graph: BranchGraph) -> str:
@@ -244,7 +252,7 @@ def _change(graph: BranchGraph, v: Vertex, arcs: Sequence[Any]) -> str:
 
 def _certified(graph: BranchGraph, commands: Sequence[str]) -> str:
     about = {
-        "problem": "the matrices A, Bn, Bt and f as they were given",
+        "problem": "the matrices A, the contact rows and f as they were given",
         "condensed": "the condensed problem, S and g as computed",
     }[graph.certified_data]
     lines = [f"<p>{escape(graph.completeness())}.</p>"]
@@ -258,8 +266,8 @@ def _certified(graph: BranchGraph, commands: Sequence[str]) -> str:
     else:
         lines.append("<p>Nothing is proven: the result rests on floating-point arithmetic.</p>")
     lines.append(
-        "<p>This page is a picture of the result and no proof. Curves are drawn between points on the arcs; critical "
-        "alphas are given to the last digit.</p>"
+        "<p>This page is a picture of the result and no proof. Curves are drawn between points on the arcs; how "
+        "exactly critical alphas are known stands in their table.</p>"
     )
     lines.append(
         proof_facts(

@@ -11,7 +11,9 @@ function between(arc, alpha) {
 function solutionsAt(alpha) {
   const found = [];
   for (const arc of data.arcs) {
-    if (!(data.vertices[arc.tail].alpha < alpha && alpha < data.vertices[arc.head].alpha)) continue;
+    // beside what was left open an arc may end before its vertex, or beyond it
+    const low = Math.max(arc.lo, data.vertices[arc.tail].alpha), high = Math.min(arc.hi, data.vertices[arc.head].alpha);
+    if (!(low < alpha && alpha < high)) continue;
     const name = `branch ${arc.branch}`, colour = onPage(branches.get(arc.branch).colour);
     if (arc.dimension > 0) found.push({ name, colour, words: `a sheet: a continuum of dimension ${arc.dimension}` });
     else found.push({ name, key: `arc ${arc.number}`, colour, words: `arc ${arc.number}, index ${signed(arc.index)}`, statuses: arc.statuses, several: [], ...between(arc, alpha) });
@@ -41,37 +43,15 @@ function showAlpha(alpha) {
 }
 
 function drawCards() {
-  const found = solutionsAt(state.alpha), shown = found.slice(state.page * CARDS, (state.page + 1) * CARDS);
+  const found = solutionsAt(state.alpha), solved = found.filter((item) => item.f);
   const special = data.vertices.some((v) => v.alpha === state.alpha && v.kind !== "end");
   const number = `${found.length} ${found.length === 1 ? "solution" : "solutions"}`;
   byId("count").textContent = (data.complete ? number : data.exact_counts ? `${number} found, not proven` : `${number} found; there may be more`)
     + ` at alpha = ${short(state.alpha)}` + (special ? ", a critical alpha (rounded)" : "");
-  byId("pages").hidden = found.length <= CARDS;
-  byId("range").textContent = `${state.page * CARDS + 1} to ${state.page * CARDS + shown.length} of ${found.length}`;
-  const solved = found.filter((item) => item.f);
-  const scales = data.body ? bodyScales(solved) : barScales(solved);
-  byId("scale").textContent = scales.words + (solved.length ? `. Values between points of an arc are interpolated, to ${Number((100 * data.tolerance).toPrecision(3))} % of what the arcs span.` : "");
-  byId("cards").replaceChildren(...shown.map((item) => card(item, scales)));
-}
-
-function card(item, scales) {
-  const dot = element("span", { className: "dot" });
-  dot.style.background = item.colour;
-  const made = element("article", { className: "card" }), heading = element("h3", {}, dot, item.name);
-  made.append(heading, element("p", {}, item.words));
-  if (!item.f) return made;
-  made.append(element("p", {}, runs(item.statuses)));
-  if (item.several.length) made.append(element("p", {}, `several statuses hold at: ${item.several.map((k) => data.nodes[k]).join(", ")}`));
-  if (data.body) heading.append(enlarge(item, made));
-  made.append(data.body ? bodyFigure(item, scales) : drawBars(item, scales), strip(item));
-  const details = element("details", {}, element("summary", {}, "values by nodes"));
-  details.addEventListener("toggle", () => {
-    if (details.childElementCount > 1) return;
-    const rows = data.nodes.map((label, k) => [label, status(item.statuses, k), ...[item.f, item.w].flatMap((v) => [short(v[k]), short(v[p + k])])]);
-    details.append(table(`Contact nodes, ${item.name}`, ["node", "status", "lambda_n", "lambda_t", "u_n", "u_t"], rows));
-  });
-  made.append(details);
-  return made;
+  if (data.body) moveBodies(solved);
+  const scales = scalesOf(solved, state.alpha), share = Number((100 * data.tolerance).toPrecision(3));
+  byId("scale").textContent = scaleWords(scales) + (solved.length ? ` Values between points of an arc are interpolated, to ${share} % of what the arcs span.` : "");
+  showCards(found, scales);
 }
 
 // -- deformed bodies ----------------------------------------------------------------------------------------------
@@ -84,30 +64,19 @@ function moves(f) {
 
 function nodalForces(f) {
   const forces = new Map();
-  f.forEach((force, k) => data.body.acts[k].forEach(([node, x, y]) => {
-    const sum = forces.get(node) || [0, 0];
-    forces.set(node, [sum[0] + force * x, sum[1] + force * y]);
+  f.forEach((force, k) => data.body.acts[k].forEach(([node, ...acts]) => {
+    const sum = forces.get(node);
+    forces.set(node, acts.map((x, c) => force * x + (sum ? sum[c] : 0)));
   }));
-  return [...forces].map(([node, sum]) => [node, ...sum]);
+  // what is far below the largest is rounding
+  const length = ([, sum]) => Math.hypot(...sum), most = [...forces].reduce((found, entry) => Math.max(found, length(entry)), 0);
+  return [...forces].filter((entry) => length(entry) > 1e-9 * most).map(([node, sum]) => [node, ...sum]);
 }
 
-function bodyScales(solutions) {
-  let force = 0;
+function moveBodies(solutions) {
   for (const item of solutions) {
     item.u = moves(item.f);
     item.forces = nodalForces(item.f);
-    for (const [, x, y] of item.forces) force = Math.max(force, Math.hypot(x, y));
   }
   prepare(solutions);
-  return { force, alpha: state.alpha, words: `Arrows are contact forces on the body; the longest is ${short(force)}${unit("force")}` };
-}
-
-// -- where the body cannot be drawn: forces and displacements of the nodes -------------------------------------------
-
-function barScales(solutions) {
-  const largest = (key) => Math.max(1e-300, ...solutions.flatMap((item) => item[key].map(Math.abs)));
-  return {
-    f: largest("f"), w: largest("w"),
-    words: `${data.no_body}. Upper bars are forces (largest ${short(largest("f"))}${unit("force")}), lower bars displacements (largest ${short(largest("w"))}${unit("length")}); left of a node normal, right tangential`,
-  };
 }

@@ -14,9 +14,15 @@ import numpy as np
 
 from enumsol._version import find_version
 from enumsol.errors import MissingDependencyError
+from enumsol.model.statuses import ContactStatus
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
+
+#: Scripts of pages with bodies, before those of one kind.
+DRAWING = ("page.theme.js", "page.common.js", "page.body.js", "page.solid.js", "page.cards.js")
+#: Of statuses, which pages keep as their places in this list.
+STATUS_NAMES = [status.value for status in ContactStatus]
 
 
 def filled_page(kind: str, scripts: Sequence[str], content: Mapping[str, Any], words: Mapping[str, str]) -> str:
@@ -32,6 +38,11 @@ def filled_page(kind: str, scripts: Sequence[str], content: Mapping[str, Any], w
         "version": escape(find_version()),
     }
     return Template((parts / "page.frame.html").read_text(encoding="utf-8")).substitute({**own, **words})
+
+
+def status_codes(statuses: Iterable[ContactStatus]) -> str:
+    """One digit per node."""
+    return "".join(str(STATUS_NAMES.index(status.value)) for status in statuses)
 
 
 def packed_plotly() -> str:

@@ -10,6 +10,7 @@ import numpy as np
 
 from enumsol.report.given import given_section, with_unit
 from enumsol.report.parts import (
+    DRAWING,
     fact_list,
     filled_page,
     packed_plotly,
@@ -53,7 +54,7 @@ def roots_page(
         "undecided": _undecided_table(found),
         "certified": _what_is_certified(found, commands),
     }
-    return filled_page("roots", ("page.theme.js", "page.common.js", "page.body.js", "page.roots.js"), content, words)
+    return filled_page("roots", (*DRAWING, "page.roots.js"), content, words)
 
 
 def _open_parts(found: RootSet) -> str:

@@ -117,12 +117,12 @@ def test_bodies_move_as_the_roots_say(wedge, wedge_page):
 @pytest.mark.slow
 def test_large_meshes_are_drawn_by_their_boundary_or_not_at_all():
     problem = gallery.clamped_block(80, 80, contact=10)
-    body = body_record(problem)
+    body, _ = body_record(problem)
     assert body["cells"] is None
     assert len(body["lines"]) == 320  # edges along the four sides
     assert len(body["points"]) == 320
     # two components of 400 nodes by 200 forces, load and slope of the load
-    said = body_record(gallery.clamped_block(100, 100))
+    _, said = body_record(gallery.clamped_block(100, 100))
     assert said.startswith("The mesh is too large to draw: the displacements of 400 nodes on its boundary")
     assert "are 161,600 numbers, and a page holds at most 150,000" in said
 
@@ -132,7 +132,7 @@ def test_what_is_said_of_a_body_that_is_not_drawn(monkeypatch):
     bare = enumsol.ContactProblem(square.A, square.Bn, square.Bt, square.f)
     graph = enumsol.branch_graph(bare, (0, 1))
     made = content.report_content(graph)
-    assert (made["body"], made["no_body"]) == (None, "The problem has no mesh")
+    assert (made["body"], made["no_body"]) == (None, "The problem has no mesh, so no body is drawn")
     monkeypatch.setattr(bodies, "_MOST_NUMBERS", 10)
     made = content.report_content(enumsol.branch_graph(square, (0, 1)))
     assert made["body"] is None
@@ -344,7 +344,7 @@ def test_the_page_of_a_history_tells_what_was_given(scene, tmp_path):
 
 def test_what_acts_on_the_body_and_holds_it(scene):
     problem = scene.problem()
-    body = body_record(problem, scene)
+    body, _ = body_record(problem, scene)
     points = np.array(body["points"])
     load = np.array(body["load"])
     np.testing.assert_allclose(load[:, 1], 1)  # on top
@@ -358,14 +358,14 @@ def test_what_acts_on_the_body_and_holds_it(scene):
     assert (E, nu) == pytest.approx((210000 * (1 + 2 * 0.3) / 1.3**2, 0.3 / 1.3), rel=1e-6)  # plane stress
     rim = {tuple(sorted(edge)) for edge in body["rim"]}
     assert len(rim) == 12
-    assert body_record(problem)["springs"] == []
+    assert body_record(problem)[0]["springs"] == []
 
 
 def test_supports_along_slopes_and_many_loads():
     """A slope moves along it only; a weight is drawn as its resultant."""
     mesh = fem.rectangle(12, 12).parted()
     options = {"young": 1, "poisson": 0.3, "contact": "bottom", "clamp": "left", "body_force": (0, -2), "friction": 0.3}
-    body = body_record(fem.mesh_problem(mesh, **options))
+    body, _ = body_record(fem.mesh_problem(mesh, **options))
     assert len(body["load"]) == 1
     x, y, fx, fy, *slope = body["load"][0]
     assert (x, y, fx, slope) == (pytest.approx(0.5, abs=0.05), pytest.approx(0.5, abs=0.05), 0, [0, 0])

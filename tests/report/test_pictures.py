@@ -179,7 +179,7 @@ def test_strips_and_words_for_screen_readers(browser, page):
     assert all(all(found) for found in browser.evaluate(tables))
     # the scale of the forces is as long as it says
     longest = max(np.max(np.hypot(root.lambda_n, root.lambda_t)) for root in roots)
-    assert browser.evaluate("data.largest") == pytest.approx(longest)
+    assert browser.evaluate("scalesOf(data.roots, data.alpha).force") == pytest.approx(longest)
     step = float(browser.evaluate("document.querySelector('.card svg text').textContent").removesuffix(" N"))
     assert 0.4 * longest < step <= longest
     last = "[...document.querySelectorAll('.card svg.body line.force')].at(-1)"

@@ -135,7 +135,7 @@ def test_bodies_with_cells_of_two_kinds(kind, tmp_path):
     triangles, others = meshio.read(tmp_path / "p.vtu").cells
     assert (len(triangles), len(others)) == (6, 3)
     assert (triangles.type, others.type) == ("triangle6" if kind[0] == 6 else "triangle", f"quad{kind[1]}".rstrip("4"))
-    record = body_record(problem)
+    record, _ = body_record(problem)
     edges = boundary_edges(np.array(record["cells"]))
     assert len(edges) == 10 * (1 if kind == (3, 4) else 2)
     assert np.all(np.isin(edges, np.unique(np.concatenate([part.ravel() for part in mesh.facets.values()]))))

@@ -37,6 +37,8 @@ def curves(
     width: float,
     tolerance: float,
     window: tuple[float, float] | None = None,
+    *,
+    components: bool = False,
 ) -> dict[int, Curve]:
     """Points along arcs, by the numbers of the arcs.
 
@@ -57,13 +59,16 @@ def curves(
         Relative to the picture's width and height.
     window : (float, float), optional
         Only the parts of arcs between these alphas; arcs outside are left out.
+    components : bool
+        All components of forces and displacements are further columns, for users of these: in 3D quantities have the
+        lengths of tangential vectors only.
     """
     names = (quantities,) if isinstance(quantities, str) else tuple(quantities)
     low, high = (-np.inf, np.inf) if window is None else window
     ranges = {arc.number: (max(arc.lo, low), min(arc.hi, high)) for arc in arcs}
     # arcs that only touch the window are left out, those that are shorter than rounding are not
     seen = [arc for arc in arcs if ranges[arc.number][0] < ranges[arc.number][1] or low <= arc.lo == arc.hi <= high]
-    polygons = [_Polygon(arc, names, ranges[arc.number]) for arc in seen]
+    polygons = [_Polygon(arc, names, ranges[arc.number], components=components) for arc in seen]
     if not polygons:
         return {}
     values = np.concatenate([polygon.curve.values for polygon in polygons])
@@ -78,8 +83,8 @@ def curves(
 class _Polygon:
     """Points of one arc in the order of the angle t."""
 
-    def __init__(self, arc: Arc, names: tuple[str, ...], ends: tuple[float, float]) -> None:
-        self._arc = arc
+    def __init__(self, arc: Arc, names: tuple[str, ...], ends: tuple[float, float], *, components: bool) -> None:
+        self._arc, self._components = arc, components
         self._lo, self._hi = ends
         self._quantities = [QUANTITIES[name] for name in names]
         self._angles = np.linspace(0.0, np.pi, _FIRST)
@@ -93,10 +98,9 @@ class _Polygon:
         points = [self._arc.state(float(alpha)) for alpha in alphas[: 1 if lo == hi else None]]
         points *= 1 if len(points) == len(alphas) else len(alphas)
         forces, moves = (np.array([point[part] for point in points]) for part in (0, 1))
-        values = np.concatenate(
-            [columns(item, forces, moves, len(self._arc.statuses)) for item in self._quantities], axis=1
-        )
-        return Curve(alphas, forces, moves, values)
+        values = [columns(item, forces, moves, len(self._arc.statuses)) for item in self._quantities]
+        values += [forces, moves] if self._components else []
+        return Curve(alphas, forces, moves, np.concatenate(values, axis=1))
 
     def refine(self, width: float, height: Floats, tolerance: float) -> None:
         """Halve angles until all chords are close."""
