@@ -286,14 +286,17 @@ def test_orders_of_changes_lead_from_one_selection_to_the_other():
 # -- folds -------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", [1])
-def test_folds_of_one_node_are_those_of_the_closed_form(seed):
-    node = OneNode(seed, load=True)
+@pytest.mark.parametrize("way", [1, -1])
+def test_folds_of_one_node_are_those_of_the_closed_form(way):
+    # with the load's slope reversed alpha falls before the fold and rises after it, or the other way round
+    node = OneNode(1, load=True)
     phi = node.folds()[0]
-    fold, given = node.alpha(phi), AlphaProblem.of(node.problem.enclosure)
+    problem = node.problem.replace(load_slope=way * node.problem.load_slope)
+    fold, given = way * node.alpha(phi), AlphaProblem.of(problem.enclosure)
     alpha, n, t = node.at(phi + 0.02)
-    start, interval = np.array([n, *t, alpha]), (Fraction(fold) - Fraction(1, 500), Fraction(fold) + Fraction(1, 500))
-    parts = runs_and_turns(given, chain_through(given, node.problem, start, interval))
+    start = np.array([n, *t, way * alpha])
+    interval = Fraction(fold) - Fraction(1, 500), Fraction(fold) + Fraction(1, 500)
+    parts = runs_and_turns(given, chain_through(given, problem, start, interval))
     assert [type(part) for part in parts] == [Run, Turn, Run]
     low, high = parts[1].alphas
     assert parts[1].settled

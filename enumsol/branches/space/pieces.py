@@ -262,7 +262,7 @@ class LinkCutter:
         # the derivative of alpha is monotone
         if start.rises == end.rises:
             return [self._run(start, end, codes, start.rises)]
-        sides = self._beside(start, end, lambda point: bool(point.direction[-1] > 0), _BESIDE_FOLD)
+        sides = self._beside(start, end, lambda point: bool(start.rises * point.direction[-1] > 0), _BESIDE_FOLD)
         if sides is None or [side.rises for side in sides] != [start.rises, end.rises]:
             return None
         alphas = self._fold(*sides)
@@ -340,11 +340,13 @@ class LinkCutter:
             low, high = (middle, high) if is_before(point) else (low, middle)
         share, away = 0.5 * (low + high), least
         for _ in range(_TRIALS):
-            if not 0.0 < share - away < share + away < 1.0:
-                return None
-            sides = self._at(start, end, share - away), self._at(start, end, share + away)
+            # both ends may be as near to it as the points beside it are put
+            before, after = max(share - away, 0.5 * share), min(share + away, 0.5 * (1.0 + share))
+            sides = self._at(start, end, before), self._at(start, end, after)
             if sides[0] is not None and sides[1] is not None and self._tells(sides[0], sides[1]):
                 return sides[0], sides[1]
+            if before == 0.5 * share and after == 0.5 * (1.0 + share):
+                break
             away *= _FARTHER
         return None
 
