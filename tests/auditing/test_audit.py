@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from path_problems import stable_problem
+from refusals import bad_argument
 
 import enumsol
 from enumsol import gallery
@@ -157,14 +158,12 @@ def test_follow_all_with_the_closed_form(graph):
 )
 def test_bad_arguments(graph, path, source, message):
     given = path.to_frame().drop(columns="lambda_t_0") if source == "frame" else source
-    with pytest.raises(enumsol.InvalidArgumentError, match=message):
-        audit(given, graph)
+    bad_argument(message, audit, given, graph)
 
 
 def test_a_graph_that_does_not_say_whether_it_is_complete_is_refused(graph, path):
     parts = {name: getattr(graph, name) for name in ("problem", "interval", "arcs", "vertices", "branches", "complete")}
-    with pytest.raises(enumsol.InvalidArgumentError, match="graph is a SimpleNamespace, which has no reasons"):
-        audit(path, SimpleNamespace(**parts))
+    bad_argument("graph is a SimpleNamespace, which has no reasons", audit, path, SimpleNamespace(**parts))
 
 
 class TestBranchGraph:
@@ -240,8 +239,7 @@ class TestBranchGraph:
                 path = follow_arc(problem, graph, vertex.number, arc.number)
                 assert path[1].statuses == arc.statuses
                 assert path.alpha[0] == pytest.approx(8 / 3)
-        with pytest.raises(enumsol.InvalidArgumentError, match="not an arc"):
-            follow_arc(problem, graph, vertex.number, 10_000)
+        bad_argument("not an arc", follow_arc, problem, graph, vertex.number, 10_000)
 
 
 def hull_distance(chart, alpha, x, polytope):

@@ -8,8 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from command_line import assert_refused, run
+from complete import whole_graph
+from refusals import bad_argument
 
-import enumsol
 from enumsol import BranchGraph, ContactProblem, audit, branch_graph, follow, follow_all, gallery, link_samples, newton
 
 EXAMPLE = "one-node-6.1"
@@ -252,8 +253,7 @@ def test_follow_all_is_not_complete_against_an_incomplete_graph(problem, cut):
 def test_sampled_graphs_are_refused(problem, everything):
     linked = link_samples(problem, [3.0, 4.0, 5.0])
     for call in (lambda: audit(everything, linked), lambda: follow_all(problem, (3.0, 5.0), graph=linked)):
-        with pytest.raises(enumsol.InvalidArgumentError, match=r"graph is a SampledGraph, .* expected a BranchGraph"):
-            call()
+        bad_argument(r"graph is a SampledGraph, .* expected a BranchGraph", call)
 
 
 # -- rows that are not there -------------------------------------------------------------------------------------------
@@ -263,10 +263,8 @@ def test_sampled_graphs_are_refused(problem, everything):
 def test_a_row_without_a_path_is_refused_by_its_number(graph, everything, empty):
     frame = everything.astype({"path": object})
     frame.loc[[3, 4], "path"] = empty
-    with pytest.raises(enumsol.InvalidArgumentError, match="path is empty in row 3 and 1 more"):
-        audit(frame, graph)
-    with pytest.raises(enumsol.InvalidArgumentError, match="path is empty in row 0 and"):
-        audit(everything.assign(path=np.nan), graph)
+    bad_argument("path is empty in row 3 and 1 more", audit, frame, graph)
+    bad_argument("path is empty in row 0 and", audit, everything.assign(path=np.nan), graph)
 
 
 def test_the_file_and_row_without_a_path_are_named(capsys, tmp_path, everything):
@@ -307,8 +305,7 @@ def test_an_audit_of_no_points_is_not_ok(graph, everything):
 @pytest.mark.parametrize("tolerance", [np.nan, np.inf, 0.0, -1e-5, 1.0])
 def test_a_tolerance_that_no_point_can_miss_is_refused(graph, everything, tolerance, capsys, tmp_path):
     wrong = everything.assign(lambda_n_0=everything["lambda_n_0"] + 0.5)
-    with pytest.raises(enumsol.InvalidArgumentError, match=r"tolerance is .*; expected a number above 0 and below 1"):
-        audit(wrong, graph, tolerance=tolerance)
+    bad_argument(r"tolerance is .*; expected a number above 0 and below 1", audit, wrong, graph, tolerance=tolerance)
     wrong.to_csv(tmp_path / "p.csv", index=False)
     assert_refused(
         *run(capsys, "audit", f"gallery:{EXAMPLE}", tmp_path / "p.csv", f"--tolerance={tolerance}"), "tolerance is "
@@ -317,8 +314,7 @@ def test_a_tolerance_that_no_point_can_miss_is_refused(graph, everything, tolera
 
 @pytest.mark.parametrize("detour", [np.nan, np.inf, 0.5])
 def test_a_detour_that_no_jump_exceeds_is_refused(graph, everything, detour):
-    with pytest.raises(enumsol.InvalidArgumentError, match="detour is"):
-        audit(everything, graph, detour=detour)
+    bad_argument("detour is", audit, everything, graph, detour=detour)
 
 
 # -- sheets and families -----------------------------------------------------------------------------------------------
@@ -329,8 +325,7 @@ def test_points_on_a_sheet_are_on_the_graph():
     problem = ContactProblem(
         [[2.0, -1.0], [-1.0, 2.0]], [[1.0, 0.0]], [[0.0, 1.0]], [0.0, 0.0], friction=2.0, load_slope=[1.0, -2.0]
     )
-    graph = branch_graph(problem, (0.25, 1.0))
-    assert graph.complete
+    graph = whole_graph(problem, (0.25, 1.0))
     assert [arc.dimension for arc in graph.arcs] == [1]
     alpha = np.linspace(0.25, 1.0, 20)
     share = np.linspace(0.1, 0.9, 20) * graph.roots_at(1.0).families[0].vertices.max(axis=0)[0, 0]

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from problems3d import SLIDING
+from refusals import bad_argument
 
 import enumsol
 from enumsol.auditing import follow_arc, read_points
@@ -39,12 +40,9 @@ def test_what_a_path_missed_and_points_off_the_graph(graph, path):
 def test_points_of_another_dimension_are_refused(graph, path):
     plane = enumsol.gallery.one_node_triangle()
     other = enumsol.follow(plane, enumsol.newton(plane, 0), interval=(0, 1))
-    with pytest.raises(enumsol.InvalidArgumentError, match="path 0 is one in 2D; expected a path in 3D"):
-        enumsol.audit(other, graph)
-    with pytest.raises(enumsol.InvalidArgumentError, match="no column 'lambda_t1_0'"):
-        read_points(path.to_frame().drop(columns="lambda_t1_0"), SLIDING)
-    with pytest.raises(enumsol.InvalidArgumentError, match="another dimension"):
-        enumsol.follow_all(plane, graph.interval, graph=graph)
+    bad_argument("path 0 is one in 2D; expected a path in 3D", enumsol.audit, other, graph)
+    bad_argument("no column 'lambda_t1_0'", read_points, path.to_frame().drop(columns="lambda_t1_0"), SLIDING)
+    bad_argument("another dimension", enumsol.follow_all, plane, graph.interval, graph=graph)
     run = read_points(path, SLIDING)[0]
     assert run.forces.shape == (len(path), 3)
     assert np.array_equal(run.forces[:, 1:], path.lambda_t[:, 0])

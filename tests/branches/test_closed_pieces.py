@@ -6,8 +6,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from branches.test_lower_bounds import KINDS, case, padded
+from complete import whole_graph
 from effort import some
 from generators import through_the_unloaded_state
+from interruptions import CtrlC, interrupted
 from path_problems import generic_problem
 from trees import by_the_tree
 
@@ -17,7 +19,6 @@ from enumsol.branches.enclosed.following import TracedProblem
 from enumsol.branches.enclosed.single_branches import ClosedPieces
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.unloaded import vanishing_alpha
-from enumsol.errors import Interrupted
 from enumsol.trusted.arcs.only_branch import only_roots
 from enumsol.trusted.piece_form import PieceNumbers
 
@@ -48,8 +49,7 @@ def same(graph, other):
 )
 def test_blocks_need_no_tree(traction, length, interval):
     problem = gallery.clamped_block(8, 4, length, traction=traction)
-    graph = branch_graph(problem, interval)
-    assert graph.complete
+    graph = whole_graph(problem, interval)
     assert graph.stats.nodes == 0 < graph.stats.closed
     with by_the_tree():
         other = branch_graph(problem, interval)
@@ -64,8 +64,7 @@ def test_blocks_need_no_tree(traction, length, interval):
 @pytest.mark.slow
 def test_numbers_are_sought_where_plain_ones_do_not_serve():
     problem = gallery.clamped_block(32, 16, 0.5, traction=(1.0, -0.3))
-    graph = branch_graph(problem, (1, 2))
-    assert graph.complete
+    graph = whole_graph(problem, (1, 2))
     assert graph.stats.nodes == 0
     assert any(np.any(found.numbers.nu) for found in graph.pieces if found.numbers is not None)
     assert verify(problem, graph.proof).complete
@@ -74,8 +73,7 @@ def test_numbers_are_sought_where_plain_ones_do_not_serve():
 def test_a_load_that_vanishes_inside():
     small, interval = through_the_unloaded_state()
     body = padded(ContactProblem(small.A, small.Bn, small.Bt, [0.0, 0.0], load_slope=[1.5, -4.0], friction=0.5), 25)
-    graph = branch_graph(body, interval)
-    assert graph.complete
+    graph = whole_graph(body, interval)
     assert graph.stats.nodes == 0 < graph.stats.closed
     with by_the_tree():
         assert same(graph, branch_graph(body, interval))
@@ -166,14 +164,10 @@ def test_the_same_with_workers():
 
 
 def test_an_interruption_claims_nothing(monkeypatch):
-    def stop(*_, **__):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(enumsol.branches.enclosed.single_branches, "only_roots", stop)
-    with pytest.raises(Interrupted) as caught:
-        branch_graph(gallery.clamped_block(8, 4), (0, 3))
-    assert not caught.value.partial.complete
-    assert caught.value.partial.proof is None
+    monkeypatch.setattr(enumsol.branches.enclosed.single_branches, "only_roots", CtrlC())
+    partial = interrupted("interrupted", branch_graph, gallery.clamped_block(8, 4), (0, 3))
+    assert not partial.complete
+    assert partial.proof is None
 
 
 def test_the_time_may_be_over_at_once():
@@ -199,6 +193,5 @@ def test_large_bodies_need_no_many_digits(monkeypatch):
     monkeypatch.setattr("enumsol.trusted.arcs.precise.refined_table", lambda _: pytest.fail("asked for many digits"))
     block = gallery.clamped_block(16, 8)
     assert block.n > EXACT_DOF_LIMIT
-    graph = branch_graph(block, (0, 1))
-    assert graph.complete
+    graph = whole_graph(block, (0, 1))
     assert graph.stats.closed > 0

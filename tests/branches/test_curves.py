@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from refusals import bad_argument
 
-from enumsol import InvalidArgumentError, branch_graph, gallery
+from enumsol import branch_graph, gallery
 from enumsol.branches.figures.curves import curves
 
 GRAPHS = [("one-node-6.1", (0, 10)), ("two-node-6.7-minus", (-3, 3)), ("chain-2", (0, 10)), ("wedge-8-5", (1, 5))]
@@ -67,5 +68,4 @@ def test_a_plot_takes_a_tolerance():
     graph, _ = arcs_of("one-node-6.1", (0, 10))
     rough, fine = (graph.plot(tolerance=tolerance).axes[0] for tolerance in (0.05, 1e-4))
     assert max(len(line.get_xdata()) for line in fine.lines) > max(len(line.get_xdata()) for line in rough.lines)
-    with pytest.raises(InvalidArgumentError, match="tolerance is 0"):
-        graph.plot(tolerance=0)
+    bad_argument("tolerance is 0", graph.plot, tolerance=0)

@@ -8,12 +8,12 @@ import pandas as pd
 import pytest
 from cut_short import false_claims_of_graph, false_claims_of_roots
 from generators import integer_problem as integer_data, random_problem, singular_problem
+from interruptions import CtrlC, interrupted
 from path_problems import generic_problem, integer_problem, mirrored_problem
 
 from enumsol import branch_graph, enumerate_roots, gallery, multiplicity_table
 from enumsol.branches import BranchGraph, ways
 from enumsol.branches.enclosed import tracing
-from enumsol.errors import Interrupted
 
 KINDS = ("friction", "load", "both")
 INTERVAL = (0.0, 3.0)
@@ -67,34 +67,17 @@ def test_gallery_graphs_cut_short_claim_nothing_false(name):
 @pytest.mark.parametrize("calls", [1, 2, 3])
 def test_a_graph_cut_short_by_an_interruption_claims_nothing_false(calls):
     full = complete_graph("wedge-8-3")
-    problem = full.problem
-    seen = []
-
-    def progress(stage, share):
-        seen.append((stage, share))
-        if stage == "search" and len(seen) == calls:
-            raise KeyboardInterrupt
-
-    with pytest.raises(Interrupted) as caught:
-        branch_graph(problem, (0.0, 5.0), progress=progress)
-    assert list(false_claims_of_graph(caught.value.partial, full)) == []
+    stop = CtrlC(lambda stage, share: stage == "search", call=calls)
+    partial = interrupted("interrupted", branch_graph, full.problem, (0.0, 5.0), progress=stop)
+    assert list(false_claims_of_graph(partial, full)) == []
 
 
 @pytest.mark.parametrize("calls", [1, 5, 12])
 @pytest.mark.parametrize("name", ["two-node-6.4", "chain-4", "one-node-6.3"])
 def test_an_interruption_while_arcs_are_worked_out_keeps_those_that_are_done(name, calls):
     full = complete_graph(name)
-    problem = full.problem
-    seen = []
-
-    def progress(stage, _):
-        seen.append(stage)
-        if seen.count("arcs") == min(calls, full.stats.selections):
-            raise KeyboardInterrupt
-
-    with pytest.raises(Interrupted) as caught:
-        branch_graph(problem, (0.0, 5.0), progress=progress)
-    partial = caught.value.partial
+    stop = CtrlC(lambda stage, share: stage == "arcs", call=min(calls, full.stats.selections))
+    partial = interrupted("interrupted", branch_graph, full.problem, (0.0, 5.0), progress=stop)
     assert "interrupted after the arcs of" in partial.reasons[0]
     assert list(false_claims_of_graph(partial, full)) == []
 
@@ -102,18 +85,8 @@ def test_an_interruption_while_arcs_are_worked_out_keeps_those_that_are_done(nam
 @pytest.mark.slow
 def test_an_interruption_keeps_the_selections_of_a_group_that_are_finished(monkeypatch):
     full = complete_graph("wedge-8-3")
-    asked, over_parts = [], tracing.over_parts
-
-    def interrupted(parts):
-        asked.append(len(parts))
-        if len(asked) == 6:
-            raise KeyboardInterrupt
-        return over_parts(parts)
-
-    monkeypatch.setattr(tracing, "over_parts", interrupted)
-    with pytest.raises(Interrupted) as caught:
-        branch_graph(full.problem, (0.0, 5.0))
-    partial = caught.value.partial
+    monkeypatch.setattr(tracing, "over_parts", CtrlC(call=6, then=tracing.over_parts))
+    partial = interrupted("interrupted", branch_graph, full.problem, (0.0, 5.0))
     done = int(re.search(r"the arcs of (\d+) of", partial.reasons[0])[1])
     assert 0 < done < full.stats.selections
     assert partial.arcs
@@ -124,14 +97,8 @@ def test_exact_algebra_stops_soon_after_an_interrupted_search(monkeypatch):
     full = complete_graph("chain-4")
     assert full.stats.selections > 8
     monkeypatch.setattr(ways, "_SELECTIONS_AFTER_INTERRUPT", 0)
-
-    def progress(stage, share):
-        if stage == "search" and share == 1.0:
-            raise KeyboardInterrupt
-
-    with pytest.raises(Interrupted) as caught:
-        branch_graph(full.problem, (0.0, 5.0), "fast", progress=progress)
-    partial = caught.value.partial
+    stop = CtrlC(lambda stage, share: stage == "search" and share == 1.0)
+    partial = interrupted("interrupted", branch_graph, full.problem, (0.0, 5.0), "fast", progress=stop)
     assert "the arcs of 8 of" in partial.reasons[1]
     assert list(false_claims_of_graph(partial, full)) == []
 

@@ -6,6 +6,7 @@ from math import isqrt
 
 import numpy as np
 import pytest
+from complete import whole_graph
 from effort import some
 from path_problems import assert_balanced, assert_same_roots, mirrored_problem, one_node
 
@@ -24,8 +25,7 @@ def uncoupled(*loads, **options):
 
 
 def test_a_sheet_is_one_edge_with_families_at_every_alpha():
-    graph = branch_graph(one_node((0.0, 0.0), friction=2.0, load_slope=[1.0, -2.0]), (0.25, 1.0), "exact")
-    assert graph.complete
+    graph = whole_graph(one_node((0.0, 0.0), friction=2.0, load_slope=[1.0, -2.0]), (0.25, 1.0), "exact")
     (sheet,) = graph.sheets
     assert (sheet.dimension, sheet.index) == (1, 1)
     assert len(graph.arcs) == 1
@@ -36,8 +36,7 @@ def test_a_sheet_is_one_edge_with_families_at_every_alpha():
 
 
 def test_a_load_that_passes_zero_has_every_selection_there():
-    graph = branch_graph(one_node((0.0, 0.0), friction=2.0, load_slope=[1.0, -2.0]), (-1.0, 1.0), "exact")
-    assert graph.complete
+    graph = whole_graph(one_node((0.0, 0.0), friction=2.0, load_slope=[1.0, -2.0]), (-1.0, 1.0), "exact")
     (origin,) = [v for v in graph.vertices if v.alpha == 0.0]
     assert len(origin.active[0]) == 4
     assert (origin.index_left, origin.index_right) == (1, 1)
@@ -54,29 +53,25 @@ def test_an_origin_in_many_nodes_needs_no_list_of_all_selections():
     problem = ContactProblem(
         np.kron(np.eye(p), A), rows[0::2], rows[1::2], np.zeros(2 * p), friction=0.5, load_slope=np.tile([1.0, 0.25], p)
     )
-    graph = branch_graph(problem, (-1.0, 1.0), "exact")
-    assert graph.complete
+    graph = whole_graph(problem, (-1.0, 1.0), "exact")
     assert len(graph.arcs) == 2
 
 
 def test_an_unloaded_body_rests():
-    graph = branch_graph(uncoupled([0.0, 0.0], [0.0, 0.0]), (0.0, 2.0), "exact")
-    assert graph.complete
+    graph = whole_graph(uncoupled([0.0, 0.0], [0.0, 0.0]), (0.0, 2.0), "exact")
     assert len(graph.arcs) == 1
     assert np.all(graph.arcs[0].values(1.0)[0] == 0)
 
 
 def test_a_node_without_friction_is_not_split_by_its_slip():
-    graph = branch_graph(one_node((1.0, 0.0), friction=0.0, load_slope=[0.0, 1.0]), (-1.5, 1.5), "exact")
-    assert graph.complete
+    graph = whole_graph(one_node((1.0, 0.0), friction=0.0, load_slope=[0.0, 1.0]), (-1.5, 1.5), "exact")
     assert len(graph.arcs) == 1
     assert graph.arcs[0].statuses[0] in (ContactStatus.STICK, ContactStatus.SLIP_MINUS, ContactStatus.SLIP_PLUS)
 
 
 def test_friction_that_starts_at_zero_is_glued_at_the_border():
     for f in ((1.5, 7.0), (1.5, -0.5), (1.0, 0.0)):
-        graph = branch_graph(one_node(f), (0.0, 9.0), "exact")
-        assert graph.complete
+        graph = whole_graph(one_node(f), (0.0, 9.0), "exact")
         assert_same_roots(graph.roots_at(0), enumerate_roots(one_node(f), 0, "exact"))
 
 
@@ -165,15 +160,13 @@ def pair(push):
 
 
 def test_a_pitchfork_and_the_perturbation_that_destroys_it():
-    graph = branch_graph(pair(0.0), (0.0, 6.0), "exact")
-    assert graph.complete
+    graph = whole_graph(pair(0.0), (0.0, 6.0), "exact")
     (pitchfork,) = [v for v in graph.vertices if v.kind == "bifurcation"]
     left = [arc for arc in graph.arcs if arc.head == pitchfork.number]
     right = [arc for arc in graph.arcs if arc.tail == pitchfork.number]
     assert (pitchfork.alpha, len(left), len(right)) == (3.0, 1, 3)
     assert (pitchfork.index_left, pitchfork.index_right) == (-1, -1)
-    moved = branch_graph(pair(1e-6), (0.0, 6.0), "exact")
-    assert moved.complete
+    moved = whole_graph(pair(1e-6), (0.0, 6.0), "exact")
     assert_balanced(moved)
     assert not [v for v in moved.vertices if v.kind == "bifurcation"]
 

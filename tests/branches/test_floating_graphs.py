@@ -6,9 +6,11 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from complete import whole_graph
 from helpers.floating_oracle import Oracle, block_on_table, random_body
-from helpers.proof_tools import copied, multipliers, proof_of, records_of, with_multipliers
-from rational_checker import Refused, check_records
+from helpers.proof_tools import copied, multipliers, of_kind, proof_of, records_of, replaced, with_multipliers
+from rational_checker import check_records
+from rational_forms import Refused
 
 import enumsol
 
@@ -85,8 +87,7 @@ def test_all_solutions_of_many_random_bodies():
 
 def test_a_block_that_is_pushed_until_it_slides(tmp_path):
     problem = pushed(max_rigid_displacement=4.0)
-    graph = enumsol.branch_graph(problem, (-2, Fraction(3, 2)))
-    assert graph.complete
+    graph = whole_graph(problem, (-2, Fraction(3, 2)))
     assert "complete: yes (proven, within rigid displacements of 4)" in repr(graph)
     alphas, at, between = graph.steps
     assert (alphas[0], alphas[-1]) == (-2, Fraction(3, 2))
@@ -115,8 +116,7 @@ def test_a_block_that_is_pushed_until_it_slides(tmp_path):
 def test_arcs_end_where_the_body_has_moved_as_far_as_was_asked():
     """Pushed more and more, the block gives way where it touches the table, before it slides."""
     problem = pushed(max_rigid_displacement=1 / 64)
-    graph = enumsol.branch_graph(problem, (-1.5, 0))
-    assert graph.complete
+    graph = whole_graph(problem, (-1.5, 0))
     (end,) = (v for v in graph.vertices if v.kind == "bound")
     assert end.bounded
     assert (end.index_left, end.index_right) == (0, 1)
@@ -133,8 +133,7 @@ def test_arcs_end_where_the_body_has_moved_as_far_as_was_asked():
 def test_a_body_that_slides_without_friction_is_a_sheet():
     problem = block_on_table(cells=1, friction=0.0, max_rigid_displacement=2.0)
     problem = problem.replace(load_slope=block_on_table(cells=1, press=2.0, friction=0.0).f - problem.f)
-    graph = enumsol.branch_graph(problem, (0, 1))
-    assert graph.complete
+    graph = whole_graph(problem, (0, 1))
     assert graph.sheets
     (family,) = graph.roots_at(0.5).families
     assert family.free_modes == (0,)
@@ -197,26 +196,20 @@ def test_a_proof_says_within_which_bound():
     assert "S and g as computed" in refusal(records)
 
 
-def _kind(record):
-    return record[0] if isinstance(record, list) else None
-
-
 def test_forged_leaves_are_refused():
-    excluded, survivors = ([place for place, record in enumerate(RECORDS) if _kind(record) == kind] for kind in "xs")
+    excluded, survivors = (of_kind(RECORDS, kind) for kind in "xs")
     assert excluded
     for place in excluded:
         rows, values = multipliers(["x", *RECORDS[place][2:]])
         for forged in ([0.0] * len(values), [-v for v in values]):
-            records = copied(RECORDS)
-            records[place] = ["x", RECORDS[place][1], *with_multipliers(["x", "", ""], rows, forged)[1:]]
-            assert "do not exclude" in refusal(records)
+            assert "do not exclude" in refusal(
+                replaced(RECORDS, place, ["x", RECORDS[place][1], *with_multipliers(["x", "", ""], rows, forged)[1:]])
+            )
     for record in (["q", [1.0] * 2, [0.0] * 2, [0.0] * 2, [0.0] * 2], ["m", [1.0] * 2, [1.0] * 2, [0.0] * 2]):
         records = copied(RECORDS)
         records.insert(excluded[0], record)
         assert "unknown kind of record" in refusal(records)
-    records = copied(RECORDS)
-    del records[survivors[0]]
-    assert "do not cover" in refusal(records)
+    assert "do not cover" in refusal(replaced(RECORDS, survivors[0]))
 
 
 def test_samples_are_linked_where_the_graph_has_a_branch():

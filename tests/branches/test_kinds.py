@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from complete import whole_graph
 from effort import some
 from path_problems import assert_balanced, integer_problem
 
@@ -64,16 +65,14 @@ def test_it_may_end_alone_too():
     """The same body with a friction that falls: a load increase has to leave the branch there."""
     forth = fold_beside_grazing(0.25)
     back = ContactProblem(forth.A, forth.Bn, forth.Bt, forth.f, friction=([5.0, 5.0], [-1.0, 0.0]))
-    graph = branch_graph(back, (0, 5))
-    assert graph.complete
+    graph = whole_graph(back, (0, 5))
     (vertex,) = (v for v in graph.vertices if v.kind == "terminal")
     assert vertex.alpha == pytest.approx(7 / 3, abs=1e-15)
     assert vertex in graph.jumps
 
 
 def test_pushed_to_the_other_side_both_statuses_hold():
-    graph = branch_graph(fold_beside_grazing(-0.25), (0, 5))
-    assert graph.complete
+    graph = whole_graph(fold_beside_grazing(-0.25), (0, 5))
     assert Counter(v.kind for v in graph.vertices if not v.border) == {"bifurcation": 1, "fold": 1}
 
 

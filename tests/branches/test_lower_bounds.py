@@ -15,7 +15,9 @@ from math import inf, nextafter
 import numpy as np
 import pytest
 from branches.test_degenerate import uncoupled
+from complete import all_roots, whole_graph
 from effort import some
+from interruptions import CtrlC
 from path_problems import (
     generic_problem,
     grazing_problem,
@@ -89,16 +91,8 @@ def case(seed):
 def cut_short(problem, interval, rng, nodes, way):
     """A graph that is not complete, for one reason or another (or one that is, after all)."""
     if way == "interrupted":
-        left = int(rng.integers(1, 6))
-
-        def stop(stage, _):
-            nonlocal left
-            left -= 1
-            if left == 0:
-                raise KeyboardInterrupt
-
         try:
-            return branch_graph(problem, interval, progress=stop)
+            return branch_graph(problem, interval, progress=CtrlC(call=int(rng.integers(1, 6))))
         except Interrupted as error:
             return error.partial
     return branch_graph(problem, interval, max_nodes=None if way == "whole" else int(rng.integers(1, max(nodes, 2))))
@@ -220,8 +214,7 @@ def test_claims_are_true():
 def test_the_enumeration_of_roots_agrees():
     full, graph, _ = next(graphs_of(2))
     for alpha in alphas_to_test(full, graph, np.random.default_rng(3), 8):
-        roots = enumerate_roots(full.problem, alpha, "exact")
-        assert roots.complete
+        roots = all_roots(full.problem, alpha, "exact")
         assert graph.at_least(alpha) <= len(roots) + len(roots.families) == full.multiplicity_at(alpha)
 
 
@@ -292,8 +285,7 @@ def test_where_all_selections_hold_a_search_cut_short_knows_no_kind():
 def test_an_event_just_outside_the_interval_is_no_solution(n, beyond):
     third, beyond = Fraction(1, 3), Fraction(beyond)
     for interval in ((third + beyond, 2), (0, third - beyond)):
-        graph = branch_graph(sliding(n), interval)
-        assert graph.complete
+        graph = whole_graph(sliding(n), interval)
         assert [graph.at_least(end) for end in interval] == [1, 1]
         assert [v.kind for v in graph.vertices] == ["end", "end"]
         assert len(graph.arcs) == 1
@@ -308,8 +300,7 @@ def test_solutions_are_several_from_where_a_sheet_begins():
     # a sheet that begins at a point, where g vanishes
     problem = uncoupled([0.0, 0.0], friction=2.0, load_slope=[1.0, -2.0])
     for first in (0.0, -1.0):
-        graph = branch_graph(problem, (first, 1.0))
-        assert graph.complete
+        graph = whole_graph(problem, (first, 1.0))
         assert graph.sheets
         assert graph.uniqueness_limit == 0.0
     assert enumerate_roots(problem, 0.5).families

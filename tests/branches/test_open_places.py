@@ -6,6 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 from branches.test_degenerate import pair
+from complete import whole_graph
 from path_problems import generic_problem
 from problems3d import SLIDING
 
@@ -42,8 +43,7 @@ def test_a_large_body_is_decided_at_its_contact_nodes():
     assert graph.completeness() == f"complete: no ({reason})"
     with pytest.raises(IncompleteGraphError, match=re.escape(reason)):
         graph.multiplicity_at(3.25)
-    small = branch_graph(problem.at_contact_nodes(), (2.5, 3.5))
-    assert small.complete
+    small = whole_graph(problem.at_contact_nodes(), (2.5, 3.5))
     assert {small.multiplicity_at(alpha) for alpha in (2.75, 3.25)} == {3, 5}
     assert graph.at_least(3.25) <= small.multiplicity_at(3.25)
 
@@ -117,8 +117,7 @@ def states(codes):
 
 def test_what_contradicts_a_search_is_told_as_a_defect():
     problem = gallery.two_node_square()
-    graph = branch_graph(problem, (0.0, 10.0), "exact")
-    assert graph.complete
+    graph = whole_graph(problem, (0.0, 10.0), "exact")
     exact = ExactCondensed.from_problem(problem)
     held = {codes for arc in graph.arcs for codes in arc.selections}
     inner = [vertex for vertex in graph.vertices if not vertex.border]

@@ -5,8 +5,9 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from refusals import bad_argument
 
-from enumsol import ContactProblem, InvalidArgumentError, branch_graph, gallery
+from enumsol import ContactProblem, branch_graph, gallery
 from enumsol.branches.claims import MultiplicitySteps
 from enumsol.branches.figures.curves import QUANTITIES, Curve, curves, side_by_side
 from enumsol.branches.figures.labels import narrow_changes
@@ -150,8 +151,7 @@ def test_a_spike_is_shown_larger(graphs):
     square = graphs["square"]
     assert len(square.plot().axes) == len(square.plot(zoom=False).axes) == 2
     assert square.plot(zoom=(2.9, 4.0)).axes[2].get_xlim() == (2.9, 4.0)
-    with pytest.raises(InvalidArgumentError, match="overlaps"):
-        square.plot(zoom=(20, 30))
+    bad_argument("overlaps", square.plot, zoom=(20, 30))
 
 
 @pytest.mark.parametrize("window", [None, (2.9, 4.0)])
@@ -229,8 +229,7 @@ def test_what_cannot_be_drawn_is_refused(graphs, options, message):
 
     if options.get("ax") == "axes":
         options = {**options, "ax": new_figure().subplots()}
-    with pytest.raises(InvalidArgumentError, match=message):
-        graphs["square"].plot(**options)
+    bad_argument(message, graphs["square"].plot, **options)
 
 
 def test_a_sheet_is_shaded_from_end_to_end():

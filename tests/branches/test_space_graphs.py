@@ -8,7 +8,10 @@ from math import sqrt
 
 import numpy as np
 import pytest
+from complete import whole_graph
+from interruptions import CtrlC, interrupted
 from problems3d import SLIDING, OneNode, forces, random_over_alpha, sliding_node
+from refusals import bad_argument
 
 import enumsol
 from enumsol.arithmetic.balls import Ball
@@ -128,8 +131,7 @@ def test_a_damaged_file_is_refused(graph, tmp_path):
     graph.save(place)
     damaged = re.sub(r'"borders": \[\[', '"borders": [[0.0], [', place.read_text(encoding="utf-8"), count=1)
     place.write_text(damaged, encoding="utf-8")
-    with pytest.raises(enumsol.InvalidArgumentError, match="damaged"):
-        enumsol.BranchGraph.load(place)
+    bad_argument("damaged", enumsol.BranchGraph.load, place)
 
 
 def test_a_search_that_is_cut_short_is_not_complete():
@@ -146,34 +148,26 @@ def test_what_was_found_is_kept_when_the_time_is_over_or_somebody_interrupts():
     assert not graph.complete
     assert "time limit" in graph.reasons[0]
     assert graph.at_least(1.8) in (0, 1)
-
-    def stop(step, share):
-        if step == "arcs" or share > 0.5:
-            raise KeyboardInterrupt
-
-    with pytest.raises(enumsol.Interrupted, match="kept") as caught:
-        enumsol.branch_graph(SLIDING, (1.78, 1.82), max_nodes=60, progress=stop)
-    assert not caught.value.partial.complete
-    assert caught.value.partial.proof is None
+    stop = CtrlC(lambda step, share: step == "arcs" or share > 0.5)
+    partial = interrupted("kept", enumsol.branch_graph, SLIDING, (1.78, 1.82), max_nodes=60, progress=stop)
+    assert not partial.complete
+    assert partial.proof is None
 
 
 def test_what_is_refused():
-    with pytest.raises(enumsol.InvalidArgumentError, match='arithmetic is "fast" for a problem in 3D'):
-        enumsol.branch_graph(SLIDING, (1, 2), "fast")
+    bad_argument('arithmetic is "fast" for a problem in 3D', enumsol.branch_graph, SLIDING, (1, 2), "fast")
     with (
         ThreadPoolExecutor(1) as workers,
         pytest.raises(enumsol.InvalidArgumentError, match="executor is given for a problem in 3D"),
     ):
         enumsol.branch_graph(SLIDING, (1, 2), executor=workers)
-    with pytest.raises(enumsol.InvalidArgumentError, match="expected F >= 0"):
-        enumsol.branch_graph(SLIDING, (-1, 2))
+    bad_argument("expected F >= 0", enumsol.branch_graph, SLIDING, (-1, 2))
     with pytest.raises(enumsol.NotHeldError):
         enumsol.branch_graph(enumsol.gallery.block_on_table3d(), (0, 1))
 
 
 def test_a_graph_in_3d_has_no_page_yet(graph, tmp_path):
-    with pytest.raises(enumsol.InvalidArgumentError, match="in 3D"):
-        enumsol.write_report(graph, tmp_path / "page.html")
+    bad_argument("in 3D", enumsol.write_report, graph, tmp_path / "page.html")
 
 
 # -- what happens along a curve ----------------------------------------------------------------------------------------
@@ -232,8 +226,7 @@ def test_vertices_of_the_same_bounds_are_not_in_an_order(graph):
 
 def test_counts_along_random_graphs_are_those_of_searches():
     problem = random_over_alpha(2, 2)
-    graph = enumsol.branch_graph(problem, (0, 1))
-    assert graph.complete
+    graph = whole_graph(problem, (0, 1))
     for alpha in np.linspace(0.03, 0.97, 4).tolist():
         known, found = enumsol.enumerate_roots(problem, alpha), graph.roots_at(alpha)
         assert known.complete

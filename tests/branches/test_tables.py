@@ -5,11 +5,12 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 import numpy as np
 import pandas as pd
 import pytest
+from interruptions import CtrlC, interrupted
 from path_problems import generic_problem
+from refusals import bad_argument
 
 from enumsol import gallery
 from enumsol.branches import branch_graph, link_samples, multiplicity_table
-from enumsol.errors import Interrupted, InvalidArgumentError
 
 ALPHAS = [0.5, 2.0, 3.5, 5.0, 7.5]
 
@@ -73,26 +74,19 @@ def test_two_dask_workers_give_the_same_table(square):
 
 
 def test_an_interruption_keeps_what_was_done(square):
-    def stop(done, total):
-        if done == 3:
-            raise KeyboardInterrupt
-
-    with pytest.raises(Interrupted, match="3 of 5") as caught:
-        multiplicity_table(square, ALPHAS, progress=stop)
-    assert caught.value.partial["alpha"].tolist() == ALPHAS[:3]
-    with ThreadPoolExecutor(1) as executor, pytest.raises(Interrupted) as caught:
-        multiplicity_table(square, ALPHAS, executor=executor, progress=stop)
-    assert len(caught.value.partial) == 3
+    stops = [CtrlC(lambda done, total: done == 3) for _ in range(2)]
+    partial = interrupted("3 of 5", multiplicity_table, square, ALPHAS, progress=stops[0])
+    assert partial["alpha"].tolist() == ALPHAS[:3]
+    with ThreadPoolExecutor(1) as executor:
+        partial = interrupted("interrupted", multiplicity_table, square, ALPHAS, executor=executor, progress=stops[1])
+    assert len(partial) == 3
 
 
 def test_bad_alphas_are_refused_before_any_work(square):
-    with pytest.raises(InvalidArgumentError, match="alpha"):
-        multiplicity_table(square, [1.0, np.nan])
-    with pytest.raises(InvalidArgumentError, match="friction"):
-        multiplicity_table(square, [1.0, -1.0])
+    bad_argument("alpha", multiplicity_table, square, [1.0, np.nan])
+    bad_argument("friction", multiplicity_table, square, [1.0, -1.0])
     assert len(multiplicity_table(square, [])) == 0
-    with pytest.raises(InvalidArgumentError, match="empty"):
-        link_samples(square, [])
+    bad_argument("empty", link_samples, square, [])
 
 
 def test_linked_samples_follow_the_branches(square):

@@ -5,6 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from branches.test_degenerate import pair, uncoupled
+from complete import whole_graph
 from generators import through_the_unloaded_state, vanishing_problem
 from path_problems import (
     generic_problem,
@@ -163,8 +164,7 @@ def test_exact_algebra_that_would_take_too_long_is_not_begun(monkeypatch):
     A, rows = np.eye(28), np.zeros((2, 2, 28))  # more degrees of freedom, which nothing touches
     A[:4, :4], rows[0, :, :4], rows[1, :, :4] = small.A.toarray(), small.Bn.toarray(), small.Bt.toarray()
     problem = ContactProblem(A, *rows, np.append(small.f, np.zeros(24)), friction=small.friction)
-    exactly = branch_graph(problem, (0.0, 6.0))
-    assert exactly.complete
+    exactly = whole_graph(problem, (0.0, 6.0))
     assert [v.alpha for v in exactly.vertices if v.kind == "bifurcation"] == [3.0]
     monkeypatch.setattr(ways, "LARGEST_EXACT_WORK", 0)
     graph = branch_graph(problem, (0.0, 6.0))
@@ -204,8 +204,7 @@ def test_the_unloaded_state_joins_both_sides():
 
 def test_without_any_load_there_is_nothing_to_trace():
     problem = uncoupled([0.0, 0.0], [0.0, 0.0])
-    graph = branch_graph(problem, (0.0, 2.0))
-    assert graph.complete
+    graph = whole_graph(problem, (0.0, 2.0))
     assert len(graph.arcs) == 1
     # a load inside the body alone, which cancels on the way to the contact nodes, gives no proof that is not whole
     assert graph.proof is None or verify(problem, graph.proof).ok
@@ -225,8 +224,7 @@ def test_boxes_far_from_zero_may_be_long(seed):
 def test_many_digits_decide_long_boxes():
     """Beside a fold of a slender body doubles do not suffice: many digits go on from there, in boxes that grow."""
     problem = gallery.taper(4, 4, (5.0, 50.0))
-    graph = branch_graph(problem, (0, 0.4))
-    assert graph.complete
+    graph = whole_graph(problem, (0, 0.4))
     assert graph.arcs_by == "balls"
     for alpha in (0.1, 0.15, 0.18, 0.3, 0.4):
         assert graph.multiplicity_at(alpha) == len(enumerate_roots(problem, alpha))

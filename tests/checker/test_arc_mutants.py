@@ -12,7 +12,7 @@ from branches.test_degenerate import pair
 from checker.test_graph_mutants import PATHS
 from effort import some
 from path_problems import generic_problem, one_node, planted_corner, together
-from proof_tools import copied, proof_of, records_of
+from proof_tools import copied, of_kind, proof_of, records_of
 
 from enumsol import branch_graph, gallery, verify
 
@@ -40,14 +40,6 @@ def original(name):
 # -- mutations ---------------------------------------------------------------------------------------------------------
 
 
-def _traces(records):
-    return [k for k, record in enumerate(records) if isinstance(record, list) and record and record[0] == "t"]
-
-
-def _boxes(records):
-    return [k for k, record in enumerate(records) if isinstance(record, list) and record and record[0] == "b"]
-
-
 def _moved(rng, value):
     """An alpha beside another."""
     if isinstance(value, str):
@@ -67,7 +59,7 @@ def _shifted(rng, text):
 
 
 def _part(rng, records):
-    boxes = [k for k in _boxes(records) if records[k][4]]
+    boxes = [k for k in of_kind(records, "b") if records[k][4]]
     if boxes:
         parts = records[rng.choice(boxes)][4]
         yield parts, rng.randrange(len(parts))
@@ -119,7 +111,7 @@ def join_parts(rng, records):
 
 
 def change_box(rng, records):
-    boxes = _boxes(records)
+    boxes = of_kind(records, "b")
     k = rng.choice(boxes)
     how = rng.randrange(6)
     if how == 0:
@@ -151,7 +143,7 @@ def _block(records, k):
 
 
 def change_trace(rng, records):
-    k = rng.choice(_traces(records))
+    k = rng.choice(of_kind(records, "t"))
     first, last = _block(records, k)
     how = rng.randrange(7)
     if how == 0:
@@ -176,17 +168,17 @@ def change_trace(rng, records):
             if place == -1:
                 box[4][-1][1] = value
     else:
-        other = rng.choice(_traces(records))
+        other = rng.choice(of_kind(records, "t"))
         records[k][1], records[other][1] = records[other][1], records[k][1]
 
 
 def remove_arc(rng, records):
     """An arc and its events are nowhere; the partners of the events may be removed as well."""
-    k = rng.choice(_traces(records))
+    k = rng.choice(of_kind(records, "t"))
     codes = {records[k][1]}
     if rng.random() < 0.6:
-        codes.add(rng.choice([records[j][1] for j in _traces(records)]))
-    for j in _traces(records):
+        codes.add(rng.choice([records[j][1] for j in of_kind(records, "t")]))
+    for j in of_kind(records, "t"):
         if records[j][1] in codes:
             first, last = _block(records, j)
             for box in records[first + 1 : last]:
@@ -195,7 +187,7 @@ def remove_arc(rng, records):
 
 def hide_selection(rng, records):
     """A surviving selection is removed, or is left to halves that do not follow; its trace may vanish, too."""
-    handed = [k for k, record in enumerate(records) if isinstance(record, list) and record and record[0] == "s"]
+    handed = of_kind(records, "s")
     if not handed:
         return
     k = rng.choice(handed)
@@ -209,7 +201,7 @@ def hide_selection(rng, records):
     else:
         del records[k]
     if rng.random() < 0.7:
-        for j in reversed(_traces(records)):
+        for j in reversed(of_kind(records, "t")):
             if records[j][1] == codes:
                 first, last = _block(records, j)
                 del records[first:last]
@@ -217,13 +209,13 @@ def hide_selection(rng, records):
 
 def add_selection(rng, records):
     """A selection that is no leaf of the tree, with the trace of another or none."""
-    handed = [k for k, record in enumerate(records) if isinstance(record, list) and record and record[0] == "s"]
-    traces = _traces(records)
+    handed = of_kind(records, "s")
+    traces = of_kind(records, "t")
     if not handed or not traces:
         return
     codes = "".join(rng.choice("01234") for _ in records[handed[0]][1])
     records.insert(rng.choice(handed), ["s", codes])
-    first, last = _block(records, rng.choice(_traces(records)))
+    first, last = _block(records, rng.choice(of_kind(records, "t")))
     block = copied(records[first:last])
     block[0][1] = codes
     if rng.random() < 0.5:
@@ -252,7 +244,7 @@ def change_head(rng, records):
 def change_type(rng, records):
     """Something of another type where a number, text or list is expected."""
     junk = rng.choice((None, True, "x", "1/0", -1, 10**17, 1e308, -1e308, 5e-324, [], {}, [[]], "9" * 3000, 0.1))
-    k = rng.choice(_boxes(records) + _traces(records))
+    k = rng.choice(of_kind(records, "b") + of_kind(records, "t"))
     target = records[k]
     if target[0] == "b" and target[4] and rng.random() < 0.7:
         target = rng.choice(target[4])
@@ -350,8 +342,8 @@ def test_mutants_accepted_as_a_whole_are_true(name):
 @pytest.mark.parametrize("name", [name for name in ORIGINALS if name != "open"])
 def test_an_arc_removed_with_its_events_is_refused(name):
     _, records, *_ = original(name)
-    for k in _traces(records):
-        for j in _traces(records):
+    for k in of_kind(records, "t"):
+        for j in of_kind(records, "t"):
             changed = copied(records)
             removed = 0
             for place in {k, j}:
@@ -376,9 +368,9 @@ def test_proofs_of_degenerate_graphs_are_accepted():
 def _with_selection(records, codes, like):
     """Records with a selection that is no leaf of the tree, and with the trace of another as its own."""
     records = copied(records)
-    handed = next(k for k, record in enumerate(records) if isinstance(record, list) and record[0] == "s")
+    handed = of_kind(records, "s")[0]
     records.insert(handed, ["s", codes])
-    first, last = _block(records, next(k for k in _traces(records) if records[k][1] == like))
+    first, last = _block(records, next(k for k in of_kind(records, "t") if records[k][1] == like))
     records[last:last] = [["t", codes, *records[first][2:]], *copied(records[first + 1 : last])]
     recount(records)
     return records
@@ -394,7 +386,7 @@ def test_a_status_that_a_node_cannot_have_is_refused():
 def test_traces_that_reach_beyond_their_pieces_are_refused(place, beyond):
     problem, records, *_ = original("triangle")
     records = copied(records)
-    k = next(k for k in _traces(records) if records[k][1] == "0")
+    k = next(k for k in of_kind(records, "t") if records[k][1] == "0")
     records[k][place] = beyond
     if place == 2:
         records[k + 1][1] = beyond
@@ -407,7 +399,7 @@ def test_traces_that_reach_beyond_their_pieces_are_refused(place, beyond):
 def _with_boxes(records, boxes):
     """Records with other boxes in the first trace."""
     records = copied(records)
-    first, last = _block(records, _traces(records)[0])
+    first, last = _block(records, of_kind(records, "t")[0])
     records[first + 1 : last] = boxes
     return records
 

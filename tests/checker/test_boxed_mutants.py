@@ -4,12 +4,13 @@ import functools
 
 import numpy as np
 import pytest
+from complete import all_roots
 from effort import some
 from problems3d import degenerate_integers
-from proof_tools import copied, proof_of, records_of
+from proof_tools import copied, of_kind, proof_of, put, put_in_all, records_of, refused, replaced
 from trees import by_the_tree
 
-from enumsol import ProofFormatError, enumerate_roots, verify
+from enumsol import verify
 from enumsol.search.space.space_setup import SpaceSolvers
 
 _BOX, _BOX_RAD, _RHO, _MID, _RAD, _INDEX = range(1, 7)
@@ -21,34 +22,9 @@ def proven(seed):
     """Problem, the forces of its degenerate solution as records have them, and records of a proof with such leaves."""
     problem, _, _, _, _ = degenerate_integers(seed)
     with by_the_tree():
-        roots = enumerate_roots(problem, 0)
-    assert roots.complete
+        roots = all_roots(problem, 0)
     records = records_of(roots.proof)
-    return problem, records, [k for k, record in enumerate(records) if isinstance(record, list) and record[0] == "l"]
-
-
-def report_of(seed, change):
-    """What the checker says of changed records; None where they cannot be read."""
-    problem, records, places = proven(seed)
-    records = copied(records)
-    change(records, places)
-    try:
-        return verify(problem, proof_of(records))
-    except ProofFormatError:
-        return None
-
-
-def refused(seed, change):
-    report = report_of(seed, change)
-    return report is None or not report.ok
-
-
-def each(entry, function):
-    def change(records, places):
-        for k in places:
-            records[k][entry] = function(records[k][entry])
-
-    return change
+    return problem, records, of_kind(records, "l")
 
 
 def times(factor):
@@ -62,33 +38,33 @@ def shifted(step):
 @pytest.mark.few(0, 1)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_changed_leaves_are_refused(seed):
-    assert proven(seed)[2]
-    assert report_of(seed, lambda records, places: None).complete
-    for number, change in enumerate(
-        (
-            each(_INDEX, lambda index: -index),
-            each(_INDEX, float),
-            each(_INDEX, lambda index: 0),
-            each(_MID, shifted(1e-3)),
-            each(_RAD, times(0.0)),
-            each(_RAD, times(-1.0)),
-            each(_BOX, shifted(1.0)),
-            each(_BOX_RAD, times(0.0)),
-            each(_BOX_RAD, times(-1.0)),
-            each(_BOX_RAD, times(1e6)),
-            each(_BOX_RAD, times(1e-300)),
-            each(_RHO, times(0.0)),
-            each(_RHO, times(-1.0)),
-            each(_RHO, times(1e300)),
-            each(_RHO, lambda values: [*values, 1.0]),
-            each(_BOX, lambda values: values[:-1]),
-            each(_BOX_RAD, lambda values: [*values, 1.0]),
-            each(_BOX, lambda values: "box"),
-            each(_MID, lambda values: None),
-            each(_BOX_RAD, lambda values: [True] * len(values)),
-        )
-    ):
-        assert refused(seed, change), number
+    problem, records, places = proven(seed)
+    assert places
+    assert verify(problem, proof_of(records)).complete
+    changes = (
+        (_INDEX, lambda index: -index),
+        (_INDEX, float),
+        (_INDEX, lambda index: 0),
+        (_MID, shifted(1e-3)),
+        (_RAD, times(0.0)),
+        (_RAD, times(-1.0)),
+        (_BOX, shifted(1.0)),
+        (_BOX_RAD, times(0.0)),
+        (_BOX_RAD, times(-1.0)),
+        (_BOX_RAD, times(1e6)),
+        (_BOX_RAD, times(1e-300)),
+        (_RHO, times(0.0)),
+        (_RHO, times(-1.0)),
+        (_RHO, times(1e300)),
+        (_RHO, lambda values: [*values, 1.0]),
+        (_BOX, lambda values: values[:-1]),
+        (_BOX_RAD, lambda values: [*values, 1.0]),
+        (_BOX, lambda values: "box"),
+        (_MID, lambda values: None),
+        (_BOX_RAD, lambda values: [True] * len(values)),
+    )
+    for number, (entry, function) in enumerate(changes):
+        assert refused(problem, put_in_all(records, places, entry, function)), number
 
 
 @pytest.mark.few(0, 1)
@@ -96,14 +72,12 @@ def test_changed_leaves_are_refused(seed):
 def test_boxes_at_other_leaves(seed):
     """Leaves that hold nothing, or a regular root, and parts of the tree that are not decided, said to be in a box."""
     (problem, records, places), refusals = proven(seed), 0
-    leaves = [k for k, record in enumerate(records) if isinstance(record, list) and record[0] in "rx"]
+    leaves = of_kind(records, "r", "x")
     for k in leaves[:: max(1, len(leaves) // 6)]:
         record = records[k]
-        changed = copied(records)
-        changed[k] = copied(records)[places[0]]
-        report = verify(problem, proof_of(changed))
+        report = verify(problem, proof_of(replaced(records, k, records[places[0]])))
         # where a complete leaf holds nothing, all of it lies in the box
-        assert not report.ok or (record[0] == "x" and report.roots == changed[-1]["roots"])
+        assert not report.ok or (record[0] == "x" and report.roots == records[-1]["roots"])
         refusals += not report.ok
     assert refusals
 
@@ -113,20 +87,11 @@ def test_boxes_at_other_leaves(seed):
 def test_leaves_that_are_left_out(seed):
     """A leaf with the root is said to hold nothing, or is not there, and the counts are as before or fit that."""
     problem, records, places = proven(seed)
-    changed = copied(records)
-    changed[places[0]] = ["n"]
-    assert not verify(problem, proof_of(changed)).ok
-    changed = copied(records)
-    del changed[places[0]]
-    assert not verify(problem, proof_of(changed)).ok
-    changed = copied(records)
-    changed[-1]["roots"] += 1
-    assert not verify(problem, proof_of(changed)).ok
-    changed = copied(records)
-    changed[places[0]] = ["u", "open"]
-    changed[-1]["undecided"] += 1
-    report = verify(problem, proof_of(changed))
-    assert not report.complete
+    assert refused(problem, replaced(records, places[0], ["n"]))
+    assert refused(problem, replaced(records, places[0]))
+    assert refused(problem, put(records, (-1, "roots"), lambda roots: roots + 1))
+    changed = put(replaced(records, places[0], ["u", "open"]), (-1, "undecided"), lambda undecided: undecided + 1)
+    assert not verify(problem, proof_of(changed)).complete
 
 
 @pytest.mark.few(0, 1)

@@ -10,8 +10,8 @@ from branches.test_lower_bounds import case, padded
 from effort import some
 from flint import fmpq
 from generators import through_the_unloaded_state
-from graph_proofs import accepted, of_kind, refused, replaced, three_with_everything, without_arcs
-from proof_tools import bytes_of, copied, proof_of, records_of
+from graph_proofs import accepted, refused, three_with_everything, without_arcs
+from proof_tools import bytes_of, copied, of_kind, proof_of, records_of, replaced
 from rational_arcs import Selection
 from rational_checker import check
 from rational_forms import Data
@@ -230,7 +230,8 @@ def test_what_stands_beside_the_record(name):
     with by_the_tree():
         graph = branch_graph(body, [Fraction(end) for end in records[max(heads(records[:k]))]["piece"]])
     # a leaf whose claim is true
-    true = [record for record in records_of(graph.proof) if isinstance(record, list) and record[0] == "x"]
+    whole = records_of(graph.proof)
+    true = [whole[j] for j in of_kind(whole, "x")]
     for record in beside + true[:1]:
         for place in (k, k + 1):
             for forged in ([*records[:place], record, *records[place:]],):

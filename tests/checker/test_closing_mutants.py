@@ -8,7 +8,8 @@ import pytest
 from effort import some
 from generators import integer_problem, random_problem
 from proof_tools import copied, proof_of, records_of
-from rational_checker import Refused, check_records
+from rational_checker import check_records
+from rational_forms import Refused
 from touching import beside_a_loaded_node, row_of_discs, touching_problem
 from trees import above_known_roots, every_subtree
 

@@ -4,8 +4,9 @@ import functools
 
 import pytest
 from floating_oracle import block_on_table, random_body
-from proof_tools import bytes_of, copied, leaves_of, multipliers, proof_of, records_of, with_multipliers
-from rational_checker import Refused, check, check_records, fingerprint
+from proof_tools import bytes_of, leaves_of, multipliers, proof_of, put, records_of, replaced, with_multipliers
+from rational_checker import check, check_records
+from rational_forms import Refused, fingerprint
 
 import enumsol
 
@@ -85,9 +86,7 @@ def test_forgeries_are_refused_by_both(seed):
     tried = 0
     for place, _ in leaves_of(records):
         for leaf in forged(records[place]):
-            changed = copied(records)
-            changed[place] = leaf
-            mine, exact = verdicts(problem, changed)
+            mine, exact = verdicts(problem, replaced(records, place, leaf))
             # where balance alone excludes an assignment, rationals need no multipliers
             assert not mine
             assert leaf[0] == "x" or not exact
@@ -98,14 +97,10 @@ def test_forgeries_are_refused_by_both(seed):
 def test_another_bound_and_leaves_of_held_bodies_are_refused():
     problem, _, records = of(SEEDS[0])
     for bound in (2.0, None, "8"):
-        changed = copied(records)
-        changed[0]["max_rigid_displacement"] = bound
-        assert refused(problem, changed)
+        assert refused(problem, put(records, (0, "max_rigid_displacement"), bound))
     place = leaves_of(records)[0][0]
     for leaf in (["z"], ["X", "", ""], ["m", [0], [0], [], [], []], ["i", []]):
-        changed = copied(records)
-        changed[place] = leaf
-        assert refused(problem, changed)
+        assert refused(problem, replaced(records, place, leaf))
 
 
 @pytest.mark.parametrize(("push", "bound"), [(0.5, 4.0), (1.0, 4.0), (1.25, 1e6)])

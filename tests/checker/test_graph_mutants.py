@@ -12,7 +12,7 @@ from generators import through_the_unloaded_state
 from graph_proofs import forms_at_once, without_arcs
 from oracles import exact_solutions
 from proof_fuzz import mutant, read
-from proof_tools import copied, proof_of, records_of
+from proof_tools import copied, of_kind, proof_of, records_of
 from rational_checker import check_records
 
 from enumsol import ContactProblem, ProofFormatError, branch_graph, gallery, verify
@@ -108,5 +108,5 @@ def test_the_originals_name_every_selection_that_holds(name):
     assert set().union(*holding.values()) <= report.selections
     # and there is something to lose: selections that hold at some alphas only
     assert len({frozenset(codes) for codes in holding.values()}) > 1
-    by_forms = sum(isinstance(record, list) and record[0] == "f" for record in records)
+    by_forms = len(of_kind(records, "f"))
     assert (by_forms > 0) == (name in BY_FORMS)

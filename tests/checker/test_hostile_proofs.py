@@ -15,7 +15,8 @@ import pytest
 from effort import some
 from oracles import exact_solutions
 from proof_fuzz import mutant, read
-from proof_tools import Judge, bytes_of, copied, multipliers, proof_of, records_of, sealed, with_multipliers
+from proof_tools import Judge, bytes_of, copied, multipliers, of_kind, proof_of, records_of, sealed, with_multipliers
+from refusals import bad_argument
 
 from enumsol import (
     ContactProblem,
@@ -29,7 +30,6 @@ from enumsol import (
 )
 from enumsol.cli import main
 from enumsol.condensation.factorization import Factorization
-from enumsol.errors import InvalidArgumentError
 from enumsol.proof import proof_file as proof_module
 from enumsol.proof.compressed_parts import Part
 
@@ -280,7 +280,7 @@ def test_a_leaf_with_more_multipliers_than_there_are_rows():
     for name in ("stopped", "graph in several pieces"):
         problem, proof = before(name)
         records = copied(records_of(proof))
-        k = next(k for k, record in enumerate(records) if isinstance(record, list) and record[0] == "x")
+        k = of_kind(records, "x")[0]
         rows, values = multipliers(["x", *records[k][-2:]])
         records[k][-2:] = with_multipliers(["x", "", ""], rows * 100, [v / 100 for v in values * 100])[1:]
         assert "multipliers, and there are" in refused(problem, proof_of(records)).failures[0]
@@ -377,14 +377,12 @@ def test_what_is_no_file(tmp_path):
         with pytest.raises(ProofFormatError, match="cannot be read"):
             Proof.load(path)
     for path in (5, None, b"x", "a\0b"):
-        with pytest.raises(InvalidArgumentError, match="expected"):
-            Proof.load(path)
+        bad_argument("expected", Proof.load, path)
     problem, proof = before("graph")
     for path in (tmp_path, tmp_path / "no" / "such", "/dev/full"):
         with pytest.raises(EnumsolError, match="cannot be written"):
             proof.save(path)
-    with pytest.raises(InvalidArgumentError, match="a character that no name has"):
-        proof.save("a\0b")
+    bad_argument("a character that no name has", proof.save, "a\0b")
     file = tmp_path / "kept.proof"
     proof.save(str(file))
     loaded = Proof.load(str(file))

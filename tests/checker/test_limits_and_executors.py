@@ -6,12 +6,15 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from compare import differences
+from complete import proven_roots
 from effort import some
 from generators import integer_problem
+from interruptions import CtrlC, interrupted
 from proof_tools import bytes_of, records_of
+from refusals import bad_argument
 
 import enumsol
-from enumsol import ContactProblem, Interrupted, Proof, enumerate_roots, gallery, verify
+from enumsol import ContactProblem, Proof, enumerate_roots, gallery, verify
 from enumsol.condensation.exact import ExactSystem
 from enumsol.proof.proof_file import fraction_text
 
@@ -79,9 +82,7 @@ def test_limits(limits, wedge):
 
 def test_a_limit_that_was_not_reached(wedge):
     problem, alpha = wedge
-    roots = enumerate_roots(problem, alpha, max_nodes=100_000, time_limit=1e6, stop_after=100)
-    assert roots.complete
-    assert verify(problem, roots.proof).complete
+    proven_roots(problem, alpha, max_nodes=100_000, time_limit=1e6, stop_after=100)
 
 
 def test_streamed_saved_and_loaded(wedge, tmp_path):
@@ -110,15 +111,8 @@ def test_proof_is_written_while_the_search_runs(wedge, tmp_path):
 
 def test_interruption_keeps_the_roots_and_no_proof(wedge, tmp_path):
     problem, alpha = wedge
-    path = tmp_path / "interrupted.proof"
-
-    def stop(progress):
-        if progress.nodes >= 192:
-            raise KeyboardInterrupt
-
-    with pytest.raises(Interrupted) as caught:
-        enumerate_roots(problem, alpha, progress=stop, proof_path=path)
-    partial = caught.value.partial
+    path, stop = tmp_path / "interrupted.proof", CtrlC(lambda progress: progress.nodes >= 192)
+    partial = interrupted("interrupted", enumerate_roots, problem, alpha, progress=stop, proof_path=path)
     assert not partial.complete
     assert partial.proof is None
     assert "interrupted" in partial.stopped
@@ -147,10 +141,8 @@ def test_a_proof_that_cannot_be_written(tmp_path, wedge):
 def test_arguments_of_verify(wedge):
     problem, alpha = wedge
     roots = enumerate_roots(problem, alpha)
-    with pytest.raises(enumsol.InvalidArgumentError, match="proof is a RootSet"):
-        verify(problem, roots)
-    with pytest.raises(enumsol.InvalidArgumentError, match="problem is a Proof"):
-        verify(roots.proof, roots.proof)
+    bad_argument("proof is a RootSet", verify, problem, roots)
+    bad_argument("problem is a Proof", verify, roots.proof, roots.proof)
 
 
 def test_a_report_prints_its_counts(wedge):
@@ -186,9 +178,7 @@ def test_rational_leaves_may_be_long(monkeypatch):
     longest = rationals = 0
     for gap in (nearest, np.nextafter(nearest, -np.inf)):
         problem = ContactProblem(free.A, rows[:1], rows[1:2], f, friction=0.5, gap=float(gap))
-        roots = enumerate_roots(problem, 0.0)
-        assert roots.complete
-        assert verify(problem, roots.proof).complete
+        roots = proven_roots(problem, 0.0)
         rationals += roots.stats.escalations.rationals
         points = [p for record in records_of(roots.proof)[1:-1] if record[0] == "D" for p in record[1]]
         longest = max([longest, *(len(part) for point in points for x in point for part in x.split("/"))])

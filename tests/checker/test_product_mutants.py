@@ -4,11 +4,12 @@ import functools
 
 import numpy as np
 import pytest
+from complete import all_roots
 from problems3d import from_compliance, soft_or_coupled
-from proof_tools import copied, proof_of, records_of
+from proof_tools import copied, of_kind, proof_of, put_in_all, records_of, refused, replaced
 from trees import products_at_once
 
-from enumsol import ProofFormatError, enumerate_roots, verify
+from enumsol import verify
 from enumsol.model.sectors import SECTORS
 
 _CODES, _CENTRE, _NUMBERS = 1, 2, 3
@@ -20,30 +21,20 @@ def proven():
     S, g, F = soft_or_coupled(8, 2)
     problem = from_compliance(S, g, (F[:, 0], F[:, 1]))
     with products_at_once():
-        roots = enumerate_roots(problem, 0)
-    assert roots.complete
+        roots = all_roots(problem, 0)
     return problem, records_of(roots.proof)
 
 
-def places(records, kind):
-    return [k for k, record in enumerate(records) if isinstance(record, list) and record[0] == kind]
-
-
-def refused(change):
-    problem, records = proven()
-    records = copied(records)
-    change(records)
-    try:
-        return not verify(problem, proof_of(records)).ok
-    except ProofFormatError:
-        return True
+def products(records):
+    """Places of the forms of products."""
+    return [k for k in of_kind(records, "q") if len(records[k]) == 4]
 
 
 def test_the_proof_has_all_of_them_and_is_accepted():
     problem, records = proven()
-    assert len(places(records, "q")) >= 2
-    assert places(records, "j")
-    assert len(places(records, "e")) > 3
+    assert len(of_kind(records, "q")) >= 2
+    assert of_kind(records, "j")
+    assert len(of_kind(records, "e")) > 3
     assert verify(problem, proof_of(records)).complete
 
 
@@ -68,12 +59,8 @@ def test_the_proof_has_all_of_them_and_is_accepted():
     ],
 )
 def test_changed_forms_are_refused(entry, function):
-    def change(records):
-        for k in places(records, "q"):
-            if len(records[k]) == 4:
-                records[k][entry] = function(records[k][entry])
-
-    assert refused(change)
+    problem, records = proven()
+    assert refused(problem, put_in_all(records, products(records), entry, function))
 
 
 @pytest.mark.parametrize(
@@ -89,50 +76,26 @@ def test_changed_forms_are_refused(entry, function):
     ],
 )
 def test_changed_boxes_are_refused(entry, function):
-    def change(records):
-        for k in places(records, "j"):
-            records[k][entry] = function(records[k][entry])
-
-    assert refused(change)
+    problem, records = proven()
+    assert refused(problem, put_in_all(records, of_kind(records, "j"), entry, function))
 
 
 def test_a_form_that_is_left_out_or_stands_elsewhere():
-    _, records = proven()
-    products = [k for k in places(records, "q") if len(records[k]) == 4]
-
-    def without(records):
-        for k in reversed(products):
-            del records[k]
-
-    def first_for_all(records):
-        first = records[products[0]]
-        for k in reversed(products):
-            del records[k]
-        records.insert(products[0], first)
-
-    assert refused(without)
-    assert refused(first_for_all)
+    problem, records = proven()
+    forms = products(records)
+    without = [record for k, record in enumerate(records) if k not in forms]
+    first_for_all = [record for k, record in enumerate(records) if k not in forms[1:]]
+    assert refused(problem, without)
+    assert refused(problem, first_for_all)
 
 
 def test_leaves_that_say_something_else():
     """A leaf that holds a root is said to hold none; one of the energy is said to be one of a form."""
-    _, records = proven()
-    for kind in "jx":
-        for k in places(records, kind):
-
-            def change(records, k=k):
-                records[k] = ["e"]
-
-            assert refused(change) or kind == "x"
-    # before any form was declared
-    first = places(records, "q")[0]
-    early = [k for k in places(records, "x") if k < first]
-    for k in early:
-
-        def change(records, k=k):
-            records[k] = ["e"]
-
-        assert refused(change)
+    problem, records = proven()
+    first = of_kind(records, "q")[0]
+    for k in of_kind(records, "j", "x"):
+        # one of the energy may be one of a form, but not before any form was declared
+        assert refused(problem, replaced(records, k, ["e"])) or (records[k][0] == "x" and k > first)
 
 
 @pytest.mark.few(1, 2)
@@ -141,7 +104,7 @@ def test_random_changes(part):
     """What is accepted has the roots that there are."""
     problem, records = proven()
     rng, accepted = np.random.default_rng(part), 0
-    forms = [k for k in places(records, "q") if len(records[k]) == 4]
+    forms = products(records)
     for _ in range(15):
         changed = copied(records)
         record = changed[forms[int(rng.integers(len(forms)))]]

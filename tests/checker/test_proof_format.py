@@ -17,20 +17,10 @@ import rational_floating
 import rational_forms
 import rational_pieces
 import rational_zeros
+from complete import all_roots
 from effort import some
 from generators import integer_problem, random_problem, singular_problem
-from graph_proofs import (
-    GRAPHS,
-    accepted,
-    cut_in_two,
-    graph,
-    of_kind,
-    refused,
-    replaced,
-    three_with_everything,
-    triangle,
-    without_arcs,
-)
+from graph_proofs import GRAPHS, accepted, cut_in_two, graph, refused, three_with_everything, triangle, without_arcs
 from proof_tools import (
     MAGIC,
     Judge,
@@ -38,12 +28,15 @@ from proof_tools import (
     copied,
     leaves_of,
     multipliers,
+    of_kind,
     proof_of,
     records_of,
+    replaced,
     sealed,
     with_multipliers,
 )
-from rational_checker import Refused, check, check_records, fingerprint
+from rational_checker import check, check_records
+from rational_forms import Refused, fingerprint
 from touching import beside_a_loaded_node
 
 from enumsol import enumerate_roots, gallery, verify
@@ -73,8 +66,7 @@ POINTS = {
 def point(name):
     """Problem, records and enumeration."""
     problem, alpha = POINTS[name]()
-    roots = enumerate_roots(problem, alpha)
-    assert roots.complete
+    roots = all_roots(problem, alpha)
     return problem, records_of(roots.proof), roots
 
 

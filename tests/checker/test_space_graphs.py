@@ -6,8 +6,9 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from complete import all_roots
 from problems3d import random_over_alpha
-from proof_tools import proof_of, records_of
+from proof_tools import of_kind, proof_of, records_of
 
 from enumsol import enumerate_roots, gallery, verify
 from enumsol.arithmetic.balls import Ball
@@ -37,8 +38,7 @@ def test_a_proof_says_that_all_solutions_lie_on_its_curves(p, seed):
     boxes = [box for chain in cover.chains for box in chain.boxes]
     given = AlphaProblem.of(cover.problem.enclosure)
     for alpha in np.linspace(0.01, 0.99, 7):
-        roots = enumerate_roots(cover.problem, alpha)
-        assert roots.complete
+        roots = all_roots(cover.problem, alpha)
         crossed = 0
         for chain in cover.chains:
             at = np.array([joint.at(0.0).mid[-1] for joint in chain.joints]) - alpha
@@ -69,7 +69,8 @@ def test_one_solution_at_every_alpha_of_a_piece_needs_no_curve():
 def test_forged_certificates_over_a_piece_are_refused(way):
     cover = alone_at_every_alpha()
     records = records_of(cover.proof())
-    k, first = next((k, record) for k, record in enumerate(records) if isinstance(record, list) and record[0] == "m")
+    k = of_kind(records, "m")[0]
+    first = records[k]
     if way == "numbers":
         first[1][0] *= -1.0
     elif way == "wider":

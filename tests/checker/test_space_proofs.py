@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from effort import some
 from problems3d import from_compliance
-from proof_tools import copied, leaves_of, proof_of
-from space_proofs import RANDOM, Truth, case, mutant, of_kind, random_problem, values_of, with_values
+from proof_tools import copied, leaves_of, of_kind, proof_of, put, replaced
+from refusals import bad_argument
+from space_proofs import RANDOM, Truth, case, mutant, random_problem, values_of, with_values
 
 import enumsol
 from enumsol import Proof, ProofFormatError, enumerate_roots, gallery, verify
@@ -94,10 +95,8 @@ def test_plane_and_space_are_told_apart():
         report = verify(problem, proof)
         assert not report.ok
         assert "another problem" in report.failures[0]
-    with pytest.raises(enumsol.InvalidArgumentError, match=r"problem is a dict; expected a ContactProblem"):
-        verify({}, in_space)
-    with pytest.raises(enumsol.InvalidArgumentError, match=r"problem is a ContactProblem3D; expected a ContactProblem"):
-        stability_radius(space, in_space)
+    bad_argument(r"problem is a dict; expected a ContactProblem", verify, {}, in_space)
+    bad_argument(r"problem is a ContactProblem3D; expected a ContactProblem", stability_radius, space, in_space)
 
 
 def test_another_problem_and_another_alpha():
@@ -131,9 +130,9 @@ def enumsol_records(problem):
 
 
 def test_units_need_one_product():
-    records = copied(case(SEVERAL)[2])
-    records[0]["force"][0] += 1
-    assert "common scaling" in refused(SEVERAL, records)
+    assert "common scaling" in refused(
+        SEVERAL, put(case(SEVERAL)[2], (0, "force", 0), case(SEVERAL)[2][0]["force"][0] + 1)
+    )
 
 
 # -- the tree ----------------------------------------------------------------------------------------------------------
@@ -166,9 +165,7 @@ def test_branchings_of_the_wrong_kind():
     _, _, records, _ = case((1, 22))
     first = of_kind(records, "b")[0]
     for record in (["b", 1, [0, 5]], ["b", 0, [0, 4]], ["b", 0, [0, 1, 2, 3]], ["b", -1, [0, 5]], ["b", True, [0, 5]]):
-        changed = copied(records)
-        changed[first] = record
-        assert "does not cover" in refused((1, 22), changed)
+        assert "does not cover" in refused((1, 22), replaced(records, first, record))
 
 
 def test_sectors_end_at_a_depth():
@@ -195,17 +192,15 @@ def test_leaves_merged_and_doubled():
         refused(SEVERAL, changed)
     # a branching replaced by one leaf of its own
     for k in of_kind(records, "b"):
-        changed = copied(records)
-        changed[k] = ["n"]
-        refused(SEVERAL, changed)
+        refused(SEVERAL, replaced(records, k, ["n"]))
 
 
 @pytest.mark.parametrize("key", ["roots", "undecided", "leaves"])
 def test_wrong_counts(key):
     for step in (-1, 1):
-        records = copied(case(SEVERAL)[2])
-        records[-1][key] += step
-        assert "the counts at the end" in refused(SEVERAL, records)
+        assert "the counts at the end" in refused(
+            SEVERAL, put(case(SEVERAL)[2], (-1, key), case(SEVERAL)[2][-1][key] + step)
+        )
 
 
 # -- leaves ------------------------------------------------------------------------------------------------------------
@@ -225,9 +220,7 @@ def test_wrong_claims_about_leaves():
         assert expected in refused(SEVERAL, changed), codes[k]
     for k in of_kind(records, "x"):
         if {5, 6} & set(codes[k]):
-            changed = copied(records)
-            changed[k] = ["n"]
-            assert "still open" in refused(SEVERAL, changed)
+            assert "still open" in refused(SEVERAL, replaced(records, k, ["n"]))
 
 
 @pytest.mark.slow
@@ -235,14 +228,12 @@ def test_roots_moved_and_turned():
     _, _, records, _ = case(SEVERAL)
     for k in of_kind(records, "r"):
         for index in (-records[k][3], 0, 1.0 * records[k][3], str(records[k][3])):
-            changed = copied(records)
-            changed[k][3] = index
-            assert "its index is wrong" in refused(SEVERAL, changed)
+            assert "its index is wrong" in refused(SEVERAL, put(records, (k, 3), index))
         for j in range(len(records[k][1])):
             if records[k][2][j] > 1e-200:
-                changed = copied(records)
-                changed[k][1][j] += 8 * records[k][2][j]
-                assert "its enclosure does not hold" in refused(SEVERAL, changed)
+                assert "its enclosure does not hold" in refused(
+                    SEVERAL, put(records, (k, 1, j), records[k][1][j] + 8 * records[k][2][j])
+                )
         changed = copied(records)
         changed[k][2] = [0.0] * len(changed[k][2])
         assert "its enclosure does not hold" in refused(SEVERAL, changed)
@@ -254,9 +245,9 @@ def test_roots_moved_and_turned():
 def test_multipliers_of_the_wrong_sign_and_rows_of_others():
     _, _, records, _ = case(SEVERAL)
     for k in of_kind(records, "x"):
-        changed = copied(records)
-        changed[k] = with_values(records[k], [-v for v in values_of(records[k])])
-        assert "do not exclude" in refused(SEVERAL, changed)
+        assert "do not exclude" in refused(
+            SEVERAL, replaced(records, k, with_values(records[k], [-v for v in values_of(records[k])]))
+        )
         changed = copied(records)
         for row in changed[k][1]:
             row[1] = 1 - row[1]

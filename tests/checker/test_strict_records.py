@@ -16,13 +16,15 @@ import numpy as np
 import pytest
 import space_proofs
 from generators import fe_compliance, from_condensed, integer_problem, through_the_unloaded_state
-from graph_proofs import cut_in_two, forms_at_once, of_kind, triangle
-from proof_tools import MAGIC, bytes_of, copied, proof_of, records_of, sealed
-from rational_checker import Refused, check
+from graph_proofs import cut_in_two, forms_at_once, triangle
+from proof_tools import MAGIC, bytes_of, copied, of_kind, proof_of, records_of, sealed
+from rational_checker import check
+from rational_forms import Refused
+from refusals import bad_argument
 from touching import beside_a_loaded_node
 from trees import by_the_tree
 
-from enumsol import InvalidArgumentError, Proof, ProofFormatError, branch_graph, enumerate_roots, gallery, verify
+from enumsol import Proof, ProofFormatError, branch_graph, enumerate_roots, gallery, verify
 from enumsol.search import form_policy as forms
 
 POINTS = {
@@ -345,8 +347,7 @@ def test_a_search_does_not_go_on_with_another_header(name, value, tmp_path):
     problem, records = case("roots")
     place = tmp_path / "begun.proof"
     proof_of([{**records[0], name: value}, *records[1:]]).save(place)
-    with pytest.raises(InvalidArgumentError, match="proof_path"):
-        enumerate_roots(problem, 5.0, proof_path=place, resume=True)
+    bad_argument("proof_path", enumerate_roots, problem, 5.0, proof_path=place, resume=True)
 
 
 @pytest.mark.parametrize("name", ["roots", "sides", "sectors"])

@@ -7,7 +7,8 @@ import re
 import numpy as np
 import pytest
 from branches.test_degenerate import pair
-from command_line import assert_refused, on_terminal, run
+from command_line import assert_refused, on_terminal, printed, run
+from interruptions import CtrlC
 
 from enumsol import BranchGraph, gallery, write_problem
 
@@ -18,10 +19,9 @@ GRAPH = ("graph", "gallery:one-node-6.1", "--from", 0, "--to", 20)
 
 
 def test_table_of_the_first_example(capsys):
-    status, out, err = run(
+    out = printed(
         capsys, "table", "gallery:one-node-6.1", "--from", 1, "--to", 5, "--samples", 5, "--arithmetic", "verified"
     )
-    assert (status, err) == (0, "")
     rows = [line.split() for line in out.splitlines()[1:6]]
     assert [(row[0], row[1]) for row in rows] == [("1", "1"), ("2", "1"), ("3", "3"), ("4", "3"), ("5", "3")]
     assert out.endswith("complete: yes (proven at all 5 alphas; says nothing about those in between)\n")
@@ -38,10 +38,9 @@ def test_listed_alphas_may_be_fractions(capsys):
 
 
 def test_long_tables_are_printed_as_runs(capsys):
-    status, out, _ = run(
+    out = printed(
         capsys, *("table", "gallery:two-node-6.4", "--from", 0, "--to", 10, "--samples", 101, "--arithmetic", "fast")
     )
-    assert status == 0
     rows = [line.split() for line in out.splitlines()[1:5]]
     assert [row[:3] for row in rows] == [["0", "2.9", "1"], ["3", "3", "3"], ["3.1", "3.8", "5"], ["3.9", "10", "3"]]
     assert out.endswith("complete: not proven (0 undecided)\n")
@@ -89,8 +88,7 @@ def test_ctrl_c_prints_the_table_so_far(tmp_path):
 
 
 def test_graph_of_the_first_example(capsys):
-    status, out, err = run(capsys, *GRAPH)
-    assert (status, err) == (0, "")
+    out = printed(capsys, *GRAPH)
     assert "branches 2, arcs 3" in out
     assert "folds at 2.66667" in out
     assert "one solution below alpha = 2.6666667" in out
@@ -113,8 +111,7 @@ def test_graph_answers(capsys):
 def test_graph_files(capsys, tmp_path):
     files = {name: tmp_path / f"graph.{name}" for name in ("save", "json", "csv", "graphml", "plot")}
     files["plot"] = tmp_path / "graph.png"
-    status, out, _ = run(capsys, *GRAPH, *(part for name, file in files.items() for part in (f"--{name}", file)))
-    assert status == 0
+    out = printed(capsys, *GRAPH, *(part for name, file in files.items() for part in (f"--{name}", file)))
     assert "branches 2" in out
     assert len(BranchGraph.load(files["save"]).arcs) == 3
     content = json.loads(files["json"].read_text())
@@ -143,8 +140,7 @@ def test_a_proof_that_leaves_arcs_open_is_not_complete(capsys, tmp_path):
 def test_a_graph_has_a_proof(capsys, tmp_path):
     file = tmp_path / "graph.proof"
     assert run(capsys, *GRAPH, "--proof", file)[0] == 0
-    status, out, _ = run(capsys, "verify", "gallery:one-node-6.1", file)
-    assert status == 0
+    out = printed(capsys, "verify", "gallery:one-node-6.1", file)
     assert "proof: verified for alpha in [0, 20]" in out
     assert "complete: yes" in out
     assert run(capsys, "verify", "gallery:one-node-6.2", file)[0] == 2
@@ -176,8 +172,7 @@ def test_graph_with_jobs(capsys, tmp_path):
     for jobs in (1, 2):
         graph, proof = tmp_path / f"{jobs}.graph", tmp_path / f"{jobs}.proof"
         arguments = ("--from", 0, "--to", 5, "--jobs", jobs, "--save", graph, "--proof", proof)
-        status, out, _ = run(capsys, "graph", "gallery:two-node-6.4", *arguments)
-        assert status == 0
+        out = printed(capsys, "graph", "gallery:two-node-6.4", *arguments)
         outputs.append((out, proof.read_bytes()))
     assert outputs[0] == outputs[1]
     assert run(capsys, "verify", "gallery:two-node-6.4", proof)[0] == 0
@@ -278,17 +273,9 @@ def test_after_no_time(capsys, tmp_path):
 
 
 def test_after_ctrl_c(capsys, tmp_path, monkeypatch):
-    calls = []
-
-    def interrupt(*state):
-        calls.append(state)
-        if len(calls) == 1:
-            raise KeyboardInterrupt
-
     # the first word of progress comes from the search
-    monkeypatch.setattr("enumsol.cli.progress.Display.show", interrupt)
+    monkeypatch.setattr("enumsol.cli.progress.Display.show", CtrlC())
     status, out = draw(capsys, tmp_path, "wedge-8-5")
-    assert calls
     assert status == 130
     assert out.splitlines()[-1].startswith("complete: no (interrupted after ")
 
@@ -321,10 +308,7 @@ def test_rows_of_several_alphas_say_so(capsys):
 
 
 def test_an_empty_table_explains_nothing(capsys, monkeypatch):
-    def interrupt(*_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("enumsol.branches.table.table_row", interrupt)
+    monkeypatch.setattr("enumsol.branches.table.table_row", CtrlC())
     status, out, _ = run(capsys, *SAMPLED, "--samples", 3)
     assert status == 130
     assert out == "\ncomplete: no (interrupted after 0 of 3 alphas)\n"

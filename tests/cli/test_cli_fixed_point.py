@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 from command_line import assert_refused
 from helpers.floating_oracle import block_on_table
+from interruptions import CtrlC
 
 import enumsol
 from enumsol.fixed_points import FixedPoint, successive
@@ -17,9 +18,12 @@ def run(capsys, *arguments):
     return command_line.run(capsys, "fixed-point", *arguments)
 
 
+def printed(capsys, *arguments):
+    return command_line.printed(capsys, "fixed-point", *arguments)
+
+
 def test_a_limit_is_printed(capsys):
-    status, out, err = run(capsys, "gallery:one-node-6.1", "--alpha", 5, "--start", 10)
-    assert (status, err) == (0, "")
+    out = printed(capsys, "gallery:one-node-6.1", "--alpha", 5, "--start", 10)
     assert out.startswith("FixedPoint at alpha = 5: converged after 2 iterations")
     assert "stick" in out
 
@@ -27,8 +31,7 @@ def test_a_limit_is_printed(capsys):
 def test_3d_with_every_output(capsys, tmp_path):
     files = {name: tmp_path / f"limit.{name}" for name in ("json", "csv", "npz", "vtu")}
     options = [part for name, file in files.items() for part in (f"--{name}", file)]
-    status, out, _ = run(capsys, "gallery:block3d-4", "--alpha", "1/2", *options)
-    assert status == 0
+    out = printed(capsys, "gallery:block3d-4", "--alpha", "1/2", *options)
     assert "converged" in out
     content = json.loads(files["json"].read_text())
     assert content["converged"]
@@ -43,14 +46,12 @@ def test_3d_with_every_output(capsys, tmp_path):
 
 def test_a_problem_in_a_file(capsys, tmp_path):
     enumsol.write_problem(enumsol.gallery.one_node_3d(), tmp_path / "node.npz")
-    status, out, _ = run(capsys, tmp_path / "node.npz", "--alpha", 0)
-    assert status == 0
+    out = printed(capsys, tmp_path / "node.npz", "--alpha", 0)
     assert "slip" in out
 
 
 def test_alpha_is_asked_for_where_something_depends_on_it(capsys):
-    status, out, _ = run(capsys, "gallery:one-node-3d")
-    assert status == 0
+    out = printed(capsys, "gallery:one-node-3d")
     assert out.startswith("FixedPoint at alpha = 0")
     status, _, err = run(capsys, "gallery:block3d-4")
     assert status == 2
@@ -66,27 +67,17 @@ def test_not_converged_is_status_3(capsys):
 
 def test_starts_in_2d(capsys, tmp_path):
     table, picture = tmp_path / "starts.csv", tmp_path / "starts.png"
-    status, out, _ = run(
-        capsys, "gallery:one-node-6.1", "--alpha", 5, "--starts", 10, "--csv", table, "--plot", picture
-    )
-    assert status == 0
+    out = printed(capsys, "gallery:one-node-6.1", "--alpha", 5, "--starts", 10, "--csv", table, "--plot", picture)
     assert "root 1: reached from 0 of 10 starts" in out
     assert "complete: yes (proven)" in out
     assert len(pd.read_csv(table)) == 10
     assert picture.stat().st_size > 1000
-    status, out, _ = run(capsys, "gallery:one-node-6.1", "--alpha", 5, "--starts", 5, "--json", "-")
+    _, out, _ = run(capsys, "gallery:one-node-6.1", "--alpha", 5, "--starts", 5, "--json", "-")
     assert json.loads(out)["never"] == [1]
 
 
 def test_ctrl_c_prints_the_last_iterate(capsys, monkeypatch):
-    whole, count = successive.solve_scaled, iter(range(100))
-
-    def solve(*arguments):
-        if next(count) == 2:
-            raise KeyboardInterrupt
-        return whole(*arguments)
-
-    monkeypatch.setattr(successive, "solve_scaled", solve)
+    monkeypatch.setattr(successive, "solve_scaled", CtrlC(call=3, then=successive.solve_scaled))
     status, out, _ = run(capsys, "gallery:one-node-3d", "--alpha", 0)
     assert status == 130
     assert "interrupted after 2 iterations" in out
@@ -118,8 +109,7 @@ def test_bad_input_is_one_sentence(capsys, arguments, message):
 def test_a_body_that_nothing_holds(capsys, tmp_path):
     enumsol.write_problem(block_on_table(push=0.5), tmp_path / "rests.npz")
     enumsol.write_problem(block_on_table(push=1.1), tmp_path / "slides.npz")
-    status, out, _ = run(capsys, tmp_path / "rests.npz", "--json", "-")
-    assert status == 0
+    out = printed(capsys, tmp_path / "rests.npz", "--json", "-")
     assert np.allclose(json.loads(out)["rigid_coordinates"], 0)
     assert json.loads(out)["free_motion"] is None
     status, out, _ = run(capsys, tmp_path / "slides.npz")

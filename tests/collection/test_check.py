@@ -4,7 +4,8 @@ import json
 
 import numpy as np
 import pytest
-from command_line import assert_refused, run
+from command_line import assert_refused, printed, run
+from refusals import bad_argument
 
 import enumsol
 from enumsol import InvalidArgumentError, collection
@@ -232,8 +233,7 @@ def test_files_of_problems_are_no_answers(tmp_path):
     assert [problem.entry.name for problem in report.problems] == ["node-3d-3"]
     assert report.ok
     assert len(report.not_tried) == len(collection.COLLECTION) - 1
-    with pytest.raises(InvalidArgumentError, match="there are none in it"):
-        collection.check(tmp_path / "problems" / "wedge-8-5.h5")
+    bad_argument("there are none in it", collection.check, tmp_path / "problems" / "wedge-8-5.h5")
 
 
 # -- the command, and refusals -----------------------------------------------------------------------------------------
@@ -256,14 +256,12 @@ def test_the_command_reports_and_ends_with_a_status(tmp_path, capsys):
 
 @pytest.mark.slow
 def test_the_list_and_the_export(tmp_path, capsys):
-    status, out, _ = run(capsys, "collection", "list")
-    assert status == 0
+    out = printed(capsys, "collection", "list")
     assert [line.split()[0] for line in out.splitlines()] == list(collection.COLLECTION)
-    status, out, _ = run(capsys, "collection", "list", "--json", "-")
+    _, out, _ = run(capsys, "collection", "list", "--json", "-")
     assert [entry["roots"] for entry in json.loads(out)] == [e.roots for e in collection.COLLECTION.values()]
     place = tmp_path / "all of it"
-    status, out, _ = run(capsys, "collection", "export", place)
-    assert status == 0
+    out = printed(capsys, "collection", "export", place)
     assert out.startswith(f"wrote {len(collection.COLLECTION)} problems to ")
     assert len(list(place.rglob("*.*"))) == 4 * len(collection.COLLECTION) + 1
     assert len(json.loads((place / "index.json").read_text())) == len(collection.COLLECTION)
@@ -318,8 +316,7 @@ def test_what_does_not_fit_is_refused_in_a_sentence(tmp_path, name, arrays, mess
 )
 def test_damaged_files_are_refused_in_a_sentence(tmp_path, name, text, message):
     (tmp_path / name).write_text(text)
-    with pytest.raises(InvalidArgumentError, match=message):
-        collection.check(tmp_path)
+    bad_argument(message, collection.check, tmp_path)
 
 
 def test_places_names_and_tolerances_are_refused_in_a_sentence(tmp_path, capsys):
@@ -331,7 +328,5 @@ def test_places_names_and_tolerances_are_refused_in_a_sentence(tmp_path, capsys)
     written(tmp_path)
     assert_refused(*run(capsys, "collection", "check", tmp_path, "--tolerance", 0.5), "tolerance is 0.5, but root ")
     assert_refused(*run(capsys, "collection", "check", tmp_path, "--tolerance", 0), "tolerance is 0")
-    with pytest.raises(InvalidArgumentError, match="names is 'wedge-8-5'; expected a list of names"):
-        collection.export(tmp_path, "wedge-8-5")
-    with pytest.raises(InvalidArgumentError, match="name is 3; expected a name of the collection"):
-        collection.get(3)
+    bad_argument("names is 'wedge-8-5'; expected a list of names", collection.export, tmp_path, "wedge-8-5")
+    bad_argument("name is 3; expected a name of the collection", collection.get, 3)

@@ -3,6 +3,7 @@ import itertools
 import numpy as np
 import pytest
 from effort import some
+from refusals import bad_argument
 
 from enumsol import (
     ContactProblem,
@@ -164,14 +165,12 @@ def test_test_functions_and_split():
 
 @pytest.mark.parametrize("r", [0.0, -1.0, np.nan, np.inf])
 def test_r_must_be_positive(r):
-    with pytest.raises(InvalidArgumentError, match=r"r is .*; expected a finite number > 0"):
-        PiecewiseSmoothEquation(gallery.one_node_triangle(), r)
+    bad_argument(r"r is .*; expected a finite number > 0", PiecewiseSmoothEquation, gallery.one_node_triangle(), r)
 
 
 def test_wrong_shapes_get_one_sentence():
     equation = PiecewiseSmoothEquation(gallery.one_node_triangle())
-    with pytest.raises(InvalidArgumentError, match=r"x has shape \(3,\); expected \(n \+ 2p,\) = \(4,\)"):
-        equation.residual(np.zeros(3), 1.0)
+    bad_argument(r"x has shape \(3,\); expected \(n \+ 2p,\) = \(4,\)", equation.residual, np.zeros(3), 1.0)
     for signs in ([[1, 1]], [[1, 0, 1]], [1, 1, 1]):
         with pytest.raises(
             InvalidArgumentError, match=r"signs has .*; expected \(p, 3\) = \(1, 3\) with entries -1 or 1"

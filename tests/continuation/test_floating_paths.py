@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from complete import all_roots
 from effort import some
 from helpers.floating_oracle import block_on_table, random_body
 from helpers.floating_space import known_body
+from refusals import bad_argument
 
 import enumsol
 from enumsol.continuation import SmoothPath, follow, newton
@@ -162,8 +164,7 @@ def test_newton_and_follow_in_3d(seed):
 @pytest.mark.parametrize("seed", [0, 2, 5])
 def test_paths_in_3d_end_at_enumerated_roots(seed):
     problem, path = path_in_3d(seed)
-    roots = enumsol.enumerate_roots(problem, path.alpha[-1])
-    assert roots.complete
+    roots = all_roots(problem, path.alpha[-1])
     assert any(np.allclose(root.lambda_n, path.lambda_n[-1], atol=1e-7) for root in roots)
 
 
@@ -232,7 +233,5 @@ def test_starts_have_rigid_coordinates():
     root = newton(problem, 0)
     values = (0, root.lambda_n, root.lambda_t)
     assert len(follow(problem, (*values, root.rigid_coordinates), interval=(0, 0.1)))
-    with pytest.raises(enumsol.InvalidArgumentError, match=r"tuple of 3; expected .*rigid_coordinates"):
-        follow(problem, values)
-    with pytest.raises(enumsol.InvalidArgumentError, match="coordinate of rigid mode 0; expected at most 1"):
-        follow(problem, (*values, [2.0, 0.0, 0.0]))
+    bad_argument(r"tuple of 3; expected .*rigid_coordinates", follow, problem, values)
+    bad_argument("coordinate of rigid mode 0; expected at most 1", follow, problem, (*values, [2.0, 0.0, 0.0]))

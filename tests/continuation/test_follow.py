@@ -2,6 +2,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from refusals import bad_argument
 
 import enumsol
 from enumsol import gallery
@@ -198,8 +199,7 @@ def test_without_an_interval_friction_bounds_alpha():
 def test_smooth_path_wrong_derivative_is_named():
     problem = gallery.one_node_triangle()
     smooth = SmoothPath(F=lambda a: a * a, dF=lambda a: a)
-    with pytest.raises(enumsol.InvalidArgumentError, match=r"SmoothPath\.dF at alpha = 2"):
-        follow(problem, (2.0, [0.0], [0.0]), 1, (1, 3), smooth_path=smooth)
+    bad_argument(r"SmoothPath\.dF at alpha = 2", follow, problem, (2.0, [0.0], [0.0]), 1, (1, 3), smooth_path=smooth)
 
 
 @pytest.mark.few(4, 2)
@@ -335,13 +335,11 @@ def test_printed_algorithm_ends_on_a_solution_after_a_jump():
 def test_bad_arguments(arguments, message):
     problem = gallery.one_node_triangle()
     given = {"start": (5.0, [0.0], [0.0]), "interval": (0, 20)} | arguments
-    with pytest.raises(enumsol.InvalidArgumentError, match=message):
-        follow(problem, **given)
+    bad_argument(message, follow, problem, **given)
 
 
 @pytest.mark.parametrize(
     "bad", [{"h_min": 0}, {"h_init": 9}, {"k_thr": 20}, {"r": -1}, {"h_dec": 1}, {"transition_tolerance": 1}]
 )
 def test_bad_options(bad):
-    with pytest.raises(enumsol.InvalidArgumentError, match=f"options.{next(iter(bad))}"):
-        ContinuationOptions(**bad)
+    bad_argument(f"options.{next(iter(bad))}", ContinuationOptions, **bad)

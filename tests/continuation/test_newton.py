@@ -2,6 +2,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from refusals import bad_argument
 
 import enumsol
 from enumsol import gallery
@@ -84,5 +85,4 @@ def test_smooth_path_value_is_used():
     ],
 )
 def test_bad_arguments(arguments, message):
-    with pytest.raises(enumsol.InvalidArgumentError, match=message):
-        newton(gallery.one_node_triangle(), **arguments)
+    bad_argument(message, newton, gallery.one_node_triangle(), **arguments)

@@ -2,8 +2,9 @@ import json
 
 import numpy as np
 import pytest
+from interruptions import CtrlC, interrupted
+from refusals import bad_argument
 
-import enumsol
 from enumsol import gallery
 from enumsol.continuation import ContinuationOptions, Path, follow, newton
 
@@ -44,8 +45,7 @@ def test_save_and_load(path, tmp_path):
 
 def test_load_refuses_other_files(tmp_path):
     np.savez(tmp_path / "other.npz", a=1)
-    with pytest.raises(enumsol.InvalidArgumentError, match="does not hold a path"):
-        Path.load(tmp_path / "other.npz")
+    bad_argument("does not hold a path", Path.load, tmp_path / "other.npz")
 
 
 @pytest.mark.parametrize(("name", "value"), [("status", "tired"), ("kinds", ["start", "hop"])])
@@ -60,8 +60,7 @@ def test_kinds_and_status_are_texts_too_and_those_of_a_file_must_exist(path, tmp
     assert meta["status"] == "interval left"
     assert set(meta["kinds"]) == {"start", "step", "transition", "end"}
     np.savez(file, **stored | {"meta": np.array(json.dumps(meta | {name: value}))})
-    with pytest.raises(enumsol.InvalidArgumentError, match=r"tired|hop"):
-        Path.load(file)
+    bad_argument(r"tired|hop", Path.load, file)
 
 
 def test_resume_after_the_step_limit_is_the_same_path(problem, path, tmp_path):
@@ -70,8 +69,7 @@ def test_resume_after_the_step_limit_is_the_same_path(problem, path, tmp_path):
     assert part.status == "step limit"
     part.save(tmp_path / "part.npz")
     loaded = Path.load(tmp_path / "part.npz")
-    with pytest.raises(enumsol.InvalidArgumentError, match="problem is missing"):
-        loaded.resume()
+    bad_argument("problem is missing", loaded.resume)
     whole = loaded.resume(problem, options=ContinuationOptions())
     assert whole.status == "interval left"
     assert whole.alpha == pytest.approx(path.alpha, abs=1e-9)
@@ -98,12 +96,9 @@ def test_plot(path):
     assert {line.get_label() for line in ax.lines} == {"steps", "folds", "start"}
     assert path.plot(ax=ax) is figure
     assert len(ax.lines) == 6
-    with pytest.raises(enumsol.InvalidArgumentError, match="ax is a NotebookFigure; expected the Axes"):
-        path.plot(ax=figure)
-    with pytest.raises(enumsol.InvalidArgumentError, match="quantity"):
-        path.plot(quantity="stress")
-    with pytest.raises(enumsol.InvalidArgumentError, match="node"):
-        path.plot(node=3)
+    bad_argument("ax is a NotebookFigure; expected the Axes", path.plot, ax=figure)
+    bad_argument("quantity", path.plot, quantity="stress")
+    bad_argument("node", path.plot, node=3)
 
 
 def test_plot_over_a_graph(problem, path, tmp_path):
@@ -113,25 +108,14 @@ def test_plot_over_a_graph(problem, path, tmp_path):
     ax = figure.axes[0]
     figure.savefig(tmp_path / "figure.png")
     assert "steps" in {line.get_label() for line in ax.lines}
-    with pytest.raises(enumsol.InvalidArgumentError, match="both given"):
-        path.plot(branches.branch_graph(problem, (0.0, 20.0)), ax=ax)
+    bad_argument("both given", path.plot, branches.branch_graph(problem, (0.0, 20.0)), ax=ax)
 
 
 def test_interruption_keeps_the_path(problem, path, monkeypatch):
     from enumsol.continuation import follower
 
-    real, calls = follower.moore_penrose, []
-
-    def interrupted(*arguments):
-        calls.append(1)
-        if len(calls) > 5:
-            raise KeyboardInterrupt
-        return real(*arguments)
-
-    monkeypatch.setattr(follower, "moore_penrose", interrupted)
-    with pytest.raises(enumsol.Interrupted, match="resume") as caught:
-        follow(problem, path[0], -1, (0, 20))
-    partial = caught.value.partial
+    monkeypatch.setattr(follower, "moore_penrose", CtrlC(call=6, then=follower.moore_penrose))
+    partial = interrupted("resume", follow, problem, path[0], -1, (0, 20))
     assert len(partial) == 6
     monkeypatch.undo()
     assert partial.resume().alpha == pytest.approx(path.alpha, abs=1e-9)

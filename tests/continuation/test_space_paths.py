@@ -5,9 +5,9 @@ import oracles3d
 import pytest
 from effort import some
 from problems3d import OneNode, from_compliance, random_coupled
+from refusals import bad_argument
 
 import enumsol
-from enumsol import InvalidArgumentError
 from enumsol.continuation import SmoothPath, follow, newton, start_tangents
 from enumsol.continuation.equations import equation_on
 from enumsol.continuation.space_equation import SLIP, SpaceEquation
@@ -253,19 +253,14 @@ def test_what_is_not_offered_in_3d_is_refused():
     problem = random_path_problem(1, p=1)
     graph = enumsol.branch_graph(enumsol.gallery.one_node_triangle(), (0, 1), "fast")
     path = follow(problem, newton(problem, 0.0), 1, (0, 1))
-    with pytest.raises(InvalidArgumentError, match="path 0 is one in 3D; expected a path in 2D"):
-        enumsol.audit(path, graph)
+    bad_argument("path 0 is one in 3D; expected a path in 2D", enumsol.audit, path, graph)
     wrong = SmoothPath(F=lambda alpha: [[alpha, alpha, alpha]], dF=lambda alpha: 1.0)
-    with pytest.raises(InvalidArgumentError, match=r"gives shape \(1, 3\) at alpha = 1; expected \(1, 2\)"):
-        newton(problem, 1, smooth_path=wrong)
-    with pytest.raises(InvalidArgumentError, match=r"start has shape \(2,\); expected a Root .* \(3,\) or \(1, 3\)"):
-        newton(problem, 0, [1.0, 2.0])
-    with pytest.raises(InvalidArgumentError, match=r"lambda_t of start has shape \(1,\); expected \(1, 2\)"):
-        follow(problem, (0.0, [0.0], [0.0]))
+    bad_argument(r"gives shape \(1, 3\) at alpha = 1; expected \(1, 2\)", newton, problem, 1, smooth_path=wrong)
+    bad_argument(r"start has shape \(2,\); expected a Root .* \(3,\) or \(1, 3\)", newton, problem, 0, [1.0, 2.0])
+    bad_argument(r"lambda_t of start has shape \(1,\); expected \(1, 2\)", follow, problem, (0.0, [0.0], [0.0]))
     weakening = enumsol.gallery.block3d(1, 1, 1, friction=enumsol.FrictionTable([0, 1], [0.5, 0.4]))
     for call in (
         lambda: newton(weakening, 0),
         lambda: follow(weakening, (0, np.zeros(weakening.p), np.zeros((weakening.p, 2)))),
     ):
-        with pytest.raises(InvalidArgumentError, match="depends on the solution"):
-            call()
+        bad_argument("depends on the solution", call)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from complete import all_roots
 from parted_meshes import grid, moved
 from two_bodies import blocks, together
 
@@ -32,8 +33,7 @@ def pressed_discs(upper, lower, friction=0.0):
         mesh, young=E, poisson=NU, pairs=[("upper.bottom", "lower.bottom")], clamp="lower.top",
         symmetry=["upper.left", "lower.left"], displacement={"upper.top": ("free", -0.02)}, friction=friction,
     )  # fmt: skip
-    roots = enumsol.enumerate_roots(problem, 0)
-    assert roots.complete
+    roots = all_roots(problem, 0)
     (root,) = roots
     order = np.argsort(problem.coordinates[:, 0])
     x, forces = problem.coordinates[order, 0], root.lambda_n[order]

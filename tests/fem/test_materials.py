@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from complete import all_roots
 from parted_meshes import grid
 from parted_solids import solid
+from refusals import bad_argument
 
 import enumsol
 from enumsol import InvalidArgumentError, fem
@@ -21,8 +23,7 @@ def halves(mesh, axis=1):
 
 
 def only_root(problem, alpha=0):
-    roots = enumsol.enumerate_roots(problem, alpha)
-    assert roots.complete
+    roots = all_roots(problem, alpha)
     (root,) = roots
     return root
 
@@ -198,8 +199,7 @@ def test_friction_of_a_pair_goes_by_its_first_part():
 def test_values_by_part_that_do_not_fit(changes, message):
     flat = halves(grid(2, 2, 4))
     mesh = fem.PartedMesh(flat.points, flat.cells, flat.facets, {}, {**flat.bodies, "all": np.arange(4)})
-    with pytest.raises(InvalidArgumentError, match=message):
-        fem.mesh_problem(mesh, **(STEEL | {"contact": "bottom", "clamp": "top"} | changes))
+    bad_argument(message, fem.mesh_problem, mesh, **(STEEL | {"contact": "bottom", "clamp": "top"} | changes))
 
 
 def test_a_mesh_without_names_of_bodies_says_what_is_missing():

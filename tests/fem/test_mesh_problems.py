@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from complete import all_roots
 from parted_meshes import doubled, grid, moved
+from refusals import bad_argument
 
 import enumsol
 from enumsol import InvalidArgumentError, InvalidProblemError, fem
@@ -13,8 +15,7 @@ STEEL = {"young": E, "poisson": NU}
 
 
 def only_root(problem, alpha=0):
-    roots = enumsol.enumerate_roots(problem, alpha)
-    assert roots.complete
+    roots = all_roots(problem, alpha)
     assert len(roots) == 1
     return roots[0]
 
@@ -215,8 +216,7 @@ def test_all_kinds_of_cells_agree(kind):
             wedge, **STEEL, contact=["left", "right"], spring={"top": (0.02, 0.02)}, gap=-5e-4,
             load={"top": (1e-4, 1e-3)},
         )  # fmt: skip
-        roots = enumsol.enumerate_roots(problem, 2.5, max_nodes=20_000)
-        assert roots.complete
+        roots = all_roots(problem, 2.5, max_nodes=20_000)
         forces = [-(problem.contact_rows.T @ np.r_[root.lambda_n, root.lambda_t]) for root in roots]
         return sorted((force.reshape(-1, 2).sum(axis=0) for force in forces), key=lambda force: force[1])
 
@@ -432,8 +432,7 @@ def test_facets_inside_the_body_are_refused():
 def test_facets_without_their_nodes_between_are_refused():
     mesh = grid(2, 2, 6)
     bare = fem.PartedMesh(mesh.points, mesh.cells, {name: part[:, :2] for name, part in mesh.facets.items()})
-    with pytest.raises(InvalidArgumentError, match="bottom has facets of 2 nodes; expected 3, as the cells have"):
-        fem.mesh_problem(bare, **GOOD)
+    bad_argument("bottom has facets of 2 nodes; expected 3, as the cells have", fem.mesh_problem, bare, **GOOD)
 
 
 def test_a_folded_boundary_has_no_normal():

@@ -6,6 +6,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
+from refusals import bad_argument
 
 from enumsol import InvalidArgumentError, MissingDependencyError, fem
 
@@ -129,8 +130,7 @@ CUBE = fem.box(1, 1, 1)
     ],
 )
 def test_meshes_that_are_no_body_are_refused(cells, message):
-    with pytest.raises(InvalidArgumentError, match=message):
-        fem.read_solid(meshio.Mesh(POINTS, cells))
+    bad_argument(message, fem.read_solid, meshio.Mesh(POINTS, cells))
 
 
 @pytest.mark.parametrize(
@@ -156,10 +156,8 @@ def test_files_that_meshio_cannot_read(tmp_path, capsys, name, text):
 
 
 def test_other_arguments(tmp_path, monkeypatch):
-    with pytest.raises(InvalidArgumentError, match="there is no such file; expected a mesh that meshio reads"):
-        fem.read_solid(tmp_path / "nowhere.msh")
-    with pytest.raises(InvalidArgumentError, match="it is a directory; expected a mesh that meshio reads"):
-        fem.read_solid(tmp_path)
+    bad_argument("there is no such file; expected a mesh that meshio reads", fem.read_solid, tmp_path / "nowhere.msh")
+    bad_argument("it is a directory; expected a mesh that meshio reads", fem.read_solid, tmp_path)
     (tmp_path / "secret.msh").touch()
     with monkeypatch.context() as patched:  # the user who runs the tests may read everything
 
@@ -167,12 +165,10 @@ def test_other_arguments(tmp_path, monkeypatch):
             raise PermissionError(13, "Permission denied")
 
         patched.setattr("pathlib.Path.open", refused)
-        with pytest.raises(
-            InvalidArgumentError, match=r"secret\.msh: it cannot be read \(Permission denied\); expected"
-        ):
-            fem.read_solid(tmp_path / "secret.msh")
-    with pytest.raises(InvalidArgumentError, match="source is a int; expected the name of a file or a meshio"):
-        fem.read_solid(3)
+        bad_argument(
+            r"secret\.msh: it cannot be read \(Permission denied\); expected", fem.read_solid, tmp_path / "secret.msh"
+        )
+    bad_argument("source is a int; expected the name of a file or a meshio", fem.read_solid, 3)
     monkeypatch.setitem(sys.modules, "netCDF4", None)
     (tmp_path / "p.exo").touch()
     with pytest.raises(

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from refusals import bad_argument, bad_problem
 
 from enumsol import fem
-from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.errors import InvalidProblemError
 from enumsol.fem.solid_problems import ContactSurface
 
 KINDS = ("hexahedra", "tetrahedra")
@@ -244,8 +245,7 @@ def test_a_contact_node_held_in_part_is_refused_unless_a_patch_holds_it():
     held = np.zeros((len(mesh.points), 3), dtype=bool)
     held[mesh.nodes("left")] = True
     held[mesh.nodes("front"), 1] = True
-    with pytest.raises(InvalidArgumentError, match="contact node 1 is held in some components only"):
-        on_bottom(mesh, held=held)
+    bad_argument("contact node 1 is held in some components only", on_bottom, mesh, held=held)
     assert on_bottom(mesh, held=held, multipliers="elements", ratio=1).p == 4
 
 
@@ -281,8 +281,7 @@ INSIDE = BOX.cells[0][[1, 2, 6, 5]]
     ],
 )
 def test_bad_arguments_are_named(options, message):
-    with pytest.raises(InvalidArgumentError, match=message):
-        on_bottom(BOX, **options)
+    bad_argument(message, on_bottom, BOX, **options)
 
 
 @pytest.mark.parametrize(
@@ -295,5 +294,4 @@ def test_bad_arguments_are_named(options, message):
     ],
 )
 def test_data_that_make_no_problem_are_named(options, message):
-    with pytest.raises(InvalidProblemError, match=message):
-        on_bottom(BOX, **options)
+    bad_problem(message, on_bottom, BOX, **options)

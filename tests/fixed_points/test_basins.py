@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from effort import some
 from generators import FRICTION, dense_compliance, fe_compliance, from_condensed
+from interruptions import CtrlC, interrupted
+from refusals import bad_argument
 
 import enumsol
 from enumsol.fixed_points import basins, fixed_point_residual, plot_basins
@@ -42,10 +44,8 @@ def test_what_is_no_root_is_no_fixed_point():
     moved = enumsol.solve_tresca(problem, sticking.lambda_n + 0.1, 5.0)
     assert not enumsol.is_fixed_point(problem, moved)
     other = enumsol.gallery.get("two-node-5").build()
-    with pytest.raises(enumsol.InvalidArgumentError, match=r"expected \(2,\), as the problem has p = 2"):
-        enumsol.is_fixed_point(other, sticking)
-    with pytest.raises(enumsol.InvalidArgumentError, match="root is a int without alpha"):
-        enumsol.is_fixed_point(problem, 3)
+    bad_argument(r"expected \(2,\), as the problem has p = 2", enumsol.is_fixed_point, other, sticking)
+    bad_argument("root is a int without alpha", enumsol.is_fixed_point, problem, 3)
 
 
 @pytest.mark.few(0, 1)
@@ -88,26 +88,15 @@ def test_given_starts_and_their_errors():
     table = enumsol.basin_table(problem, roots, [[0.0], [100.0]])
     assert list(table["root"]) == [0, 2]
     for starts, message in (([1.0], "starts has shape"), (0, "starts is 0"), ([[1.0, 2.0]], r"expected \(k, p\)")):
-        with pytest.raises(enumsol.InvalidArgumentError, match=message):
-            enumsol.basin_table(problem, roots, starts)
-    with pytest.raises(enumsol.InvalidArgumentError, match="roots has 0 roots"):
-        enumsol.basin_table(problem, [], 5)
+        bad_argument(message, enumsol.basin_table, problem, roots, starts)
+    bad_argument("roots has 0 roots", enumsol.basin_table, problem, [], 5)
     with pytest.raises(enumsol.InvalidArgumentError, match="all at the same alpha"):
         enumsol.basin_table(problem, [roots[0], enumsol.enumerate_roots(problem, 4.0)[0]])
-    with pytest.raises(enumsol.InvalidArgumentError, match="table lacks"):
-        plot_basins(table[["start"]])
+    bad_argument("table lacks", plot_basins, table[["start"]])
 
 
 def test_interrupted_keeps_the_rows(monkeypatch):
     problem = enumsol.gallery.get("one-node-6.1").build()
-    roots, whole, count = enumsol.enumerate_roots(problem, 5.0), basins.successive_approximations, iter(range(100))
-
-    def approximate(*arguments):
-        if next(count) == 3:
-            raise KeyboardInterrupt
-        return whole(*arguments)
-
-    monkeypatch.setattr(basins, "successive_approximations", approximate)
-    with pytest.raises(enumsol.Interrupted, match="after 3 of 10 starts") as caught:
-        enumsol.basin_table(problem, roots, 10)
-    assert len(caught.value.partial) == 3
+    roots, stop = enumsol.enumerate_roots(problem, 5.0), CtrlC(call=4, then=basins.successive_approximations)
+    monkeypatch.setattr(basins, "successive_approximations", stop)
+    assert len(interrupted("after 3 of 10 starts", enumsol.basin_table, problem, roots, 10)) == 3

@@ -6,7 +6,9 @@ import warnings
 import numpy as np
 import pytest
 from effort import some
+from interruptions import CtrlC, interrupted
 from problems3d import from_compliance, random_compliance, violations
+from refusals import bad_argument, bad_problem
 from scipy.optimize import brentq
 
 import enumsol
@@ -227,13 +229,8 @@ def test_zero_load_and_no_friction():
 
 
 def test_interrupted_keeps_the_last_iterate():
-    def stop(state):
-        if state.iteration == 3:
-            raise KeyboardInterrupt
-
-    with pytest.raises(enumsol.Interrupted) as caught:
-        enumsol.successive_approximations(from_compliance(W, -Q, 0.1), 0, progress=stop)
-    partial = caught.value.partial
+    problem, stop = from_compliance(W, -Q, 0.1), CtrlC(lambda state: state.iteration == 3)
+    partial = interrupted("interrupted", enumsol.successive_approximations, problem, 0, progress=stop)
     assert partial.outcome is Outcome.INTERRUPTED
     assert partial.iterations == 3
     assert partial.lambda_n[0] == pytest.approx(0.066, abs=1e-3)
@@ -254,13 +251,10 @@ def test_saved_and_loaded(tmp_path, rng):
     assert repr(again) == repr(found)
     for name in ("lambda_n", "lambda_t", "u_n", "u_t", "u", "slip", "increments", "contraction"):
         np.testing.assert_array_equal(getattr(again, name), getattr(found, name))
-    with pytest.raises(enumsol.InvalidArgumentError, match="is about other contact nodes"):
-        FixedPoint.load(tmp_path / "limit.npz", from_compliance(W, Q, 0.1))
+    bad_argument("is about other contact nodes", FixedPoint.load, tmp_path / "limit.npz", from_compliance(W, Q, 0.1))
     (tmp_path / "other.npz").write_bytes(b"PK")
-    with pytest.raises(enumsol.InvalidArgumentError, match="does not hold a fixed point"):
-        FixedPoint.load(tmp_path / "other.npz", problem)
-    with pytest.raises(enumsol.InvalidArgumentError, match="cannot be read"):
-        FixedPoint.load(tmp_path / "none.npz", problem)
+    bad_argument("does not hold a fixed point", FixedPoint.load, tmp_path / "other.npz", problem)
+    bad_argument("cannot be read", FixedPoint.load, tmp_path / "none.npz", problem)
 
 
 def test_frames(rng):
@@ -275,10 +269,9 @@ def test_frames(rng):
 @pytest.mark.parametrize("bad", [-0.1, np.nan, np.inf, "x", (1.0, 2.0, 3.0), None])
 def test_a_function_that_returns_no_coefficients(bad):
     problem = from_compliance(W, -Q, lambda node, slip: bad, node_ids=["toe"])
-    with pytest.raises(
-        enumsol.InvalidProblemError, match=r"friction returns .* at contact node toe for slip 0; expected"
-    ):
-        enumsol.successive_approximations(problem, 0)
+    bad_problem(
+        r"friction returns .* at contact node toe for slip 0; expected", enumsol.successive_approximations, problem, 0
+    )
 
 
 def test_a_function_that_jumps_is_warned_of():
@@ -318,8 +311,7 @@ def test_errors_of_the_users_own_function_come_through():
 )
 def test_bad_arguments(change, message):
     arguments = {"problem": from_compliance(W, -Q, 0.1), "alpha": 0} | change
-    with pytest.raises(enumsol.InvalidArgumentError, match=message):
-        enumsol.successive_approximations(**arguments)
+    bad_argument(message, enumsol.successive_approximations, **arguments)
 
 
 @pytest.mark.parametrize(

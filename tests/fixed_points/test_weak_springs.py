@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from complete import all_roots
 from problems3d import block_on_springs
 
 import enumsol
@@ -62,8 +63,7 @@ def check(found, roots):
 @pytest.mark.parametrize("spring", [0.1, 1e-3, 1e-6, 1e-8])
 def test_proven_roots_in_2d(spring, seed):
     problem = plane(np.random.default_rng([seed, 41]), spring)
-    roots = enumsol.enumerate_roots(problem, 0)
-    assert roots.complete
+    roots = all_roots(problem, 0)
     found = enumsol.successive_approximations(problem, 0)
     check(found, roots)
     assert found.converged or spring < 1e-3

@@ -17,6 +17,14 @@ def run(capsys, *arguments):
     return status, out, err
 
 
+def printed(capsys, *arguments, note=None):
+    """What a command prints that ends with status 0, and with a note or with nothing beside it."""
+    status, out, err = run(capsys, *arguments)
+    assert status == 0
+    assert err == "" if note is None else note in err
+    return out
+
+
 def call(*arguments, **options):
     command = [sys.executable, "-m", "enumsol", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, **options)

@@ -7,8 +7,9 @@ from unittest import mock
 
 import numpy as np
 from generators import through_the_unloaded_state
-from proof_tools import copied, proof_of, records_of
-from rational_checker import Refused, check_records
+from proof_tools import proof_of, records_of
+from rational_checker import check_records
+from rational_forms import Refused
 
 from enumsol import ContactProblem, branch_graph, gallery, verify
 from enumsol.search import form_policy as forms
@@ -84,13 +85,3 @@ def cut_in_two(records):
     for ends in ([piece["piece"][0], middle], [middle, piece["piece"][1]]):
         changed += [{**piece, "piece": ends, "roots": [leaf[1] for leaf in selections]}, *selections]
     return [*changed, *records[arcs:-1], {**records[-1], "pieces": 3}]
-
-
-def of_kind(records, *kinds):
-    return [k for k, record in enumerate(records) if isinstance(record, list) and record[0] in kinds]
-
-
-def replaced(records, k, record):
-    changed = copied(records)
-    changed[k] = record
-    return changed

@@ -10,9 +10,10 @@ from fractions import Fraction
 
 import numpy as np
 from oracles import _affine, _at, _conditions, _dimension, _meet, _rref, _vertices, exact_condense
-from rational_checker import Refused, check_records
+from rational_checker import check_records
+from rational_forms import Refused
 
-from enumsol import Proof
+from enumsol import Proof, ProofFormatError, verify
 
 MAGIC = b"enumsol-proof 1\n"
 
@@ -69,9 +70,60 @@ def leaves_of(records):
     return found
 
 
+# -- changed records ---------------------------------------------------------------------------------------------------
+
+
 def copied(records):
     """Records that may be changed."""
     return copy.deepcopy(records)
+
+
+def of_kind(records, *kinds):
+    """Places of the records of these kinds."""
+    return [k for k, record in enumerate(records) if isinstance(record, list) and record and record[0] in kinds]
+
+
+def replaced(records, place, *others):
+    """The records with others, or none, in place of one."""
+    changed = copied(records)
+    changed[place : place + 1 or None] = others
+    return changed
+
+
+def put(record, path, value):
+    """The record, or records, with another value at a path; a function makes it of what stands there."""
+    if not path:
+        return value(record) if callable(value) else value
+    changed = copied(record)
+    changed[path[0]] = put(changed[path[0]], path[1:], value)
+    return changed
+
+
+def put_in_all(records, places, entry, value):
+    """The records with another value, or one made of what stands there, as an entry of several."""
+    for k in places:
+        records = put(records, (k, entry), value)
+    return records
+
+
+def why_refused(problem, records):
+    """The reasons for which the checker refuses records, or cannot read them."""
+    try:
+        report = verify(problem, proof_of(records))
+    except ProofFormatError as error:
+        return str(error)
+    assert not report.ok
+    assert not report.complete
+    assert "REFUSED" in repr(report)
+    return " ".join(report.failures)
+
+
+def refused(problem, records):
+    """Whether the checker refuses records, or cannot read them."""
+    try:
+        return not verify(problem, proof_of(records)).ok
+    except ProofFormatError:
+        return True
 
 
 # -- the judge ---------------------------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import proof_fuzz
 from problems3d import from_compliance
-from proof_tools import bytes_of, copied, proof_of, records_of
+from proof_tools import bytes_of, copied, of_kind, proof_of, records_of
 from trees import by_the_tree
 
 from enumsol import enumerate_roots, gallery
@@ -64,11 +64,6 @@ def case(name):
     with by_the_tree():
         roots = enumerate_roots(problem, alpha)
     return problem, alpha, records_of(roots.proof), bytes_of(roots.proof)
-
-
-def of_kind(records, *kinds):
-    """Places of the records of these kinds."""
-    return [k for k, record in enumerate(records) if isinstance(record, list) and record[0] in kinds]
 
 
 def values_of(record):

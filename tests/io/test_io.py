@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 import scipy.io
 import scipy.sparse as sp
+from refusals import bad_argument, bad_problem
 
 from enumsol import (
     BodyMesh,
     ContactProblem,
     ContactProblem3D,
     FrictionTable,
-    InvalidArgumentError,
     InvalidProblemError,
     SlipMean,
     enumerate_roots,
@@ -256,8 +256,7 @@ def test_a_directory_is_replaced_without_leftovers(tmp_path):
     assert_same(read_problem(place), plain)
     assert (place / "_notes.mtx").exists()
     (place / "mass.mtx").write_text("of somebody else")
-    with pytest.raises(InvalidProblemError, match=r"mass\.mtx is not known"):
-        write_problem(plain, place)
+    bad_problem(r"mass\.mtx is not known", write_problem, plain, place)
     assert (place / "mass.mtx").exists()
 
 
@@ -399,10 +398,7 @@ def test_bad_sparse_parts(tmp_path, part, value, pattern):
 def test_pickled_objects_are_never_loaded(tmp_path):
     place = tmp_path / "p.npz"
     np.savez(place, allow_pickle=True, **(DENSE | {"A": np.array(sp.csc_array(A), dtype=object)}))
-    with pytest.raises(
-        InvalidProblemError, match=r"A is a pickled Python object, which is never loaded; .* A_data, A_ind"
-    ):
-        read_problem(place)
+    bad_problem(r"A is a pickled Python object, which is never loaded; .* A_data, A_ind", read_problem, place)
 
 
 @pytest.mark.parametrize("content", [b"", b"hello", b"PK\x03\x04 but not further", b"\x93NUMPY\x01\x00", bytes(1000)])
@@ -521,8 +517,7 @@ def test_bad_matrix_market_directories(tmp_path, file, text, pattern):
 
 def test_labels_that_a_format_cannot_keep(tmp_path):
     mixed = ContactProblem(**DENSE, node_ids=["a", 1])
-    with pytest.raises(InvalidProblemError, match=r"node_ids cannot be kept in a \.npz file; expected"):
-        write_problem(mixed, tmp_path / "p.npz")
+    bad_problem(r"node_ids cannot be kept in a \.npz file; expected", write_problem, mixed, tmp_path / "p.npz")
     write_problem(mixed, tmp_path / "p")
     assert read_problem(tmp_path / "p").node_ids == ("a", 1)
     with pytest.raises(InvalidProblemError, match=r"node_ids cannot be kept in node_ids\.json"):
@@ -543,18 +538,14 @@ def test_a_callable_cannot_be_written(tmp_path, place):
 
 def test_places_that_cannot_be_written(tmp_path):
     problem = ContactProblem(**DENSE)
-    with pytest.raises(InvalidArgumentError, match=r"its name ends in '\.txt'; expected a \.npz file"):
-        write_problem(problem, tmp_path / "p.txt")
+    bad_argument(r"its name ends in '\.txt'; expected a \.npz file", write_problem, problem, tmp_path / "p.txt")
     for place in (tmp_path / "no" / "p.npz", tmp_path / "no" / "p"):
-        with pytest.raises(InvalidArgumentError, match=re.escape(f"path {place} cannot be written (No such file")):
-            write_problem(problem, place)
+        bad_argument(re.escape(f"path {place} cannot be written (No such file"), write_problem, problem, place)
     for what in (3, DENSE):
-        with pytest.raises(
-            InvalidArgumentError, match=f"problem is a {type(what).__name__}; expected a ContactProblem"
-        ):
-            write_problem(what, tmp_path / "p.npz")
-    with pytest.raises(InvalidArgumentError, match="path is a int; expected the name of a file or directory"):
-        read_problem(3)
+        bad_argument(
+            f"problem is a {type(what).__name__}; expected a ContactProblem", write_problem, what, tmp_path / "p.npz"
+        )
+    bad_argument("path is a int; expected the name of a file or directory", read_problem, 3)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
@@ -562,8 +553,7 @@ def test_places_that_may_not_be_read(tmp_path):
     place = tmp_path / "p.npz"
     write_problem(ContactProblem(**DENSE), place)
     place.chmod(0)
-    with pytest.raises(InvalidProblemError, match=r"it cannot be read \(Permission denied\)"):
-        read_problem(place)
+    bad_problem(r"it cannot be read \(Permission denied\)", read_problem, place)
 
 
 def test_a_written_archive_is_plain_numpy(tmp_path):

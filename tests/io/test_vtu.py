@@ -7,12 +7,12 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 import pytest
+from refusals import bad_argument
 
 import enumsol
 from enumsol import (
     BodyMesh,
     ContactProblem3D,
-    InvalidArgumentError,
     MissingDependencyError,
     OutputError,
     fem,
@@ -179,8 +179,7 @@ def test_a_mesh_without_facets_will_do_for_nodes(tmp_path):
 def test_bad_arguments_are_named(tmp_path, problem, change, name, message):
     state = vars(some_state(PATCHES)) | change
     state = SimpleNamespace(**{key: value for key, value in state.items() if value is not None})
-    with pytest.raises(InvalidArgumentError, match=message):
-        write_vtu(problem, state, tmp_path / name)
+    bad_argument(message, write_vtu, problem, state, tmp_path / name)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -241,8 +240,7 @@ def test_files_keep_the_lame_coefficients(tmp_path):
 
 def test_without_lame_coefficients_there_are_no_stresses(tmp_path):
     problem = gallery.two_node_square()
-    with pytest.raises(InvalidArgumentError, match="no mesh with Lame coefficients"):
-        fem.cell_stresses(problem, np.zeros(problem.n))
+    bad_argument("no mesh with Lame coefficients", fem.cell_stresses, problem, np.zeros(problem.n))
     write_vtu(problem, enumsol.enumerate_roots(problem, 3.5)[0], tmp_path / "p.vtu")
     assert "stress" not in meshio.read(tmp_path / "p.vtu").cell_data
     with pytest.raises(enumsol.InvalidProblemError, match=r"mesh_lame has shape \(3,\)"):
@@ -263,5 +261,4 @@ def test_all_roots_in_one_call(tmp_path, name):
     for root, file in zip(roots, files, strict=True):
         moved = meshio.read(tmp_path / file).point_data["displacement"][:, : problem.mesh.points.shape[1]]
         np.testing.assert_allclose(moved, problem.mesh.displacements(root.u))
-    with pytest.raises(InvalidArgumentError, match="state is empty"):
-        write_vtu(problem, [], tmp_path / "none.vtu")
+    bad_argument("state is empty", write_vtu, problem, [], tmp_path / "none.vtu")

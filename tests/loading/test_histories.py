@@ -5,9 +5,12 @@ import dataclasses
 import numpy as np
 import pandas as pd
 import pytest
+from complete import all_roots
+from interruptions import CtrlC, interrupted
+from refusals import bad_argument
 
 import enumsol
-from enumsol import ContactProblem, Interrupted, InvalidArgumentError, LoadStep, enumerate_roots, histories
+from enumsol import ContactProblem, InvalidArgumentError, LoadStep, enumerate_roots, histories
 from enumsol.model.restart import SlipStart, restarted
 
 
@@ -68,8 +71,7 @@ def test_a_complete_step_is_complete_for_every_start_in_its_ball(dimension, pull
     shape, rng = problem.slip_offset.shape, np.random.default_rng(3)
     radius = np.full(shape, 2e-6 if dimension == 2 else 1e-5)
     wide = restarted(problem, SlipStart(np.zeros(shape), radius))
-    roots = enumerate_roots(wide, alpha)
-    assert roots.complete
+    roots = all_roots(wide, alpha)
     assert len(roots) == 3
     widest = max(float(np.max(np.ptp(root.enclosure.lambda_n, axis=1))) for root in roots)
     assert widest > 1e-7  # the start's radius, not rounding
@@ -165,13 +167,8 @@ def test_limits_keep_what_was_found(pulled_wedge):
 
 
 def test_an_interruption_keeps_the_steps_before(pulled_wedge):
-    def press_ctrl_c(state):
-        if state.step == 3:
-            raise KeyboardInterrupt
-
-    with pytest.raises(Interrupted, match="histories was interrupted in step 3; 5 roots so far") as caught:
-        histories(pulled_wedge, [-1, 0, 0.5, 1], progress=press_ctrl_c)
-    partial = caught.value.partial
+    said, stop = "histories was interrupted in step 3; 5 roots so far", CtrlC(lambda state: state.step == 3)
+    partial = interrupted(said, histories, pulled_wedge, [-1, 0, 0.5, 1], progress=stop)
     assert partial.counts == (1, 1, 3, 0)
     assert partial.unique_until == 2
     assert not partial.complete
@@ -195,8 +192,7 @@ def test_a_tolerance_joins_ends_in_one_ball(pulled_wedge):
     for other in apart.stages(2):
         assert stage.start.holds(other.start.ball)
     assert not joined.complete  # so wide a ball is not decided, and that is said
-    with pytest.raises(InvalidArgumentError, match="merge"):
-        histories(pulled_wedge, [1, 0], merge=1.0, arithmetic="exact")
+    bad_argument("merge", histories, pulled_wedge, [1, 0], merge=1.0, arithmetic="exact")
 
 
 def test_a_load_held_after_an_unstable_slip_has_two_roots_beside_it_or_none(pulled_wedge):
@@ -276,8 +272,7 @@ def test_increments_that_matter_are_told():
     ],
 )
 def test_steps_that_cannot_be_used(steps, message):
-    with pytest.raises(InvalidArgumentError, match=message):
-        histories(enumsol.gallery.one_node_triangle(), steps)
+    bad_argument(message, histories, enumsol.gallery.one_node_triangle(), steps)
 
 
 def test_tables_and_arrays_are_steps():
@@ -290,5 +285,4 @@ def test_tables_and_arrays_are_steps():
     assert by_array.root((2, 0)).lambda_t[0] == pytest.approx(1.0)
     named = histories(problem, pd.DataFrame({"f1": [0.5, 3.0]}))
     assert [named.root((k, 0)).statuses for k in (1, 2)] == [by_array.root((k, 0)).statuses for k in (1, 2)]
-    with pytest.raises(InvalidArgumentError, match="stop_after is an option of enumerate_roots"):
-        histories(problem, loads, stop_after=2)
+    bad_argument("stop_after is an option of enumerate_roots", histories, problem, loads, stop_after=2)

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from refusals import bad_argument
 
 import enumsol
 from enumsol import History, InvalidArgumentError, histories
@@ -49,10 +50,8 @@ def test_damaged_files_are_refused(tmp_path, out_again, pulled_wedge):
     record = json.loads(place.read_text())
     for change in ({"format": "x"}, {"version": 9}, {"stages": [{}]}, {"steps": 1}):
         place.write_text(json.dumps(record | change))
-        with pytest.raises(InvalidArgumentError, match=r"h\.json"):
-            History.load(place, pulled_wedge)
-    with pytest.raises(InvalidArgumentError, match="cannot be read"):
-        History.load(tmp_path / "none.json", pulled_wedge)
+        bad_argument(r"h\.json", History.load, place, pulled_wedge)
+    bad_argument("cannot be read", History.load, tmp_path / "none.json", pulled_wedge)
 
 
 def test_every_history_is_a_line(out_again, tmp_path):
@@ -70,5 +69,4 @@ def test_every_history_is_a_line(out_again, tmp_path):
     assert own.get_xlabel() == "step"
     labels = {text.get_text() for text in by_step.texts}
     assert any("4.4" in label for label in labels)
-    with pytest.raises(InvalidArgumentError, match="x is 'force'; expected one of step, alpha"):
-        out_again.plot("force")
+    bad_argument("x is 'force'; expected one of step, alpha", out_again.plot, "force")

@@ -5,14 +5,10 @@ import dataclasses
 
 import numpy as np
 import pytest
-from proof_tools import proof_of, records_of
+from proof_tools import of_kind, proof_of, records_of
 
 import enumsol
 from enumsol import histories, verify
-
-
-def stages_of(records):
-    return [k for k, record in enumerate(records) if isinstance(record, list) and record[0] == "s"]
 
 
 def test_a_branching_history_is_verified(out_again, pulled_wedge):
@@ -68,42 +64,42 @@ def test_only_verified_arithmetic_proves(pulled_wedge):
 
 
 def no_follower(records):
-    places = stages_of(records)
+    places = of_kind(records, "s")
     records[places[2]][4] = records[places[2]][4][:-1]
 
 
 def narrow_start(records):
     """The start after a root that moved is a thousandth as wide as it has to be."""
-    for k in stages_of(records):
+    for k in of_kind(records, "s"):
         if records[k][3] is not None:
             records[k][3] = [1e-3 * radius for radius in records[k][3]]
 
 
 def other_start(records):
-    places = stages_of(records)
+    places = of_kind(records, "s")
     records[places[3]][2] = [x + 1e-9 for x in records[places[3]][2]]
 
 
 def exact_start(records):
-    for k in stages_of(records):
+    for k in of_kind(records, "s"):
         records[k][3] = None
 
 
 def negative_radius(records):
-    k = next(k for k in stages_of(records) if records[k][3] is not None)
+    k = next(k for k in of_kind(records, "s") if records[k][3] is not None)
     records[k][3] = [-radius for radius in records[k][3]]
 
 
 def first_from_elsewhere(records):
-    records[stages_of(records)[0]][2][0] = 1e-12
+    records[of_kind(records, "s")[0]][2][0] = 1e-12
 
 
 def skips_a_step(records):
-    records[stages_of(records)[1]][1] = 3
+    records[of_kind(records, "s")[1]][1] = 3
 
 
 def follows_itself(records):
-    places = stages_of(records)
+    places = of_kind(records, "s")
     records[places[1]][4] = [1]
 
 
@@ -116,11 +112,11 @@ def fewer_steps(records):
 
 
 def a_search_left_out(records):
-    places = stages_of(records)
+    places = of_kind(records, "s")
     del records[places[-1] : -1]
     records[0]["stages"] -= 1
     records[-1]["stages"] -= 1
-    for k in stages_of(records):
+    for k in of_kind(records, "s"):
         records[k][4] = [n for n in records[k][4] if n < records[0]["stages"]]
 
 
@@ -137,8 +133,7 @@ def one_more_name(records):
 
 
 def leaf_gone(records):
-    k = next(k for k, record in enumerate(records) if isinstance(record, list) and record[0] == "r")
-    records[k] = ["n"]
+    records[of_kind(records, "r")[0]] = ["n"]
 
 
 #: These are sound and prove less.
@@ -174,7 +169,7 @@ def test_a_start_that_is_proven_and_too_narrow_is_not_believed(pulled_wedge):
     """The search of the next step is honest, but it is about other starts than the root's end."""
     history = histories(pulled_wedge, [0.5, 1])
     records = records_of(history.proof)
-    places = stages_of(records)
+    places = of_kind(records, "s")
     alone = dataclasses.replace(pulled_wedge, slip_offset=records[places[1]][2])
     honest = records_of(enumsol.enumerate_roots(alone, 1.0).proof)
     assert records[places[1]][3] is not None
@@ -188,7 +183,7 @@ def test_a_start_that_is_proven_and_too_narrow_is_not_believed(pulled_wedge):
 def test_a_wide_start_may_not_be_decided_in_rationals(pulled_wedge):
     history = histories(pulled_wedge, [0.5, 1])
     records = records_of(history.proof)
-    k = next(k for k in stages_of(records) if records[k][3] is not None)
+    k = next(k for k in of_kind(records, "s") if records[k][3] is not None)
     records[k + 1]["data"] = "condensed"
     report = verify(pulled_wedge, proof_of(records))
     assert not report.ok

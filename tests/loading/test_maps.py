@@ -5,10 +5,12 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from complete import all_roots
 from helpers.floating_oracle import Oracle, block_on_table
+from interruptions import CtrlC, interrupted
 
 import enumsol
-from enumsol import Interrupted, InvalidArgumentError, MultiplicityMap, enumerate_roots, multiplicity_map
+from enumsol import InvalidArgumentError, MultiplicityMap, enumerate_roots, multiplicity_map
 from enumsol.loading import strips
 from enumsol.search.data_boxes import Box
 
@@ -52,8 +54,7 @@ def test_uniqueness_between_values_is_proven_or_said_not_to_be(over_gap):
         for first, last in strip.unique:
             for alpha, share in ((first, 0.0), (last, 1.0), *rng.uniform(0, 1, size=(3, 2))):
                 problem = dataclasses.replace(square, gap=strip.low + share * (strip.high - strip.low))
-                roots = enumerate_roots(problem, min(max(alpha, first), last))
-                assert roots.complete
+                roots = all_roots(problem, min(max(alpha, first), last))
                 assert len(roots) == 1
     frame = over_gap.to_frame()
     assert np.all(frame["to_next"][frame["solutions"] > 1] == 0)
@@ -157,13 +158,8 @@ def test_what_is_not_done_is_said(over_gap):
     assert "not proven at 2 of 2 values" in repr(short)
     none = multiplicity_map(square, (0, 5), {"gap": [0.0, 0.1]}, time_limit=1e-9)
     assert not none.complete
-
-    def press_ctrl_c(done, of):
-        raise KeyboardInterrupt
-
-    with pytest.raises(Interrupted, match="after 1 of 2 values") as caught:
-        multiplicity_map(square, (0, 5), {"gap": [0.0, 0.1]}, progress=press_ctrl_c)
-    partial = caught.value.partial
+    over = {"gap": [0.0, 0.1]}
+    partial = interrupted("after 1 of 2 values", multiplicity_map, square, (0, 5), over, progress=CtrlC())
     assert isinstance(partial, MultiplicityMap)
     assert partial.values == (0.0,)
     assert not partial.complete

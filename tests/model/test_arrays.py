@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 import scipy.sparse as sp
 from hypothesis import given, settings, strategies as st
+from refusals import bad_argument, bad_problem
 
 from enumsol import ContactProblem, EnumsolError, InvalidArgumentError, InvalidProblemError, fem, gallery, read_problem
 from enumsol.support.array_arguments import real_array, real_matrix
@@ -143,8 +144,7 @@ def test_numbers_that_float64_holds_are_taken():
 def test_files_are_read_as_exactly(tmp_path):
     for name, bad in (("f", np.array([1, 2, 3, LARGE])), ("gap", np.array("1")), ("f", F.astype(np.longdouble) / 3)):
         np.savez(tmp_path / "p.npz", **({"A": A, "Bn": BN, "Bt": BT, "f": F} | {name: bad}))
-        with pytest.raises(InvalidProblemError, match=rf"p\.npz: {name} (has the value|is not an array of real)"):
-            read_problem(tmp_path / "p.npz")
+        bad_problem(rf"p\.npz: {name} (has the value|is not an array of real)", read_problem, tmp_path / "p.npz")
 
 
 # -- other arrays ----------------------------------------------------------------------------------------------------
@@ -234,8 +234,7 @@ def test_masked_rows_of_a_list_are_seen():
 
 def test_frames_with_integers_and_floats_are_not_rounded():
     frame = pd.DataFrame({0: [LARGE, 0], 1: [0.5, 1.0]})
-    with pytest.raises(InvalidProblemError, match=r"A has the value 9007199254740993 at index \(0, 0\)"):
-        real_matrix(frame, "A")
+    bad_problem(r"A has the value 9007199254740993 at index \(0, 0\)", real_matrix, frame, "A")
 
 
 @pytest.mark.parametrize("value", ["0.5", b"0.5", 1j, np.array("0.5"), np.str_("0.5"), np.datetime64("2020-01-01")])
@@ -320,8 +319,7 @@ def test_meshes_are_checked_alike(case):
     ],
 )
 def test_gallery_arguments(build, pattern):
-    with pytest.raises(InvalidArgumentError, match=pattern):
-        build()
+    bad_argument(pattern, build)
 
 
 # -- anything at all -------------------------------------------------------------------------------------------------

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from problems3d import from_compliance
+from refusals import bad_argument, bad_problem
 
 import enumsol
-from enumsol import ContactProblem3D, FrictionTable, InvalidArgumentError, InvalidProblemError
+from enumsol import ContactProblem3D, FrictionTable, InvalidProblemError
 
 EYE = np.eye(6)
 
@@ -54,8 +55,7 @@ def test_a_callable_gets_the_row_and_the_slip_and_alpha_adds():
     np.testing.assert_allclose(body.coefficients(2.0, np.array([0.25, 0.5])), [[1.25, 2.0], [2.5, 2.0]])
     assert body.depends_on_solution
     for call in (lambda: body.friction_at(0), lambda: body.fingerprint):
-        with pytest.raises(InvalidArgumentError, match="which depends on the solution; expected constant coefficients"):
-            call()
+        bad_argument("which depends on the solution; expected constant coefficients", call)
 
 
 def test_a_table_is_linear_between_and_constant_beyond():
@@ -85,8 +85,7 @@ def test_a_table_is_linear_between_and_constant_beyond():
     ],
 )
 def test_bad_data(change, message):
-    with pytest.raises(InvalidProblemError, match=message):
-        problem(**change)
+    bad_problem(message, problem, **change)
 
 
 @pytest.mark.parametrize(
@@ -101,8 +100,7 @@ def test_bad_data(change, message):
     ],
 )
 def test_bad_tables(arguments, message):
-    with pytest.raises(InvalidProblemError, match=message):
-        FrictionTable(*arguments)
+    bad_problem(message, FrictionTable, *arguments)
 
 
 def test_a_table_for_other_nodes():
@@ -112,10 +110,7 @@ def test_a_table_for_other_nodes():
 
 def test_friction_that_is_negative_at_alpha():
     body = problem(friction=0.1, friction_slope=(0.0, -1.0), node_ids=["a", "b"])
-    with pytest.raises(
-        InvalidArgumentError, match=r"friction F2 at alpha = 1 is -0\.9 at contact node a; expected F >= 0"
-    ):
-        body.friction_at(1)
+    bad_argument(r"friction F2 at alpha = 1 is -0\.9 at contact node a; expected F >= 0", body.friction_at, 1)
 
 
 def test_immutable_fingerprinted_and_pickled():
@@ -134,15 +129,14 @@ def test_immutable_fingerprinted_and_pickled():
 
 
 def test_slip_means_are_checked():
-    T = sp.csr_array(EYE[:3])
-    for weights, message in (
-        (-np.ones((2, 3)) / 3, "slip_mean has a negative weight"),
-        (np.ones((3, 3)) / 3, "slip_mean has T1, T2, offset, weights of shapes"),
-    ):
-        with pytest.raises(InvalidProblemError, match=message):
-            problem(slip_mean=enumsol.SlipMean(T, T, np.zeros((3, 2)), sp.csr_array(weights)))
-    mean = enumsol.SlipMean(T, T, np.zeros((3, 2)), sp.csr_array(np.ones((2, 3)) / 3))
-    np.testing.assert_allclose(problem(slip_mean=mean).slip_mean(np.arange(6.0)), np.sqrt(2.0) * np.ones(2))
+    def with_weights(weights):
+        T = sp.csr_array(EYE[:3])
+        return problem(slip_mean=enumsol.SlipMean(T, T, np.zeros((3, 2)), sp.csr_array(weights)))
+
+    bad_problem("slip_mean has a negative weight", with_weights, -np.ones((2, 3)) / 3)
+    bad_problem("slip_mean has T1, T2, offset, weights of shapes", with_weights, np.ones((3, 3)) / 3)
+    mean = with_weights(np.ones((2, 3)) / 3).slip_mean(np.arange(6.0))
+    np.testing.assert_allclose(mean, np.sqrt(2.0) * np.ones(2))
 
 
 def test_nodes_far_apart_are_checked_block_by_block():

@@ -8,10 +8,10 @@ from importlib.resources import files
 import numpy as np
 import pytest
 from pages import Reader, data_of
+from refusals import bad_argument
 
 import enumsol
 from enumsol import (
-    InvalidArgumentError,
     MissingDependencyError,
     branch_graph,
     enumerate_roots,
@@ -244,14 +244,10 @@ def test_continua_and_sheets(tmp_path):
 
 def test_what_cannot_be_written_is_refused(tmp_path, monkeypatch):
     graph = branch_graph(gallery.one_node_triangle(), (0, 5))
-    with pytest.raises(InvalidArgumentError, match="solutions is a int"):
-        write_report(3, tmp_path / "page.html")
-    with pytest.raises(InvalidArgumentError, match="title is a int"):
-        write_report(graph, tmp_path / "page.html", title=3)
-    with pytest.raises(InvalidArgumentError, match="units is 'N'"):
-        write_report(graph, tmp_path / "page.html", units="N")
-    with pytest.raises(InvalidArgumentError, match="cannot be written"):
-        write_report(graph, tmp_path / "nowhere" / "page.html")
+    bad_argument("solutions is a int", write_report, 3, tmp_path / "page.html")
+    bad_argument("title is a int", write_report, graph, tmp_path / "page.html", title=3)
+    bad_argument("units is 'N'", write_report, graph, tmp_path / "page.html", units="N")
+    bad_argument("cannot be written", write_report, graph, tmp_path / "nowhere" / "page.html")
     monkeypatch.setitem(sys.modules, "plotly.offline", None)
     with pytest.raises(MissingDependencyError, match=r"enumsol\[report\]"):
         write_report(graph, tmp_path / "page.html")
@@ -330,8 +326,7 @@ def test_the_problem_is_told_as_it_was_given(scene, tmp_path):
     plain = page_of(roots, tmp_path, scene=scene)
     assert "Numbers are in the user's own consistent units" in Reader(plain).text
     assert 'id="given"' not in page_of(roots, tmp_path)
-    with pytest.raises(InvalidArgumentError, match="scene is a str; expected a Scene"):
-        write_report(graph, tmp_path / "page.html", scene="scene.toml")
+    bad_argument("scene is a str; expected a Scene", write_report, graph, tmp_path / "page.html", scene="scene.toml")
 
 
 @pytest.mark.slow

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from browser import find_browser
 from pages import Reader, data_of
+from refusals import bad_argument
 
 import enumsol
-from enumsol import InvalidArgumentError, MissingDependencyError, enumerate_roots, fem, gallery, write_report
+from enumsol import MissingDependencyError, enumerate_roots, fem, gallery, write_report
 from enumsol.cli import main
 from enumsol.model.shapes import body_shape, slip_directions
 from enumsol.report import body, roots_content
@@ -214,8 +215,7 @@ def test_the_command(tmp_path, capsys, monkeypatch):
     assert "enumsol roots gallery:wedge3d-2-3 --alpha=1.0 --proof roots.proof" in again
     assert main(["roots", "gallery:two-node-5", "--alpha", "5", "--report", "-"]) == 2
     assert "--report is -; expected the name of a file" in capsys.readouterr().err
-    with pytest.raises(InvalidArgumentError, match="solutions is a int; expected a BranchGraph, a RootSet or a"):
-        write_report(3, page)
+    bad_argument("solutions is a int; expected a BranchGraph, a RootSet or a", write_report, 3, page)
     monkeypatch.setitem(sys.modules, "plotly.offline", None)
     with pytest.raises(MissingDependencyError, match=r"enumsol\[report\]"):
         write_report(enumerate_roots(gallery.get("wedge3d-2-3").build(), 1), page)

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from parted_meshes import grid
 from parted_solids import solid
+from refusals import bad_argument, bad_problem
 
 import enumsol
-from enumsol import BodyMesh, InvalidArgumentError, fem
+from enumsol import BodyMesh, fem
 from enumsol.model.cells import boundary_facets, facet_outlines, outline_edges
 from enumsol.model.shapes import body_shape, own_scales, round_scale, slip_directions
 
@@ -100,8 +101,7 @@ def test_in_space():
     assert len(roots.plot_bodies().axes) == len(roots)
     from enumsol.support.plotting import new_figure
 
-    with pytest.raises(InvalidArgumentError, match="projection '3d'"):
-        roots[0].plot_body(new_figure().subplots())
+    bad_argument("projection '3d'", roots[0].plot_body, new_figure().subplots())
 
 
 @pytest.mark.parametrize(("kind", "nodes"), [(4, 3), (8, 4), (10, 6), (27, 8)])
@@ -195,8 +195,7 @@ def test_without_a_mesh_the_picture_is_refused():
     square = enumsol.gallery.two_node_square()
     problem = enumsol.ContactProblem(square.A, square.Bn, square.Bt, square.f)
     roots = enumsol.enumerate_roots(problem, 3.5)
-    with pytest.raises(InvalidArgumentError, match="no mesh"):
-        roots[0].plot_body()
+    bad_argument("no mesh", roots[0].plot_body)
     assert (
         problem.fingerprint
         == enumsol.ContactProblem(square.A, square.Bn, square.Bt, square.f, mesh=square.mesh).fingerprint
@@ -217,8 +216,7 @@ def test_without_a_mesh_the_picture_is_refused():
 )
 def test_a_mesh_that_does_not_fit_is_refused(change, message):
     parts = {"points": np.zeros((4, 2)), "cells": [[0, 1, 2]], "motion": np.eye(8)[:, :4], "offset": None}
-    with pytest.raises(enumsol.InvalidProblemError, match=message):
-        BodyMesh(**{**parts, **change})
+    bad_problem(message, BodyMesh, **{**parts, **change})
     square = enumsol.gallery.two_node_square()
     with pytest.raises(enumsol.InvalidProblemError, match="expected n = 4"):
         enumsol.ContactProblem(
@@ -247,8 +245,7 @@ def test_files_keep_the_mesh(tmp_path, place):
 def test_part_of_a_mesh_in_a_file_is_refused(tmp_path):
     arrays = {"A": np.eye(2), "Bn": [[1, 0]], "Bt": [[0, 1]], "f": [1, 1], "mesh_points": np.zeros((3, 2))}
     np.savez(tmp_path / "part.npz", **arrays)
-    with pytest.raises(enumsol.InvalidProblemError, match="mesh_cells, mesh_motion is missing"):
-        enumsol.read_problem(tmp_path / "part.npz")
+    bad_problem("mesh_cells, mesh_motion is missing", enumsol.read_problem, tmp_path / "part.npz")
 
 
 def test_vtu_of_a_plane_body(wedge, tmp_path):

@@ -5,9 +5,10 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from complete import whole_graph
 from oracles import NAMES
 
-from enumsol import ContactProblem, ContactStatus, branch_graph, enumerate_roots
+from enumsol import ContactProblem, ContactStatus, enumerate_roots
 from enumsol.roots import slip_signs
 
 SLIPS = {0: {"stick", "slip+", "slip-"}, 1: {"slip+"}, -1: {"slip-"}}
@@ -90,8 +91,7 @@ def test_a_sign_that_nothing_decides_leaves_all_three_names(monkeypatch):
 def test_branch_graphs_name_such_nodes_exactly():
     # u_t of node 1 is alpha - 1/2 at stiffness one, beside a node of stiffness 1e-20
     problem = diagonal_problem([1e-20, 1e-20, 1.0, 1.0], [-1.0, 0.0, 1.0, -0.5], load_slope=[0.0, 0.0, 0.0, 1.0])
-    graph = branch_graph(problem, (0.0, 1.0))
-    assert graph.complete
+    graph = whole_graph(problem, (0.0, 1.0))
     for v in graph.vertices:
         assert {status.value for status in v.active[1]} == SLIPS[int(np.sign(v.alpha - 0.5))]
     for alpha, expected in ((0.25, -1), (0.5, 0), (0.75, 1)):
@@ -111,8 +111,7 @@ def test_a_vertex_at_an_irrational_alpha_names_its_frictionless_node_exactly():
         friction=(np.zeros(2), np.array([1.0, 0.0])),
         load_slope=[1.0, 1.0, 0.0, 1.0],
     )
-    graph = branch_graph(problem, (0.0, 4.0), "exact")
-    assert graph.complete
+    graph = whole_graph(problem, (0.0, 4.0), "exact")
     assert any(not v.exact.is_rational for v in graph.vertices)
     for v in graph.vertices:
         low, high = v.enclosure

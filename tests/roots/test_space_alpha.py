@@ -5,10 +5,12 @@ from fractions import Fraction
 import numpy as np
 import oracles3d
 import pytest
+from complete import all_roots
 from effort import some
 from problems3d import bounds, random_coupled, random_one_node, unmatched
+from refusals import bad_argument
 
-from enumsol import ContactProblem3D, InvalidArgumentError, enumerate_roots, multiplicity_table, verify
+from enumsol import ContactProblem3D, enumerate_roots, multiplicity_table, verify
 
 ALPHAS = [0.0, 0.75, -0.5, Fraction(8, 3)]
 
@@ -97,8 +99,7 @@ def test_two_nodes_against_newtons_method():
         S, _, F = random_coupled(rng, 2)
         problem, at = moving(rng, S, F)
         for alpha in ALPHAS[1:3]:
-            roots = enumerate_roots(problem, alpha)
-            assert roots.complete
+            roots = all_roots(problem, alpha)
             assert roots.index_sum == 1
             wanted = oracles3d.newton_set(*at(alpha), 100, rng)
             missed, _ = unmatched(roots, wanted)
@@ -126,5 +127,4 @@ def test_a_table_over_alpha():
 def test_friction_that_becomes_negative_is_refused():
     problem = ContactProblem3D(np.eye(3), *np.eye(3)[:, None], [1, 1, 1], friction=1.0, friction_slope=-0.5)
     assert enumerate_roots(problem, 2).complete  # F = 0
-    with pytest.raises(InvalidArgumentError, match=r"friction F1 at alpha = 2\.5 is -0\.25"):
-        enumerate_roots(problem, Fraction(5, 2))
+    bad_argument(r"friction F1 at alpha = 2\.5 is -0\.25", enumerate_roots, problem, Fraction(5, 2))

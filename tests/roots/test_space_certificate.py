@@ -5,6 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import oracles3d
 import pytest
+from complete import all_roots
 from effort import some
 from problems3d import bounds, exactly, forces, from_compliance, random_compliance, random_coupled, random_one_node
 from space_proofs import RANDOM, random_problem
@@ -20,8 +21,7 @@ from enumsol.trusted.space.space_uniqueness import is_complete, only_root, only_
 
 def closed(problem, alpha=0):
     """The only root, by one leaf that the checker accepts."""
-    roots = enumerate_roots(problem, alpha, max_nodes=1)
-    assert roots.complete, roots
+    roots = all_roots(problem, alpha, max_nodes=1)
     assert (roots.stats.closed, len(roots), roots[0].index) == (1, 1, 1)
     report = verify(problem, roots.proof)
     assert report.complete, report

@@ -3,10 +3,11 @@
 import numpy as np
 import oracles3d
 import pytest
+from complete import all_roots
 from effort import some
 from problems3d import from_compliance, random_coupled, unmatched
-from proof_tools import copied, leaves_of, proof_of, records_of
-from space_proofs import RANDOM, of_kind, random_problem
+from proof_tools import leaves_of, of_kind, proof_of, put, records_of
+from space_proofs import RANDOM, random_problem
 from trees import by_the_tree, closed_in_the_tree
 
 from enumsol import enumerate_roots, verify
@@ -64,9 +65,7 @@ def test_proofs_that_say_something_else_are_refused(with_lone_root):
     assert codes != (UNDECIDED,) * p
 
     def report(entry, value):
-        changed = copied(records)
-        changed[place][entry] = value
-        return verify(problem, proof_of(changed))
+        return verify(problem, proof_of(put(records, (place, entry), value)))
 
     numbers = records[place][1]
     theta = numbers[3 * p + (len(numbers) - 3 * p) // 2 :]
@@ -84,8 +83,7 @@ def test_a_search_goes_on_from_a_lone_root(with_lone_root, tmp_path):
     path = tmp_path / "lone.proof"
     with closed_in_the_tree():
         enumerate_roots(problem, 0, proof_path=path)
-        again = enumerate_roots(problem, 0, proof_path=path, resume=True)
-    assert again.complete
+        again = all_roots(problem, 0, proof_path=path, resume=True)
     assert (len(again), again.stats.nodes) == (len(roots), 0)
     assert verify(problem, again.proof).complete
 

@@ -1,8 +1,8 @@
 """Pictures of solutions in 3D: marks by status, and arrows along the slips."""
 
 import numpy as np
-import pytest
 from problems3d import from_compliance
+from refusals import bad_argument
 
 import enumsol
 from enumsol.support.plotting import new_figure
@@ -34,18 +34,15 @@ def test_without_a_mesh_the_local_axes_are_drawn():
 
 def test_without_coordinates_there_is_no_picture():
     root = enumsol.enumerate_roots(from_compliance(np.eye(3), np.ones(3), 0.3), 0)[0]
-    with pytest.raises(enumsol.InvalidArgumentError, match="the problem has no coordinates"):
-        root.plot()
+    bad_argument("the problem has no coordinates", root.plot)
 
 
 def test_what_is_known_in_2d_only_is_refused():
     root = enumsol.enumerate_roots(enumsol.gallery.one_node_3d(), 0)[0]
     assert isinstance(root, enumsol.Root)
     for name in ("condition", "dlambda_dalpha", "signs"):
-        with pytest.raises(enumsol.InvalidArgumentError, match=f"{name} is asked of a root in 3D; expected one in 2D"):
-            getattr(root, name)
-    with pytest.raises(enumsol.InvalidArgumentError, match="local_branch_test is asked of a root in 3D"):
-        root.local_branch_test()
+        bad_argument(f"{name} is asked of a root in 3D; expected one in 2D", getattr, root, name)
+    bad_argument("local_branch_test is asked of a root in 3D", root.local_branch_test)
 
 
 def test_a_root_in_2d_is_plotted_as_its_body():

@@ -3,6 +3,7 @@
 import numpy as np
 import oracles3d
 import pytest
+from complete import all_roots
 from effort import some
 from problems3d import forces, unmatched
 
@@ -34,8 +35,7 @@ REACHED = {"wedge3d-2-3": {0, 2}, "wedge3d-4-3": {0, 2}, "wedge3d-4-9": {0, 8}, 
 def test_all_roots_of_a_wedge_that_jams(name):
     entry = enumsol.gallery.get(name)
     problem, alpha = entry.build(), entry.alpha
-    roots = enumsol.enumerate_roots(problem, alpha)
-    assert roots.complete
+    roots = all_roots(problem, alpha)
     assert roots.index_sum == 1
     assert enumsol.verify(problem, roots.proof)
     kinds = [tuple(sorted({str(status) for status in root.statuses})) for root in roots]
@@ -79,8 +79,7 @@ def test_a_wedge_pulled_straight_is_its_own_mirror_image():
 def test_eight_nodes_on_weak_springs(size, friction, count):
     """The wall hardly resists a motion of all nodes together: S has eigenvalues far apart."""
     problem = enumsol.gallery.wedge3d(*size, friction=friction, multipliers="nodes")
-    roots = enumsol.enumerate_roots(problem, 0)
-    assert roots.complete
+    roots = all_roots(problem, 0)
     assert len(roots) == count
     assert roots.index_sum == 1
     condensed = problem.condensed

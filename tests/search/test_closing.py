@@ -4,6 +4,7 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from complete import all_roots
 from generators import integer_problem, random_problem
 from proof_tools import records_of
 from rational_checker import check_records
@@ -20,8 +21,7 @@ from enumsol.search import fathoming as closing, solvers
 def test_grazing_nodes_cost_a_number_of_nodes_linear_in_theirs(slides, grazing):
     for k in (4, 8, 16, 32):
         problem = beside_a_loaded_node(k, slides=slides, grazing=grazing)
-        roots = enumerate_roots(problem, 0, max_nodes=6 * k + 20)
-        assert roots.complete
+        roots = all_roots(problem, 0, max_nodes=6 * k + 20)
         assert len(roots) == roots.index_sum == 1
         assert all(len(held) == (2 if grazing else 4) for held in roots[0].active[1:])
         assert verify(problem, roots.proof).complete
@@ -45,8 +45,7 @@ def test_much_friction(slides, arithmetic):
 def test_sides_without_rationals(monkeypatch):
     monkeypatch.setattr(solvers, "EXACT_DOF_LIMIT", 0)
     problem = row_of_discs(8, weights=(2.0, 3.0), friction=0.9)
-    roots = enumerate_roots(problem, 0, max_nodes=200)
-    assert roots.complete
+    roots = all_roots(problem, 0, max_nodes=200)
     assert any(record[0] == "m" and max(record[1]) > 6 for record in records_of(roots.proof)[1:-1])
     assert len(roots) == roots.index_sum == 1
     assert verify(problem, roots.proof).complete
@@ -54,8 +53,7 @@ def test_sides_without_rationals(monkeypatch):
 
 def only_root(problem, most):
     """The one root, with a proof, of a search of at most so many nodes."""
-    roots = enumerate_roots(problem, 0, max_nodes=most)
-    assert roots.complete
+    roots = all_roots(problem, 0, max_nodes=most)
     assert roots.index_sum == len(roots) == 1
     assert verify(problem, roots.proof).complete
     return roots[0]
@@ -82,8 +80,7 @@ def test_the_index_where_very_many_selections_hold():
 def test_sixty_four_unloaded_nodes():
     problem = beside_a_loaded_node(64, slides=False, grazing=False)
     for arithmetic in ("verified", "exact"):
-        roots = enumerate_roots(problem, 0, arithmetic, max_nodes=20)
-        assert roots.complete
+        roots = all_roots(problem, 0, arithmetic, max_nodes=20)
         assert len(roots) == 1
         assert all(len(held) == 4 for held in roots[0].active[1:])
 
@@ -204,8 +201,7 @@ def test_nearly_grazing_nodes(slides):
     A = problem.A.toarray() * (1 + 1e-16 * rng.normal(size=(problem.n, problem.n)))
     f = problem.f + 1e-17 * rng.normal(size=problem.n)
     problem = ContactProblem((A + A.T) / 6, problem.Bn, problem.Bt, f / 3, friction=0.5)
-    roots = enumerate_roots(problem, 0, max_nodes=60)
-    assert roots.complete
+    roots = all_roots(problem, 0, max_nodes=60)
     assert roots.index_sum == len(roots) == 1
     assert roots.stats.closed
     assert roots[0].regular
@@ -217,8 +213,7 @@ def test_executors_find_the_same():
     problem = beside_a_loaded_node(6, slides=True, grazing=False)
     alone = enumerate_roots(problem, 0)
     with ProcessPoolExecutor(2) as executor:
-        together = enumerate_roots(problem, 0, executor=executor)
-    assert together.complete
+        together = all_roots(problem, 0, executor=executor)
     assert [root.active for root in together] == [root.active for root in alone]
     assert verify(problem, together.proof).complete
 
@@ -239,8 +234,7 @@ def test_sides_are_told_to_workers(workers, monkeypatch):
     monkeypatch.setattr("enumsol.search.parallel.FIRST", 8)
     monkeypatch.setattr("enumsol.search.parallel.NODES", 16)
     with ThreadPoolExecutor(workers) as executor:
-        together = enumerate_roots(problem, 0, executor=executor, max_nodes=600)
-    assert together.complete
+        together = all_roots(problem, 0, executor=executor, max_nodes=600)
     assert [root.active for root in together] == [root.active for root in alone]
     assert any(record[0] == "b" and max(record[2]) > 6 for record in records_of(together.proof)[1:-1])
     assert verify(problem, together.proof).complete
@@ -251,7 +245,6 @@ def test_a_proof_with_sides_is_resumed(nodes, tmp_path):
     problem = row_of_discs(12, weights=(2.0, 3.0), friction=0.9)
     stopped = enumerate_roots(problem, 0, max_nodes=nodes, proof_path=tmp_path / "a.proof")
     assert not stopped.complete
-    roots = enumerate_roots(problem, 0, max_nodes=3000, proof_path=tmp_path / "a.proof", resume=True)
-    assert roots.complete
+    roots = all_roots(problem, 0, max_nodes=3000, proof_path=tmp_path / "a.proof", resume=True)
     assert len(roots) == 1
     assert verify(problem, roots.proof).complete

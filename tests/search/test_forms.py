@@ -4,12 +4,14 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
+from complete import all_roots
 from effort import some
+from exact_balls import holds
 from flint import fmpq, fmpq_mat
 from generators import fe_compliance, from_condensed, integer_problem, random_problem
-from proof_tools import copied, proof_of, records_of
-from rational_checker import Refused, check_records
-from rational_forms import Data, Forms, _value
+from proof_tools import copied, of_kind, proof_of, put, records_of
+from rational_checker import check_records
+from rational_forms import Data, Forms, Refused, _value
 
 from enumsol import enumerate_roots, gallery, verify
 from enumsol.checker.stability import stability_radius
@@ -69,8 +71,7 @@ def test_a_long_search_is_shorter_with_forms(monkeypatch):
     problem = gallery.clamped_block(32, 16)
     plain = enumerate_roots(problem, 0.3)
     monkeypatch.setattr(policy, "NODES", 100)
-    found = enumerate_roots(problem, 0.3)
-    assert found.complete
+    found = all_roots(problem, 0.3)
     assert kinds_of(found.proof).count("f") > 20
     assert found.stats.nodes < 0.7 * plain.stats.nodes
     assert [root.statuses for root in found] == [root.statuses for root in plain]
@@ -81,8 +82,7 @@ def test_a_good_form_leaves_little_more_than_one_path(monkeypatch):
     # open or in contact, then stick or slip: five nodes of the tree a contact node, if every one is branched on once
     problem = gallery.clamped_block(32, 16)
     monkeypatch.setattr(policy, "NODES", 0)
-    found = enumerate_roots(problem, 0.3)
-    assert found.complete
+    found = all_roots(problem, 0.3)
     assert found.stats.nodes <= 6 * 32
 
 
@@ -144,8 +144,8 @@ def test_enclosed_forms_hold_the_exact_ones(seed):
     multipliers[2:] = np.abs(multipliers[2:])
     form = EnclosedForm.of(system, codes, multipliers, 0.0)
     H, h = forms.own_form([[fmpq(*x.as_integer_ratio()) for x in row] for row in multipliers.tolist()])
-    _inside(H.tolist(), form.H, form.H_rad)
-    _inside([h], form.h[None], form.h_rad[None])
+    assert holds(form.H, form.H_rad, H.tolist())
+    assert holds(form.h, form.h_rad, h)
     # with equations: the same wherever they hold, more elsewhere
     weight = float(rng.uniform(0.1, 10.0))
     heavy = EnclosedForm.of(system, codes, multipliers, weight)
@@ -163,20 +163,14 @@ def test_enclosed_forms_hold_the_exact_ones(seed):
         x - 2 * sum((_exact(factor[k]) * given[m][i] * given[m][-1] for m, k in order), fmpq(0))
         for i, x in enumerate(h)
     ]
-    _inside(square, heavy.H, heavy.H_rad)
-    _inside([turned], heavy.h[None], heavy.h_rad[None])
+    assert holds(heavy.H, heavy.H_rad, square)
+    assert holds(heavy.h, heavy.h_rad, turned)
     constant = sum((_exact(factor[k]) * given[m][-1] ** 2 for m, k in order), fmpq(0))
-    assert abs(constant - _exact(heavy.k)) <= _exact(heavy.k_rad)
+    assert holds(heavy.k, heavy.k_rad, [constant])
 
 
 def _exact(value):
     return fmpq(*float(value).as_integer_ratio())
-
-
-def _inside(exact, mid, rad):
-    for row, centres, radii in zip(exact, mid.tolist(), rad.tolist(), strict=True):
-        for x, centre, radius in zip(row, centres, radii, strict=True):
-            assert abs(x - _exact(centre)) <= _exact(radius)
 
 
 def _matching(given, rows):
@@ -199,10 +193,6 @@ def _matching(given, rows):
 def proven(seed):
     problem = slipping(seed)
     return problem, records_of(enumerate_roots(problem, 1.0).proof)
-
-
-def of_kind(records, kind):
-    return [k for k, record in enumerate(records) if isinstance(record, list) and record[0] == kind]
 
 
 def agrees(problem, records):
@@ -249,12 +239,8 @@ def test_leaves_refer_to_forms_that_serve_them(eager, seed):
     problem, records = proven(seed)
     for k in of_kind(records, "f"):
         for back in (0, -1, 10**6, 1.0, "1", None):
-            changed = copied(records)
-            changed[k][1] = back
-            assert not agrees(problem, changed)
-        changed = copied(records)
-        changed[k][1] += 1
-        agrees(problem, changed)
+            assert not agrees(problem, put(records, (k, 1), back))
+        agrees(problem, put(records, (k, 1), records[k][1] + 1))
         changed = copied(records)
         del changed[k][3]
         assert not agrees(problem, changed)

@@ -6,13 +6,15 @@ from itertools import product
 import numpy as np
 import pytest
 from flint import fmpq
+from interruptions import CtrlC, interrupted
 from path_problems import generic_problem, one_node
+from refusals import bad_argument
 
 from enumsol import ContactProblem, gallery
 from enumsol.branches import branch_graph, ways
 from enumsol.branches.exact.gluing import glue
 from enumsol.condensation.exact import ExactCondensed
-from enumsol.errors import IncompleteGraphError, Interrupted, InvalidArgumentError, TooLargeError
+from enumsol.errors import IncompleteGraphError, InvalidArgumentError, TooLargeError
 from enumsol.model.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.relaxation.interval_relaxation import IntervalEngine, IntervalSystem
 from enumsol.search.certifiers.interval_certifiers import ExactIntervalCertifier, VerifiedIntervalCertifier
@@ -122,25 +124,18 @@ def test_a_stopped_search_is_not_complete():
 def test_bad_arguments_are_refused_by_name():
     problem = one_node((1.5, -4.0))
     for interval in ((1.0, 1.0), (2.0, 1.0), (0.0,), 3.0):
-        with pytest.raises(InvalidArgumentError, match="interval"):
-            branch_graph(problem, interval)
-    with pytest.raises(InvalidArgumentError, match=r"interval\[1\] is inf"):
-        branch_graph(problem, (0.0, np.inf))
-    with pytest.raises(InvalidArgumentError, match="arithmetic"):
-        branch_graph(problem, (0.0, 1.0), "sloppy")
-    with pytest.raises(InvalidArgumentError, match="max_nodes"):
-        branch_graph(problem, (0.0, 1.0), max_nodes=0)
-    with pytest.raises(InvalidArgumentError, match="time_limit"):
-        branch_graph(problem, (0.0, 1.0), time_limit=0.0)
-    with pytest.raises(InvalidArgumentError, match="ContactProblem"):
-        branch_graph(None, (0.0, 1.0))
+        bad_argument("interval", branch_graph, problem, interval)
+    bad_argument(r"interval\[1\] is inf", branch_graph, problem, (0.0, np.inf))
+    bad_argument("arithmetic", branch_graph, problem, (0.0, 1.0), "sloppy")
+    bad_argument("max_nodes", branch_graph, problem, (0.0, 1.0), max_nodes=0)
+    bad_argument("time_limit", branch_graph, problem, (0.0, 1.0), time_limit=0.0)
+    bad_argument("ContactProblem", branch_graph, None, (0.0, 1.0))
     with pytest.raises(TooLargeError, match="exact"):
         branch_graph(gallery.clamped_block(16, 16, contact=2), (0.0, 1.0), "exact")
 
 
 def test_negative_friction_in_the_interval_is_refused_with_node_and_alpha():
-    with pytest.raises(InvalidArgumentError, match=r"node 0 .* alpha = -1 .*zero at alpha = 0"):
-        branch_graph(one_node((1.5, -4.0)), (-1.0, 1.0))
+    bad_argument(r"node 0 .* alpha = -1 .*zero at alpha = 0", branch_graph, one_node((1.5, -4.0)), (-1.0, 1.0))
     with pytest.raises(InvalidArgumentError, match=r"node 0 .* alpha = 5 .*zero at alpha = 4"):
         branch_graph(one_node((1.5, -4.0), friction=(4.0, -1.0)), (0.0, 5.0))
     branch_graph(one_node((1.5, -4.0), friction=(4.0, -1.0)), (0.0, 4.0))
@@ -166,17 +161,8 @@ def test_a_selection_left_out_by_the_search_is_noticed(seed):
 
 
 def test_an_interrupted_search_keeps_its_arcs():
-    problem = gallery.get("wedge-8-5").build()
-    calls = []
-
-    def stop(stage, share):
-        calls.append((stage, share))
-        if stage == "search" and len(calls) == 2:
-            raise KeyboardInterrupt
-
-    with pytest.raises(Interrupted) as caught:
-        branch_graph(problem, (0.0, 5.0), progress=stop)
-    partial = caught.value.partial
+    stop = CtrlC(lambda stage, share: stage == "search", call=2)
+    partial = interrupted("interrupted", branch_graph, gallery.get("wedge-8-5").build(), (0.0, 5.0), progress=stop)
     assert partial.arcs
     assert not partial.complete
     assert any("interrupted" in reason for reason in partial.reasons)
@@ -187,19 +173,12 @@ def test_an_interrupted_search_keeps_its_arcs():
 def test_after_an_interrupted_search_not_all_is_followed(boxes, followed, tree_only, monkeypatch):
     """Only until so many boxes are made, and the graph says so."""
     monkeypatch.setattr(ways, "_BOXES_AFTER_INTERRUPT", boxes)
-    found = []
-
-    def stop(stage, share):
-        found.append(stage)
-        if stage == "search" and len(found) == 4:
-            raise KeyboardInterrupt
-
-    with pytest.raises(Interrupted) as caught:
-        branch_graph(gallery.get("wedge-8-3").build(), (0.0, 3.0), progress=stop)
-    reasons = caught.value.partial.reasons
+    stop = CtrlC(lambda stage, share: stage == "search", call=4)
+    partial = interrupted("interrupted", branch_graph, gallery.get("wedge-8-3").build(), (0.0, 3.0), progress=stop)
+    reasons = partial.reasons
     assert any("interrupted after" in reason and "nodes" in reason for reason in reasons)
     assert any("the arcs of 8 of" in reason for reason in reasons) == followed
-    assert caught.value.partial.arcs
+    assert partial.arcs
 
 
 @pytest.mark.few(0, 3)

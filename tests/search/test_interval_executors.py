@@ -4,8 +4,11 @@ import os
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
 import pytest
+from complete import whole_graph
 from dying import DyingExecutor
+from interruptions import CtrlC, interrupted
 from proof_tools import bytes_of
+from refusals import bad_argument
 
 import enumsol
 from enumsol import branch_graph, gallery, verify
@@ -49,8 +52,7 @@ def arcs(graph):
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_the_same_graph_and_proof_as_without_workers(name, executors):
     problem, interval = PROBLEMS[name]()
-    alone = branch_graph(problem, interval)
-    assert alone.complete
+    alone = whole_graph(problem, interval)
     assert verify(problem, alone.proof).ok
     for executor in executors:
         graph = branch_graph(problem, interval, executor=executor)
@@ -108,18 +110,10 @@ def check_partial(partial, whole):
 @pytest.mark.slow
 def test_an_interruption_keeps_what_was_found(executors, wedge):
     problem, whole = wedge
-    calls = []
-
-    def stop(stage, share):
-        calls.append(share)
-        if stage == "search" and len(calls) == 2:
-            raise KeyboardInterrupt
-
     for executor in executors:
-        calls.clear()
-        with pytest.raises(enumsol.Interrupted, match="kept") as caught:
-            branch_graph(problem, (0, 5), "fast", progress=stop, executor=executor)
-        assert check_partial(caught.value.partial, whole) > 0
+        stop = CtrlC(lambda stage, share: stage == "search", call=2)
+        partial = interrupted("kept", branch_graph, problem, (0, 5), "fast", progress=stop, executor=executor)
+        assert check_partial(partial, whole) > 0
 
 
 @pytest.mark.parametrize("healthy", [0, 1, 4])
@@ -135,10 +129,8 @@ def test_an_executor_that_was_shut_down(wedge):
     pool = ThreadPoolExecutor(1)
     pool.shutdown()
     with pytest.warns(RuntimeWarning, match="takes no tasks"):
-        graph = branch_graph(wedge[0], (0, 5), executor=pool)
-    assert graph.complete
-    with pytest.raises(enumsol.InvalidArgumentError, match="executor"):
-        branch_graph(wedge[0], (0, 5), executor=3)
+        whole_graph(wedge[0], (0, 5), executor=pool)
+    bad_argument("executor", branch_graph, wedge[0], (0, 5), executor=3)
 
 
 @pytest.mark.slow

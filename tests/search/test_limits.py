@@ -5,6 +5,8 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
 import pytest
 from compare import differences, forces, statuses
+from interruptions import CtrlC
+from refusals import refusal
 
 import enumsol
 from enumsol import gallery
@@ -103,30 +105,21 @@ def test_progress(method):
     assert seen[-1].seconds > 0
 
 
-class Stop:
-    """Raises KeyboardInterrupt once a share of the search is done."""
-
-    def __init__(self, share):
-        self.share = share
-
-    def __call__(self, progress):
-        if progress.covered > self.share:
-            raise KeyboardInterrupt
-
-
 @pytest.mark.few(0, 1)
 @pytest.mark.parametrize("method", ["tree", "exhaustive"])
 def test_interruption_keeps_what_was_found(method):
     problem = gallery.chain(6, 0.0)
-    with pytest.raises(enumsol.Interrupted) as caught:
-        enumsol.enumerate_roots(problem, 5.0, "fast", method, progress=Stop(0.3))
-    partial = caught.value.partial
+    stop = CtrlC(lambda progress: progress.covered > 0.3)
+    error = refusal(
+        enumsol.Interrupted, "interrupted", enumsol.enumerate_roots, problem, 5.0, "fast", method, progress=stop
+    )
+    partial = error.partial
     whole = enumsol.enumerate_roots(problem, 5.0, "fast")
     assert 0 < len(partial) < len(whole)
     assert statuses(partial) < statuses(whole)
     assert not partial.complete
     assert repr(partial).splitlines()[-1].startswith("complete: no (interrupted")
-    assert isinstance(caught.value, KeyboardInterrupt)
+    assert isinstance(error, KeyboardInterrupt)
 
 
 @pytest.mark.slow

@@ -5,14 +5,16 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 from compare import assert_as_exhaustive, differences
+from complete import all_roots
 from effort import some
 from generators import fe_compliance
 from proof_tools import copied, proof_of, records_of
 from rational_checker import check_records
+from refusals import bad_argument
 from touching import problem_of_any_kind
 from trees import by_the_tree
 
-from enumsol import InvalidArgumentError, enumerate_roots, gallery, is_unique, verify
+from enumsol import enumerate_roots, gallery, is_unique, verify
 from enumsol.model.statuses import UNDECIDED
 from enumsol.search import descent, fathoming as closing, reduction
 from enumsol.search.definite import Nodes
@@ -102,8 +104,7 @@ def test_numbers_that_prove_nothing_cost_their_time_only(monkeypatch):
 def test_without_a_solution_the_tree_finds_it(monkeypatch):
     monkeypatch.setattr(reduction, "_MOST_STEPS", 0)
     problem = gallery.clamped_block(8, 4)
-    roots = enumerate_roots(problem, 0.3)
-    assert roots.complete
+    roots = all_roots(problem, 0.3)
     assert roots.stats.nodes > 1
 
 
@@ -199,8 +200,7 @@ def test_uniqueness_is_an_answer():
     assert is_unique(problem, 3.5, max_nodes=1) is None
     assert is_unique(problem, 1, arithmetic="fast") is None
     assert is_unique(gallery.get("one-node-6.3").build(), 2.0) is False  # a continuum
-    with pytest.raises(InvalidArgumentError, match="alpha"):
-        is_unique(problem, "one")
+    bad_argument("alpha", is_unique, problem, "one")
 
 
 def test_time_that_ends_while_numbers_are_sought(monkeypatch):

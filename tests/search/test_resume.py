@@ -13,11 +13,13 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from compare import differences
+from complete import all_roots
 from generators import from_condensed, integer_problem
 from hypothesis import HealthCheck, given, settings, strategies as st
 from problems3d import forces
 from proof_fuzz import mutant
-from proof_tools import bytes_of, copied, multipliers, proof_of, records_of, with_multipliers
+from proof_tools import bytes_of, copied, multipliers, of_kind, proof_of, records_of, with_multipliers
+from refusals import bad_argument
 from touching import touching_problem
 from trees import above_known_roots, by_the_tree
 
@@ -256,7 +258,7 @@ def test_forgeries(forge, tmp_path):
 
 def test_rows_that_do_not_exist_in_space(tmp_path):
     records = copied(records_of(known("block in space")[2].proof))
-    excluded = [record for record in records if isinstance(record, list) and record[0] == "x"]
+    excluded = [records[k] for k in of_kind(records, "x")]
     for record in excluded[:4]:
         record[1][0] = [3, 0, 5]  # v has no such component
     found = resumed("block in space", bytes_of(proof_of(records)), tmp_path / "x.proof")
@@ -300,7 +302,7 @@ def test_what_the_file_holds_is_taken_whatever_the_limits(tmp_path):
         check("wedge", found)
     # undecided leaves in the middle of the file, and a limit that is reached among them: all that follows is kept
     records = records_of(whole.proof)
-    roots = [k for k, record in enumerate(records) if isinstance(record, list) and record[0] == "x"]
+    roots = of_kind(records, "x")
     for k in roots[2:40:3]:
         records[k] = ["u", "left for later"]
     found = resumed("wedge", bytes_of(proof_of(records)), tmp_path / "x.proof", max_nodes=3)
@@ -350,8 +352,7 @@ def test_with_an_executor(name, tmp_path):
 
 def refused(path, message, problem, alpha, **options):
     before = path.read_bytes() if path.is_file() else None
-    with pytest.raises(InvalidArgumentError, match=message):
-        enumerate_roots(problem, alpha, proof_path=path, resume=True, **options)
+    bad_argument(message, enumerate_roots, problem, alpha, proof_path=path, resume=True, **options)
     assert before is None or path.read_bytes() == before
     assert os.listdir(path.parent) == [path.name]
 
@@ -385,12 +386,10 @@ def test_files_of_other_searches(tmp_path):
 
 def test_arguments(tmp_path):
     problem, alpha, _ = known("one node")
-    with pytest.raises(InvalidArgumentError, match="resume is True without proof_path"):
-        enumerate_roots(problem, alpha, resume=True)
+    bad_argument("resume is True without proof_path", enumerate_roots, problem, alpha, resume=True)
     with pytest.raises(InvalidArgumentError, match="resume is a str; expected a bool"):
         enumerate_roots(problem, alpha, proof_path=tmp_path / "x", resume="yes")
-    with pytest.raises(InvalidArgumentError, match="cannot be read"):
-        enumerate_roots(problem, alpha, proof_path=tmp_path, resume=True)
+    bad_argument("cannot be read", enumerate_roots, problem, alpha, proof_path=tmp_path, resume=True)
 
 
 # -- killed ------------------------------------------------------------------------------------------------------------
@@ -440,8 +439,7 @@ def test_kill_9(tmp_path):
     second = length(path)
     assert second >= 576 - FLUSH_EVERY - 1
     assert [path.name, path.name + BESIDE][: len(os.listdir(tmp_path))] == sorted(os.listdir(tmp_path))
-    found = enumerate_roots(problem, entry.alpha, proof_path=path, resume=True)
-    assert found.complete
+    found = all_roots(problem, entry.alpha, proof_path=path, resume=True)
     assert not differences(found, whole, rtol=1e-9)
     assert found.stats.resumed >= second - 1
     assert found.stats.resumed + found.stats.nodes == whole.stats.nodes
@@ -471,8 +469,7 @@ def test_ctrl_c_of_a_resumed_search(at, tmp_path, monkeypatch):
         assert path.read_bytes() == before
     else:
         assert lengths[1] > lengths[0]
-    found = enumerate_roots(problem, entry.alpha, proof_path=path, resume=True)
-    assert found.complete
+    found = all_roots(problem, entry.alpha, proof_path=path, resume=True)
     assert found.stats.resumed >= lengths[1] - 1
     assert len(found) == 5
 

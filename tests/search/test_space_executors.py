@@ -6,7 +6,9 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 import numpy as np
 import pytest
 import scipy.linalg
+from complete import all_roots
 from dying import DyingExecutor
+from interruptions import CtrlC, interrupted
 from problems3d import from_compliance, random_coupled
 from proof_tools import bytes_of, records_of
 
@@ -138,14 +140,8 @@ def test_limits(limits, executors, many):
 def test_an_interruption_keeps_what_was_found(executors, many, monkeypatch):
     monkeypatch.setattr(parallel, "NODES", 16)
     problem, whole = many
-
-    def stop(progress):
-        if progress.covered > 0.5:
-            raise KeyboardInterrupt
-
-    with pytest.raises(enumsol.Interrupted, match="roots so far") as caught:
-        enumerate_roots(problem, 0, executor=executors[1], progress=stop)
-    partial = caught.value.partial
+    stop = CtrlC(lambda progress: progress.covered > 0.5)
+    partial = interrupted("roots so far", enumerate_roots, problem, 0, executor=executors[1], progress=stop)
     known = [values(root) for root in whole]
     assert 0 < len(partial) < 27
     assert all(values(root) in known for root in partial)
@@ -157,8 +153,7 @@ def test_an_interruption_keeps_what_was_found(executors, many, monkeypatch):
 @pytest.mark.parametrize("healthy", [0, 3])
 def test_a_lost_worker_costs_time_and_nothing_else(healthy, many):
     with ProcessPoolExecutor(2) as pool, pytest.warns(RuntimeWarning, match="a worker died"):
-        found = enumerate_roots(many[0], 0, executor=DyingExecutor(pool, healthy, os._exit, 1))
-    assert found.complete
+        found = all_roots(many[0], 0, executor=DyingExecutor(pool, healthy, os._exit, 1))
     assert_equal(found, many[1])
     assert verify(many[0], found.proof).complete
 

@@ -5,9 +5,11 @@ from fractions import Fraction
 import numpy as np
 import oracles3d
 import pytest
+from complete import all_roots
+from exact_balls import holds
 from problems3d import forces, from_compliance, random_coupled, unmatched
-from proof_tools import bytes_of, copied, leaves_of, proof_of, records_of
-from space_proofs import of_kind, values_of, with_values
+from proof_tools import bytes_of, copied, leaves_of, of_kind, proof_of, records_of
+from space_proofs import values_of, with_values
 from trees import by_the_tree, forms_at_once
 
 from enumsol import enumerate_roots, fem, verify
@@ -115,11 +117,8 @@ def test_balls_of_a_form_hold_the_exact_one():
         for t in enclosed.tau[i].tolist():
             rows[i] = [x - share[t - p] * y for x, y in zip(rows[i], S[t], strict=True)]
             load[i] -= share[t - p] * g[t]
-    for i in range(3 * p):
-        assert abs(load[i] - Fraction(form.h[i])) <= Fraction(form.h_rad[i])
-        for j in range(3 * p):
-            exact = (rows[i][j] + rows[j][i]) / 2
-            assert abs(exact - Fraction(form.H[i, j])) <= Fraction(form.H_rad[i, j])
+    assert holds(form.h, form.h_rad, load)
+    assert holds(form.H, form.H_rad, [(rows[i][j] + rows[j][i]) / 2 for i in range(3 * p) for j in range(3 * p)])
     # no more than some roundings wider than the balls of S and g
     assert np.max(form.H_rad) < 8 * np.max(enclosed.S_rad) + 1e-14 * np.max(np.abs(enclosed.S))
 
@@ -204,8 +203,7 @@ def test_a_search_goes_on_with_the_form_of_an_earlier_one(with_form, tmp_path):
             path = tmp_path / f"{most}.proof"
             begun = enumerate_roots(problem, 0, max_nodes=most, proof_path=path)
             assert not begun.complete
-            again = enumerate_roots(problem, 0, proof_path=path, resume=True)
-            assert again.complete
+            again = all_roots(problem, 0, proof_path=path, resume=True)
             assert len(again) == len(roots)
             assert verify(problem, again.proof).complete
 
@@ -229,8 +227,7 @@ def test_a_body_on_weak_springs_takes_few_nodes():
         friction=1.0,
     )
     with by_the_tree():
-        roots = enumerate_roots(problem, 0)
-    assert roots.complete
+        roots = all_roots(problem, 0)
     assert of_kind(records_of(roots.proof), "f")
     assert roots.stats.nodes <= 600
     assert verify(problem, roots.proof).complete

@@ -1,6 +1,7 @@
 """How many nodes the tree in 3D needs: the count is deterministic (studies/search_in_3d_choices)."""
 
 import pytest
+from complete import all_roots
 
 import enumsol
 from enumsol import gallery
@@ -21,8 +22,7 @@ pytestmark = pytest.mark.usefixtures("tree_only")
 )
 def test_blocks_with_many_slipping_nodes(cells, F, most):
     problem = gallery.block3d(*cells)
-    roots = enumsol.enumerate_roots(problem, F)
-    assert roots.complete
+    roots = all_roots(problem, F)
     assert (len(roots), roots.index_sum) == (1, 1)
     # statuses before sectors, and the most violated node always: 877, 2,891, 2,268, 13,359 and 3,953
     assert roots.stats.nodes <= most

@@ -5,9 +5,11 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
 import pytest
 from compare import differences
+from complete import all_roots
+from interruptions import CtrlC, interrupted
 from proof_tools import bytes_of, records_of
 
-from enumsol import Interrupted, enumerate_roots, gallery, verify
+from enumsol import enumerate_roots, gallery, verify
 from enumsol.search import form_policy as policy, parallel
 from enumsol.support.workers import Crew
 
@@ -136,18 +138,13 @@ def left(found):
 
 def test_an_interruption_keeps_what_came_in(small_parts, wedge, tmp_path):
     problem, alpha, whole = wedge
-    path = tmp_path / "x.proof"
-
-    def stop(progress):
-        if progress.covered > 0.6:
-            raise KeyboardInterrupt
-
+    path, stop = tmp_path / "x.proof", CtrlC(lambda progress: progress.covered > 0.6)
     with ThreadPoolExecutor(2) as executor:
-        with pytest.raises(Interrupted) as caught:
-            enumerate_roots(problem, alpha, executor=executor, progress=stop, proof_path=path)
-        assert 0 < len(caught.value.partial) <= len(whole)
-        found = enumerate_roots(problem, alpha, executor=executor, proof_path=path, resume=True)
-    assert found.complete
+        partial = interrupted(
+            "interrupted", enumerate_roots, problem, alpha, executor=executor, progress=stop, proof_path=path
+        )
+        assert 0 < len(partial) <= len(whole)
+        found = all_roots(problem, alpha, executor=executor, proof_path=path, resume=True)
     assert not differences(found, whole, rtol=1e-12)
 
 

@@ -1,11 +1,11 @@
 """Why a search ended early: a reason to decide by, and the sentence that results show."""
 
 import pytest
+from interruptions import CtrlC, interrupted
 
 import enumsol
 from enumsol import gallery
 from enumsol.branches import branch_graph
-from enumsol.errors import Interrupted
 from enumsol.search.outcome import Stop, StopReason
 
 
@@ -35,18 +35,12 @@ def test_every_reason_has_a_sentence_of_its_own():
 def test_results_show_the_sentence_and_nothing_is_decided_by_it(monkeypatch):
     monkeypatch.setattr(Stop, "__str__", lambda stop: f"interrupted? not examined? {stop.reason.name}")
     problem, alpha = gallery.get("wedge-8-5").build(), 3.0
-
-    def stop(*_):
-        raise KeyboardInterrupt
-
     cut = enumsol.enumerate_roots(problem, alpha, max_nodes=40)
     assert cut.stopped.endswith("NODE_LIMIT")
     assert enumsol.verify(problem, cut.proof).ok
-    with pytest.raises(Interrupted) as caught:
-        enumsol.enumerate_roots(problem, alpha, progress=stop)
-    assert caught.value.partial.stopped.endswith("INTERRUPTED")
-    assert caught.value.partial.proof is None
+    partial = interrupted("interrupted", enumsol.enumerate_roots, problem, alpha, progress=CtrlC())
+    assert partial.stopped.endswith("INTERRUPTED")
+    assert partial.proof is None
     assert branch_graph(problem, (0.0, 1.0), max_nodes=5).reasons[0].endswith("NODE_LIMIT")
-    with pytest.raises(Interrupted) as caught:
-        branch_graph(problem, (0.0, 1.0), progress=stop)
-    assert caught.value.partial.reasons[0].endswith("INTERRUPTED")
+    partial = interrupted("interrupted", branch_graph, problem, (0.0, 1.0), progress=CtrlC())
+    assert partial.reasons[0].endswith("INTERRUPTED")

@@ -7,6 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pandas as pd
 import pytest
+from refusals import bad_argument
 
 import enumsol
 from enumsol import InvalidArgumentError, gallery
@@ -219,8 +220,7 @@ def test_a_rational_alpha_stays_one(problem, graph):
 @pytest.mark.parametrize("alphas", [1.0, "1.0", np.float64(1.0), np.array(1.0), "1,2", b"1", None, 5])
 @pytest.mark.parametrize("function", [enumsol.multiplicity_table, enumsol.link_samples])
 def test_one_number_is_not_several(problem, function, alphas):
-    with pytest.raises(InvalidArgumentError, match=r"alphas is .*; expected several numbers, such as \[1\.0, 2\.5\]"):
-        function(problem, alphas)
+    bad_argument(r"alphas is .*; expected several numbers, such as \[1\.0, 2\.5\]", function, problem, alphas)
 
 
 @pytest.mark.parametrize(
@@ -241,8 +241,7 @@ def test_several_of_any_kind_are_read(problem, alphas):
 
 def test_a_wrong_one_among_several_is_named(problem):
     for alphas in ([1.0, "x"], [1.0, np.ma.masked], [1.0, None], np.ma.array([1.0, 2.0], mask=[False, True])):
-        with pytest.raises(InvalidArgumentError, match=r"^alphas\[1\] is .*; expected a finite real number"):
-            enumsol.multiplicity_table(problem, alphas)
+        bad_argument(r"^alphas\[1\] is .*; expected a finite real number", enumsol.multiplicity_table, problem, alphas)
     assert alpha_list([]) == []
 
 
@@ -257,13 +256,10 @@ def test_intervals_of_any_kind_are_read(interval):
 @pytest.mark.parametrize("interval", [None, 5, "01", "0,1", {0, 1}, {0: 1, 2: 3}, (0,), (0, 1, 2), [], iter((0, 1))])
 def test_what_is_no_interval_gets_one_sentence(problem, interval):
     expected = r"^interval is .*; expected a pair of numbers \(first alpha, last alpha\)$"
-    with pytest.raises(InvalidArgumentError, match=expected):
-        enumsol.branch_graph(problem, interval)
-    with pytest.raises(InvalidArgumentError, match=expected):
-        enumsol.follow_all(problem, interval)
+    bad_argument(expected, enumsol.branch_graph, problem, interval)
+    bad_argument(expected, enumsol.follow_all, problem, interval)
     if interval is not None:  # all alpha, for a path
-        with pytest.raises(InvalidArgumentError, match=expected):
-            enumsol.follow(problem, enumsol.newton(problem, 1), 1, interval)
+        bad_argument(expected, enumsol.follow, problem, enumsol.newton(problem, 1), 1, interval)
 
 
 def test_the_order_of_the_ends_is_exact(problem):
@@ -276,10 +272,8 @@ def test_the_order_of_the_ends_is_exact(problem):
 
 def test_only_paths_may_go_to_infinity(problem):
     assert unbounded_interval((-math.inf, np.float32("inf"))) == (-math.inf, math.inf)
-    with pytest.raises(InvalidArgumentError, match=r"interval\[1\] is inf; expected a finite real number"):
-        enumsol.branch_graph(problem, (0, math.inf))
-    with pytest.raises(InvalidArgumentError, match=r"interval\[0\] is nan"):
-        enumsol.follow(problem, enumsol.newton(problem, 1), 1, (math.nan, 4))
+    bad_argument(r"interval\[1\] is inf; expected a finite real number", enumsol.branch_graph, problem, (0, math.inf))
+    bad_argument(r"interval\[0\] is nan", enumsol.follow, problem, enumsol.newton(problem, 1), 1, (math.nan, 4))
 
 
 # -- the command line ------------------------------------------------------------------------------------------------

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from interruptions import CtrlC, interrupted
 
 import enumsol
 from enumsol import ContactProblem, gallery
 from enumsol.condensation.exact import ExactSystem
-from enumsol.errors import Interrupted
 from enumsol.support.deadlines import heard_by, tell, tell_part
 from enumsol.trusted.arcs.precise import PreciseSystem
 
@@ -67,14 +67,8 @@ def test_checkers_tell_leaves_the_interval_and_selections(monkeypatch):
 def test_ctrl_c_in_the_middle_of_a_selection_in_rationals_keeps_what_was_found():
     problem = closed_gap()
     assert any(not root.regular for root in enumsol.enumerate_roots(problem, 0.0))
-
-    def stop(name, done, of):
-        if name == "a selection in rationals":
-            raise KeyboardInterrupt
-
-    with heard_by(stop), pytest.raises(Interrupted) as caught:
-        enumsol.enumerate_roots(problem, 0.0)
-    assert not caught.value.partial.complete
+    with heard_by(CtrlC(lambda name, done, of: name == "a selection in rationals")):
+        assert not interrupted("interrupted", enumsol.enumerate_roots, problem, 0.0).complete
 
 
 def test_ctrl_c_ends_condensing_between_two_groups_of_columns():

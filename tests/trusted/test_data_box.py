@@ -5,6 +5,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from exact_balls import holds
 from generators import integer_problem, random_problem
 from oracles import exact_condense, solutions_of
 
@@ -134,11 +135,6 @@ def solutions_at(pair, point, unit):
             yield [x * y for x, y in zip(force, length, strict=True)], w, F
 
 
-def near(ball, values):
-    pairs = zip(ball.mid.tolist(), ball.rad.tolist(), values, strict=True)
-    return all(abs(Fraction(mid) - x) <= Fraction(rad) for mid, rad, x in pairs)
-
-
 @pytest.mark.few(6)
 @pytest.mark.parametrize("seed", range(16))
 def test_a_solution_is_enclosed_and_served(seed):
@@ -153,8 +149,12 @@ def test_a_solution_is_enclosed_and_served(seed):
             inside = [
                 (force, w, F)
                 for force, w, F in solutions_at(pair, point, system.force)
-                if near(found.force.ball, force)
-                and near(found.w.ball, [x / Fraction(float(unit)) for x, unit in zip(w, system.length, strict=True)])
+                if holds(found.force.ball.mid, found.force.ball.rad, force)
+                and holds(
+                    found.w.ball.mid,
+                    found.w.ball.rad,
+                    [x / Fraction(float(unit)) for x, unit in zip(w, system.length, strict=True)],
+                )
             ]
             assert inside
             for numbers in (plain, PieceNumbers(mu, kappa, nu)):
@@ -223,10 +223,10 @@ def test_regular_solutions_are_enclosed_to_first_order(seed):
                 for x, (low, high) in ((alpha, box.alphas), (share, box.shares))
             )
             solutions = solutions_at(pair, (alpha, share), system.force)
-            assert any(_holds(found.force, s, t, force) for force, _, _ in solutions)
+            assert any(expands_to(found.force, s, t, force) for force, _, _ in solutions)
 
 
-def _holds(expansion, s, t, values):
+def expands_to(expansion, s, t, values):
     for k, value in enumerate(values):
         parts = [(expansion.value, 1), (expansion.along, s), (expansion.across, t)]
         middle = sum(Fraction(float(part.mid[k])) * factor for part, factor in parts)
@@ -295,11 +295,11 @@ def test_all_data_of_a_box_are_held_in_any_units():
     for alpha in box[0]:
         for share in box[1]:
             _, g, F = pair.data(Fraction(alpha), Fraction(share))
-            assert near(one.g.ball, g)
-            assert near(one.F.ball, F)
+            assert holds(one.g.ball.mid, one.g.ball.rad, g)
+            assert holds(one.F.ball.mid, one.F.ball.rad, F)
             s, t = (8 * Fraction(x) - 3 for x in (alpha, share))
-            assert _holds(one.g, s, t, g)
-            assert _holds(one.F, s, t, F)
+            assert expands_to(one.g, s, t, g)
+            assert expands_to(one.F, s, t, F)
 
 
 def test_ranges_that_boxes_cover():

@@ -6,8 +6,9 @@ from itertools import product
 import numpy as np
 import pytest
 from effort import some
+from exact_balls import agrees_with_exact, exact_bound
 from generators import dense_compliance, fe_compliance, from_condensed, integer_problem
-from oracles import _affine, _at, _conditions, exact_condense
+from oracles import _affine, _conditions, exact_condense
 from proof_tools import Judge, det_sign, leaves_of, multipliers, records_of
 
 from enumsol import enumerate_roots, gallery
@@ -128,20 +129,6 @@ def test_large_multipliers_of_an_infeasible_assignment():
     assert positive == 18
 
 
-def exact_bound(judge, rows, values):
-    """The dual bound itself in Fractions."""
-    m = 2 * len(judge.F)
-    linear, constant = [-x for x in judge.g], Fraction(0)
-    for row, value in zip(rows.tolist(), values.tolist(), strict=True):
-        kind, i = divmod(row, len(judge.F))
-        u = Fraction(value) * (judge.length[i] if kind < 4 else judge.force[i])
-        form = judge._row(kind, i)
-        linear = [a - u * b for a, b in zip(linear, form, strict=False)]
-        constant -= u * form[m]
-    solved = _affine([[*row, v / 2] for row, v in zip(judge.S, linear, strict=True)])[0]
-    return sum(a * x for a, x in zip(linear, solved, strict=True)) / 2 + constant
-
-
 def test_sign_of_the_margin_where_the_bound_is_next_to_zero():
     # along the ray of a pruned leaf's multipliers the bound is a parabola: look on both sides of its zero
     signs = []
@@ -221,23 +208,8 @@ def test_batches_equal_single_leaves():
 
 def _check_selection(system, S, g, F, codes):
     """Compare one verified selection with the exact solution; its verdict, None for not regular."""
-    p = len(F)
     ball = solve_selection(system, codes)
-    sign = det_sign(S, F, codes)
-    if ball is None:
-        return None
-    assert ball.det_sign == sign != 0
-    equations, inequalities = _conditions(S, g, F, codes)
-    point, free = _affine(equations)
-    assert not free
-    w = [g[r] - sum(S[r][k] * point[k] for k in range(2 * p)) for r in range(2 * p)]
-    for exact, mid, rad in ((point, ball.force.mid, ball.force.rad), (w, ball.w.mid, ball.w.rad)):
-        for x, m, r in zip(exact, mid.tolist(), rad.tolist(), strict=True):
-            assert abs(x - Fraction(m)) <= Fraction(r)
-    least = min(_at(row, point) for row in inequalities)
-    assert not ball.is_root or least > 0
-    assert not ball.is_excluded or least < 0
-    return ball.is_root or ball.is_excluded
+    return None if ball is None else agrees_with_exact(ball, S, g, F, codes)
 
 
 @pytest.mark.slow

