@@ -11,16 +11,9 @@ from pages import Reader, data_of
 from refusals import bad_argument
 
 import enumsol
-from enumsol import (
-    MissingDependencyError,
-    branch_graph,
-    enumerate_roots,
-    fem,
-    gallery,
-    write_report,
-)
+from enumsol import MissingDependencyError, branch_graph, enumerate_roots, fem, gallery, histories, write_report
 from enumsol.cli import main
-from enumsol.report import body as bodies, content
+from enumsol.report import body as bodies, content, history_page
 from enumsol.report.body import body_record
 from enumsol.report.content import rounded_list, slider_alphas
 
@@ -395,3 +388,22 @@ def test_no_outline_is_as_wide_as_a_body_is_long():
     measured = " ".join(names for names, rule in rules.items() if "non-scaling-stroke" in rule)
     # the width of .stands is set where it is drawn, that of .axis is one of a diagram
     assert {names for names in drawn if names not in measured} == {".axis", ".stands"}
+
+
+# -- the page of a history ---------------------------------------------------------------------------------------------
+
+
+def test_an_incomplete_history_says_so(tmp_path, monkeypatch):
+    """Of three roots of the second step one is followed."""
+    monkeypatch.setattr(history_page, "_image", lambda _, words: f"<p>Picture of {words}.</p>")
+    problem = gallery.one_node_triangle()
+    history = histories(problem, [5, 4], follow="nearest")
+    write_report(history, tmp_path / "page.html", units=("N", "mm"))
+    page = Reader((tmp_path / "page.html").read_text())
+    assert not history.complete
+    assert "This history is not complete." in page.text
+    assert "these are all histories" not in page.text
+    for said in (history.completeness(), *history.reasons, problem.fingerprint, "enumsol verify PROBLEM FILE"):
+        assert said in page.text
+    for drawn in ("alpha against displacement", "lambda_n against step", "deformed bodies of step 2"):
+        assert f"Picture of {drawn}." in page.text

@@ -4,12 +4,14 @@ import numpy as np
 import pytest
 from parted_meshes import grid
 from parted_solids import solid
+from problems3d import from_compliance
 from refusals import bad_argument, bad_problem
 
 import enumsol
 from enumsol import BodyMesh, fem
 from enumsol.model.cells import boundary_facets, facet_outlines, outline_edges
 from enumsol.model.shapes import body_shape, own_scales, round_scale, slip_directions
+from enumsol.support.plotting import new_figure
 
 
 @pytest.fixture(scope="module")
@@ -272,3 +274,49 @@ def test_prescribed_displacements_move_nodes_too():
     assert mesh.displacements([2.0, 3.0]).tolist() == [[2, 0], [0.5, 0], [0, 3]]
     problem = enumsol.ContactProblem(np.eye(2), [[1, 0]], [[0, 1]], [1, 1], mesh=mesh)
     assert body_shape(problem).displacements(np.array([2.0, 3.0])).tolist() == [[2, 0], [0.5, 0], [0, 3]]
+
+
+# -- bodies in 3D ------------------------------------------------------------------------------------------------------
+
+
+def test_arrows_point_along_the_slips():
+    problem = enumsol.gallery.get("block3d-9").build()
+    root = enumsol.enumerate_roots(problem, 0.5)[0]
+    body, ax = root.plot().axes
+    assert body.name == "3d"
+    (alone,) = root.plot(new_figure().subplots()).axes
+    assert alone.name != "3d"
+    slides = [str(status) == "slip" for status in root.statuses]
+    (arrows,) = [part for part in ax.collections if hasattr(part, "U")]
+    # the axes of the gallery's block are x and -y
+    expected = root.u_t[slides] * [1.0, -1.0]
+    expected /= np.linalg.norm(expected, axis=1)[:, None]
+    np.testing.assert_allclose(np.stack([arrows.U, arrows.V], axis=1), expected, atol=1e-12)
+    np.testing.assert_allclose(arrows.XY, problem.coordinates[slides][:, :2])
+    assert sum(len(line.get_xdata()) for line in ax.lines) == problem.p
+    assert {text.get_text() for text in ax.get_legend().get_texts()} == {"open (1)", "stick (4)", "slip (4)"}
+
+
+def test_without_a_mesh_the_local_axes_are_drawn():
+    root = enumsol.enumerate_roots(enumsol.gallery.one_node_3d(), 0)[0]
+    (arrows,) = [part for part in root.plot().axes[0].collections if hasattr(part, "U")]
+    np.testing.assert_allclose([arrows.U[0], arrows.V[0]], root.u_t[0] / np.linalg.norm(root.u_t))
+
+
+def test_without_coordinates_there_is_no_picture():
+    root = enumsol.enumerate_roots(from_compliance(np.eye(3), np.ones(3), 0.3), 0)[0]
+    bad_argument("the problem has no coordinates", root.plot)
+
+
+def test_what_is_known_in_2d_only_is_refused():
+    root = enumsol.enumerate_roots(enumsol.gallery.one_node_3d(), 0)[0]
+    assert isinstance(root, enumsol.Root)
+    for name in ("condition", "dlambda_dalpha", "signs"):
+        bad_argument(f"{name} is asked of a root in 3D; expected one in 2D", getattr, root, name)
+    bad_argument("local_branch_test is asked of a root in 3D", root.local_branch_test)
+
+
+def test_a_root_in_2d_is_plotted_as_its_body():
+    root = enumsol.enumerate_roots(enumsol.gallery.two_node_square(), 3.5)[0]
+    assert root.slip_angle is None
+    assert [ax.get_title() for ax in root.plot().axes] == [ax.get_title() for ax in root.plot_body().axes]

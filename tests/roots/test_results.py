@@ -1,6 +1,7 @@
 """RootSet and Root as the user sees them."""
 
 from fractions import Fraction
+from html.parser import HTMLParser
 
 import numpy as np
 import pytest
@@ -8,7 +9,8 @@ from compare import forces
 from generators import dense_compliance, from_condensed, planted_load
 
 import enumsol
-from enumsol import ContactProblem, ContactStatus, PiecewiseSmoothEquation, gallery
+from enumsol import ContactProblem, ContactStatus, PiecewiseSmoothEquation, branch_graph, enumerate_roots, gallery
+from enumsol.support.messages import html_lines, html_table
 
 CASES = [
     ("one-node-6.1", None),
@@ -200,3 +202,137 @@ def test_exact_values_are_rounded_once():
         assert roots[1].lambda_n[0] == float(1 / (alpha - 2))
         assert roots[1].lambda_t[0] == float(-alpha / (alpha - 2))
         assert roots.alpha == alpha
+
+
+# -- a root in print ---------------------------------------------------------------------------------------------------
+
+
+def printed(root, capsys):
+    print(root)  # noqa: T201  # printing it is the test
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 80
+    return lines
+
+
+def test_one_line_a_node_under_a_heading(capsys):
+    roots = enumsol.enumerate_roots(gallery.two_node_square(), 3.5)
+    heading, columns, *rows = printed(roots[1], capsys)
+    assert heading == f"Root at alpha = 3.5: index -1, regular, margin {roots[1].margin:.2e}"
+    assert columns.split() == ["node", "status", "lambda_n", "lambda_t", "u_n", "u_t"]
+    assert [row.split() for row in rows] == [
+        ["0", "slip-", "0.5", "-1.75", "0", "-1"],
+        ["1", "open", "0", "0", "-0.25", "-0.75"],
+    ]
+
+
+def test_a_root_that_is_not_regular_says_so(capsys):
+    roots = enumsol.enumerate_roots(gallery.one_node_triangle(), Fraction(8, 3))
+    assert printed(roots[1], capsys)[0] == "Root at alpha = 2.66667: index +0, not regular, margin 0.00e+00"
+
+
+def test_labels_are_those_of_the_problem(capsys):
+    square = gallery.two_node_square()
+    labels = ["left foot", 17]
+    problem = ContactProblem(square.A, square.Bn, square.Bt, square.f, friction=(0.0, 1.0), node_ids=labels)
+    lines = printed(enumsol.enumerate_roots(problem, 3.5)[1], capsys)
+    assert lines[2].startswith("left foot slip-")
+    assert lines[3].startswith("       17 open")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("size", "more"), [(16, 0), (32, 12), (100, 80)])
+def test_large_roots_are_cut(capsys, size, more):
+    entry = gallery.get(f"clamped-block-{size}")
+    problem = entry.build()
+    lines = printed(enumsol.newton(problem, entry.alpha), capsys)
+    if more:
+        assert len(lines) == 2 + 20 + 1
+        assert lines[-1].startswith(f"... {more} more nodes; all of them: ")
+    else:
+        assert len(lines) == 2 + problem.p
+
+
+def test_the_prompt_shows_the_same():
+    root = enumsol.newton(gallery.one_node_triangle(), 1.0)
+    assert repr(root) == str(root)
+
+
+# -- in notebooks ------------------------------------------------------------------------------------------------------
+
+
+class Cells(HTMLParser):
+    """Elements and texts of a piece of HTML; complains about what is not closed."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.tags, self.cells = [], [], []
+        self.feed(text)
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        self.open.append(tag)
+        self.tags.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.cells.append(data)
+
+
+def test_texts_are_escaped():
+    cells = Cells(html_lines(["a < b & c"]) + html_table(["<i>"], [["<script>x</script>", 3]]))
+    assert cells.cells == ["a < b & c", "<i>", "<script>x</script>", "3"]
+    assert "script" not in cells.tags
+
+
+def test_roots_and_root_sets():
+    square = gallery.two_node_square()
+    labels = ["<script>x</script>", "b"]
+    problem = enumsol.ContactProblem(square.A, square.Bn, square.Bt, square.f, node_ids=labels)
+    roots = enumerate_roots(problem, 3.5)
+    cells = Cells(roots._repr_html_())
+    assert cells.tags.count("tr") == 6
+    assert cells.cells[0] == repr(roots).splitlines()[0]
+    assert cells.cells[-2:] == ["index sum: +1", "complete: yes (proven)"]
+    one = Cells(roots[1]._repr_html_())
+    assert set(labels) <= set(one.cells)
+    assert "script" not in one.tags
+    assert one.tags.count("tr") == 3
+    for text in repr(roots[1]).split()[-5:]:
+        assert text in one.cells
+
+
+def test_a_family():
+    family = enumerate_roots(gallery.get("one-node-6.3").build(), 2).families[0]
+    cells = Cells(family._repr_html_())
+    assert cells.cells[0] == "RootFamily at alpha = 2: index +1, dimension 1"
+    assert cells.cells[-5:] == ["0", "1", "2", "1", "slip-"]
+
+
+def test_many_nodes_and_many_roots_are_cut():
+    roots = enumerate_roots(gallery.chain(4), 5.0)
+    cells = Cells(roots._repr_html_())
+    assert cells.tags.count("tr") == 21
+    assert any("61 more" in text for text in cells.cells)
+    block = enumerate_roots(gallery.clamped_block(24, 2), 3.0)[0]
+    assert Cells(block._repr_html_()).tags.count("tr") == 21
+    assert "... 4 more nodes" in block._repr_html_()
+    space = enumerate_roots(gallery.get("one-node-3d-3").build(), 0)
+    assert "lambda_t2" in Cells(space[1]._repr_html_()).cells
+
+
+@pytest.mark.parametrize("nodes", [None, 3])
+def test_graphs_and_proofs(nodes):
+    problem = gallery.two_node_square()
+    graph = branch_graph(problem, (0, 10), max_nodes=nodes)
+    cells = Cells(graph._repr_html_())
+    assert cells.cells[-1] == graph.completeness()
+    assert cells.tags.count("tr") == (1 + len(graph.branches) if graph.branches else 0)
+    if nodes is None:
+        assert Cells(graph.proof._repr_html_()).cells == [repr(graph.proof)]
+        report = enumsol.verify(problem, graph.proof)
+        assert Cells(report._repr_html_()).cells == repr(report).splitlines()
+    roots = enumerate_roots(problem, 3.5, max_nodes=nodes)
+    report = enumsol.verify(problem, roots.proof)
+    assert Cells(report._repr_html_()).cells == repr(report).splitlines()
