@@ -166,10 +166,6 @@ def test_what_is_refused():
         enumsol.branch_graph(enumsol.gallery.block_on_table3d(), (0, 1))
 
 
-def test_a_graph_in_3d_has_no_page_yet(graph, tmp_path):
-    bad_argument("in 3D", enumsol.write_report, graph, tmp_path / "page.html")
-
-
 # -- what happens along a curve ----------------------------------------------------------------------------------------
 
 
