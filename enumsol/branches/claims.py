@@ -18,13 +18,14 @@ import numpy as np
 from enumsol.arithmetic.algebraic import CriticalAlpha
 from enumsol.arithmetic.rationals import rational
 from enumsol.branches.lower_bounds import least_at, least_steps
+from enumsol.model.problem import ContactProblem
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
     from enumsol.branches.elements import Arc, Vertex
-    from enumsol.condensation.condensed import CondensedProblem
+    from enumsol.model.problem3d import ContactProblem3D
 
 
 class Standing(enum.Enum):
@@ -231,19 +232,21 @@ class Claims:
         return lines
 
 
-def uniqueness_bound(condensed: CondensedProblem, interval: tuple[float, float]) -> float | None:
+def uniqueness_bound(problem: ContactProblem | ContactProblem3D, interval: tuple[float, float]) -> float | None:
     """An alpha up to which uniqueness follows without any search (theory, section 5.6), if there is one."""
-    a, b = interval
-    p = len(condensed.F0)
+    (a, b), p, condensed = interval, problem.p, problem.condensed
+    # in 3D both coefficients of every node
+    lines = problem.friction if isinstance(problem, ContactProblem) else (problem.friction, problem.friction_slope)
+    F0, F1 = map(np.array, lines)
     if not condensed.definite:  # within rounding, and the bound nearly zero
         return None
     inverse = np.linalg.inv(condensed.S)
     product = np.linalg.eigvalsh(inverse[:p, :p])[-1] * np.linalg.eigvalsh(condensed.S[p:, p:])[-1]
     largest = 1.0 / float(np.sqrt(product))
-    if np.any(condensed.F0 + a * condensed.F1 >= largest):
+    if np.any(F0 + a * F1 >= largest):
         return None
-    rising = condensed.F1 > 0
-    reached = (largest - condensed.F0[rising]) / condensed.F1[rising]
+    rising = F1 > 0
+    reached = (largest - F0[rising]) / F1[rising]
     return min(b, float(np.min(reached, initial=np.inf)))
 
 

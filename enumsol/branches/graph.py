@@ -16,7 +16,6 @@ from enumsol.branches.graph_files import load_graph, save_graph, write_graphml
 from enumsol.branches.graph_text import arcs_frame, graph_html, graph_text, vertices_frame
 from enumsol.branches.roots_at import roots_at, roots_on
 from enumsol.errors import IncompleteGraphError, InvalidArgumentError
-from enumsol.model.problem import ContactProblem
 from enumsol.support.arguments import alpha_value
 
 if TYPE_CHECKING:
@@ -224,12 +223,10 @@ class BranchGraph(GraphData):
     def uniqueness_bound(self) -> float | None:
         """An alpha up to which uniqueness follows without any search (theory, section 5.6), if there is one.
 
-        F^2 lmax((S^-1)_nn) lmax(S_tt) < 1 at every contact node; evaluated in floats. None for a body that nothing
-        holds, and in 3D.
+        F^2 lmax((S^-1)_nn) lmax(S_tt) < 1 at every contact node, in 3D for both coefficients; evaluated in floats. None
+        for a body that nothing holds.
         """
-        if self.problem.modes is not None or not isinstance(self.problem, ContactProblem):
-            return None
-        return uniqueness_bound(self.problem.condensed, self.interval)
+        return None if self.problem.modes is not None else uniqueness_bound(self.problem, self.interval)
 
     def starting_point(self, branch: Branch) -> Root | None:
         """A regular root in the middle of the branch's longest arc; None when there is none at any float alpha."""

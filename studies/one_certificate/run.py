@@ -215,7 +215,7 @@ def before(case: Case, problem: Any) -> float:
     """The F up to which one solution follows without a search."""
     if case.series.startswith("3D"):
         return float(enumsol.lipschitz_estimate(problem, 1.0).factor)
-    bound = uniqueness_bound(problem.condensed, (0.0, float(GRID[-1])))
+    bound = uniqueness_bound(problem, (0.0, float(GRID[-1])))
     return math.nan if bound is None else bound
 
 

@@ -9,12 +9,22 @@ from math import sqrt
 import numpy as np
 import pytest
 from complete import whole_graph
+from effort import some
 from interruptions import CtrlC, interrupted
-from problems3d import SLIDING, OneNode, forces, random_over_alpha, sliding_node
+from problems3d import (
+    SLIDING,
+    OneNode,
+    forces,
+    from_compliance,
+    random_compliance,
+    random_over_alpha,
+    sliding_node,
+)
 from refusals import bad_argument
 
 import enumsol
 from enumsol.arithmetic.balls import Ball
+from enumsol.branches.claims import uniqueness_bound
 from enumsol.branches.elements import VertexKind
 from enumsol.branches.space import cover
 from enumsol.branches.space.chains import chain_through
@@ -51,6 +61,26 @@ def test_a_node_that_slips_until_it_sticks(graph):
     assert graph.multiplicity_at(1.8) == graph.at_least(1.8) == 1
     assert graph.uniqueness_limit is None
     assert graph.steps[1:] == ([1, 1, 1], [1, 1])
+
+
+def test_below_the_bound_of_the_stiffness_there_is_one_root():
+    """Theory, (5.9): for one node by its closed form, and for random ones, orthotropic, by enumeration."""
+    S = np.array([[2.0, 0.5, 0.0], [0.5, 3.0, 0.0], [0.0, 0.0, 1.0]])
+    one = from_compliance(S, np.ones(3), (0.1, 0.2), friction_slope=(0.5, 0.25))
+    inverse = 3.0 / (2.0 * 3.0 - 0.25)  # of S, in the normal component
+    expected = min((1 / sqrt(inverse * 3.0) - F0) / F1 for F0, F1 in ((0.1, 0.5), (0.2, 0.25)))
+    assert uniqueness_bound(one, (0.0, 9.0)) == pytest.approx(expected)
+    assert uniqueness_bound(one, (0.0, 0.25)) == 0.25
+    assert uniqueness_bound(one, (2.0, 3.0)) is None
+    rng = np.random.default_rng(5)
+    for _ in range(some(8, of=60)):
+        p = int(rng.integers(1, 3))
+        slope = tuple(rng.uniform(0.2, 1.0, (2, p)))
+        g = rng.normal(size=3 * p) * 3
+        problem = from_compliance(random_compliance(rng, p), g, 0.0, friction_slope=slope)
+        bound = uniqueness_bound(problem, (0.0, 100.0))
+        found = enumsol.enumerate_roots(problem, 0.999 * bound)
+        assert (found.complete, len(found)) == (True, 1)
 
 
 def test_values_along_arcs_are_those_of_the_closed_form(graph):
@@ -151,6 +181,8 @@ def test_what_was_found_is_kept_when_the_time_is_over_or_somebody_interrupts():
     stop = CtrlC(lambda step, share: step == "arcs" or share > 0.5)
     partial = interrupted("kept", enumsol.branch_graph, SLIDING, (1.78, 1.82), max_nodes=60, progress=stop)
     assert not partial.complete
+    assert partial.stats.nodes > 0
+    assert f"interrupted after {partial.stats.nodes} nodes" in partial.reasons[0]
     assert partial.proof is None
 
 

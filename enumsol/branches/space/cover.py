@@ -127,8 +127,10 @@ class SpaceCover:
             alone=self.alone,
             spanned=None if self.alone else self._spans,
         )
-        self.records = tree.run()
-        self.single, self.nodes, self.stopped = tree.single, tree.nodes, tree.stopped
+        try:
+            self.records = tree.run()
+        finally:
+            self.single, self.nodes, self.stopped = tree.single, tree.nodes, tree.stopped
 
     def _is_new(self, chain: Chain) -> bool:
         """Whether a chain is proven to be whole, and none that is known."""
