@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.trusted.space.solution_curve import AlphaProblem, CurveBox, SolutionCurve
+    from enumsol.trusted.space.solution_curve import AlphaProblem, CurveBox, CurvePoint, SolutionCurve
 
     Array = NDArray[np.float64]
 
@@ -224,8 +224,9 @@ class ChainBuilder:
         """The solution near a point, in a box without length across a direction."""
         border = self.across(direction)
         near = curve_point(self.problem, x, border)
-        if near is None:
-            return None
+        return None if near is None else self._proven(near, border)
+
+    def _proven(self, near: CurvePoint, border: Array) -> SolutionCurve | None:
         found = curve_around(self.problem, near.x, near.direction, border, 0.0, roomy=False)
         return None if found is None or None in found.statuses else found
 
@@ -260,29 +261,35 @@ class ChainBuilder:
         end: SolutionCurve | None = None,
     ) -> tuple[CurveLink, SolutionCurve] | None:
         """A box from a joint to the one at another place of the skeleton, and that joint."""
-        following = self.joint(*self._at(line, further)) if end is None else end
-        if following is None:
+        x, ahead = self._at(line, further)
+        border = self.across(ahead)
+        near = curve_point(self.problem, x, border) if end is None else None
+        if near is not None:
+            x, ahead, after = near.x, near.direction, near.statuses
+        elif end is not None:
+            x, ahead, after = end.at(0.0).mid, end.box.direction, end.statuses
+        else:
             return None
-        start, chord = joint.at(0.0).mid, following.at(0.0).mid - joint.at(0.0).mid
-        border = self._between(joint, following, chord)
-        length = float(border @ chord)
+        start, chord = joint.at(0.0).mid, x - joint.at(0.0).mid
+        across = self._between(joint.box.direction, ahead, chord)
+        length = float(across @ chord)
         if not length > 0:
             return None
-        direction = chord / length
-        before, after = joint.statuses, following.statuses
-        changing = [i for i in range(self.problem.p) if before[i] != after[i]]
-        curve = curve_around(self.problem, start + 0.5 * chord, direction, border, 0.5 * _LONGER * length, changing)
+        changing = [i for i in range(self.problem.p) if joint.statuses[i] != after[i]]
+        middle, half = start + 0.5 * chord, 0.5 * _LONGER * length
+        curve = curve_around(self.problem, middle, chord / length, across, half, changing)
         if curve is None:
             return None
-        link = link_between(curve, joint, following)
-        if link is None or (former is not None and not goes_on(former, link, joint)):
+        following = self._proven(near, border) if near is not None else end
+        link = None if following is None else link_between(curve, joint, following)
+        if following is None or link is None or (former is not None and not goes_on(former, link, joint)):
             return None
         return link, following
 
-    def _between(self, one: SolutionCurve, other: SolutionCurve, chord: Array) -> Array:
-        """A border for a chord: the tangents at both ends go on along it."""
+    def _between(self, one: Array, other: Array, chord: Array) -> Array:
+        """A border for a chord: the directions at both ends go on along it."""
         total = np.zeros_like(chord)
-        for joint in (one, other):
-            scaled = joint.box.direction / self.unit
+        for direction in (one, other):
+            scaled = direction / self.unit
             total += scaled / np.linalg.norm(scaled)
         return np.asarray(total / np.linalg.norm(total) / self.unit)

@@ -513,6 +513,9 @@ class _Proven:
                 wide = np.minimum(wide, near.width(step, radius, shares))
                 # the same solutions, whatever the shares are
                 radius = step.reach(radius, shares)
+                if not half:
+                    # derivatives at a point are known but for rounding
+                    return radius, wide, step
                 closer = near.step(wide)
                 found = None if closer is None else closer.shares(radius, half)
                 if closer is None or found is None:
