@@ -124,8 +124,18 @@ def build(
     jobs: int = 1,
     **limits: Any,
 ) -> BranchGraph:
-    """The graph, with progress on stderr."""
+    """The graph, with progress on stderr.
+
+    Raises
+    ------
+    InvalidArgumentError
+        Several processes are asked for in 3D, or as ``branch_graph``.
+    """
     from enumsol.branches import branch_graph
+    from enumsol.model.problem import ContactProblem
+
+    if jobs > 1 and not isinstance(problem, ContactProblem):
+        raise InvalidArgumentError(f"--jobs is {jobs} for a problem in 3D; expected 1: one process follows its curves")
 
     with workers(jobs) as executor, Display("branch graph") as display:
 

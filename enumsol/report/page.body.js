@@ -315,7 +315,7 @@ const keyEntry = (kind, text) =>
 function bodyKeys(items) {
   const used = data.statuses.filter((_, code) => items.some((item) => item.statuses.includes(String(code))));
   const keys = used.map((name) => element("span", {}, svg("svg", { width: 14, height: 14 }, marker(name, 7, 7, 5, name)), name));
-  if (!data.body || nodesOnly) return keys;
+  if (!data.body || nodesOnly || !items.length) return keys;
   keys.push(keyEntry("force", "contact force on the body"), keyEntry("before", "undeformed body"));
   if (dimension === 3) return used.includes("slip") ? [...keys, keyEntry("load", "direction of slip")] : keys;
   if (data.body.load.length) keys.push(keyEntry("load", data.body.load.length === 1 ? "load, the resultant" : "load"));

@@ -50,13 +50,13 @@ function angle(bounds) {
 function scalesOf(items, alpha) {
   const largest = (key) => Math.max(1e-300, ...items.flatMap((item) => item[key].map(Math.abs)));
   const pressed = items.flatMap((item) => (item.forces ?? []).map(([, ...force]) => Math.hypot(...force)));
-  return { force: pressed.reduce((most, x) => Math.max(most, x), 0), f: largest("f"), w: largest("w"), alpha };
+  return { force: pressed.reduce((most, x) => Math.max(most, x), 0), f: largest("f"), w: largest("w"), alpha, bodies: items.some((item) => item.u) };
 }
 
 function scaleWords(scales) {
   const said = [];
   if (scales.force > 0) said.push(`Arrows are contact forces on the body; the longest is ${short(scales.force)}${unit("force")}.`);
-  if (solid) said.push("Drag a body to turn it; all turn with it.");
+  if (solid && scales.bodies) said.push("Drag a body to turn it; all turn with it.");
   if (data.no_body) said.push(`${data.no_body}.`);
   if (!data.body || nodesOnly) {
     const order = tangents === 1 ? "left of a node normal, right tangential" : "of a node from left to right normal and along both tangents";

@@ -139,8 +139,9 @@ function drawDiagram() {
 // arcs that coincide are moved by pixels, whatever the zoom; what pointing shows is not moved
 function separate() {
   const beside = data.beside[columnOf()] || {};
-  const layout = byId("diagram")._fullLayout, [low, high] = layout.yaxis.range;
-  const unit = (high - low) / layout.yaxis._length;
+  const axis = byId("diagram")._fullLayout.yaxis;
+  if (!axis) return; // nothing was found, and nothing is drawn
+  const [low, high] = axis.range, unit = (high - low) / axis._length;
   const moved = { y: [] }, numbers = [];
   byId("diagram").data.forEach((trace, k) => {
     if (trace.meta === undefined || !(trace.meta in beside)) return;

@@ -213,13 +213,15 @@ def _branches(graph: BranchGraph) -> str:
         indices = ", ".join(sorted({"?" if arc.index is None else f"{arc.index:+d}" for arc in branch.arcs}))
         cells = (str(branch.number), f"{lo:.8g}", f"{hi:.8g}", shape(branch), str(len(branch.arcs)), indices, folds)
         rows.append((f' data-branch="{branch.number}" tabindex="0"', cells))
+    if not rows:
+        return f"<p>None{'' if graph.complete else ' was found'}.</p>"
     return table_text("All branches", ("branch", "alpha from", "to", "shape", "arcs", "indices", "folds at"), rows)
 
 
 def _vertices(graph: BranchGraph) -> str:
     found = listed(graph)
     if not found:
-        return "<p>None: no status changes inside the interval.</p>"
+        return f"<p>None{': no status changes inside the interval' if graph.complete else ' was found'}.</p>"
     meeting: dict[int, list[Any]] = {v.number: [] for v in found}
     for arc in graph.arcs:
         for end in (arc.tail, arc.head):

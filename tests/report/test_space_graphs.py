@@ -117,6 +117,8 @@ def test_the_command_takes_a_problem_in_3d(tmp_path, capsys):
     assert main([*command, "--proof", str(proof)]) == 0
     assert capsys.readouterr().out.endswith("complete: yes (proven)\n")
     assert f"enumsol verify {tmp_path / 'node.npz'} {proof}" in Reader(page.read_text()).text
+    assert main([*command, "--jobs", "2"]) == 2
+    assert "--jobs is 2 for a problem in 3D; expected 1" in capsys.readouterr().err
     assert main([*command, "--max-nodes", "1"]) == 3
     capsys.readouterr()
     assert "This graph is not complete" in Reader(page.read_text()).text
@@ -172,6 +174,20 @@ def test_bodies_follow_the_slider(browser, wedge_page, wedge):
     marks = browser.evaluate("scenes.map((s) => s.data.filter((t) => t.mode === 'markers').map((t) => t.name))")
     assert sorted(marks) == sorted([sorted({s.value for s in root.statuses}) for root in wedge.roots_at(1.02)])
     assert browser.evaluate("document.documentElement.scrollWidth") <= 1000
+    assert browser.complaints() == []
+
+
+@in_a_browser
+def test_a_graph_without_arcs_says_that_none_was_found(browser, folder):
+    graph = branch_graph(TURNING, (0.0, 0.5), max_nodes=1, time_limit=1e-9)
+    assert not graph.arcs
+    write_report(graph, folder / "none.html")
+    text = Reader((folder / "none.html").read_text()).text
+    assert text.count("None was found.") == 2
+    assert "no status changes" not in text
+    browser.size(1000, 500)
+    browser.open(folder / "none.html")
+    assert browser.evaluate("byId('count').textContent") == "0 solutions found; there may be more at alpha = 0.25"
     assert browser.complaints() == []
 
 
