@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from interruptions import CtrlC, interrupted
+from problems3d import SLIDING
 
 import enumsol
 from enumsol import ContactProblem, gallery
@@ -63,6 +64,18 @@ def test_checkers_tell_leaves_the_interval_and_selections(monkeypatch):
     for name in ("per cent of the interval", "selections followed"):
         assert said[name] == sorted(said[name])
         assert all(done <= of for done, of in said[name])
+
+
+def test_a_graph_in_3d_tells_how_far_it_follows_a_curve():
+    said = told_by(lambda: enumsol.branch_graph(SLIDING, (1.79, 1.795)))
+    for name in ("steps along a curve", "boxes of a curve cut into arcs"):
+        assert said[name] == sorted(said[name])
+        assert said[name][0][0] == 0
+        assert all(done < of == said[name][0][1] for done, of in said[name])
+    with heard_by(CtrlC(lambda name, done, of: name == "steps along a curve")):
+        partial = interrupted("interrupted", enumsol.branch_graph, SLIDING, (1.79, 1.795))
+    assert partial.stats.nodes > 0
+    assert not partial.complete
 
 
 def test_ctrl_c_in_the_middle_of_a_selection_in_rationals_keeps_what_was_found():

@@ -13,7 +13,7 @@ import numpy as np
 from enumsol.continuation.follow import follow
 from enumsol.continuation.path_data import PathStatus
 from enumsol.errors import EnumsolError
-from enumsol.support.deadlines import look
+from enumsol.support.deadlines import look, tell
 from enumsol.trusted.space.curve_chains import CurveChain, CurveLink, goes_on, link_between
 from enumsol.trusted.space.solution_curve import curve_around, curve_point
 
@@ -201,6 +201,7 @@ class ChainBuilder:
         way, failed = 1.0, False
         while place < last:
             look()
+            tell("steps along a curve", int(place), len(line) - 1)
             # no link is left that is too short
             further = place + way if last - place - way > _SHORTEST else last
             if further != last and abs(further - round(further)) < _BESIDE:

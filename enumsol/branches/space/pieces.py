@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.support.deadlines import look
+from enumsol.support.deadlines import look, tell
 from enumsol.trusted.space.curve_events import CurveMotion
 from enumsol.trusted.space.solution_curve import curve_around, curve_point, lies_in, only_curve, parameter_in
 
@@ -139,8 +139,9 @@ def runs_and_turns(problem: AlphaProblem, chain: CurveChain) -> list[Run | Turn]
     Begins and ends with a run, but for a curve that is closed and has a turn: it begins with that and ends with a run.
     """
     found: list[Run | Turn] = []
-    for link, start, end in zip(chain.links, chain.joints[:-1], chain.joints[1:], strict=True):
+    for k, (link, start, end) in enumerate(zip(chain.links, chain.joints[:-1], chain.joints[1:], strict=True)):
         look()
+        tell("boxes of a curve cut into arcs", k, len(chain.links))
         for part in LinkCutter(problem, link).parts(start, end):
             _append(found, part)
     if chain.closed:
