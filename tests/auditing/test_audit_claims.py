@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from command_line import assert_refused, run
+from command_line import assert_refused, printed, run
 from complete import whole_graph
 from refusals import bad_argument
 
@@ -89,8 +89,7 @@ def test_points_not_compared_have_an_exit_status_of_their_own(capsys, tmp_path, 
     points, result, rows = (tmp_path / name for name in ("p.csv", "r.json", "r.csv"))
     everything.to_csv(points, index=False)
     options = ("--to", 10, "--json", result, "--csv", rows)
-    status, out, _ = run(capsys, "audit", f"gallery:{EXAMPLE}", points, *options)
-    assert status == 4
+    out = printed(capsys, "audit", f"gallery:{EXAMPLE}", points, *options, status=4)
     assert "not compared" in out
     assert "ok, complete" not in out
     content = json.loads(result.read_text())
@@ -228,8 +227,7 @@ def test_the_command_line_never_says_complete_of_an_incomplete_graph(capsys, tmp
     )
     cut.save(tmp_path / "cut.json")
     arguments = ("audit", f"gallery:{EXAMPLE}", tmp_path / "p.csv", "--graph", tmp_path / "cut.json")
-    status, out, _ = run(capsys, *arguments)
-    assert status == 3
+    out = printed(capsys, *arguments, status=3)
     assert out.startswith("Audit of ")
     assert "ok, every arc that the graph holds was visited, but the graph is not complete: " in out.splitlines()[0]
     assert not COMPLETE.search(out)

@@ -6,7 +6,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from complete import whole_graph
+from complete import accepted_report, whole_graph
 from helpers.floating_oracle import Oracle, block_on_table, random_body
 from helpers.proof_tools import copied, multipliers, of_kind, proof_of, records_of, replaced, with_multipliers
 from rational_checker import check_records
@@ -183,8 +183,7 @@ def refusal(records, problem=PROBLEM):
 
 
 def test_a_proof_says_within_which_bound():
-    report = enumsol.verify(PROBLEM, proof_of(RECORDS))
-    assert report.ok
+    report = accepted_report(PROBLEM, proof_of(RECORDS))
     assert report.within == 4.0
     assert "within rigid displacements of 4" in repr(report)
     records = copied(RECORDS)

@@ -6,12 +6,14 @@ from itertools import combinations, pairwise, takewhile
 
 import numpy as np
 import pytest
+from arc_oracle import counted
 from branches.test_lower_bounds import case, padded
+from complete import accepted_report, complete_report
 from effort import some
 from flint import fmpq
 from generators import through_the_unloaded_state
 from graph_proofs import accepted, refused, three_with_everything, without_arcs
-from proof_tools import bytes_of, copied, of_kind, proof_of, records_of, replaced
+from proof_tools import bytes_of, copied, of_kind, proof_of, put, records_of, replaced
 from rational_arcs import Selection
 from rational_checker import check
 from rational_forms import Data
@@ -80,32 +82,6 @@ def end_of(records, head):
     return next(k for k in range(head + 1, len(records)) if not isinstance(records[k], list))
 
 
-def arcs_of(boxes):
-    """How many arcs a trace has."""
-    number, present = 0, False
-    for kind, _, *rest in (part for box in boxes for part in box[4]):
-        rising = kind == "e" and rest[2] == 1
-        number += kind in ("h", "e") and (rising or not present)
-        present = kind == "h" or rising
-    return number
-
-
-def counted(records):
-    """With counts that fit, as somebody would make them who wants to be believed."""
-    records = copied(records)
-    first, traces = next(k for k, record in enumerate(records) if "traces" in record), of_kind(records, "t")
-    boxes = [records[k + 1 : end] for k, end in pairwise([*traces, len(records) - 1])]
-    records[first]["traces"] = len(traces)
-    records[-1] = {
-        "pieces": len(heads(records)),
-        "leaves": len(of_kind(records, "x", "f")),
-        "selections": len({records[k][1] for k in of_kind(records, "s")}),
-        "traces": len(traces),
-        "arcs": sum(map(arcs_of, boxes)),
-    }
-    return records
-
-
 def plain(p):
     return ["m", [1.0] * p, [1.0] * p, [0.0] * p]
 
@@ -113,8 +89,7 @@ def plain(p):
 @pytest.mark.parametrize("name", BODIES)
 def test_both_checkers_take_them(name):
     body, records = proven(name)
-    report = verify(body, proof_of(records))
-    assert report.complete
+    report = complete_report(body, proof_of(records))
     assert report.closed == len(of_kind(records, "m"))
     assert accepted(body, records)
     assert counted(records) == records
@@ -129,8 +104,7 @@ def agree(seeds, **options):
         graph = branch_graph(body, interval, **options)
         if graph.proof is None:
             continue
-        report = verify(body, graph.proof)
-        assert report.ok, seed
+        report = accepted_report(body, graph.proof)
         if "arcs" in records_of(graph.proof)[-1]:
             assert check(body, bytes_of(graph.proof)) == report.selections, seed
             closed += report.closed > 0
@@ -304,9 +278,7 @@ def test_parts_left_open(name):
         for i, part in enumerate(records[k][4]):
             low, high = Fraction(begin), Fraction(part[1])
             begin = part[1]
-            changed = copied(records)
-            changed[k][4][i] = ["u", part[1]]
-            changed = counted(changed)
+            changed = counted(put(records, (k, 4, i), ["u", part[1]]))
             met = any(low < b and a < high for a, b in pieces)
             if part[0] in "he" and met and not elsewhere(body, records, k, (low, high)):
                 assert refused(body, changed), part
@@ -367,10 +339,9 @@ def test_events_without_partners(name):
     for k in of_kind(records, "b"):
         for i, part in enumerate(records[k][4]):
             if part[0] == "e":
-                changed = copied(records)
-                changed[k][4][i] = ["u", part[1]]
-                report = verify(body, proof_of(counted(changed)))
-                assert report.ok <= accepted(body, counted(changed))
+                changed = counted(put(records, (k, 4, i), ["u", part[1]]))
+                report = verify(body, proof_of(changed))
+                assert report.ok <= accepted(body, changed)
                 given += not report.ok
     assert given
 

@@ -9,11 +9,11 @@ from effort import some
 from helpers.floating_oracle import Oracle, block_on_table, random_body
 from helpers.floating_space import known_body
 from helpers.proof_tools import (
-    copied,
     leaves_of,
     multipliers,
     of_kind,
     proof_of,
+    put,
     records_of,
     replaced,
     why_refused,
@@ -150,11 +150,9 @@ def test_a_family_is_as_long_as_the_bound():
     assert enumsol.verify(SLIDING, proof_of(records)).within == 4.0
     place = of_kind(records, "D")[0]
     for point in range(len(records[place][1])):
-        forged = copied(records)
-        forged[place][1][point][-1] = "1/1"
-        assert "not those that are claimed" in why_refused(SLIDING, forged)
-        forged[place][1][point].pop()
-        assert "expected points of 7 fractions" in why_refused(SLIDING, forged)
+        path = (place, 1, point)
+        assert "not those that are claimed" in why_refused(SLIDING, put(records, (*path, -1), "1/1"))
+        assert "expected points of 7 fractions" in why_refused(SLIDING, put(records, path, lambda point: point[:-1]))
 
 
 def enclosed(problem):

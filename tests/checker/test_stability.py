@@ -8,7 +8,7 @@ from effort import some
 from generators import fe_compliance, from_condensed, planted_load, random_load
 from helpers.floating_oracle import block_on_table, random_body
 from oracles import exact_condense
-from proof_tools import copied, proof_of, records_of
+from proof_tools import proof_of, put, records_of
 
 from enumsol import ContactProblem, enumerate_roots, gallery
 from enumsol.checker.stability import LARGEST, stability_radius
@@ -104,9 +104,8 @@ def test_no_radius_without_a_complete_proof():
     problem = gallery.one_node_triangle()
     roots = enumerate_roots(problem, 5.0, max_nodes=2)
     assert stability_radius(problem, roots.proof) == 0.0
-    records = copied(records_of(enumerate_roots(problem, 5.0).proof))
-    records[-1]["roots"] += 1
-    assert stability_radius(problem, proof_of(records)) == 0.0
+    records = records_of(enumerate_roots(problem, 5.0).proof)
+    assert stability_radius(problem, proof_of(put(records, (-1, "roots"), lambda roots: roots + 1))) == 0.0
 
 
 def test_larger_bodies_have_one():

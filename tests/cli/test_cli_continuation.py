@@ -119,15 +119,13 @@ def test_the_algorithm_as_printed_jumps_and_the_audit_says_so(capsys, tmp_path):
     file = tmp_path / "points.csv"
     options = ("--root", 2, "--direction", "-1", "--no-check-steps", "--h-max", 0.5, "--csv", file)
     run(capsys, *FOLLOW, *options)
-    status, out, _ = run(capsys, "audit", "gallery:one-node-6.1", file, "--from", 0, "--to", 20)
-    assert status == 3
+    out = printed(capsys, "audit", "gallery:one-node-6.1", file, "--from", 0, "--to", 20, status=3)
     assert "jumps             1\n" in out
     assert "branch 1 -> 0" in out
 
 
 def test_step_limit_is_status_3(capsys):
-    status, out, _ = run(capsys, *FOLLOW, "--root", 0, "--max-steps", 3)
-    assert status == 3
+    out = printed(capsys, *FOLLOW, "--root", 0, "--max-steps", 3, status=3)
     assert "the limit of 3 steps was reached" in out
 
 
@@ -138,8 +136,7 @@ def test_degenerate_starts(capsys):
     assert "2 paths" in out
     # where stick and slip of both nodes meet: several tangents, and the user is told how to choose
     chain = ("follow", "gallery:chain-2", "--from", 0, "--to", 6, "--start", "8/3")
-    status, out, _ = run(capsys, *chain)
-    assert status == 3
+    out = printed(capsys, *chain, status=3)
     assert "choose with tangent=k" in out
     answer = run(capsys, *chain, "--root", 3, "--direction", "+1")
     assert_refused(*answer, "admissible tangents have orientation +1")
@@ -187,8 +184,7 @@ def test_audit_names_a_missed_branch(capsys, points, tmp_path):
     frame = pd.read_csv(points)
     some = tmp_path / "some.csv"
     frame[frame["root"] > 0].to_csv(some, index=False)
-    status, out, _ = run(capsys, "audit", "gallery:one-node-6.1", some, "--from", 0)
-    assert status == 3
+    out = printed(capsys, "audit", "gallery:one-node-6.1", some, "--from", 0, status=3)
     assert "arc 0 of branch 0, alpha from 0 to 20: open" in out
 
 
@@ -213,8 +209,7 @@ def test_ctrl_c_audits_what_was_found(capsys, points, monkeypatch):
         raise Interrupted("interrupted", partial)
 
     monkeypatch.setattr("enumsol.cli.audit.build", interrupted)
-    status, out, _ = run(capsys, "audit", "gallery:one-node-6.1", points)
-    assert status == 130
+    out = printed(capsys, "audit", "gallery:one-node-6.1", points, status=130)
     assert "but the graph is not complete: stopped" in out
 
 

@@ -6,6 +6,7 @@ import json
 import meshio
 import pytest
 from command_line import assert_refused, printed, run
+from complete import complete_report
 
 import enumsol
 from enumsol import History, Proof, verify, write_problem
@@ -36,8 +37,7 @@ def test_everything_is_written(capsys, wedge, tmp_path, pulled_wedge):
     out = printed(capsys, "history", problem, "--steps", steps, *options, "--plot", tmp_path / "out.png")
     assert out.splitlines()[0] == "History of 4 steps: 5 histories (verified)"
     assert out.endswith("complete: yes (proven), unique until step 2\n")
-    report = verify(pulled_wedge, Proof.load(files["proof"]))
-    assert report.complete
+    complete_report(pulled_wedge, Proof.load(files["proof"]))
     assert run(capsys, "verify", problem, files["proof"])[0] == 0
     content = json.loads(files["json"].read_text())
     assert content["histories"] == [1, 1, 3, 5]
@@ -79,8 +79,7 @@ def test_steps_stand_in_the_toml_file_of_a_mesh(capsys, tmp_path):
 
 def test_what_is_left_open_is_an_exit_status(capsys, wedge):
     problem, steps = wedge
-    status, out, _ = run(capsys, "history", problem, "--steps", steps, "--follow", "nearest")
-    assert status == 3
+    out = printed(capsys, "history", problem, "--steps", steps, "--follow", "nearest", status=3)
     assert "(not followed)" in out
     assert run(capsys, "history", problem, "--steps", steps, "--max-branches", 1)[0] == 3
     assert run(capsys, *NODE, "--steps", "5,4", "--arithmetic", "fast")[0] == 0

@@ -15,8 +15,7 @@ def test_a_search_in_two_parts(capsys, tmp_path):
     proof, report = tmp_path / "w.proof", tmp_path / "w.json"
     # the same line every time
     search = (*WEDGE, "--proof", proof, "--json", report, "--max-nodes", 150, "--resume")
-    status, out, _ = run(capsys, *search)
-    assert status == 3
+    out = printed(capsys, *search, status=3)
     assert "resumed" not in out
     first = json.loads(report.read_text())
     assert first["stats"]["resumed"] == 0

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from complete import limit_of
 from helpers.floating_oracle import Oracle, block_on_table, random_body
 from helpers.floating_space import known_body, on_weak_springs
 from scipy.optimize import linprog
@@ -137,8 +138,7 @@ def test_bounds_within_which_nothing_holds_the_body_are_told_apart(seed):
 def test_a_block_on_a_table(push):
     problem = block_on_table(push=push)
     (root,) = enumsol.enumerate_roots(problem, 0)
-    found = enumsol.successive_approximations(problem, 0)
-    assert found.converged
+    found = limit_of(problem, 0)
     assert found.free_motion is None
     np.testing.assert_allclose(found.u, root.u, atol=1e-9)
     np.testing.assert_allclose(found.lambda_t, root.lambda_t, atol=1e-9)
@@ -147,8 +147,7 @@ def test_a_block_on_a_table(push):
 
 
 def test_a_block_that_slides_or_is_lifted():
-    slides = enumsol.successive_approximations(block_on_table(push=1.0), 0)
-    assert slides.converged
+    slides = limit_of(block_on_table(push=1.0), 0)
     assert slides.free_motion == pytest.approx([1.0, 0.0, 0.0], abs=1e-6)
     assert "the body may move on along rigid mode 0 with the same forces" in slides.why
 
@@ -175,8 +174,7 @@ def test_a_block_that_slides_or_is_lifted():
 
 def test_a_limit_beyond_the_bound_is_told():
     problem = random_body(60_135)
-    found = enumsol.successive_approximations(problem, 0.25)
-    assert found.converged
+    found = limit_of(problem, 0.25)
     assert found.beyond_bound
     assert "beyond the bound 8 of rigid displacements" in found.why
     checked(problem, 0.25, found)
@@ -188,8 +186,7 @@ def test_a_limit_beyond_the_bound_is_told():
 
 
 def test_without_friction_it_may_move_on():
-    found = enumsol.successive_approximations(block_on_table(friction=0.0), 0)
-    assert found.converged
+    found = limit_of(block_on_table(friction=0.0), 0)
     assert np.abs(found.free_motion) == pytest.approx([1.0, 0.0, 0.0], abs=1e-6)
 
 
@@ -234,8 +231,7 @@ def test_weak_springs_tend_to_it():
 
 def test_friction_that_depends_on_the_slip():
     problem = known_body(5).problem.replace(friction=lambda node, slip: (0.3 + 0.1 * np.exp(-slip), 0.4))
-    found = enumsol.successive_approximations(problem, 0)
-    assert found.converged
+    found = limit_of(problem, 0)
     checked(problem, 0, found)
     expected = problem.coefficients(0, np.linalg.norm(found.u_t, axis=1))
     np.testing.assert_allclose(found.coefficients, expected, atol=1e-9)

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from complete import all_roots
+from complete import all_roots, limit_of
 from problems3d import block_on_springs
 
 import enumsol
@@ -76,8 +76,7 @@ def test_proven_roots_in_3d(spring, seed):
     problem = block_on_springs(np.random.default_rng([seed, 41]), spring)
     roots = enumsol.enumerate_roots(problem, 0, max_nodes=900)  # with weak springs others may stay undecided
     assert len(roots) == 1
-    found = enumsol.successive_approximations(problem, 0)
-    assert found.converged
+    found = limit_of(problem, 0)
     check(found, roots)
 
 
@@ -120,8 +119,7 @@ def test_uncertain_forces_are_told_and_kept(tmp_path):
     read = FixedPoint.load(tmp_path / "limit.npz", problem)
     assert (read.outcome, read.rounding, read.why) == (found.outcome, found.rounding, found.why)
     # with a tolerance that can be had it is a solution
-    loose = enumsol.successive_approximations(problem, 0, tolerance=1e-6)
-    assert loose.converged
+    loose = limit_of(problem, 0, tolerance=1e-6)
     assert distance(loose, enumsol.enumerate_roots(problem, 0)) < 1e-5
 
 

@@ -6,6 +6,7 @@ from functools import cache
 
 from exact_arcs import Truth, places
 from flint import fmpq
+from proof_tools import copied
 
 from enumsol.arithmetic.algebraic import real_roots
 from enumsol.arithmetic.rationals import rational
@@ -93,3 +94,26 @@ def arc_count(records):
                 else:
                     holds = False
     return count
+
+
+def recount(records):
+    """Make the counts of a graph's proof fit, as somebody would who wants to be believed."""
+    lists = [record for record in records if isinstance(record, list) and len(record) > 1]
+    heads = [record for record in records[:-1] if isinstance(record, dict) and "traces" in record]
+    traces = sum(record[0] == "t" for record in lists)
+    for head in heads[:1]:
+        head["traces"] = traces
+    if records and isinstance(records[-1], dict) and "pieces" in records[-1]:
+        arcs = {"traces": traces, "arcs": arc_count(records)} if heads or "arcs" in records[-1] else {}
+        records[-1] = arcs | {
+            "pieces": sum(isinstance(record, dict) and "piece" in record for record in records),
+            "leaves": sum(record[0] in ("x", "f") for record in lists),
+            "selections": len({str(record[1]) for record in lists if record[0] == "s"}),
+        }
+
+
+def counted(records):
+    """The records with counts that fit."""
+    changed = copied(records)
+    recount(changed)
+    return changed

@@ -17,10 +17,10 @@ def run(capsys, *arguments):
     return status, out, err
 
 
-def printed(capsys, *arguments, note=None):
-    """What a command prints that ends with status 0, and with a note or with nothing beside it."""
-    status, out, err = run(capsys, *arguments)
-    assert status == 0
+def printed(capsys, *arguments, status=0, note=None):
+    """What a command prints that ends with this status, and with a note or with nothing beside it."""
+    ended, out, err = run(capsys, *arguments)
+    assert ended == status
     assert err == "" if note is None else note in err
     return out
 

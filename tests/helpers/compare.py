@@ -2,6 +2,8 @@
 
 import numpy as np
 from oracles import NAMES
+from oracles3d import newton_set
+from problems3d import unmatched
 
 from enumsol import enumerate_roots, verify
 
@@ -88,6 +90,18 @@ def assert_as_exhaustive(problem, alpha, roots):
     assert [(root.active, root.index) for root in roots] == [(root.active, root.index) for root in exact]
     assert verify(problem, roots.proof).complete
     return exact
+
+
+def assert_same_in_space(problem, roots, plain, data, seed):
+    """Roots in 3D are those of another search, and all that Newton's method finds for S, g and F; their proof holds."""
+    assert roots.complete
+    assert plain.complete
+    assert (len(roots), roots.index_sum) == (len(plain), 1)
+    assert [root.statuses for root in roots] == [root.statuses for root in plain]
+    missed, _ = unmatched(list(roots), newton_set(*data, 20, np.random.default_rng(seed)))
+    assert not missed
+    report = verify(problem, roots.proof)
+    assert (report.complete, report.roots) == (True, len(roots)), report
 
 
 def _near(points, vertices, tolerance):

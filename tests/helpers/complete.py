@@ -1,6 +1,6 @@
-"""Enumerations and graphs that leave nothing open, and whose proofs the checker accepts."""
+"""Results that leave nothing open: enumerations, graphs, what the checker says of proofs, limits of iterations."""
 
-from enumsol import branch_graph, enumerate_roots, verify
+from enumsol import branch_graph, enumerate_roots, successive_approximations, verify
 
 
 def all_roots(problem, alpha, *arguments, **options):
@@ -13,8 +13,7 @@ def all_roots(problem, alpha, *arguments, **options):
 def proven_roots(problem, alpha, *arguments, **options):
     """The same with a proof that the checker accepts."""
     roots = all_roots(problem, alpha, *arguments, **options)
-    report = verify(problem, roots.proof)
-    assert report.complete, report
+    complete_report(problem, roots.proof)
     return roots
 
 
@@ -28,6 +27,26 @@ def whole_graph(problem, interval, *arguments, **options):
 def proven_graph(problem, interval, *arguments, **options):
     """The same with a proof that the checker accepts, arcs and all."""
     graph = whole_graph(problem, interval, *arguments, **options)
-    report = verify(problem, graph.proof)
-    assert report.complete, report
+    complete_report(problem, graph.proof)
     return graph
+
+
+def accepted_report(problem, proof, *arguments, **options):
+    """What the checker says of a proof that it accepts, whether or not this leaves something open."""
+    report = verify(problem, proof, *arguments, **options)
+    assert report.ok, report
+    return report
+
+
+def complete_report(problem, proof, *arguments, **options):
+    """What the checker says of a proof that leaves nothing open."""
+    report = verify(problem, proof, *arguments, **options)
+    assert report.complete, report
+    return report
+
+
+def limit_of(problem, alpha, *arguments, **options):
+    """Where successive approximations converge to."""
+    found = successive_approximations(problem, alpha, *arguments, **options)
+    assert found.converged, found
+    return found

@@ -5,19 +5,11 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from plain_arrays import BN, BT, A, F, problem
 from refusals import bad_argument, bad_problem
 
 from enumsol import ContactProblem, InvalidProblemError, enumerate_roots, fem, gallery
 from enumsol.condensation.factorization import Factorization
-
-A = np.array([[2.0, -0.5, 0.0, 0.0], [-0.5, 2.0, -0.5, 0.0], [0.0, -0.5, 2.0, -0.5], [0.0, 0.0, -0.5, 2.0]])
-BN, BT = np.eye(4)[[0, 2]], np.eye(4)[[1, 3]]
-F = np.array([1.0, -2.0, 0.5, 1.0])
-
-
-def problem(**changes):
-    data = {"A": A, "Bn": BN, "Bt": BT, "f": F} | changes
-    return ContactProblem(**data)
 
 
 def with_entry(array, index, value):
@@ -78,12 +70,7 @@ BAD = {
 @pytest.mark.parametrize("case", BAD)
 def test_bad_data_get_one_sentence(case):
     changes, pattern = BAD[case]
-    with pytest.raises(InvalidProblemError, match=pattern) as caught:
-        problem(**changes)
-    message = str(caught.value)
-    assert "\n" not in message
-    assert not message.endswith(".")
-    assert "expected" in message
+    assert "expected" in str(bad_problem(pattern, problem, **changes))
 
 
 def test_a_body_held_in_one_direction_only_is_named_as_free():

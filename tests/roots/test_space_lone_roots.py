@@ -1,11 +1,11 @@
 """A root in 3D that is proven to be the only one with the statuses of an assignment (theory, section 12.6)."""
 
 import numpy as np
-import oracles3d
 import pytest
+from compare import assert_same_in_space
 from complete import all_roots
 from effort import some
-from problems3d import from_compliance, random_coupled, unmatched
+from problems3d import from_compliance, random_coupled
 from proof_tools import leaves_of, of_kind, proof_of, put, records_of
 from space_proofs import RANDOM, random_problem
 from trees import by_the_tree, closed_in_the_tree
@@ -31,14 +31,7 @@ def test_the_same_roots_as_by_the_tree_and_by_newton():
             plain = enumerate_roots(problem, 0)
         with closed_in_the_tree():
             roots = enumerate_roots(problem, 0)
-        assert plain.complete
-        assert roots.complete
-        assert (len(roots), roots.index_sum) == (len(plain), 1)
-        assert [root.statuses for root in roots] == [root.statuses for root in plain]
-        missed, _ = unmatched(list(roots), oracles3d.newton_set(*data, 20, np.random.default_rng(seed)))
-        assert not missed
-        report = verify(problem, roots.proof)
-        assert (report.complete, report.roots) == (True, len(roots)), report
+        assert_same_in_space(problem, roots, plain, data, seed)
         lone = of_kind(records_of(roots.proof), "m")
         used += bool(lone)
         several += bool(lone) and len(roots) > 1

@@ -55,6 +55,14 @@ def kept(limit):
     return 1.2 * limit + 2.0
 
 
+def cut(clock, call, *arguments, time_limit):
+    """The result of a call that ends as its limit promises, before it is complete."""
+    found = call(*arguments, time_limit=time_limit)
+    assert clock[0] <= kept(time_limit)
+    assert not found.complete
+    return found
+
+
 def uncoupled(p, load=(1.0, -2.0)):
     """Nodes that do not feel each other, each with a continuum of solutions at alpha = 2."""
     A = np.kron(np.eye(p), [[2.0, -1.0], [-1.0, 2.0]])
@@ -175,9 +183,7 @@ def test_many_solutions_at_one_alpha(clock, takes, arithmetic, limit):
     """Every elimination takes a second: in the leaves of the tree, and where their solutions are joined."""
     takes(ExactSelections, "row_reduced")
     takes(ExactSelections, "solve_equations")
-    roots = enumerate_roots(uncoupled(4), 2, arithmetic, time_limit=limit)
-    assert clock[0] <= kept(limit)
-    assert not roots.complete
+    roots = cut(clock, enumerate_roots, uncoupled(4), 2, arithmetic, time_limit=limit)
     assert "time limit" in str(roots)
     assert roots.at_least <= 1  # it is one continuum
     if roots.proof is not None:
@@ -201,9 +207,7 @@ def test_a_form_is_not_sought_beyond_the_limit(clock, takes, tree_only, monkeypa
     monkeypatch.setattr(forms, "NODES", 0)
     takes(FormAscent, "_candidate")
     problem = gallery.clamped_block(12, 6)
-    roots = enumerate_roots(problem, 0.3, time_limit=4.0)
-    assert clock[0] <= kept(4.0)
-    assert not roots.complete
+    roots = cut(clock, enumerate_roots, problem, 0.3, time_limit=4.0)
     assert verify(problem, roots.proof).ok
 
 
@@ -220,9 +224,7 @@ def test_the_exhaustive_method(clock, takes, arithmetic):
     solver = Solvers(uncoupled(4), 2.0, arithmetic, 1e-9)
     takes(type(solver.exact if arithmetic == "exact" else solver.floats), "solve")
     takes(ExactSelections, "row_reduced")
-    roots = enumerate_roots(uncoupled(4), 2, arithmetic, "exhaustive", time_limit=20)
-    assert clock[0] <= kept(20)
-    assert not roots.complete
+    roots = cut(clock, enumerate_roots, uncoupled(4), 2, arithmetic, "exhaustive", time_limit=20)
     assert "time limit" in roots.stopped
 
 
@@ -232,9 +234,7 @@ def test_the_exhaustive_method(clock, takes, arithmetic):
 @pytest.mark.parametrize("limit", [5, 20, 60])
 def test_arcs_by_exact_algebra(clock, takes, limit):
     takes(KnownSelections, "add")
-    graph = branch_graph(gallery.chain(4), (0, 10), time_limit=limit)
-    assert clock[0] <= kept(limit)
-    assert not graph.complete
+    graph = cut(clock, branch_graph, gallery.chain(4), (0, 10), time_limit=limit)
     assert graph.arcs
     (reason,) = graph.reasons
     assert reason.startswith("stopped by the time limit after the arcs of ")
@@ -247,9 +247,7 @@ def test_arcs_that_are_joined(clock, takes, name):
     takes(KnownSelections, name)
     problem, whole = gallery.chain(3), branch_graph(gallery.chain(3), (0, 10))
     clock[0] = 0.0
-    graph = branch_graph(problem, (0, 10), time_limit=20.0)
-    assert clock[0] <= kept(20.0)
-    assert not graph.complete
+    graph = cut(clock, branch_graph, problem, (0, 10), time_limit=20.0)
     for alpha in (1.0, 2.0, 3.0, 4.5, 7.0, 10.0):
         assert graph.at_least(alpha) <= whole.multiplicity_at(alpha)
     settled = {(v.alpha, v.kind) for v in graph.vertices if v.kind != "unsettled"}
@@ -259,9 +257,7 @@ def test_arcs_that_are_joined(clock, takes, name):
 @pytest.mark.parametrize("name", ["solve", "active"])
 def test_continua_and_grazing_arcs(clock, takes, name):
     takes(ExactSelections, name)
-    graph = branch_graph(uncoupled(3), (0, 4), time_limit=30.0)
-    assert clock[0] <= kept(30.0)
-    assert not graph.complete
+    graph = cut(clock, branch_graph, uncoupled(3), (0, 4), time_limit=30.0)
     assert all(v.kind == "unsettled" for v in graph.vertices if v.alpha == 2.0)
 
 
@@ -271,9 +267,8 @@ def test_arcs_in_balls(clock, takes, limit):
     whole = branch_graph(problem, (0, 3))
     assert whole.arcs_by == "balls"
     takes(_Tracing, "_box")
-    graph = branch_graph(problem, (0, 3), time_limit=limit)
-    assert clock[0] <= kept(limit) < 60
-    assert not graph.complete
+    graph = cut(clock, branch_graph, problem, (0, 3), time_limit=limit)
+    assert clock[0] < 60
     assert graph.reasons[0].startswith("stopped by the time limit after the arcs of ")
     assert all(graph.at_least(alpha) <= whole.multiplicity_at(alpha) for alpha in (0.5, 1.5, 2.2, 3.0))
 

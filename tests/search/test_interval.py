@@ -8,7 +8,7 @@ import pytest
 from flint import fmpq
 from interruptions import CtrlC, interrupted
 from path_problems import generic_problem, one_node
-from refusals import bad_argument
+from refusals import bad_argument, refusal
 
 from enumsol import ContactProblem, gallery
 from enumsol.branches import branch_graph, ways
@@ -130,8 +130,7 @@ def test_bad_arguments_are_refused_by_name():
     bad_argument("max_nodes", branch_graph, problem, (0.0, 1.0), max_nodes=0)
     bad_argument("time_limit", branch_graph, problem, (0.0, 1.0), time_limit=0.0)
     bad_argument("ContactProblem", branch_graph, None, (0.0, 1.0))
-    with pytest.raises(TooLargeError, match="exact"):
-        branch_graph(gallery.clamped_block(16, 16, contact=2), (0.0, 1.0), "exact")
+    refusal(TooLargeError, "exact", branch_graph, gallery.clamped_block(16, 16, contact=2), (0.0, 1.0), "exact")
 
 
 def test_negative_friction_in_the_interval_is_refused_with_node_and_alpha():
@@ -194,8 +193,7 @@ def test_a_graph_cut_short_says_what_it_found_and_no_more(name, nodes):
     assert steps.exact == (not graph.reasons)
     if graph.reasons:
         for question in ("steps", "uniqueness_limit"):
-            with pytest.raises(IncompleteGraphError, match="not complete"):
-                getattr(graph, question)
+            refusal(IncompleteGraphError, "not complete", getattr, graph, question)
 
 
 @pytest.mark.few(0, 2)

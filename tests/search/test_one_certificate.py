@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 from compare import assert_as_exhaustive, differences
-from complete import all_roots
+from complete import all_roots, proven_roots
 from effort import some
 from generators import fe_compliance, random_problem
 from proof_tools import copied, proof_of, records_of
@@ -39,12 +39,11 @@ def whole(problem, alpha):
 def test_blocks_take_one_node(nx, traction):
     problem = gallery.clamped_block(nx, nx // 6, traction=traction)
     for alpha in (0.1, 1.0, 2.0) if traction[0] > 0.5 else (0.1, 1.0, 2.0, 5.0):
-        roots = enumerate_roots(problem, alpha)
+        roots = proven_roots(problem, alpha)
         assert (roots.stats.nodes, roots.stats.closed, len(roots)) == (1, 1, 1)
         assert roots.by_one_certificate
         assert str(roots).endswith("complete: yes (proven: one solution, by one certificate)")
         assert [record[0] for record in records_of(roots.proof)[1:-1]] in (["m"], ["a"])
-        assert verify(problem, roots.proof).complete
         with by_the_tree():
             assert not differences(roots, enumerate_roots(problem, alpha))
 
@@ -82,11 +81,10 @@ def test_long_trees_of_small_bodies_are_cut_short(monkeypatch):
     with by_the_tree():
         tree = enumerate_roots(problem, 5.0)
     assert tree.stats.nodes > 10
-    roots = enumerate_roots(problem, 5.0)
+    roots = proven_roots(problem, 5.0)
     assert roots.by_one_certificate
     assert roots.stats.nodes == 11
     assert not differences(roots, tree)
-    assert verify(problem, roots.proof).complete
     with ThreadPoolExecutor(2) as executor:
         assert not differences(enumerate_roots(problem, 5.0, executor=executor), tree)
 
@@ -97,10 +95,9 @@ def test_numbers_that_prove_nothing_cost_their_time_only(monkeypatch):
         tree = enumerate_roots(problem, 1.0)
     monkeypatch.setattr(closing, "_LONG", 20)
     monkeypatch.setattr(closing.Reduction, "weights", lambda self, *_, **__: np.ones(5 * len(self.nodes)))
-    roots = enumerate_roots(problem, 1.0)
+    roots = proven_roots(problem, 1.0)
     assert not roots.by_one_certificate
     assert not differences(roots, tree)
-    assert verify(problem, roots.proof).complete
 
 
 def test_without_a_solution_the_tree_finds_it(monkeypatch):
@@ -236,10 +233,9 @@ def kinds(proof):
 def test_blocks_that_are_not_definite_take_one_node(size, traction, alpha, monkeypatch):
     monkeypatch.setattr(closing.Reduction, "weights", lambda *_, **__: None)
     problem = gallery.clamped_block(*size, traction=traction)
-    roots = enumerate_roots(problem, alpha, max_nodes=1)
+    roots = proven_roots(problem, alpha, max_nodes=1)
     assert roots.by_one_certificate
     assert kinds(roots.proof) == ["a"]
-    assert verify(problem, roots.proof).complete
     assert stability_radius(problem, roots.proof) > 0
     if size[0] < 200:
         with by_the_tree():
