@@ -18,6 +18,8 @@ _POWERS = {
     **dict.fromkeys(("spring", "body_force"), (1, -3)),
     **dict.fromkeys(("thickness", "displacement", "gap", "obstacle", "max_rigid_displacement"), (0, 1)),
 }
+#: Options that mean nothing in 3D.
+_PLANE = ("plane", "thickness")
 _RAISED = {1: "", 2: "\N{SUPERSCRIPT TWO}", 3: "\N{SUPERSCRIPT THREE}"}
 
 
@@ -43,6 +45,7 @@ def given_section(scene: Scene | None, units: tuple[str, str] | None) -> str:
         ("", (name, _said(value), unit_text(units, *_POWERS[name]) if name in _POWERS else ""))
         for name, value in scene.options.items()
         if value is not None and not (np.ndim(value) == 1 and len(value) == 0)
+        if scene.dimension == 2 or name not in _PLANE
     ]
     about = fact_list((title, "; ".join(lines)) for title, lines in scene.sections.items() if lines)
     words = "" if units is not None else "<p>Numbers are in the user's own consistent units.</p>"

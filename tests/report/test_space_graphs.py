@@ -1,17 +1,21 @@
 """The page of a graph in 3D: its numbers against arcs and roots, its words, and how it works in a headless browser."""
 
+import re
+
 import numpy as np
 import pytest
 from branches.test_degenerate import pair
 from browser import find_browser
 from pages import Reader, data_of
+from parted_solids import solid
 
 import enumsol
-from enumsol import branch_graph, gallery, write_report
+from enumsol import branch_graph, fem, gallery, write_report
 from enumsol.branches import ways
 from enumsol.branches.figures.curves import QUANTITIES, curves
 from enumsol.cli import main
 from enumsol.model.shapes import body_shape
+from enumsol.report.given import given_section
 
 pytest.importorskip("plotly")
 in_a_browser = pytest.mark.skipif(find_browser() is None, reason="no headless browser (Debian's package chromium)")
@@ -107,6 +111,13 @@ def test_the_bodies_of_a_graph_move_as_the_roots_say(wedge, wedge_page):
                 nodal[node[k]] += force * np.array(act)
         expected = shape.contact_forces(wedge.problem, root.lambda_n, root.lambda_t)
         np.testing.assert_allclose(nodal, expected, atol=1e-6 * np.max(np.abs(expected), initial=1e-30))
+
+
+def test_options_of_plane_bodies_are_not_told_of_a_solid():
+    options = {"young": 2, "poisson": 0.3, "contact": "bottom", "clamp": "left", "load": {"top": (0.1, 0, -0.3)}}
+    scene = fem.mesh_scene(solid((2, 1, 1), 8), **options, friction=0.4)
+    told = re.findall(r'<tr><th scope="row">(.*?)</th>', given_section(scene, ("N", "mm")))
+    assert told == ["young", "poisson", "contact", "friction", "clamp", "load", "gap"]
 
 
 @pytest.mark.slow
