@@ -30,16 +30,8 @@ from proof_tools import (
 )
 from refusals import bad_argument, refusal
 
-from enumsol import (
-    ContactProblem,
-    EnumsolError,
-    Proof,
-    ProofFormatError,
-    enumerate_roots,
-    gallery,
-    verify,
-    write_problem,
-)
+import enumsol
+from enumsol import ContactProblem, EnumsolError, Proof, ProofFormatError, enumerate_roots, gallery, verify
 from enumsol.cli import main
 from enumsol.condensation.factorization import Factorization
 from enumsol.proof import proof_file as proof_module
@@ -409,7 +401,7 @@ def test_the_command_line_answers_in_words(tmp_path, capsys):
     hostile = {}
     for name in ("stopped", "graph in several pieces"):
         problem, proof = before(name)
-        write_problem(problem, tmp_path / f"{name}.npz")
+        enumsol.write_problem(problem, tmp_path / f"{name}.npz")
         key = "alpha" if name == "stopped" else "interval"
         hostile[name, "fraction"] = changed(name, 0, **{key: "1e400" if key == "alpha" else ["0", "1e4000000"]})[1]
         hostile[name, "bomb"] = bomb(records_of(proof)[:2], "[]", 5)

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from exact_balls import holds
 from problems3d import from_compliance, random_coupled
 from proof_tools import copied, leaves_of, of_kind, proof_of, records_of
-from space_proofs import case, values_of, with_values
+from space_proofs import arc_of_sector, case, values_of, with_values
 from trees import by_the_tree, forms_at_once
 
 from enumsol import ContactProblem3D, enumerate_roots, verify
@@ -97,7 +97,7 @@ class Space:
         if kind > 6:
             if code < 9:
                 return "."
-            (a, b), (c, d) = arc(number), arc(code - 8)
+            (a, b), (c, d) = arc_of_sector(number), arc_of_sector(code - 8)
             return "+" if a <= c and d <= b else "."
         return (table[code] if code < 8 else "E+....+")[kind]
 
@@ -150,18 +150,11 @@ class Space:
 
 def direction(number):
     """Where a sector begins."""
-    q, s = divmod(arc(number)[0] % 1 * 4, 1)
+    q, s = divmod(arc_of_sector(number)[0] % 1 * 4, 1)
     x, y = (1 - s * s) / (1 + s * s), 2 * s / (1 + s * s)
     for _ in range(q):
         x, y = -y, x
     return (63 * x - 16 * y) / 65, (16 * x + 63 * y) / 65
-
-
-def arc(number):
-    """Where a sector begins and ends, as a share of all sectors of its level."""
-    length, first = divmod(number, 2**31)
-    count = 2 ** (len(f"{first:b}") - 1)
-    return Fraction(first - count, count), Fraction(first - count + length + 1, count)
 
 
 def following(number):
@@ -190,8 +183,8 @@ def covers(problem, records):
         if codes[node] <= 8:
             assert sorted(children) == sorted(split(codes[node], tangents[node]))
         else:
-            parts = sorted(arc(code - 8) for code in children)
-            begin, end = arc(codes[node] - 8)
+            parts = sorted(arc_of_sector(code - 8) for code in children)
+            begin, end = arc_of_sector(codes[node] - 8)
             assert len(parts) > 1
             assert [begin, *(b for _, b in parts)] == [*(a for a, _ in parts), end]
             assert all(floor(4 * a) == ceil(4 * b) - 1 for a, b in parts)
@@ -276,7 +269,7 @@ def test_what_is_accepted_of_changed_multipliers_holds_in_rationals():
                 if rng.random() < 0.3 and rows[j][0] > 5:
                     run = int(rng.integers(3)) << 31 if rows[j][0] > 6 else 0
                     number = int(rng.integers(4, 40)) + run
-                    a, b = arc(number)
+                    a, b = arc_of_sector(number)
                     rows[j][2] = number if floor(4 * a) == ceil(4 * b) - 1 else rows[j][2]
                 accepted = checker._leaf(codes[k], with_values(["x", rows, ""], values)) is None
                 bound = space.bound(codes[k], rows, values, header["force"], header["length"])
@@ -290,17 +283,9 @@ def test_the_fingerprint_is_that_of_the_document():
     A = sp.csc_array(np.diag([2.0, 3.0, 4.0]))
     eye = np.eye(3)
     problem = ContactProblem3D(
-        A,
-        eye[:1],
-        eye[1:2],
-        eye[2:],
-        rng.normal(size=3),
-        0.25,
-        (0.5, 0.75),
-        (1.0, 2.0),
-        rng.normal(size=3),
+        A, eye[:1], eye[1:2], eye[2:], rng.normal(size=3), 0.25, (0.5, 0.75), (1.0, 2.0), rng.normal(size=3),
         [[0.1, 0.2]],
-    )
+    )  # fmt: skip
     digest = hashlib.sha256(b"enumsol problem in 3D, 1")
     matrices = [
         part for M in (A, *(sp.csc_array(eye[k : k + 1]) for k in range(3))) for part in (M.indptr, M.indices, M.data)

@@ -119,14 +119,9 @@ def outcomes(place):
         commands = {name: [str(part) for part in arguments] for name, arguments in PRINTING.items()}
         environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
         done = subprocess.run(
-            [sys.executable, "-c", DRIVER, where, json.dumps(commands)],
-            cwd=place,
-            env=environment,
-            text=True,
-            check=True,
-            capture_output=True,
-            timeout=600,
-        )
+            [sys.executable, "-c", DRIVER, where, json.dumps(commands)], cwd=place, env=environment, text=True,
+            check=True, capture_output=True, timeout=600,
+        )  # fmt: skip
         return {name: (status, said) for name, status, said in map(json.loads, done.stdout.splitlines())}
 
     return {where: run_all(where) for where in ("full", "unread")}

@@ -47,15 +47,10 @@ def dense_problem(rng, n, p, decades):
     rows = rng.normal(size=(2 * p, n))
     size = 10 ** rng.uniform(-3, 3, size=4)
     return ContactProblem(
-        0.5 * (A + A.T),
-        rows[:p],
-        rows[p:],
-        size[0] * rng.normal(size=n),
-        gap=size[1] * rng.normal(size=p),
-        friction=(rng.uniform(0, 2, size=p), rng.uniform(0, 1, size=p)),
-        load_slope=size[2] * rng.normal(size=n),
+        0.5 * (A + A.T), rows[:p], rows[p:], size[0] * rng.normal(size=n), gap=size[1] * rng.normal(size=p),
+        friction=(rng.uniform(0, 2, size=p), rng.uniform(0, 1, size=p)), load_slope=size[2] * rng.normal(size=n),
         slip_offset=size[3] * rng.normal(size=p),
-    )
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("decades", [1, 6, 9])

@@ -5,15 +5,8 @@ import pytest
 from effort import some
 from refusals import bad_argument
 
-from enumsol import (
-    ContactProblem,
-    ContactStatus,
-    InvalidArgumentError,
-    PiecewiseSmoothEquation,
-    enumerate_roots,
-    gallery,
-    sign_array,
-)
+import enumsol
+from enumsol import ContactStatus, PiecewiseSmoothEquation, enumerate_roots, gallery, sign_array
 from enumsol.model.statuses import STATUSES
 from enumsol.search.exhaustive import selection_systems
 
@@ -23,16 +16,11 @@ NAMES = {OPEN: (-1, -1, -1), STICK: (1, -1, 1), SLIP_PLUS: (1, 1, 1), SLIP_MINUS
 
 def random_equation(rng, n=8, p=3, *, r=None):
     X = rng.normal(size=(n, n))
-    problem = ContactProblem(
-        X @ X.T + np.eye(n),
-        rng.normal(size=(p, n)),
-        rng.normal(size=(p, n)),
-        rng.normal(size=n),
-        gap=rng.normal(size=p),
-        friction=(rng.uniform(0, 2, size=p), rng.uniform(0, 2, size=p)),
-        load_slope=rng.normal(size=n),
-        slip_offset=rng.normal(size=p),
-    )
+    problem = enumsol.ContactProblem(
+        X @ X.T + np.eye(n), rng.normal(size=(p, n)), rng.normal(size=(p, n)), rng.normal(size=n),
+        gap=rng.normal(size=p), friction=(rng.uniform(0, 2, size=p), rng.uniform(0, 2, size=p)),
+        load_slope=rng.normal(size=n), slip_offset=rng.normal(size=p),
+    )  # fmt: skip
     return PiecewiseSmoothEquation(problem, float(np.exp(rng.normal())) if r is None else r)
 
 
@@ -173,7 +161,7 @@ def test_wrong_shapes_get_one_sentence():
     bad_argument(r"x has shape \(3,\); expected \(n \+ 2p,\) = \(4,\)", equation.residual, np.zeros(3), 1.0)
     for signs in ([[1, 1]], [[1, 0, 1]], [1, 1, 1]):
         with pytest.raises(
-            InvalidArgumentError, match=r"signs has .*; expected \(p, 3\) = \(1, 3\) with entries -1 or 1"
+            enumsol.InvalidArgumentError, match=r"signs has .*; expected \(p, 3\) = \(1, 3\) with entries -1 or 1"
         ):
             equation.selection_residual(signs, np.zeros(4), 1.0)
 

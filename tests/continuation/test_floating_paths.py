@@ -70,13 +70,9 @@ def test_a_block_slides_until_it_meets_a_wall():
     # two nodes in a row, the first on the ground, the second 5 before a wall without friction
     A, N = 16.0 * np.array([[1, 0, -1, 0], [0, 1, 0, -1], [-1, 0, 1, 0], [0, -1, 0, 1]]), np.tile(np.eye(2), (2, 1))
     problem = enumsol.ContactProblem(
-        *(A, [[0, -1, 0, 0], [0, 0, 1, 0]], [[1, 0, 0, 0], [0, 0, 0, 1]], [0, -1, 0, 0]),
-        gap=[0, 5],
-        friction=([0.25, 0.0], 0.0),
-        load_slope=[0.25, 0, 0, 0],
-        rigid_modes=N,
-        max_rigid_displacement=50.0,
-    )
+        *(A, [[0, -1, 0, 0], [0, 0, 1, 0]], [[1, 0, 0, 0], [0, 0, 0, 1]], [0, -1, 0, 0]), gap=[0, 5],
+        friction=([0.25, 0.0], 0.0), load_slope=[0.25, 0, 0, 0], rigid_modes=N, max_rigid_displacement=50.0,
+    )  # fmt: skip
     path = follow(problem, newton(problem, 0.2), interval=(0, 2))
     assert path.status == "interval left"
     assert all(violation(problem, point) < 1e-9 for point in path)

@@ -244,13 +244,9 @@ def test_units_do_not_change_the_path(random_problems):
     problem = random_problems(5, loading=True)
     force, length, time = 3.7e6, 2.9e-4, 1.3e2
     scaled = enumsol.ContactProblem(
-        problem.A.toarray() * force / length,
-        problem.Bn,
-        problem.Bt,
-        problem.f * force,
-        friction=problem.friction,
+        problem.A.toarray() * force / length, problem.Bn, problem.Bt, problem.f * force, friction=problem.friction,
         load_slope=problem.load_slope * force / time,
-    )
+    )  # fmt: skip
     root = enumerate_roots(problem, 1.0)[0]
     one = follow(problem, root, 1, (-5, 5))
     start = (time * 1.0, root.lambda_n * force, root.lambda_t * force)

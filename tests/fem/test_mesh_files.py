@@ -30,13 +30,9 @@ def test_gmsh_version_2(tmp_path):
     assert mesh.nodes("corner").tolist() == [1]
     assert "nodes   corner (1)" in repr(mesh)
     problem = fem.mesh_problem(
-        str(tmp_path / "body.msh"),
-        young=1,
-        poisson=0,
-        contact="floor",
-        clamp="lid",
+        str(tmp_path / "body.msh"), young=1, poisson=0, contact="floor", clamp="lid",
         displacement={"corner": (0, "free")},
-    )
+    )  # fmt: skip
     assert problem.node_ids == (0, 1)
 
 

@@ -8,6 +8,7 @@ import pytest
 import scipy.sparse as sp
 from complete import all_roots
 from documents import ROOT, follow
+from parted_solids import on_bottom
 from scipy.io import mmwrite
 from two_bodies import shifted, together
 
@@ -31,17 +32,9 @@ def seen(tmp_path_factory):
 def own():
     """The block of the model, assembled here."""
     mesh = fem.box(2, 1, 1, (2.0, 1.0, 1.0))
-    return fem.solid_contact_problem(
-        mesh.points,
-        mesh.cells,
-        fem.lame(2.5, 0.25),
-        contact=mesh.facets["bottom"],
-        normals=(0.0, 0.0, -1.0),
-        axes=(1.0, 0.0, 0.0),
-        held=mesh.nodes("left"),
-        forces=fem.facet_forces(mesh.points, mesh.facets["top"], (0.3, 0.1, -0.6)),
-        friction=0.3,
-    )
+    forces = fem.facet_forces(mesh.points, mesh.facets["top"], (0.3, 0.1, -0.6))
+    frame = {"normals": (0.0, 0.0, -1.0), "axes": (1.0, 0.0, 0.0)}
+    return on_bottom(mesh, fem.lame(2.5, 0.25), **frame, forces=forces, friction=0.3)
 
 
 def test_roots_of_the_matrices_of_calculix_are_our_own(seen, own):
@@ -118,16 +111,9 @@ def test_two_bodies_that_calculix_assembled_have_our_own_roots(seen):
     upper, lower = fem.box(1, 1, 1, (0.8, 0.8, 0.5)), fem.box(2, 1, 1, (1.0, 1.0, 0.5))
     mesh = together(("upper", shifted(upper, (0.1, 0.1, 0.5))), ("lower", lower))
     own = fem.mesh_problem(
-        mesh,
-        young=2.5,
-        poisson=0.25,
-        pairs=[("upper.bottom", "lower.top")],
-        clamp=["upper.top", "lower.bottom"],
-        load={"upper.right": (0.3, 0.1, -0.8)},
-        gap=0.001,
-        friction=0.3,
-        axis=(1.0, 0.0, 0.0),
-    )
+        mesh, young=2.5, poisson=0.25, pairs=[("upper.bottom", "lower.top")], clamp=["upper.top", "lower.bottom"],
+        load={"upper.right": (0.3, 0.1, -0.8)}, gap=0.001, friction=0.3, axis=(1.0, 0.0, 0.0),
+    )  # fmt: skip
     expected = all_roots(own, 0)
     assert found.complete
     assert [k - 1 for k in slave] == list(own.node_ids)

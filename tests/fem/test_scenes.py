@@ -98,11 +98,7 @@ REFUSED = [
 ]
 
 NOTED = [
-    (
-        apart(3.5),
-        PAIR,
-        "the smallest gap of the pair upper.bottom:lower.top is 3.5, .* will not be in contact",
-    ),
+    (apart(3.5), PAIR, "the smallest gap of the pair upper.bottom:lower.top is 3.5, .* will not be in contact"),
     (
         one,
         {"gap": 5.0},

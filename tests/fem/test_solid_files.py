@@ -104,7 +104,6 @@ def test_what_the_package_writes_it_reads(tmp_path):
 
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 1.0]])
 TETRA, FACET = ("tetra", [[0, 1, 2, 3]]), ("triangle", [[0, 1, 2]])
-CUBE = fem.box(1, 1, 1)
 
 
 @pytest.mark.parametrize(

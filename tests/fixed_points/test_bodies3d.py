@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from complete import limit_of
+from parted_solids import on_bottom
 from scipy.optimize import nnls
 
 import enumsol
@@ -82,17 +83,9 @@ def test_isotropic_friction_on_a_layer_reproduces_plane_strain(F):
 
     # contact nodes must be free to move: springs across the layer hold u_y, up to 1 / stiffness
     mesh = fem.box(nx, 1, nz, (1.5, thickness, 1.0))
-    solid = fem.solid_contact_problem(
-        mesh.points,
-        mesh.cells,
-        LAME,
-        contact=mesh.facets["bottom"],
-        axes=(1.0, 0.0, 0.0),
-        held=mesh.nodes("left"),
-        springs=(0.0, 1e8, 0.0),
-        forces=fem.facet_forces(mesh.points, mesh.facets["top"], (traction[0], 0.0, traction[1])),
-        friction=F,
-    )
+    forces = fem.facet_forces(mesh.points, mesh.facets["top"], (traction[0], 0.0, traction[1]))
+    held = {"held": mesh.nodes("left"), "springs": (0.0, 1e8, 0.0)}
+    solid = on_bottom(mesh, LAME, axes=(1.0, 0.0, 0.0), **held, forces=forces, friction=F)
     found = limit_of(solid, 0)
     size = np.max(np.abs(root.lambda_n))
     # a node of the plane stands for a line of two, whose forces are those of half the layer each
@@ -124,16 +117,8 @@ def turned_block(friction, angle):
     mesh = fem.box(4, 3, 2)
     first = (np.cos(angle), -np.sin(angle), 0.0)
     second = (-np.sin(angle), -np.cos(angle), 0.0)
-    return fem.solid_contact_problem(
-        mesh.points,
-        mesh.cells,
-        LAME,
-        contact=mesh.facets["bottom"],
-        axes=(first, second),
-        held=mesh.nodes("left"),
-        forces=fem.facet_forces(mesh.points, mesh.facets["top"], (0.6, 0.4, -0.6)),
-        friction=friction,
-    )
+    forces = fem.facet_forces(mesh.points, mesh.facets["top"], (0.6, 0.4, -0.6))
+    return on_bottom(mesh, LAME, axes=(first, second), forces=forces, friction=friction)
 
 
 def table(F1, F2):

@@ -20,15 +20,9 @@ def plane(rng, spring, mesh=PLANE):
     top = mesh.points[:, 1] > np.max(mesh.points[:, 1]) - 1e-9
     forces[top] = np.array([0.3, -1.0]) * rng.uniform(0.2, 1.0, (np.count_nonzero(top), 2))
     return fem.contact_problem(
-        mesh.points,
-        mesh.triangles,
-        tuple(rng.uniform(0.5, 2.0, 2)),
-        contact=mesh.bottom,
-        normals=(0.0, -1.0),
-        springs=(spring, spring),
-        forces=forces,
-        friction=rng.uniform(0.2, 0.7),
-    )
+        mesh.points, mesh.triangles, tuple(rng.uniform(0.5, 2.0, 2)), contact=mesh.bottom, normals=(0.0, -1.0),
+        springs=(spring, spring), forces=forces, friction=rng.uniform(0.2, 0.7),
+    )  # fmt: skip
 
 
 def square(rng, spring):

@@ -56,14 +56,9 @@ def test_two_node_square_agrees_with_scikit_fem():
     lame = (1.3, 0.7)
     square = gallery.two_node_square(lame=lame)
     assembled = fem.contact_problem(
-        [[0, 0], [1, 0], [0, 1], [1, 1]],
-        [[0, 1, 2], [1, 3, 2]],
-        lame,
-        contact=[0, 1],
-        normals=[[0, -1], [1, 0]],
-        held=[2, 3],
-        forces=[[-3, -1], [1, -1], [0, 0], [0, 0]],
-    )
+        [[0, 0], [1, 0], [0, 1], [1, 1]], [[0, 1, 2], [1, 3, 2]], lame, contact=[0, 1], normals=[[0, -1], [1, 0]],
+        held=[2, 3], forces=[[-3, -1], [1, -1], [0, 0], [0, 0]],
+    )  # fmt: skip
     assert np.allclose(square.condensed.S, assembled.condensed.S, rtol=1e-13, atol=1e-13)
     assert np.allclose(square.condensed.g0, assembled.condensed.g0, rtol=1e-13, atol=1e-13)
     assert np.array_equal(square.coordinates, assembled.coordinates)

@@ -43,3 +43,17 @@ def solid(counts, kind, size=(1.0, 1.0, 1.0), shake=0.0, seed=0):
 def moved(mesh, change):
     """The mesh with its points changed."""
     return fem.SolidMesh(change(mesh.points), mesh.cells, mesh.facets, mesh.node_sets)
+
+
+def on_bottom(mesh, lame=(1, 1), **options):
+    """A body in contact at its side "bottom", held at its left one where no springs hold it."""
+    held = {} if "springs" in options else {"held": mesh.nodes("left")}
+    given = {"contact": mesh.facets["bottom"], **held, **options}
+    return fem.solid_contact_problem(mesh.points, mesh.cells, lame, **given)
+
+
+def on_springs(mesh, lame, spring, loads, friction):
+    """A body in contact at its side "bottom" with springs at every node, and loads (k, 3) on the k nodes at its top."""
+    forces = np.zeros_like(mesh.points)
+    forces[mesh.points[:, 2] > np.max(mesh.points[:, 2]) - 1e-9] = loads
+    return on_bottom(mesh, lame, springs=(spring, spring, spring), forces=forces, friction=friction)

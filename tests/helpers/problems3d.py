@@ -1,6 +1,7 @@
 """Small problems in 3D, and the equations of a solution written out by hand."""
 
 import numpy as np
+from parted_solids import on_springs
 from scipy.optimize import brentq
 
 from enumsol import ContactProblem3D, fem
@@ -148,18 +149,8 @@ def unmatched(roots, wanted, rtol=1e-6):
 def block_on_springs(rng, spring):
     """A block pressed on the ground and pulled, every node on springs."""
     block = fem.box(2, 1, 1)
-    forces = np.zeros_like(block.points)
-    top = block.points[:, 2] > np.max(block.points[:, 2]) - 1e-9
-    forces[top] = np.array([0.2, 0.1, -1.0]) * rng.uniform(0.2, 1.0, (np.count_nonzero(top), 3))
-    return fem.solid_contact_problem(
-        block.points,
-        block.cells,
-        tuple(rng.uniform(0.5, 2.0, 2)),
-        contact=block.facets["bottom"],
-        springs=(spring, spring, spring),
-        forces=forces,
-        friction=rng.uniform(0.2, 0.7),
-    )
+    loads = np.array([0.2, 0.1, -1.0]) * rng.uniform(0.2, 1.0, (len(block.nodes("top")), 3))
+    return on_springs(block, tuple(rng.uniform(0.5, 2.0, 2)), spring, loads, rng.uniform(0.2, 0.7))
 
 
 #: One node that slips for every alpha > 0 that is not too large, with the friction alpha.

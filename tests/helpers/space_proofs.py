@@ -77,6 +77,13 @@ def with_values(record, values):
     return [record[0], record[1], base64.b64encode(struct.pack(f"<{len(values)}d", *values)).decode()]
 
 
+def arc_of_sector(number):
+    """Where a sector begins and ends, as shares of the circle (docs/proof_format.md, under space proofs)."""
+    length, first = divmod(number, 2**31)
+    count = 2 ** (len(f"{first:b}") - 1)
+    return Fraction(first - count, count), Fraction(first - count + length + 1, count)
+
+
 # -- mutants -----------------------------------------------------------------------------------------------------------
 
 

@@ -7,17 +7,8 @@ import scipy.sparse as sp
 from complete import limit_of
 from refusals import bad_problem, refusal
 
-from enumsol import (
-    ContactProblem,
-    ContactProblem3D,
-    FrictionTable,
-    InvalidProblemError,
-    MissingDependencyError,
-    enumerate_roots,
-    gallery,
-    read_problem,
-    write_problem,
-)
+import enumsol
+from enumsol import ContactProblem3D, enumerate_roots, gallery, read_problem, write_problem
 
 
 def constant_square(alpha):
@@ -119,7 +110,10 @@ def test_global_problems_in_3d_round_trip_exactly(tmp_path):
     assert copy.fingerprint == problem.fingerprint
     for change, message in (
         ({"friction": (0.1, 0.2)}, "friction is orthotropic, which fclib cannot hold"),
-        ({"friction": FrictionTable([0, 1], [0.1, 0.2])}, "friction depends on the slip, which fclib cannot hold"),
+        (
+            {"friction": enumsol.FrictionTable([0, 1], [0.1, 0.2])},
+            "friction depends on the slip, which fclib cannot hold",
+        ),
         ({"friction_slope": 1.0}, "friction or load depends on alpha, which fclib cannot hold"),
     ):
         bad_problem(message, write_problem, ContactProblem3D(*arguments, **change), tmp_path / "q.h5")
@@ -129,15 +123,10 @@ def test_global_problems_in_3d_round_trip_exactly(tmp_path):
 def test_global_problems_round_trip_exactly(tmp_path):
     rng = np.random.default_rng(0)
     X = rng.normal(size=(9, 9))
-    problem = ContactProblem(
-        X @ X.T + np.eye(9),
-        rng.normal(size=(3, 9)),
-        sp.random_array((3, 9), density=0.5, rng=rng),
-        rng.normal(size=9),
-        gap=rng.normal(size=3),
-        slip_offset=rng.normal(size=3),
-        friction=(rng.random(3), 0.0),
-    )
+    problem = enumsol.ContactProblem(
+        X @ X.T + np.eye(9), rng.normal(size=(3, 9)), sp.random_array((3, 9), density=0.5, rng=rng), rng.normal(size=9),
+        gap=rng.normal(size=3), slip_offset=rng.normal(size=3), friction=(rng.random(3), 0.0),
+    )  # fmt: skip
     write_problem(problem, tmp_path / "p.h5")
     copy = read_problem(tmp_path / "p.h5")
     for name in ("A", "Bn", "Bt"):
@@ -228,7 +217,9 @@ def test_broken_structures(tmp_path):
 
 def test_paths_over_alpha_cannot_be_written(tmp_path):
     for problem in (gallery.one_node_triangle(), gallery.get("two-node-6.7-minus").build()):
-        with pytest.raises(InvalidProblemError, match="friction or load depends on alpha, which fclib cannot hold"):
+        with pytest.raises(
+            enumsol.InvalidProblemError, match="friction or load depends on alpha, which fclib cannot hold"
+        ):
             write_problem(problem, tmp_path / "p.h5")
     assert not (tmp_path / "p.h5").exists()
 
@@ -237,5 +228,7 @@ def test_without_h5py_the_extra_is_named(tmp_path, monkeypatch):
     path = tmp_path / "p.h5"
     write_problem(constant_square(1.0), path)
     monkeypatch.setitem(sys.modules, "h5py", None)
-    refusal(MissingDependencyError, r'need the package h5py.*pip install "enumsol\[fclib\]"', read_problem, path)
-    refusal(MissingDependencyError, "h5py", write_problem, constant_square(1.0), path)
+    refusal(
+        enumsol.MissingDependencyError, r'need the package h5py.*pip install "enumsol\[fclib\]"', read_problem, path
+    )
+    refusal(enumsol.MissingDependencyError, "h5py", write_problem, constant_square(1.0), path)

@@ -44,17 +44,11 @@ def awkward_problem(node_ids=None):
     f = rng.normal(size=n) * 10.0 ** rng.integers(-300, 300, size=n)
     f[:3] = (5e-324, -0.0, np.nextafter(1.0, 2.0))
     return ContactProblem(
-        sp.csc_array(0.5 * (A + A.T)),
-        sp.csr_array(sp.random_array((p, n), density=0.5, rng=rng)),
-        rng.normal(size=(p, n)),
-        f,
-        gap=rng.normal(size=p) / 3,
-        friction=(rng.random(p), rng.random(p) * 1e-17),
-        load_slope=rng.normal(size=n),
-        slip_offset=rng.normal(size=p),
-        node_ids=node_ids,
+        sp.csc_array(0.5 * (A + A.T)), sp.csr_array(sp.random_array((p, n), density=0.5, rng=rng)),
+        rng.normal(size=(p, n)), f, gap=rng.normal(size=p) / 3, friction=(rng.random(p), rng.random(p) * 1e-17),
+        load_slope=rng.normal(size=n), slip_offset=rng.normal(size=p), node_ids=node_ids,
         coordinates=rng.normal(size=(p, 2)),
-    )
+    )  # fmt: skip
 
 
 def awkward_problem_3d(friction, p=5):
@@ -333,17 +327,11 @@ BAD_ARRAYS_3D = [
     (DENSE_3D | MESH | {"mesh_motion": np.eye(6)}, "mesh_dofs is given together with mesh_motion"),
     (DENSE_3D | MESH | {"mesh_cells": [[0, 1, 2, 3]]}, r"mesh_cells holds other numbers than 0 \.\. 1"),
     (DENSE_3D | MESH | {"mesh_cells": [[0, 1, 0, 0.5]]}, "mesh_cells holds other numbers than"),
-    (
-        DENSE_3D | MESH | {"mesh_cells": [[0, 1]]},
-        r"mesh_cells has shape \(1, 2\); expected \(k, m\) with m among 4, 8",
-    ),
+    (DENSE_3D | MESH | {"mesh_cells": [[0, 1]]}, r"mesh_cells has shape \(1, 2\); expected \(k, m\) with m among 4, 8"),
     (DENSE_3D | MESH | {"mesh_dofs": [0, 1, 2, 3, 4, 4]}, "repeats a number"),
     (DENSE_3D | {"mesh_rows": [0, 1]}, "mesh_points, mesh_cells, mesh_motion is missing .found mesh_rows"),
     (DENSE_3D | MESH | {"mesh_facets": [[0, 1]]}, r"mesh_facets has shape \(1, 2\); expected \(k, m\) with m"),
-    (
-        DENSE_3D | MESH | {"mesh_facets": [[0, 1, 0]], "mesh_rows": [2]},
-        r"mesh_rows holds other numbers than -1 \.\. 1",
-    ),
+    (DENSE_3D | MESH | {"mesh_facets": [[0, 1, 0]], "mesh_rows": [2]}, r"mesh_rows holds other numbers than -1 \.\. 1"),
     (DENSE_3D | MESH | {"mesh_facets": [[0, 1, 0]], "mesh_rows": [0, 1]}, r"mesh_rows has shape \(2,\); expected"),
     (DENSE_3D | MESH | {"mesh_rows": [0]}, r"mesh_rows has shape \(1,\); expected \(k,\), one for each"),
     (DENSE_3D | MESH | {"mesh_dofs": [0, 1]}, "mesh moves by 2 degrees of freedom; expected n = 6"),
@@ -454,33 +442,13 @@ def test_wrong_places(tmp_path, name, pattern):
         ("A.mtx", SPARSE + "4 4 3\n1 1 2\n", r"A\.mtx is not a readable"),
         ("A.mtx", SPARSE + "4 4 1\n9 9 2\n", r"A\.mtx is not a readable"),
         ("A.mtx", "%%MatrixMarket matrix coordinate complex general\n4 4 1\n1 1 2 3\n", "A has complex entries"),
-        (
-            "f.mtx",
-            ARRAY + "2 2\n1\n2\n3\n4\n",
-            r"f\.mtx holds a 2 x 2 matrix; expected a vec",
-        ),
+        ("f.mtx", ARRAY + "2 2\n1\n2\n3\n4\n", r"f\.mtx holds a 2 x 2 matrix; expected a vec"),
         # the first three crash the reader of scipy 1.17
-        (
-            "gap.mtx",
-            ARRAY + "%\n2 1\n0.0=000000000000000e+",
-            r"gap\.mtx is not a readable",
-        ),
+        ("gap.mtx", ARRAY + "%\n2 1\n0.0=000000000000000e+", r"gap\.mtx is not a readable"),
         ("gap.mtx", ARRAY + "%\n2 1\n0.0\n0.x0\n", "a word in it is not a number"),
-        (
-            "A.mtx",
-            SPARSE + "4 4 2\n1 1 2.0\n2 2 1.0e",
-            r"A\.mtx is not a readable",
-        ),
-        (
-            "A.mtx",
-            SPARSE + "4 4 99999999999\n1 1 2\n",
-            "cannot hold 4 x 4 entries",
-        ),
-        (
-            "f.mtx",
-            ARRAY + "99999999999 1\n1\n",
-            "cannot hold 99999999999 x 1 entries",
-        ),
+        ("A.mtx", SPARSE + "4 4 2\n1 1 2.0\n2 2 1.0e", r"A\.mtx is not a readable"),
+        ("A.mtx", SPARSE + "4 4 99999999999\n1 1 2\n", "cannot hold 4 x 4 entries"),
+        ("f.mtx", ARRAY + "99999999999 1\n1\n", "cannot hold 99999999999 x 1 entries"),
         ("f.mtx", ARRAY + "3 1\n1\n2\n3\n", r"f has shape \(3,\); expected \(4,\)"),
         ("f.mtx", ARRAY + "4 1\n1\nnan\n3\n4\n", "f has the value nan"),
         ("gaps.mtx", "x", r"gaps\.mtx is not known \(is gap\.mtx meant\?\)"),

@@ -7,18 +7,11 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 import pytest
+from parted_solids import on_bottom
 from refusals import bad_argument, refusal
 
 import enumsol
-from enumsol import (
-    BodyMesh,
-    ContactProblem3D,
-    MissingDependencyError,
-    OutputError,
-    fem,
-    gallery,
-    write_vtu,
-)
+from enumsol import BodyMesh, ContactProblem3D, MissingDependencyError, OutputError, fem, gallery, write_vtu
 
 
 def some_state(problem, seed=0):
@@ -30,14 +23,9 @@ def some_state(problem, seed=0):
     u = problem.condensed.displacement(1.0, forces)
     u_t = np.stack([problem.Bt1 @ u, problem.Bt2 @ u], axis=1)
     return SimpleNamespace(
-        u=u,
-        lambda_n=normal,
-        lambda_t=tangential,
-        u_n=problem.Bn @ u,
-        u_t=u_t,
-        statuses=[("open", "stick", "slip")[k % 3] for k in range(p)],
-        forces=forces,
-    )
+        u=u, lambda_n=normal, lambda_t=tangential, u_n=problem.Bn @ u, u_t=u_t,
+        statuses=[("open", "stick", "slip")[k % 3] for k in range(p)], forces=forces,
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("cells", ["hexahedra", "tetrahedra"])
@@ -48,15 +36,7 @@ def test_a_body_with_forces_on_nodes(tmp_path, cells):
 
     mesh = fem.box(3, 2, 2, cells=cells)
     loads = fem.facet_forces(mesh.points, mesh.facets["top"], (0.3, 0.2, -1.0))
-    problem = fem.solid_contact_problem(
-        mesh.points,
-        mesh.cells,
-        (1, 1),
-        contact=mesh.facets["bottom"],
-        held=mesh.nodes("left"),
-        forces=loads,
-        axes=spiral,
-    )
+    problem = on_bottom(mesh, forces=loads, axes=spiral)
     state = some_state(problem)
     write_vtu(problem, state, tmp_path / "p.vtu")
     assert ElementTree.parse(tmp_path / "p.vtu").getroot().attrib["type"] == "UnstructuredGrid"
@@ -124,15 +104,7 @@ def test_directions_that_the_rows_do_not_tell_are_left_out(tmp_path):
     held = np.zeros((len(mesh.points), 3), dtype=bool)
     held[mesh.nodes("left")] = True
     held[mesh.nodes("front"), 1] = True
-    problem = fem.solid_contact_problem(
-        mesh.points,
-        mesh.cells,
-        (1, 1),
-        contact=mesh.facets["bottom"],
-        held=held,
-        multipliers="elements",
-        axes=(0.6, 0.8, 0),
-    )
+    problem = on_bottom(mesh, held=held, multipliers="elements", axes=(0.6, 0.8, 0))
     write_vtu(problem, some_state(problem), tmp_path / "p.vtu")
     data = meshio.read(tmp_path / "p.vtu").cell_data
     assert "pressure" in data

@@ -109,10 +109,7 @@ def test_problems_of_a_map_share_their_factors_and_their_data_are_those_replaced
         made = _Replaced(block, name, np.arange(block.n, dtype=float))(value)
         data = {"f": block.f + value * np.arange(block.n)} if name == "load" else {name: value}
         again = enumsol.ContactProblem(
-            block.A,
-            block.Bn,
-            block.Bt,
-            **{"f": block.f, "friction": (0.1, 1.0), "load_slope": -block.f, **data},
+            block.A, block.Bn, block.Bt, **{"f": block.f, "friction": (0.1, 1.0), "load_slope": -block.f, **data}
         )
         assert made.fingerprint == again.fingerprint
         assert made.factorization is block.factorization

@@ -313,20 +313,10 @@ def test_gallery_arguments(build, pattern):
 # -- anything at all -------------------------------------------------------------------------------------------------
 
 SCALARS = st.one_of(
-    st.none(),
-    st.booleans(),
-    st.integers(),
-    st.integers(-(2**70), 2**70),
-    st.floats(),
-    st.fractions(),
-    st.decimals(),
-    st.complex_numbers(),
-    st.text(max_size=3),
-    st.binary(max_size=3),
-    st.just(np.ma.masked),
-    st.floats(width=32).map(np.float32),
-    st.integers(0, 2**64 - 1).map(np.uint64),
-)
+    st.none(), st.booleans(), st.integers(), st.integers(-(2**70), 2**70), st.floats(), st.fractions(), st.decimals(),
+    st.complex_numbers(), st.text(max_size=3), st.binary(max_size=3), st.just(np.ma.masked),
+    st.floats(width=32).map(np.float32), st.integers(0, 2**64 - 1).map(np.uint64),
+)  # fmt: skip
 NESTED = st.recursive(SCALARS, lambda inner: st.lists(inner, max_size=3) | st.tuples(inner, inner), max_leaves=12)
 
 

@@ -24,34 +24,20 @@ def plane():
     A = X @ X.T + np.eye(6)
     A[0, 1] *= 1 + 1e-15
     return ContactProblem(
-        A,
-        sp.coo_array(np.eye(6)[:2]),
-        np.eye(6)[[3, 2]],
-        rng.normal(size=6) * 1e-7,
-        gap=[-1e-9, 0.5],
-        friction=([0.1, 0.0], [1.0, 1 / 3]),
-        load_slope=rng.normal(size=6),
-        slip_offset=[0.0, -0.25],
-        node_ids=["left", 7],
-        coordinates=rng.normal(size=(2, 2)),
-    )
+        A, sp.coo_array(np.eye(6)[:2]), np.eye(6)[[3, 2]], rng.normal(size=6) * 1e-7, gap=[-1e-9, 0.5],
+        friction=([0.1, 0.0], [1.0, 1 / 3]), load_slope=rng.normal(size=6), slip_offset=[0.0, -0.25],
+        node_ids=["left", 7], coordinates=rng.normal(size=(2, 2)),
+    )  # fmt: skip
 
 
 def space(friction=((0.5, 0.25), (0.125, 2.0))):
     """The same in 3D."""
     rng = np.random.default_rng(2)
     return from_compliance(
-        random_compliance(rng, 2),
-        rng.normal(size=6),
-        friction,
-        friction_slope=(0.5, (0.0, 1.0)),
-        gap=[0.0, 0.1],
-        load_slope=rng.normal(size=6),
-        slip_offset=rng.normal(size=(2, 2)),
-        node_ids=("a", "b"),
-        coordinates=rng.normal(size=(2, 3)),
-        areas=[1.0, 2.0],
-    )
+        random_compliance(rng, 2), rng.normal(size=6), friction, friction_slope=(0.5, (0.0, 1.0)), gap=[0.0, 0.1],
+        load_slope=rng.normal(size=6), slip_offset=rng.normal(size=(2, 2)), node_ids=("a", "b"),
+        coordinates=rng.normal(size=(2, 3)), areas=[1.0, 2.0],
+    )  # fmt: skip
 
 
 PROBLEMS = {"plane": plane, "space": space, "block": lambda: gallery.clamped_block(2, 1)} | {

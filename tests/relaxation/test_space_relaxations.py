@@ -1,10 +1,9 @@
 """Relaxations in 3D: which node is branched on, and children that were solved for that."""
 
-from fractions import Fraction
-
 import numpy as np
 import pytest
 from problems3d import from_compliance, random_coupled
+from space_proofs import arc_of_sector
 
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.statuses import CONTACT, UNDECIDED
@@ -96,21 +95,14 @@ def test_slices_that_are_cut_off_sectors_are_excluded_and_leave_the_rest():
         at, (*slices, rest) = relaxation.cut
         assert at == node
         assert all(fresh(engine, with_code(codes, node, part)).pruned for part in slices)
-        whole, *parts = (as_arc(code) for code in (codes[node], *slices, rest))
+        whole, *parts = (arc_of_sector(code - 8) for code in (codes[node], *slices, rest))
         parts.sort()
         assert [a for a, _ in parts] + [whole[1]] == [whole[0]] + [b for _, b in parts]
-        ends |= {parts.index(as_arc(part)) == 0 for part in slices}
+        ends |= {parts.index(arc_of_sector(part - 8)) == 0 for part in slices}
         runs += rest > 2**31
     assert ends == {True, False}
     assert runs > 3
     assert leaves > 2
-
-
-def as_arc(code):
-    """Where a sector begins and ends, as shares of the circle (docs/proof_format.md, under space proofs)."""
-    length, first = divmod(code - 8, 2**31)
-    level = 2 ** (len(f"{first:b}") - 1)
-    return Fraction(first - level, level), Fraction(first - level + length + 1, level)
 
 
 # -- convex forms ------------------------------------------------------------------------------------------------------

@@ -46,10 +46,7 @@ def test_integer_data(seed, sizes, count):
 
 
 @pytest.mark.few(0, 1)
-@pytest.mark.parametrize(
-    ("seed", "sizes", "count"),
-    [(2, (1, 2), some(10, of=20)), (12, (1, 2), 50), (3, (3,), 8)],
-)
+@pytest.mark.parametrize(("seed", "sizes", "count"), [(2, (1, 2), some(10, of=20)), (12, (1, 2), 50), (3, (3,), 8)])
 def test_singular_selections(seed, sizes, count):
     rng = np.random.default_rng(seed)
     families = 0

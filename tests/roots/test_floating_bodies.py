@@ -77,14 +77,7 @@ def _reaching(problem, largest):
     return problem.replace(max_rigid_displacement=largest)
 
 
-@pytest.mark.parametrize(
-    ("push", "statuses"),
-    [
-        (0.0, {"stick"}),
-        (0.25, {"stick"}),
-        (0.9, {"stick", "slip+"}),
-    ],
-)
+@pytest.mark.parametrize(("push", "statuses"), [(0.0, {"stick"}), (0.25, {"stick"}), (0.9, {"stick", "slip+"})])
 def test_a_block_below_sliding_has_one_solution(push, statuses):
     problem = block_on_table(cells=3, push=push)
     roots = enumsol.enumerate_roots(problem, 0)

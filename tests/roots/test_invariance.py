@@ -87,13 +87,9 @@ def test_numbering_of_contact_nodes(problem, alpha):
     order = np.random.default_rng(1).permutation(problem.p)
     F0, F1 = problem.friction
     permuted = rebuild(
-        problem,
-        Bn=sp.csr_array(problem.Bn)[order],
-        Bt=sp.csr_array(problem.Bt)[order],
-        gap=problem.gap[order],
-        slip_offset=problem.slip_offset[order],
-        friction=(F0[order], F1[order]),
-    )
+        problem, Bn=sp.csr_array(problem.Bn)[order], Bt=sp.csr_array(problem.Bt)[order], gap=problem.gap[order],
+        slip_offset=problem.slip_offset[order], friction=(F0[order], F1[order]),
+    )  # fmt: skip
     assert statuses(found(permuted, alpha)) == {tuple(s[i] for i in order) for s in statuses(found(problem, alpha))}
 
 

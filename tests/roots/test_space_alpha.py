@@ -26,17 +26,9 @@ def moving(rng, S, F):
     F_slope = F * rng.uniform(-0.3, 1.5, size=F.shape)
     rows = np.eye(3 * p)
     problem = ContactProblem3D(
-        A,
-        rows[:p],
-        rows[p : 2 * p],
-        rows[2 * p :],
-        f,
-        friction=tuple(F.T),
-        friction_slope=tuple(F_slope.T),
-        load_slope=slope,
-        gap=gap,
-        slip_offset=offset,
-    )
+        A, rows[:p], rows[p : 2 * p], rows[2 * p :], f, friction=tuple(F.T), friction_slope=tuple(F_slope.T),
+        load_slope=slope, gap=gap, slip_offset=offset,
+    )  # fmt: skip
 
     def at(alpha):
         load = f + float(alpha) * slope

@@ -22,16 +22,11 @@ def with_second_tangent(problem, rng, ratio):
     slope = None if problem.load_slope is None else np.append(problem.load_slope, np.zeros(p))
     F, F_slope = problem.friction
     return ContactProblem3D(
-        scipy.linalg.block_diag(problem.A.toarray(), np.eye(p) + X @ X.T / (4 * p)),
-        *wider,
-        last,
-        np.append(problem.f, np.zeros(p)),
-        gap=problem.gap,
-        friction=(F, ratio * F),
-        friction_slope=(F_slope, ratio * F_slope),
-        load_slope=slope,
+        scipy.linalg.block_diag(problem.A.toarray(), np.eye(p) + X @ X.T / (4 * p)), *wider, last,
+        np.append(problem.f, np.zeros(p)), gap=problem.gap, friction=(F, ratio * F),
+        friction_slope=(F_slope, ratio * F_slope), load_slope=slope,
         slip_offset=np.stack([problem.slip_offset, np.zeros(p)], axis=1),
-    )
+    )  # fmt: skip
 
 
 def planes():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from flint import fmpq, fmpq_mat
+from parted_solids import on_springs
 
 import enumsol
 from enumsol import ContactStatus, fem
@@ -13,19 +14,9 @@ UNIT = float(np.finfo(float).eps)
 
 def body(spring, shear):
     """A block with Young's modulus 2.5 on springs at every node, pressed on the ground and pulled sideways."""
-    forces = np.zeros_like(SOLID.points)
-    top = SOLID.points[:, 2] > np.max(SOLID.points[:, 2]) - 1e-9
-    forces[top] = 0.02 * np.array([shear, 0.5 * shear, -1.0])
-    forces[top, 0] *= np.linspace(0.5, 1.5, np.count_nonzero(top))
-    return fem.solid_contact_problem(
-        SOLID.points,
-        SOLID.cells,
-        (1.0, 1.0),
-        contact=SOLID.facets["bottom"],
-        springs=(spring, spring, spring),
-        forces=forces,
-        friction=0.5,
-    )
+    loads = np.tile(0.02 * np.array([shear, 0.5 * shear, -1.0]), (len(SOLID.nodes("top")), 1))
+    loads[:, 0] *= np.linspace(0.5, 1.5, len(loads))
+    return on_springs(SOLID, (1.0, 1.0), spring, loads, 0.5)
 
 
 def sticking(problem):

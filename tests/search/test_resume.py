@@ -23,16 +23,8 @@ from refusals import bad_argument
 from touching import touching_problem
 from trees import above_known_roots, by_the_tree
 
-from enumsol import (
-    ContactProblem,
-    Interrupted,
-    InvalidArgumentError,
-    Proof,
-    branch_graph,
-    enumerate_roots,
-    gallery,
-    verify,
-)
+import enumsol
+from enumsol import ContactProblem, Interrupted, InvalidArgumentError, Proof, enumerate_roots, gallery, verify
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.proof.begun import BegunProof
 from enumsol.proof.writer import BESIDE, FLUSH_EVERY
@@ -377,7 +369,7 @@ def test_files_of_other_searches(tmp_path):
     path.write_bytes(bytes_of(proof_of([[1, 2], ["x"]])))
     refused(path, "is not a proof", problem, alpha)
     square = gallery.two_node_square()
-    branch_graph(square, (0, 10)).proof.save(path)
+    enumsol.branch_graph(square, (0, 10)).proof.save(path)
     refused(path, "is a proof of another kind, 'graph'", square, 5)
 
 

@@ -209,14 +209,9 @@ def test_fast_arithmetic_finds_the_same(with_form):
 def test_a_body_on_weak_springs_takes_few_nodes():
     """A box of tetrahedra with 9 contact nodes."""
     problem = fem.mesh_problem(
-        fem.box(2, 2, 1, (1.0, 1.0, 0.5), "tetrahedra"),
-        young=1.0,
-        poisson=0.3,
-        contact="bottom",
-        spring={"top": (5e-4, 5e-4)},
-        load={"top": (3e-4, 1e-4, -1e-3)},
-        friction=1.0,
-    )
+        fem.box(2, 2, 1, (1.0, 1.0, 0.5), "tetrahedra"), young=1.0, poisson=0.3, contact="bottom",
+        spring={"top": (5e-4, 5e-4)}, load={"top": (3e-4, 1e-4, -1e-3)}, friction=1.0,
+    )  # fmt: skip
     with by_the_tree():
         roots = all_roots(problem, 0)
     assert of_kind(records_of(roots.proof), "f")

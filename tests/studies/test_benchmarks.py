@@ -20,13 +20,9 @@ def test_every_benchmark_runs_once(tmp_path):
     environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": path}
     environment.pop("PYTEST_ADDOPTS", None)  # which was said of this run, not of the one within
     done = subprocess.run(
-        [*command, "-o", f"cache_dir={tmp_path}"],
-        cwd=ROOT,
-        env=environment,
-        capture_output=True,
-        text=True,
+        [*command, "-o", f"cache_dir={tmp_path}"], cwd=ROOT, env=environment, capture_output=True, text=True,
         check=False,
-    )
+    )  # fmt: skip
     assert done.returncode == 0, done.stdout
     assert " passed" in done.stdout
     assert "skipped" not in done.stdout

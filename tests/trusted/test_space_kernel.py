@@ -8,40 +8,15 @@ import numpy as np
 import pytest
 from effort import some
 from problems3d import block_on_springs
-from space_proofs import on_the_end_of_a_sector, random_problem
+from space_proofs import arc_of_sector, on_the_end_of_a_sector, random_problem
 
 from enumsol import enumerate_roots
 from enumsol.arithmetic.balls import Ball, determinant_sign
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.sectors import DEEPEST, RUN, SECTORS, contains, cut, end_number, is_sector, run_of, start_of
 from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.trusted.space import sector_rows as sr
 from enumsol.trusted.space.leaves import SpaceRoot, _cut, _Leaf, distinct_roots, same_root, settle
-from enumsol.trusted.space.sector_rows import (
-    ALONG,
-    CHORD,
-    CONTACT,
-    END,
-    FORBIDDEN,
-    FORCE,
-    FREE,
-    FRICTIONLESS,
-    GAP,
-    LEFT,
-    OPEN,
-    RIGHT,
-    SLIP,
-    SLIP_MINUS,
-    SLIP_PLUS,
-    STICK,
-    TANGENT,
-    TAU,
-    UNDECIDED,
-    is_sector_covering,
-    row_sign,
-    sector_children,
-    sector_margin,
-    sector_row_terms,
-)
 
 TAU_ONE = np.array([[1, 2]])
 
@@ -70,15 +45,20 @@ def sectors():
 
 def exact_terms(kind, number):
     (x, y), (p, q) = start_of(number), start_of(end_number(number))
-    return {TANGENT: [1, -x, -y], CHORD: [x + p, y + q, -(1 + x * p + y * q)], LEFT: [-y, x], RIGHT: [q, -p]}[kind]
+    return {
+        sr.TANGENT: [1, -x, -y],
+        sr.CHORD: [x + p, y + q, -(1 + x * p + y * q)],
+        sr.LEFT: [-y, x],
+        sr.RIGHT: [q, -p],
+    }[kind]
 
 
-@pytest.mark.parametrize("kind", [TANGENT, CHORD, LEFT, RIGHT])
+@pytest.mark.parametrize("kind", [sr.TANGENT, sr.CHORD, sr.LEFT, sr.RIGHT])
 def test_coefficients_are_off_by_few_units(kind):
     for number in sectors():
-        if kind == TANGENT and number >= RUN:
+        if kind == sr.TANGENT and number >= RUN:
             continue
-        _, found = sector_row_terms((kind, 0, number), TAU_ONE, 3)
+        _, found = sr.sector_row_terms((kind, 0, number), TAU_ONE, 3)
         for value, exact in zip(found, exact_terms(kind, number), strict=True):
             assert abs(Fraction(value) - exact) <= Fraction(1, 1 << 53) * abs(exact)
 
@@ -100,19 +80,12 @@ def test_boxes_of_angles_cover_their_sectors():
 
 def test_halves_of_sectors_are_those_that_they_hold():
     for number in (4, 7, 9, 100):
-        first, second = sector_children(SECTORS + number, 2)
+        first, second = sr.sector_children(SECTORS + number, 2)
         assert start_of(first - SECTORS) == start_of(number)
         assert start_of(second - SECTORS) == start_of(end_number(first - SECTORS))
         assert start_of(end_number(second - SECTORS)) == start_of(end_number(number))
         assert contains(number, first - SECTORS)
         assert not contains(first - SECTORS, number)
-
-
-def positions(number):
-    """Where a sector begins and ends, as shares of the circle (docs/proof_format.md, under space proofs)."""
-    length, first = divmod(number, 2**31)
-    level = 2 ** (len(f"{first:b}") - 1)
-    return Fraction(first - level, level), Fraction(first - level + length + 1, level)
 
 
 def test_slices_and_what_is_left_make_up_the_sector():
@@ -125,9 +98,9 @@ def test_slices_and_what_is_left_make_up_the_sector():
             part, rest = cut(number, end, halvings)
             assert is_sector(part)
             assert is_sector(rest)
-            (a, b), parts = positions(number), sorted(map(positions, (part, rest)))
+            (a, b), parts = arc_of_sector(number), sorted(map(arc_of_sector, (part, rest)))
             assert [a, parts[0][1], b] == [parts[0][0], parts[1][0], parts[1][1]]
-            assert parts[-end] == positions(part)
+            assert parts[-end] == arc_of_sector(part)
             assert parts[-end][1] - parts[-end][0] <= (b - a) / 2**halvings
             for inner in (part, rest):
                 assert contains(number, inner)
@@ -157,12 +130,12 @@ def test_coverings_of_sectors():
                 numbers[j] = numbers[j] % RUN * 2 + numbers[j] // RUN * RUN
             else:  # the same otherwise
                 numbers = [2 * (number % RUN) + (2 * (number // RUN) + 1) * RUN for number in numbers]
-        begin, end = positions(whole)
+        begin, end = arc_of_sector(whole)
         right = len(numbers) > 1 and all(number >= 0 and number % RUN > 3 for number in numbers)
         if right:
-            parts = sorted(map(positions, numbers))
+            parts = sorted(map(arc_of_sector, numbers))
             right = [a for a, _ in parts] + [end] == [begin] + [b for _, b in parts]
-        found = is_sector_covering(SECTORS + whole, [SECTORS + number for number in numbers], 2)
+        found = sr.is_sector_covering(SECTORS + whole, [SECTORS + number for number in numbers], 2)
         assert found == right
         accepted += found
     assert 800 < accepted < 1500
@@ -173,11 +146,11 @@ def test_no_sector_is_longer_than_a_quarter_of_the_circle():
     assert not is_sector(9 + RUN)  # from one quarter into the next
     assert not is_sector(8 + 2 * RUN)
     assert not any(map(is_sector, (-1, 0, 3, RUN + 3, -RUN + 8)))
-    for kind in (CHORD, LEFT, RIGHT):
+    for kind in (sr.CHORD, sr.LEFT, sr.RIGHT):
         with pytest.raises(ValueError, match="no such row"):
-            sector_row_terms((kind, 0, 9 + RUN), TAU_ONE, 3)
+            sr.sector_row_terms((kind, 0, 9 + RUN), TAU_ONE, 3)
     with pytest.raises(ValueError, match="no such row"):
-        sector_row_terms((TANGENT, 0, 8 + RUN), TAU_ONE, 3)
+        sr.sector_row_terms((sr.TANGENT, 0, 8 + RUN), TAU_ONE, 3)
 
 
 # -- exclusions --------------------------------------------------------------------------------------------------------
@@ -186,13 +159,13 @@ def test_no_sector_is_longer_than_a_quarter_of_the_circle():
 def sampled(rng, code):
     """(y, w) of one node that satisfies the conditions of a status; forces and displacements of size one."""
     y, w = np.zeros(3), np.zeros(3)
-    if code == UNDECIDED:
-        code = int(rng.choice((OPEN, CONTACT)))
-    if code == CONTACT:
-        code = int(rng.choice((STICK, SECTORS + 4 + int(rng.integers(4)))))
-    if code == OPEN:
+    if code == sr.UNDECIDED:
+        code = int(rng.choice((sr.OPEN, sr.CONTACT)))
+    if code == sr.CONTACT:
+        code = int(rng.choice((sr.STICK, SECTORS + 4 + int(rng.integers(4)))))
+    if code == sr.OPEN:
         w = np.array([-rng.random(), *rng.normal(size=2)])
-    elif code == STICK:
+    elif code == sr.STICK:
         phi, y[0] = rng.uniform(0, 2 * np.pi), rng.random()
         y[1:] = y[0] * rng.random() * np.array([np.cos(phi), np.sin(phi)])
     else:
@@ -205,61 +178,67 @@ def sampled(rng, code):
 
 
 ROWS = [
-    (GAP, 0, 0), (FORCE, 0, 0), (TAU, 0, 0), (TAU, 0, 1), (SLIP, 0, 0), (SLIP, 0, 1),
-    *((kind, 0, number) for kind in (TANGENT, CHORD, LEFT, RIGHT) for number in (4, 5, 6, 7, 9, 19, 38)),
-    *((kind, 0, run_of(*run)) for kind in (CHORD, LEFT, RIGHT) for run in ((8, 2), (33, 3), (67, 4))),
+    (sr.GAP, 0, 0), (sr.FORCE, 0, 0), (sr.TAU, 0, 0), (sr.TAU, 0, 1), (sr.SLIP, 0, 0), (sr.SLIP, 0, 1),
+    *((kind, 0, number) for kind in (sr.TANGENT, sr.CHORD, sr.LEFT, sr.RIGHT) for number in (4, 5, 6, 7, 9, 19, 38)),
+    *((kind, 0, run_of(*run)) for kind in (sr.CHORD, sr.LEFT, sr.RIGHT) for run in ((8, 2), (33, 3), (67, 4))),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(
     "code",
-    [OPEN, STICK, CONTACT, UNDECIDED, *(SECTORS + n for n in (4, 9, 19, run_of(33, 3), run_of(67, 3), run_of(17, 3)))],
+    [
+        sr.OPEN,
+        sr.STICK,
+        sr.CONTACT,
+        sr.UNDECIDED,
+        *(SECTORS + n for n in (4, 9, 19, run_of(33, 3), run_of(67, 3), run_of(17, 3))),
+    ],
 )
 def test_rows_are_what_the_solutions_of_a_status_satisfy(code):
     rng = np.random.default_rng(code)
     for _ in range(200):
         z = np.concatenate(sampled(rng, code))
         for row in ROWS:
-            value = sum(c * z[i] for i, c in zip(*sector_row_terms(row, TAU_ONE, 3), strict=True))
-            sign = row_sign(code, row)
-            assert sign == FORBIDDEN or value >= -1e-14
-            assert sign != FREE or abs(value) <= 1e-14
+            value = sum(c * z[i] for i, c in zip(*sr.sector_row_terms(row, TAU_ONE, 3), strict=True))
+            sign = sr.row_sign(code, row)
+            assert sign == sr.FORBIDDEN or value >= -1e-14
+            assert sign != sr.FREE or abs(value) <= 1e-14
 
 
 def test_rows_of_a_node_with_one_tangent_or_none():
     tau = np.array([[-1, 1]])
-    rows = [(GAP, 0, 0), (FORCE, 0, 0), (TAU, 0, 1), (SLIP, 0, 1)]
-    rows += [(kind, 0, sign) for kind in (END, ALONG) for sign in (1, -1)]
+    rows = [(sr.GAP, 0, 0), (sr.FORCE, 0, 0), (sr.TAU, 0, 1), (sr.SLIP, 0, 1)]
+    rows += [(kind, 0, sign) for kind in (sr.END, sr.ALONG) for sign in (1, -1)]
     samples = {
-        OPEN: [[0, 0, -1, 0], [0, 0, -1, 2], [0, 0, 0, -2]],
-        STICK: [[1, 0.5, 0, 0], [1, -1, 0, 0], [0, 0, 0, 0]],
-        SLIP_PLUS: [[1, 1, 0, 2], [0, 0, 0, 1]],
-        SLIP_MINUS: [[1, -1, 0, -2], [0, 0, 0, -1]],
+        sr.OPEN: [[0, 0, -1, 0], [0, 0, -1, 2], [0, 0, 0, -2]],
+        sr.STICK: [[1, 0.5, 0, 0], [1, -1, 0, 0], [0, 0, 0, 0]],
+        sr.SLIP_PLUS: [[1, 1, 0, 2], [0, 0, 0, 1]],
+        sr.SLIP_MINUS: [[1, -1, 0, -2], [0, 0, 0, -1]],
     }
-    samples[CONTACT] = [*samples[STICK], *samples[SLIP_PLUS], *samples[SLIP_MINUS]]
-    samples[UNDECIDED] = [*samples[OPEN], *samples[CONTACT]]
+    samples[sr.CONTACT] = [*samples[sr.STICK], *samples[sr.SLIP_PLUS], *samples[sr.SLIP_MINUS]]
+    samples[sr.UNDECIDED] = [*samples[sr.OPEN], *samples[sr.CONTACT]]
     allowed = 0
     for code, points in samples.items():
         for row in rows:
-            sign = row_sign(code, row)
-            values = [sum(c * z[i] for i, c in zip(*sector_row_terms(row, tau, 2), strict=True)) for z in points]
-            assert sign == FORBIDDEN or min(values) >= 0
-            assert sign != FREE or not any(values)
-            allowed += sign != FORBIDDEN
+            sign = sr.row_sign(code, row)
+            values = [sum(c * z[i] for i, c in zip(*sr.sector_row_terms(row, tau, 2), strict=True)) for z in points]
+            assert sign == sr.FORBIDDEN or min(values) >= 0
+            assert sign != sr.FREE or not any(values)
+            allowed += sign != sr.FORBIDDEN
     assert allowed > 20
     none = np.array([[-1, -1]])
-    assert row_sign(FRICTIONLESS, (GAP, 0, 0)) == FREE
-    assert row_sign(FRICTIONLESS, (FORCE, 0, 0)) != FREE
-    for row in ((TAU, 0, 0), (SLIP, 0, 1), (END, 0, 1), (TANGENT, 0, 4)):
+    assert sr.row_sign(sr.FRICTIONLESS, (sr.GAP, 0, 0)) == sr.FREE
+    assert sr.row_sign(sr.FRICTIONLESS, (sr.FORCE, 0, 0)) != sr.FREE
+    for row in ((sr.TAU, 0, 0), (sr.SLIP, 0, 1), (sr.END, 0, 1), (sr.TANGENT, 0, 4)):
         with pytest.raises(ValueError, match="no such row"):
-            sector_row_terms(row, none, 1)
+            sr.sector_row_terms(row, none, 1)
 
 
 def test_margins_are_below_the_energy():
     rng = np.random.default_rng(7)
     positive = 0
     for _ in range(300):
-        code = int(rng.choice((OPEN, STICK, CONTACT, SECTORS + 4, SECTORS + 19)))
+        code = int(rng.choice((sr.OPEN, sr.STICK, sr.CONTACT, SECTORS + 4, SECTORS + 19)))
         X = rng.normal(size=(3, 3))
         S = X @ X.T + 0.2 * np.eye(3)
         # the energy at a sampled point of the status: g is what makes w = g - S y
@@ -268,10 +247,10 @@ def test_margins_are_below_the_energy():
         system = EnclosedSpace.of_floats(
             SpaceSystem(S, g, np.ones((1, 2)), TAU_ONE, np.ones(3), np.ones(1), np.ones(1))
         )
-        rows = [row for row in ROWS if row_sign(code, row) != FORBIDDEN]
-        values = np.array([rng.normal() if row_sign(code, row) == FREE else rng.random() for row in rows])
+        rows = [row for row in ROWS if sr.row_sign(code, row) != sr.FORBIDDEN]
+        values = np.array([rng.normal() if sr.row_sign(code, row) == sr.FREE else rng.random() for row in rows])
         values *= 10.0 ** rng.integers(-4, 1)
-        margin = sector_margin(system, (code,), rows, values)
+        margin = sr.sector_margin(system, (code,), rows, values)
         assert margin <= y @ S @ y - g @ y + 1e-12
         positive += margin > -1
     assert positive
@@ -280,17 +259,17 @@ def test_margins_are_below_the_energy():
 def test_rows_that_a_status_lacks_or_of_the_wrong_sign():
     system = EnclosedSpace.of_floats(SpaceSystem.scaled(np.eye(3), np.ones(3), np.ones((1, 2))))
     for code, row, value in (
-        (SECTORS + 4, (LEFT, 0, 5), 1.0),
-        (SECTORS + 4, (CHORD, 0, 8), 1.0),
-        (CONTACT, (CHORD, 0, 4), 1.0),
-        (SECTORS + 4, (SLIP, 0, 0), 1.0),
-        (STICK, (TANGENT, 0, 4), -1.0),
-        (STICK, (FORCE, 0, 0), np.nan),
+        (SECTORS + 4, (sr.LEFT, 0, 5), 1.0),
+        (SECTORS + 4, (sr.CHORD, 0, 8), 1.0),
+        (sr.CONTACT, (sr.CHORD, 0, 4), 1.0),
+        (SECTORS + 4, (sr.SLIP, 0, 0), 1.0),
+        (sr.STICK, (sr.TANGENT, 0, 4), -1.0),
+        (sr.STICK, (sr.FORCE, 0, 0), np.nan),
     ):
-        assert sector_margin(system, (code,), [row], np.array([value])) == -np.inf
-    for row in ((END, 0, 1), (ALONG, 0, 1), (TANGENT, 0, 3)):
+        assert sr.sector_margin(system, (code,), [row], np.array([value])) == -np.inf
+    for row in ((sr.END, 0, 1), (sr.ALONG, 0, 1), (sr.TANGENT, 0, 3)):
         with pytest.raises(ValueError, match="no such row"):
-            sector_row_terms(row, TAU_ONE, 3)
+            sr.sector_row_terms(row, TAU_ONE, 3)
 
 
 # -- leaves ------------------------------------------------------------------------------------------------------------
@@ -366,7 +345,7 @@ def test_a_root_is_one_where_rounding_ends_its_refinement():
     # 38 of these 100, and so did the linear algebra of some processors
     problem = block_on_springs(np.random.default_rng([3, 41]), 1e-3)
     enclosed = SpaceSolvers(problem, 0, "verified").enclosed
-    leaf, rng = (OPEN, STICK, STICK, SECTORS + 466088, STICK, STICK), np.random.default_rng(1)
+    leaf, rng = (sr.OPEN, sr.STICK, sr.STICK, SECTORS + 466088, sr.STICK, sr.STICK), np.random.default_rng(1)
     for _ in range(some(25, of=100)):
         E = 1 + 1e-13 * rng.normal(size=enclosed.S.shape)
         g = enclosed.g * (1 + 1e-13 * rng.normal(size=len(enclosed.g)))
