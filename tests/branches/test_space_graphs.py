@@ -73,7 +73,7 @@ def test_below_the_bound_of_the_stiffness_there_is_one_root():
     assert uniqueness_bound(one, (0.0, 0.25)) == 0.25
     assert uniqueness_bound(one, (2.0, 3.0)) is None
     rng = np.random.default_rng(5)
-    for _ in range(some(8, of=60)):
+    for _ in range(some(5, of=60)):
         p = int(rng.integers(1, 3))
         slope = tuple(rng.uniform(0.2, 1.0, (2, p)))
         g = rng.normal(size=3 * p) * 3

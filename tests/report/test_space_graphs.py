@@ -163,7 +163,7 @@ def test_a_node_has_bars_and_lengths_of_tangential_vectors(browser, node_page, t
     assert browser.complaints() == []
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @in_a_browser
 def test_bodies_follow_the_slider(browser, wedge_page, wedge):
     browser.size(1000, 500)
