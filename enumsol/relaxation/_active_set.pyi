@@ -27,12 +27,14 @@ class QPData:
 class BranchingRule:
     p: int
     candidates: int
+    slow: bool
     def __init__(
         self,
         F: NDArray[np.float64],
         slip_rows: NDArray[np.intp],
         slip_modes: NDArray[np.int8],
         candidates: int,
+        slow: bool = False,
     ) -> None: ...
 
 class QPState:

@@ -10,7 +10,7 @@ N the normals of the active rows, all rows scaled to unit length in the norm of 
 """
 
 cimport cython
-from libc.math cimport HUGE_VAL, fabs, fmax, fmin, isfinite, sqrt
+from libc.math cimport HUGE_VAL, cbrt, fabs, fmax, fmin, isfinite, sqrt
 from libc.stdlib cimport free, malloc
 from libc.string cimport memcpy, memmove, memset
 
@@ -29,6 +29,7 @@ cdef enum:
 cdef double LEAST = 1e-3      # part of the gap below which a child's gain makes no difference
 cdef double BEYOND = 0.1      # how far to trust what the first dual step of a child leaves to further ones
 cdef double LATER = 0.05      # promise of a node in contact, its slip undecided, beside that of an undecided one
+cdef double FIRST = 0.25      # and that of an undecided one beside that of a node in contact, in a slow tree
 cdef double DEPENDENT = 1e-10  # part of a unit normal outside the span of the active ones, below which it lies in it
 
 
@@ -173,6 +174,9 @@ cdef class BranchingRule:
     further steps may add. The candidate whose children close most of the gap is taken, those rather that are undecided
     altogether, and the first one at once of which all children but one are excluded.
 
+    In a slow tree, where one step closes little of the gap, nodes in contact are taken rather; shares of three children
+    are compared with those of two by their geometric means, and only what one step proves is counted.
+
     Parameters
     ----------
     F : (p,) array
@@ -182,18 +186,22 @@ cdef class BranchingRule:
         kind * p + node as in enumsol.model.statuses.RowKind.
     candidates : int
         How many nodes are looked at.
+    slow : bool
+        The tree is slow.
     """
 
     cdef readonly Py_ssize_t p, candidates
+    cdef readonly bint slow
     cdef double[::1] F, violation
     cdef Py_ssize_t[:, ::1] slip_row
     cdef signed char[:, ::1] slip_mode
     cdef Py_ssize_t[::1] order
     cdef signed char[::1] codes
 
-    def __init__(self, F, slip_rows, slip_modes, candidates):
+    def __init__(self, F, slip_rows, slip_modes, candidates, slow=False):
         self.p = len(F)
         self.candidates = candidates
+        self.slow = slow
         self.F = np.ascontiguousarray(F, dtype=np.float64)
         self.slip_row = np.ascontiguousarray(slip_rows, dtype=np.intp)
         self.slip_mode = np.ascontiguousarray(slip_modes, dtype=np.int8)
@@ -441,10 +449,10 @@ cdef class QPState:
         cdef double most
         return self._gain(row, mode, False, &most)
 
-    cdef double _share(self, int row, int mode, double gap, bint quick) noexcept nogil:
+    cdef double _share(self, int row, int mode, double gap, bint quick, double beyond) noexcept nogil:
         """The share of the gap that a row is expected to close; 1 where it is proven to; or, quick, the most."""
         cdef double most = 0.0, proven = fmin(self._gain(row, mode, quick, &most) / gap, 1.0)
-        return proven + BEYOND * (fmin(most / gap, 1.0) - proven)
+        return proven + beyond * (fmin(most / gap, 1.0) - proven)
 
     cdef double _gain(self, int row, int mode, bint quick, double *most) noexcept nogil:
         """The gain; or, quick, the ``most`` that it can be with further steps: other multipliers left out of account."""
@@ -475,27 +483,28 @@ cdef class QPState:
         A finite promise is less than 1.01.
         """
         cdef Py_ssize_t p = rule.p
-        cdef double a, b, slip
+        cdef double a, b, slip, beyond = 0.0 if rule.slow else BEYOND
         if code == UNDECIDED_:
             # open: no force; in contact: no gap
-            a = self._share(<int> i, 2, gap, quick)
+            a = self._share(<int> i, 2, gap, quick, beyond)
             if rule.F[i] > 0.0:
-                a = fmax(a, self._share(<int> (p + i), 2, gap, quick))
-            b = self._share(<int> (4 * p + i), 2, gap, quick)
+                a = fmax(a, self._share(<int> (p + i), 2, gap, quick, beyond))
+            b = self._share(<int> (4 * p + i), 2, gap, quick, beyond)
             if a >= 1.0 or b >= 1.0:
                 return HUGE_VAL
-            return (a + LEAST) * (b + LEAST)
+            return (FIRST if rule.slow else 1.0) * (a + LEAST) * (b + LEAST)
         # stick: no slip; slip: the slip bound is reached, and the slip has its sign
-        slip = self._share(<int> (5 * p + i), 2, gap, quick)
-        a = self._share(<int> rule.slip_row[0, i], rule.slip_mode[0, i], gap, quick)
-        b = self._share(<int> rule.slip_row[1, i], rule.slip_mode[1, i], gap, quick)
+        slip = self._share(<int> (5 * p + i), 2, gap, quick, beyond)
+        a = self._share(<int> rule.slip_row[0, i], rule.slip_mode[0, i], gap, quick, beyond)
+        b = self._share(<int> rule.slip_row[1, i], rule.slip_mode[1, i], gap, quick, beyond)
         if self.w[p + i] < 0.0:
             a = fmax(a, slip)
         else:
             b = fmax(b, slip)
         if (slip >= 1.0) + (a >= 1.0) + (b >= 1.0) >= 2:
             return HUGE_VAL
-        return LATER * (slip + LEAST) * (a + LEAST) * (b + LEAST)
+        a = (slip + LEAST) * (a + LEAST) * (b + LEAST)
+        return cbrt(a * a) if rule.slow else LATER * a
 
     def forced(self, given, BranchingRule rule, double target):
         """Undecided contact nodes of which one dual step excludes all children but one (see choose)."""
@@ -551,6 +560,8 @@ cdef class QPState:
         for k in range(count):
             i = rule.order[k]
             worth = fmax(rule.violation[k], 1e-12)
+            if rule.slow:
+                worth = sqrt(worth)
             if best >= 0:
                 # what cannot win is not looked at, or not closely
                 if most >= 1.01 * worth:

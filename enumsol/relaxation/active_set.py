@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enumsol.model.statuses import UNDECIDED, RowKind
 from enumsol.relaxation.engine import BRANCHING_CANDIDATES, FEASIBILITY_TOLERANCE, PRUNE_MARGIN, Relaxation
-from enumsol.relaxation.imposed_rows import EQUALITY, INEQUALITY, row_terms
+from enumsol.relaxation.imposed_rows import EQUALITY, INEQUALITY, row_terms, status_rows
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from numpy.typing import NDArray
 
     from enumsol.condensation.condensed import ScaledSystem
@@ -19,6 +22,8 @@ if TYPE_CHECKING:
     from enumsol.trusted.quadratic_forms import EnclosedForm
 
 
+#: A tree is slow where one dual step closes less of the gap at its root than this share, in the mean over the nodes.
+_SLOW = 0.04
 #: Rows that become equations when a node is open, or in contact.
 _APART = (int(RowKind.NORMAL_FORCE), int(RowKind.PENETRATION))
 
@@ -30,7 +35,7 @@ class CompiledEngine:
     ----------
     data : QPData
         The program.
-    rule : BranchingRule
+    rule : callable giving the BranchingRule, called once, when a node of the tree is to be branched on
     size : int
         The first unknowns, 2p of them, are lambda.
     offset : float
@@ -41,16 +46,26 @@ class CompiledEngine:
     name = "active-set"
 
     def __init__(
-        self, data: QPData, rule: BranchingRule, size: int, offset: float = 0.0, always: tuple[int, ...] = ()
+        self,
+        data: QPData,
+        rule: Callable[[], BranchingRule],
+        size: int,
+        offset: float = 0.0,
+        always: tuple[int, ...] = (),
     ) -> None:
-        self.data, self.rule, self.size, self.offset, self.always = data, rule, size, offset, always
+        self.data, self._rule, self.size, self.offset, self.always = data, rule, size, offset, always
         #: Most changes of the active set; a program that needs more has stalled.
         self.limit = 200 + 10 * size
 
     #: The form that is minimised in place of the energy, if any.
     form: EnclosedForm | None = None
 
-    def root(self, rows: list[int], modes: list[int]) -> Relaxation:
+    @cached_property
+    def rule(self) -> BranchingRule:
+        """Which contact node a partial assignment is branched on."""
+        return self._rule()
+
+    def root(self, rows: list[int], modes: list[int]) -> ActiveSetRelaxation:
         """The relaxation with the given rows on."""
         from enumsol.relaxation._active_set import QPState  # compiled: whoever made the data has it
 
@@ -67,6 +82,8 @@ class ActiveSetEngine(CompiledEngine):
     system : ScaledSystem
     candidates : int
         Nodes whose children are bounded before one of them is branched on.
+    slow : bool, optional
+        Whether little is gained by each branching; by default that is found out at the root of the tree.
     form : (H, h), optional
         Shapes (2p, 2p) and (2p,): minimise lambda' H lambda - h' lambda in place of the energy, H = S and h = g. H must
         be positive definite, and the form at most zero at every solution.
@@ -82,6 +99,7 @@ class ActiveSetEngine(CompiledEngine):
         system: ScaledSystem,
         *,
         candidates: int = BRANCHING_CANDIDATES,
+        slow: bool | None = None,
         form: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
     ) -> None:
         from enumsol.relaxation import _active_set  # compiled; its absence is handled by make_engine
@@ -95,7 +113,22 @@ class ActiveSetEngine(CompiledEngine):
         data = _active_set.QPData(H, h, -system.S, system.g, *self.rows)
         cones = np.array([RowKind.CONE_PLUS, RowKind.CONE_MINUS])[:, None] * p + np.arange(p)
         modes = np.full((2, p), EQUALITY, dtype=np.int8)
-        super().__init__(data, _active_set.BranchingRule(system.F, cones, modes, candidates), 2 * p)
+
+        def rule() -> BranchingRule:
+            chosen = self._is_slow(system.F) if slow is None else slow
+            return _active_set.BranchingRule(system.F, cones, modes, candidates, chosen)
+
+        super().__init__(data, rule, 2 * p)
+
+    def _is_slow(self, F: NDArray[np.float64]) -> bool:
+        """Whether one dual step closes little of the gap at the root of the tree."""
+        p, rows, modes = len(F), list[int](), list[int]()
+        for node, friction in enumerate((F > 0).tolist()):
+            for kind, mode in status_rows(UNDECIDED, friction=friction):
+                rows.append(kind * p + node)
+                modes.append(mode)
+        root = self.root(rows, modes)
+        return not (root.stalled or root.pruned) and root.gap_closed((UNDECIDED,) * p) < _SLOW
 
 
 class FormEngine(CompiledEngine):
@@ -113,7 +146,7 @@ class FormEngine(CompiledEngine):
         from enumsol.relaxation._active_set import QPData
 
         data = QPData(form.H, form.h, -scaled.S, scaled.g, *engine.rows)
-        super().__init__(data, engine.rule, engine.size, -form.k)
+        super().__init__(data, lambda: engine.rule, engine.size, -form.k)
         self.form = form
 
 

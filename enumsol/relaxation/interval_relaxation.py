@@ -191,7 +191,7 @@ class IntervalEngine(CompiledEngine):
         form = PieceForm(system.S, system.g, system.half) if form is None else form
         if not system.loaded:
             data = _active_set.QPData(form.H, form.h, -system.S, system.g, start, index, value, np.zeros(rows))
-            super().__init__(data, rule, 2 * p)
+            super().__init__(data, lambda: rule, 2 * p)
             return
         # the last unknown is tau, between -1 and 1; w follows the 2p + 1 unknowns
         index = np.append(np.where(index >= 2 * p, index + 1, index), [2 * p, 2 * p])
@@ -207,7 +207,7 @@ class IntervalEngine(CompiledEngine):
                 "the energy over an interval of alpha is not convex to working precision; expected contact rows "
                 "[Bn; Bt] that are independent beyond rounding (are two contact nodes almost the same point?)"
             ) from error
-        super().__init__(data, rule, 2 * p, offset=float(convex[-1, -1]), always=(rows, rows + 1))
+        super().__init__(data, lambda: rule, 2 * p, offset=float(convex[-1, -1]), always=(rows, rows + 1))
 
 
 def _all_rows(system: IntervalSystem) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:

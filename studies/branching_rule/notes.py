@@ -8,6 +8,8 @@ from branching_rule.rules import BASE, ONE_STEP, RULES, TAKEN
 from shared.figures import BLUE, GREY, RED, panels
 
 MEASURES = ("nodes", "QPs", "fast s", "verified s")
+#: Share of the gap below which the package takes a tree to be slow.
+SLOW = 0.04
 
 
 def ratios(rows, rule, column, base=BASE):
@@ -45,6 +47,24 @@ def conclusions(rows, max_nodes):
     for column in ("fast s", "verified s"):
         lost = [f"{name} ({value:.2f})" for name, value in ratios(rows, TAKEN, column).items() if value > 1.0]
         yield f"{column}: {TAKEN!r}, the package's, takes longer than {BASE!r} on: {'; '.join(lost) or 'none'}"
+
+
+def slow_conclusions(rows):
+    """Nodes by the rule for slow trees over those by the other one, where the share is small and where it is not."""
+    for slow in (True, False):
+        both = [line for line in rows if "-" not in (line["nodes, slow"], line["nodes, others"])]
+        chosen = {
+            f"{line['problem']}, F = {line['F']:g}": line["nodes, slow"] / line["nodes, others"]
+            for line in both
+            if (line["share"] < SLOW) == slow
+        }
+        if chosen:
+            worst = max(chosen, key=chosen.get)
+            yield (
+                f"share {'below' if slow else 'of at least'} {SLOW}: the rule for slow trees takes "
+                f"{mean(chosen.values()):.2f} times as many nodes, from {min(chosen.values()):.3f} to "
+                f"{chosen[worst]:.2f} ({worst})"
+            )
 
 
 def against_taken(rows):

@@ -6,6 +6,7 @@ from effort import some
 from generators import dense_compliance, fe_compliance, friction, planted_load, random_load
 from oracles import brute_force
 
+from enumsol import gallery
 from enumsol.condensation.condensed import CondensedSystem
 from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.relaxation.active_set import ActiveSetEngine
@@ -275,6 +276,67 @@ def test_branching_takes_an_undecided_node_and_prefers_one_that_is_forced():
         codes = tuple(UNDECIDED if i == decided else STICK for i in range(3))
         assert ActiveSetEngine(system).root(*rows_of(codes, F)).choose(codes) == decided
     assert node.choose((STICK, OPEN, SLIP_PLUS)) == -1
+
+
+def worth_in_a_slow_tree(node, system, i, code):
+    """What branching on a contact node with friction is worth, from the gains of its children (theory, (5.6), (5.7a)).
+
+    It is inf where all children but one are excluded.
+    """
+    p, gap = system.p, PRUNE_MARGIN - node.bound
+    force, w = node.forces, node.displacements
+    violation = system.F[i] * force[i] * abs(w[p + i]) - force[p + i] * w[p + i]
+
+    def share(*rows):
+        return min(1.0, max(node._state.gain(kind * p + i, EQUALITY) for kind in rows) / gap)
+
+    if code == UNDECIDED:
+        violation = 2 * violation - force[i] * w[i]
+        shares = [share(0, 1), share(4)]
+    else:
+        slip = share(5)
+        ways = [share(2), share(3)]
+        against = 0 if w[p + i] < 0 else 1
+        ways[against] = max(ways[against], slip)
+        shares = [slip, *ways]
+    if sum(x >= 1.0 for x in shares) >= len(shares) - 1:
+        return np.inf
+    product = np.prod([x + 1e-3 for x in shares])
+    return (product / 4 if len(shares) == 2 else np.cbrt(product) ** 2) * np.sqrt(max(violation, 1e-12))
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_slow_tree_is_branched_on_by_geometric_means(seed):
+    rng = np.random.default_rng(seed + 90)
+    compared, kinds = 0, set()
+    for _ in range(30):
+        system = random_system(rng, int(rng.integers(2, 9)))
+        if not np.all(system.F > 0):
+            continue
+        for codes, node in descend(rng, system, ActiveSetEngine(system, slow=True)):
+            undecided = [i for i, code in enumerate(codes) if code in (UNDECIDED, CONTACT)]
+            if node.pruned or len(undecided) < 2:
+                continue
+            worth = [worth_in_a_slow_tree(node, system, i, codes[i]) for i in undecided]
+            taken = node.choose(codes)
+            # a node that is all but decided may be passed over, since its violation is small
+            best = max((value for value in worth if value < np.inf), default=0.0)
+            assert worth[undecided.index(taken)] >= best * (1 - 1e-9)
+            compared += 1
+            kinds.add((codes[taken], UNDECIDED in codes, CONTACT in codes))
+    assert compared > 20
+    assert {(UNDECIDED, True, True), (CONTACT, True, True)} <= kinds
+
+
+def test_a_tree_is_slow_where_one_step_closes_little():
+    for problem, alpha, slow in (
+        (gallery.clip(6, 1), 3.0, True),
+        (gallery.wedge(4, 7), 1.0, False),
+        (gallery.clamped_block(8, 4), 3.0, False),
+    ):
+        system = problem.condensed.at(alpha).scaled
+        assert ActiveSetEngine(system).rule.slow == slow
+        assert ActiveSetEngine(system, slow=not slow).rule.slow != slow
 
 
 def test_memory_of_dropped_states_is_used_again():

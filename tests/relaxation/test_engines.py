@@ -51,12 +51,12 @@ def searched(problem, alpha, **options):
     return TreeSearch(system, certifier, engine=active_set.ActiveSetEngine(system, **options)).run()
 
 
-@pytest.mark.parametrize("candidates", [1, 4, 1000])
+@pytest.mark.parametrize("options", [{"candidates": 1}, {"candidates": 4}, {"candidates": 1000}, {"slow": True}])
 @pytest.mark.parametrize("name", ["wedge-8-5", "clamped-block-8"])
-def test_candidates_change_the_tree_and_not_what_is_found(name, candidates):
+def test_options_change_the_tree_and_not_what_is_found(name, options):
     entry = gallery.get(name)
     problem = entry.build()
-    want, found = searched(problem, entry.alpha), searched(problem, entry.alpha, candidates=candidates)
+    want, found = searched(problem, entry.alpha), searched(problem, entry.alpha, **options)
     assert sorted(s.codes for s in found.solutions) == sorted(s.codes for s in want.solutions)
     assert len(found.solutions) == entry.roots
 

@@ -49,6 +49,17 @@ def test_a_soft_body_is_excluded_by_its_bounds():
     assert roots.stats.escalations.refined < 10
 
 
+@pytest.mark.parametrize(("nx", "most"), [(6, 5_000), pytest.param(12, 30_000, marks=pytest.mark.long)])
+def test_slip_is_decided_soon_where_a_step_closes_little(nx, most):
+    # 5,567 and 309,035 nodes where it is mostly decided which nodes touch before it is decided how they slip
+    problem = gallery.clip(nx, 1)
+    roots = enumsol.enumerate_roots(problem, 3.0)
+    assert roots.complete
+    assert (len(roots), roots.index_sum) == (5, 1)
+    assert roots.stats.nodes < most
+    assert enumsol.verify(problem, roots.proof).complete
+
+
 @pytest.mark.few(2, 1)
 @pytest.mark.parametrize("p", [8, 14, 20, 32])
 def test_wedges(p):

@@ -135,6 +135,12 @@ def seconds_of_wedges_in_3d(p):
     return rounded(where("search_in_3d/wedges", "search s", p=p).round())
 
 
+def trees_that_are_not_slow():
+    found = table("branching_rule/slow")
+    found = found[numbers(found["share"]) >= 0.04]
+    return rounded(numbers(found["nodes, slow"]) / numbers(found["nodes, others"]))
+
+
 #: Where a page says so: a sentence, with a place for each of its numbers, and what they are.
 CLAIMS = [
     ("arithmetic", r"p = (\d+) in 2D and F from ([\d.]+) to ([\d.]+)", lambda: certified("256x")),
@@ -235,6 +241,15 @@ CLAIMS = [
         r"([\d,]+) nodes are left; of the 11,614 [^)]+\)` ([\d,]+)\. .* takes ([\d,]+), .* takes ([\d,]+)\. Cut",
         slices_in_3d,
     ),
+    (
+        "theory",
+        r"clip with 25 contact nodes and \$F = 3\$ takes ([\d,]+) nodes, with \(5\.7\) ([\d,]+)\.",
+        lambda: tuple(
+            where("branching_rule/slow", f"nodes, {rule}", problem="clip 12 x 1", F="3").item()
+            for rule in ("slow", "others")
+        ),
+    ),
+    ("theory", r"blocks would take ([\d.]+) to ([\d.]+) times as many nodes as with \(5\.7\)", trees_that_are_not_slow),
     ("theory", r"table `forms`, take ([\d.]+) to ([\d.]+) times", lambda: forms_in_3d("at the root", 3)),
     (
         "theory",
