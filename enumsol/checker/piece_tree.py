@@ -3,8 +3,8 @@
 A tree is given by its records in the order of a walk: ``["a", alpha]`` (the piece is cut there), ``["b", node, codes]``
 (a status is split), ``["x", rows, multipliers]`` (no solution over the piece), ``["n"]`` (the same, by the equations of
 a leaf), ``["k", box]`` (all solutions of a leaf lie in the box), ``["r", box]`` (the roots of a leaf, one at every
-alpha, are an arc, which is in the box at the middle), ``["m", numbers, leaf, wider, normal]`` (there is one
-solution at every alpha of the piece) and ``["u", reason]`` (open: a gap).
+alpha, are an arc, which is in the box at the middle), ``["m", numbers, first, last]`` (all solutions with the statuses
+of the assignment lie on the curve between two boxes, by one certificate) and ``["u", reason]`` (open: a gap).
 """
 
 from __future__ import annotations
@@ -22,9 +22,10 @@ from enumsol.proof.space_records import (
     CutPiece,
     ExcludedInSpace,
     InCurveBox,
-    OnlyOverPiece,
+    OnlyOnCurve,
     ThroughCurveBox,
 )
+from enumsol.trusted.space.curve_runs import Run
 from enumsol.trusted.space.pieces import AlphaPiece
 from enumsol.trusted.space.sector_rows import UNDECIDED, is_sector_covering
 from enumsol.trusted.space.space_uniqueness import is_complete
@@ -36,7 +37,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.enclosure import CondensedEnclosure
-    from enumsol.trusted.space.solution_curve import AlphaProblem, CurveBox
+    from enumsol.trusted.space.curve_runs import KnownCurve
+    from enumsol.trusted.space.solution_curve import AlphaProblem, SolutionCurve
 
     Array = NDArray[np.float64]
     Codes = tuple[int, ...]
@@ -52,11 +54,10 @@ class PieceTreeChecker:
     units : force and length, (p,) arrays of powers of two
     given : AlphaProblem
         By which boxes are given.
-    boxes : sequence of CurveBox
-        Each is proven to hold one curve.
+    curves : sequence of KnownCurve
+        Each is proven to be whole. Their boxes are numbered in this order.
     fail : called with what a leaf does not prove
-    leaves, single : int
-        All, and those that are pieces with one solution at every alpha.
+    leaves : int
     gaps : list of (low, high)
         Pieces of open leaves.
     """
@@ -64,10 +65,9 @@ class PieceTreeChecker:
     enclosure: CondensedEnclosure
     units: tuple[Array, Array]
     given: AlphaProblem
-    boxes: Sequence[CurveBox]
+    curves: Sequence[KnownCurve]
     fail: Callable[[str], object]
     leaves: int = 0
-    single: int = 0
     gaps: list[tuple[Fraction, Fraction]] = field(default_factory=list)
 
     def run(self, low: Fraction, high: Fraction, records: Iterator[Any]) -> None:
@@ -83,6 +83,8 @@ class PieceTreeChecker:
         ends = [[exactly_at(end, *pair) for end in (low, high)] for pair in pairs]
         occurs = [[max(values) > 0 for values in zip(*both, strict=True)] for both in ends]
         self._tangents = [one + other for one, other in zip(*occurs, strict=True)]
+        #: The curve of every box, and which one of its links it is.
+        self._boxes = [(known, k) for known in self.curves for k in range(len(known.chain.links))]
         waiting: list[tuple[Fraction, Fraction, Codes]] = [(low, high, (UNDECIDED,) * problem.p)]
         piece = AlphaPiece(self.enclosure, low, high, self.units)
         while waiting:
@@ -110,7 +112,7 @@ class PieceTreeChecker:
         if known is None:
             raise RecordError(f"unknown kind of record {quoted(kind)}")
         components = len(codes) + sum(self._tangents)
-        leaf = known.read(record, Limits(codes, boxes=len(self.boxes), components=components))
+        leaf = known.read(record, Limits(codes, boxes=len(self._boxes), components=components))
         self.leaves += 1
         if isinstance(leaf, UndecidedRecord):
             self.gaps.append((piece.low, piece.high))
@@ -125,18 +127,22 @@ class PieceTreeChecker:
         """What a leaf does not prove; None if all is proven."""
         if isinstance(leaf, ExcludedInSpace):
             return None if piece.margin(codes, leaf.rows, leaf.values) > 0 else "its multipliers do not exclude it"
-        if isinstance(leaf, OnlyOverPiece):
-            self.single += 1
-            alone = piece.has_one(leaf.numbers, leaf.leaf, leaf.wider, leaf.normal)
-            return None if alone else "it is not proven that there is one solution at every alpha"
+        if isinstance(leaf, OnlyOnCurve):
+            (known, first), (other, last) = self._boxes[leaf.first], self._boxes[leaf.last]
+            alone = known is other and piece.lies_on(known, Run(first, last), codes, leaf.numbers)
+            return None if alone else "it is not proven that all its solutions lie on its curve"
         if not is_complete(piece.whole, codes):
             return "its statuses are not final"
         if isinstance(leaf, NoRoot):
             return None if piece.held(codes) is None else "it is not proven to hold no root"
         if isinstance(leaf, InCurveBox):
-            inside = piece.holds_all(codes, self.given, self.boxes[leaf.box])
+            inside = piece.holds_all(codes, self.given, self._curve(leaf.box))
             return None if inside else "its roots are not proven to lie in its box"
         if isinstance(leaf, ThroughCurveBox):
-            met = piece.meets(codes, self.given, self.boxes[leaf.box])
+            met = piece.meets(codes, self.given, self._curve(leaf.box))
             return None if met else "its roots are not proven to be an arc through its box"
         raise AssertionError(leaf)
+
+    def _curve(self, box: int) -> SolutionCurve:
+        known, number = self._boxes[box]
+        return known.chain.links[number].curve

@@ -110,8 +110,6 @@ class GraphVerificationReport:
     curves : int or None
         In 3D, where the proof holds no selections and arcs: curves of solutions from end to end of the interval, or
         closed.
-    single : int
-        In 3D: pieces of alpha with one solution each, which need no curve.
     """
 
     ok: bool
@@ -126,13 +124,12 @@ class GraphVerificationReport:
     closed: int = 0
     within: float | None = None
     curves: int | None = None
-    single: int = 0
 
     @property
     def complete(self) -> bool:
         """Every solution for every alpha in the interval lies on one of the arcs, whose ends are joined as proven.
 
-        In 3D on one of the curves, or it is the only one at its alpha.
+        In 3D on one of the curves.
         """
         return self.ok and (self.arcs is not None or self.curves is not None) and not self.open
 
@@ -163,12 +160,8 @@ class GraphVerificationReport:
     def _arcs(self, ends: tuple[float, ...]) -> list[str]:
         if self.curves is not None:
             curves = counted(self.curves, "curve")
-            if self.single:
-                only = f"is the only one at its alpha, by {counted(self.single, 'certificate')}"
-                curves = f"{curves} or {only}" if self.curves else only
             if self.complete:
-                where = curves if not self.curves else f"lies on {curves}"
-                return [f"  every solution for every alpha in [{ends[0]:g}, {ends[1]:g}] {where}"]
+                return [f"  every solution for every alpha in [{ends[0]:g}, {ends[1]:g}] lies on {curves}"]
             return [f"  {curves}; left open in {counted(self.open, 'piece')} of alpha"]
         if self.arcs is None:
             return ["  the proof does not hold their arcs"]

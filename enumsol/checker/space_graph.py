@@ -8,7 +8,7 @@ between n + 1 boxes without length around the points that they share (see ``trus
 curves, points left out; at the end ``{"curves", "leaves", "gaps"}``.
 
 What is checked: every curve is one, and leaves the interval at both ends or is closed; no two are the same; the leaves
-of the tree cover all solutions, and those of a leaf lie on one of the curves or are alone at their alphas.
+of the tree cover all solutions, and those of a leaf lie on one of the curves.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from enumsol.proof.reading import RefusedError, data_of, exponents_from, numbers
 from enumsol.proof.records import Limits
 from enumsol.proof.space_records import CurveBoxRecord
 from enumsol.trusted.space.curve_chains import apart, whole_chain
+from enumsol.trusted.space.curve_runs import KnownCurve
 from enumsol.trusted.space.sector_rows import UNDECIDED
 from enumsol.trusted.space.solution_curve import AlphaProblem, CurveBox
 
@@ -62,8 +63,7 @@ class SpaceGraphChecker:
         self.failures: list[str] = []
         self.interval: tuple[Fraction, Fraction] | None = None
         self.curves: list[CurveChain] = []
-        self.boxes: list[CurveBox] = []
-        self.leaves = self.single = 0
+        self.leaves = 0
         self.gaps: list[tuple[Fraction, Fraction]] = []
 
     def run(self, records: Iterator[Any]) -> GraphVerificationReport:
@@ -84,7 +84,6 @@ class SpaceGraphChecker:
             "problem",
             open=len(self.gaps),
             curves=len(self.curves),
-            single=self.single,
         )
 
     def _fail(self, message: str) -> None:
@@ -104,9 +103,10 @@ class SpaceGraphChecker:
         if record != {"tree": True}:
             raise RefusedError("the tree over alpha is missing")
         assert self.interval is not None
-        tree = PieceTreeChecker(enclosure, units, given, self.boxes, self._fail)
+        curves = [KnownCurve(given, chain) for chain in self.curves]
+        tree = PieceTreeChecker(enclosure, units, given, curves, self._fail)
         tree.run(*self.interval, records)
-        self.leaves, self.single, self.gaps = tree.leaves, tree.single, tree.gaps
+        self.leaves, self.gaps = tree.leaves, tree.gaps
         if self.progress is not None:
             self.progress(self.leaves)
         claim = {"curves": len(self.curves), "leaves": self.leaves, "gaps": len(self.gaps)}
@@ -141,7 +141,6 @@ class SpaceGraphChecker:
         chain = whole_chain(given, found[1::2], found[::2], self.interval)
         if chain is None:
             raise RefusedError(f"curve {number} is not proven to be one from end to end")
-        self.boxes += found[1::2]
         self.curves.append(chain)
 
     def _compare(self) -> None:

@@ -211,11 +211,6 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
         return (self.discs,)
 
     @cached_property
-    def smallest_discs(self) -> Vector:
-        """Lower bounds of ``discs``, at least 0."""
-        return np.maximum(np.where(self.discs.rad > 0, self.discs.low / SAFE, self.discs.mid), 0.0)
-
-    @cached_property
     def largest_discs(self) -> Vector:
         """Upper bounds of ``discs``."""
         return np.where(self.discs.rad > 0, self.discs.size, self.discs.mid)

@@ -38,8 +38,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: By how much of an angle sectors of a leaf may be wider.
-WIDEST = 0.5
 #: Numbers of directions and sectors in rows are less; directions of tangents are less than RUN.
 _NUMBERS = RUN << DEEPEST
 
@@ -290,41 +288,32 @@ class ThroughCurveBox(_Boxed):
 
 
 @dataclass(frozen=True, eq=False)
-class OnlyOverPiece(Record):
-    """There is exactly one solution at every alpha of the piece.
+class OnlyOnCurve(Record):
+    """A run of a curve has all solutions over the piece with the statuses of the assignment.
 
     Attributes
     ----------
-    numbers : of the form, as ``trusted.space.space_uniqueness.SpaceWeights.of`` takes them
-    leaf : codes of a leaf that holds the solutions, or none
-    wider : by how much of an angle the sectors of that leaf are wider, on both sides
-    normal : lambda_n near the solutions, scaled, (p,) array; used without a leaf only
+    numbers : of the form, as ``trusted.space.piece_forms.PieceWeights.of`` takes them
+    first, last : boxes of the curve at which the run begins and ends
     """
 
-    kind, sizes = "m", (5,)
+    kind, sizes = "m", (4,)
 
     numbers: Array
-    leaf: tuple[int, ...]
-    wider: float
-    normal: Array
+    first: int
+    last: int
 
     @classmethod
-    def of(cls, entries: list[Any], limits: Limits) -> OnlyOverPiece:
-        """The numbers; RecordError below an assignment, or where there are not as many as there must be."""
-        if any(code != UNDECIDED for code in limits.codes):
-            raise RecordError("one solution is claimed where statuses are assigned")
-        values, leaf, wider, normal = entries
-        if not isinstance(leaf, list) or not all(type(code) is int for code in leaf):
-            raise RecordError("its leaf is not a list of codes")
+    def of(cls, entries: list[Any], limits: Limits) -> OnlyOnCurve:
+        """The numbers; RecordError where there are not as many as there must be, or no such boxes."""
+        values, *run = entries
+        for box in run:
+            if type(box) is not int or not 0 <= box < limits.boxes:
+                raise RecordError(f"there is no box {quoted(box)}")
         try:
-            numbers = numbers_from(values, limits.p + 2 * limits.components)
-            (angle,) = numbers_from([wider], 1)
-            found = cls(numbers, tuple(leaf), float(angle), numbers_from(normal, limits.p))
+            return cls(numbers_from(values, 2 * limits.p + 3 * limits.components - 3 * limits.p), *run)
         except ValueError as error:
             raise RecordError(f"a form over a piece cannot be read: {error}") from None
-        if not 0 <= found.wider <= WIDEST:
-            raise RecordError(f"sectors are wider by {quoted(wider)}")
-        return found
 
 
 #: All kinds of leaves in 3D.
@@ -343,7 +332,7 @@ LEAVES = table_of(
 #: The same of a body that nothing holds; others rest on a stiffness that is positive definite.
 FLOATING_LEAVES = table_of(ExcludedInSpace, Unbalanced, NoRoot, RegularRoot, UndecidedRecord)
 #: Of a tree over alpha, too.
-PIECE_LEAVES = table_of(ExcludedInSpace, NoRoot, InCurveBox, ThroughCurveBox, OnlyOverPiece, UndecidedRecord)
+PIECE_LEAVES = table_of(ExcludedInSpace, NoRoot, InCurveBox, ThroughCurveBox, OnlyOnCurve, UndecidedRecord)
 
 
 def _is_final(code: Any) -> bool:

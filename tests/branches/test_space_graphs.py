@@ -64,7 +64,7 @@ def test_a_node_that_slips_until_it_sticks(graph):
 
 
 def test_below_the_bound_of_the_stiffness_there_is_one_root():
-    """Theory, (5.9): for one node by its closed form, and for random ones, orthotropic, by enumeration."""
+    """For one node by its closed form, and for random ones, orthotropic, by enumeration (theory, (5.9))."""
     S = np.array([[2.0, 0.5, 0.0], [0.5, 3.0, 0.0], [0.0, 0.0, 1.0]])
     one = from_compliance(S, np.ones(3), (0.1, 0.2), friction_slope=(0.5, 0.25))
     inverse = 3.0 / (2.0 * 3.0 - 0.25)  # of S, in the normal component
@@ -118,7 +118,6 @@ def test_the_only_solutions_of_pieces_lie_on_a_curve_that_passes_all_of_them():
     assert graph.complete
     assert report.complete
     assert (report.curves, len(graph.branches)) == (1, 1)
-    assert report.single > 0
     for alpha in (0.5, 0.7, 1.0):
         found, known = graph.roots_at(alpha), enumsol.enumerate_roots(problem, alpha)
         assert found.complete
@@ -164,9 +163,9 @@ def test_a_damaged_file_is_refused(graph, tmp_path):
 
 
 def test_a_search_that_is_cut_short_is_not_complete():
-    graph = enumsol.branch_graph(SLIDING, (1.78, 1.82), max_nodes=3)
+    graph = enumsol.branch_graph(SLIDING, (1.78, 1.82), max_nodes=1)
     assert not graph.complete
-    assert "max_nodes = 3" in graph.reasons[0] or graph.reasons[0].startswith("stopped")
+    assert "max_nodes = 1" in graph.reasons[0] or graph.reasons[0].startswith("stopped")
     assert graph.proof is None
     with pytest.raises(enumsol.IncompleteGraphError):
         graph.multiplicity_at(1.8)

@@ -95,7 +95,9 @@ SHARED = {
     "trusted.space.solution_curve": None,
     "trusted.space.curve_chains": None,
     "trusted.space.curve_events": None,
-    "trusted.space.pieces": {"AlphaPiece"},
+    "trusted.space.curve_runs": {"CurveParts", "KnownCurve", "Run"},
+    "trusted.space.piece_forms": {"PieceWeights", "how_far_off"},
+    "trusted.space.pieces": {"AlphaPiece", "lies_in"},
     "trusted.space.space_uniqueness": {
         *(
             "LARGEST_UNIT",

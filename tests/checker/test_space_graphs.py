@@ -49,41 +49,55 @@ def test_a_proof_says_that_all_solutions_lie_on_its_curves(p, seed):
 
 
 @functools.cache
-def alone_at_every_alpha():
-    cover = SpaceCover(gallery.block3d(1, 1, 1), (Fraction(1, 2), Fraction(1)), alone=True)
+def block_by_certificates():
+    cover = SpaceCover(gallery.block3d(1, 1, 1), (Fraction(1, 2), Fraction(1)))
     cover.search(max_nodes=100)
     return cover
 
 
-def test_one_solution_at_every_alpha_of_a_piece_needs_no_curve():
-    cover = alone_at_every_alpha()
+def test_one_certificate_says_that_a_curve_has_all_solutions_of_a_piece():
+    cover = block_by_certificates()
+    assert {record.kind for record in cover.records} <= {"a", "m"}
     report = verify(cover.problem, cover.proof())
-    assert (cover.chains, cover.gaps, report.complete) == ([], [], True)
-    assert [low for low, _ in cover.single[1:]] == [high for _, high in cover.single[:-1]]
-    assert f"is the only one at its alpha, by {len(cover.single)} certificate" in repr(report)
+    assert (report.curves, cover.gaps, report.complete) == (1, [], True)
     assert all(len(enumerate_roots(cover.problem, alpha)) == 1 for alpha in (0.5, 0.75, 1))
 
 
-@pytest.mark.parametrize("way", ["numbers", "wider", "leaf", "piece", "below", "none"])
+@pytest.mark.parametrize("way", ["numbers", "theta", "run", "backwards", "no box", "piece", "none"])
 def test_forged_certificates_over_a_piece_are_refused(way):
-    cover = alone_at_every_alpha()
+    cover = block_by_certificates()
     records = records_of(cover.proof())
     k = of_kind(records, "m")[0]
     first = records[k]
     if way == "numbers":
         first[1][0] *= -1.0
-    elif way == "wider":
-        first[3] = 1.0
-    elif way == "leaf":
-        first[2][0] = 0 if first[2][0] else 1
+    elif way == "theta":
+        first[1][8:] = [number + 30.0 for number in first[1][8:]]
+    elif way == "run":
+        first[3] = first[2]
+    elif way == "backwards":
+        first[2:] = [first[3], first[2]]
+    elif way == "no box":
+        first[3] = len(cover.chains[0].links)
     elif way == "piece":
-        # the same said of a hundred times as much
+        # the same said of more than the curve passes
         records[0]["interval"] = ["1/1000", "50"]
-    elif way == "below":
-        records[k : k + 1] = [["b", 0, [5, 0]], first, first]
     else:
         del records[k]
     assert not verify(cover.problem, proof_of(records)).ok
+
+
+def test_a_certificate_below_an_assignment_speaks_of_its_statuses_only():
+    """A curve without these statuses proves nothing about them."""
+    cover = block_by_certificates()
+    records = records_of(cover.proof())
+    k, first = next((k, record) for k, record in enumerate(records) if isinstance(record, list) and record[0] == "m")
+    p = cover.problem.p
+    roots = [root for alpha in (0.5, 0.75, 1) for root in enumerate_roots(cover.problem, alpha)]
+    assert all(root.statuses[0].value != "open" for root in roots)
+    below = [["b", 0, [5, 0]], first, first]
+    assert p == len(cover.problem.friction[0])
+    assert not verify(cover.problem, proof_of([*records[:k], *below, *records[k + 1 :]])).ok
 
 
 def mutants(records, rng, count):
@@ -106,6 +120,14 @@ def mutants(records, rng, count):
         elif isinstance(found[k], list) and found[k][0] in "ark":
             found[k] = [str(rng.choice(["a", "r", "k", "n", "u"])), found[k][1]]
             found[k] = found[k][:1] if found[k][0] == "n" else found[k]
+        elif isinstance(found[k], list) and found[k][0] == "m":
+            if rng.random() < 0.3:
+                found[k][int(rng.integers(2, 4))] += int(rng.integers(-3, 4))
+            else:
+                i = int(rng.integers(len(found[k][1])))
+                found[k][1][i] = float(
+                    found[k][1][i] * 10 ** rng.uniform(-2, 2) * rng.choice([-1, 1]) + rng.choice([0, 0.1])
+                )
         elif isinstance(found[k], list) and found[k][0] == "b":
             found[k][2] = [code + int(rng.integers(-1, 2)) for code in found[k][2]]
         elif rng.random() < 0.5:
@@ -137,10 +159,13 @@ def test_what_mutants_say_is_refused_or_true(seed, count):
 
 
 @pytest.mark.long
-def test_a_block_has_one_solution_at_every_friction_up_to_two():
-    problem = gallery.get("block3d-9").build()
-    cover = SpaceCover(problem, (Fraction(0), Fraction(2)), alone=True)
-    cover.search(max_nodes=1000)
-    assert (cover.chains, cover.gaps, cover.stopped) == ([], [], None)
-    report = complete_report(problem, cover.proof())
-    assert report.single == len(cover.single)
+@pytest.mark.parametrize("cells", [(2, 1, 2), (3, 2, 2), (3, 3, 2)])
+def test_a_block_has_one_curve_by_a_few_certificates(cells):
+    """Statuses change dozens of times; the form holds through all of them."""
+    problem = gallery.block3d(*cells)
+    cover = SpaceCover(problem, (Fraction(0), Fraction(2)))
+    cover.search(max_nodes=20)
+    assert (len(cover.chains), cover.gaps, cover.stopped) == (1, [], None)
+    assert {record.kind for record in cover.records} <= {"a", "m"}
+    complete_report(problem, cover.proof())
+    assert all(len(enumerate_roots(problem, alpha)) == 1 for alpha in (0.1, 0.3, 0.7, 1.5))

@@ -8,14 +8,12 @@ from space_proofs import random_problem
 
 from enumsol import enumerate_roots
 from enumsol.arithmetic.balls import Ball
-from enumsol.branches.space.cover import SpaceCover
 from enumsol.model.sectors import SECTORS, nearest, start_of
 from enumsol.search.space.piece_multipliers import balanced
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space.leaves import Open, SpaceRoot
 from enumsol.trusted.space.pieces import AlphaPiece
 from enumsol.trusted.space.sector_rows import CONTACT, OPEN, STICK, UNDECIDED, row_sign, sector_margin, sector_row_terms
-from enumsol.trusted.space.solution_curve import CurveBox
 
 LOW, HIGH = Fraction(1, 4), Fraction(1, 2)
 
@@ -182,29 +180,6 @@ def test_a_root_over_a_piece_is_one_at_every_alpha(seed):
             assert there.index == piece.held(codes).index
 
 
-def test_points_of_a_piece_are_in_a_box_if_all_corners_are():
-    rng = np.random.default_rng(4)
-    problem = changing_problem(1, 3)
-    piece = piece_of(problem)
-    said = {True: 0, False: 0}
-    for _ in range(200):
-        forces = Ball(rng.standard_normal(3), rng.exponential(size=3) * 0.2)
-        d, e = rng.standard_normal(4), rng.standard_normal(4)
-        d = d / (e @ d)
-        centre = np.append(forces.mid, 0.375) + 0.1 * rng.standard_normal(4)
-        box = CurveBox(centre, d, e, float(rng.exponential() * 4), rng.exponential(size=4) * 4, np.ones(3))
-        inside = piece.lies_in(Ball.joined(forces, piece.alphas[None]), box)
-        said[inside] += 1
-        corners = (
-            np.append(forces.mid + s[:3] * forces.rad, float(HIGH if s[3] > 0 else LOW)) - centre
-            for s in np.array(np.meshgrid(*[[-1, 1]] * 4)).reshape(4, -1).T
-        )
-        t = [(e @ x, x) for x in corners]
-        really = all(abs(k) <= box.half and np.all(np.abs(x - k * d) <= box.radius) for k, x in t)
-        assert inside == really
-    assert min(said.values()) > 20
-
-
 def test_displacements_of_nodes_without_friction_follow_from_the_forces():
     problem = changing_problem(2, 1)
     none = np.array([0.0, 1.0])
@@ -228,19 +203,3 @@ def test_what_is_not_proven_over_a_piece_is_left_open():
     piece = piece_of(problem, Fraction(0), Fraction(64))
     codes = (SECTORS + 4,)
     assert isinstance(piece.held(codes), Open | None)
-
-
-@pytest.mark.few(2, 6)
-@pytest.mark.parametrize("seed", range(40))
-def test_a_piece_with_one_solution_has_one_at_every_alpha(seed):
-    # most of these problems have one solution, some have three
-    low = Fraction(1, 4)
-    for exponent in (2, 4, 6):
-        problem = changing_problem(2, seed, isotropic=True)
-        high = low + Fraction(1, 2**exponent)
-        cover = SpaceCover(problem, (low, high), alone=True)
-        cover.search(max_nodes=1)
-        if cover.single == [(low, high)]:
-            alphas = (low, low + (high - low) / 3, high)
-            assert [len(enumerate_roots(problem, alpha)) for alpha in alphas] == [1, 1, 1]
-            return

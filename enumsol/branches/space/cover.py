@@ -49,12 +49,8 @@ class SpaceCover:
     ----------
     problem : ContactProblem3D
     interval : first and last alpha
-    alone : bool
-        Whether solutions that one certificate proves to be the only ones at their alphas need no curve.
     chains : list of Chain
         Whole curves.
-    single : list of (low, high)
-        Pieces of alpha with one solution at every alpha, by one certificate each.
     records : list
         Of the tree, in the order of a walk; open leaves among them.
     failed : int
@@ -66,9 +62,7 @@ class SpaceCover:
 
     problem: ContactProblem3D
     interval: tuple[Fraction, Fraction]
-    alone: bool = False
     chains: list[Chain] = field(default_factory=list)
-    single: list[tuple[Fraction, Fraction]] = field(default_factory=list)
     records: list[Any] = field(default_factory=list)
     failed: int = 0
     nodes: int = 0
@@ -105,7 +99,7 @@ class SpaceCover:
         given = AlphaProblem.of(self.problem.enclosure)
         tick = None if progress is None else lambda share: progress("search", share)
 
-        def more(x: Array) -> list[CurveBox]:
+        def more(x: Array) -> Chain | None:
             # what is left open costs as much at every further point of the same curve
             chain = None
             with suppress(TimeOverError):
@@ -113,24 +107,15 @@ class SpaceCover:
                     chain = chain_through(given, self.problem, x, self.interval)
             if chain is None or not self._is_new(chain):
                 self.failed += 1
-                return []
+                return None
             self.chains.append(chain)
-            return chain.boxes
+            return chain
 
-        tree = PieceTree(
-            self.problem.enclosure,
-            self.interval,
-            self._units(),
-            more=more,
-            max_nodes=max_nodes,
-            tick=tick,
-            alone=self.alone,
-            spanned=None if self.alone else self._spans,
-        )
+        tree = PieceTree(self.problem.enclosure, self.interval, self._units(), more, max_nodes, tick)
         try:
             self.records = tree.run()
         finally:
-            self.single, self.nodes, self.stopped = tree.single, tree.nodes, tree.stopped
+            self.nodes, self.stopped = tree.nodes, tree.stopped
 
     def _is_new(self, chain: Chain) -> bool:
         """Whether a chain is proven to be whole, and none that is known."""
@@ -138,14 +123,6 @@ class SpaceCover:
         return whole and all(
             other.closed != chain.closed or apart(chain.joints, other.links, self.interval) for other in self.chains
         )
-
-    def _spans(self) -> bool:
-        """Whether a curve passes every alpha: its ends lie beyond the interval on either side."""
-        ends = (
-            [joint.alphas[0] > self.interval[0] for joint in (chain.joints[0], chain.joints[-1])]
-            for chain in self.chains
-        )
-        return any(one != other for one, other in ends)
 
     def proof(self) -> Proof:
         """Curves and tree for ``enumsol.verify``."""

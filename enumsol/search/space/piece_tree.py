@@ -5,49 +5,49 @@ from __future__ import annotations
 from collections import OrderedDict
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.arithmetic.balls import Ball
 from enumsol.condensation.space_condensed import SpaceSystem
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of, width_level
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.proof.records import Branching, NoRoot
-from enumsol.proof.space_records import CutPiece, ExcludedInSpace, InCurveBox, OnlyOverPiece, ThroughCurveBox
+from enumsol.proof.space_records import CutPiece, ExcludedInSpace, InCurveBox, OnlyOnCurve, ThroughCurveBox
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.outcome import StopReason
+from enumsol.search.space.piece_certificates import ERRORS, Passage, PieceProposals, runs_over
 from enumsol.search.space.piece_multipliers import balanced
-from enumsol.search.space.space_fathoming import Point
 from enumsol.search.space.space_newton import Isotropic
 from enumsol.search.space.space_search import SpaceSplitting
 from enumsol.search.splitting import ImposedRows
 from enumsol.support.deadlines import TimeOverError, look
+from enumsol.trusted.space.curve_runs import KnownCurve
 from enumsol.trusted.space.leaves import Open, SpaceRoot
-from enumsol.trusted.space.pieces import AlphaPiece
+from enumsol.trusted.space.pieces import AlphaPiece, lies_in
 from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
     from numpy.typing import NDArray
 
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.relaxation.space_relaxation import SpaceRelaxation
     from enumsol.selections.solution import Codes
-    from enumsol.trusted.space.solution_curve import CurveBox
+    from enumsol.trusted.space.curve_chains import CurveChain
+    from enumsol.trusted.space.solution_curve import SolutionCurve
 
     Array = NDArray[np.float64]
 
 #: Pieces whose engines are kept.
 _KEPT = 32
-#: Pieces down to this share of the interval are tried for one solution.
+#: Pieces are cut down to this share of the interval where only their length stands in the way of a certificate.
 _ALONE = 2.0**-26
-#: By how much wider the sectors are that hold the slip directions of such a piece.
-_WIDER = 0.1
-#: Smallest eigenvalue relative to S from which a form counts as definite, and nodes from which better ones are sought.
-_DEFINITE, _MANY = 1e-9, 8
+#: Pieces of undecided statuses at most at which a first curve is sought.
+_SOUGHT = 8
 #: Leaves are tested from this level of their sectors on.
 _TRIED = 3
 #: Sectors above this level are halved, rather than alpha, where a leaf is settled in the middle only.
@@ -85,49 +85,49 @@ class _Examined:
         self.splitting = SpaceSplitting(self.engine)
         self.rows = ImposedRows(self.splitting, self.system.p)
 
-    @cached_property
-    def certificate(self) -> tuple[Array, Codes, Array] | None:
-        """Numbers of a form, a leaf and lambda_n at the middle, by which that solution may be the only one."""
+        self.proposals = PieceProposals(piece, self.system, middle)
+        #: Runs of known curves that pass the piece, of so many curves.
+        self.passages: list[Passage] = []
+        self.curves = 0
+        #: Assignments of statuses for which no form is definite.
+        self.hopeless: set[tuple[int, ...]] = set()
+
+    def solution(self) -> Array | None:
+        """Forces of a solution at the middle, in the units of the problem, by Newton's method; no claim."""
         with np.errstate(all="ignore"):
-            problem = Isotropic.of(self.system)
-            y = problem.solution()
-            point = None if y is None else Point.of(self.system, problem, y)
-            if point is None:
-                return None
-            numbers = point.numbers(_DEFINITE, better=self.system.p >= _MANY)
-            return None if numbers is None else (numbers, point.codes if point.slack > 0 else (), point.n)
+            y = Isotropic.of(self.system).solution()
+        if y is None:
+            return None
+        tau, found = self.system.tau, np.zeros(len(self.system.g))
+        found[: len(tau)] = y[:, 0]
+        for k in (0, 1):
+            has = tau[:, k] >= 0
+            found[tau[has, k]] = y[has, 1 + k] / self.system.unit[tau[has, k]]
+        return np.asarray(self.piece.forces(Ball.exact(found)).mid)
 
     def root(self, codes: Codes) -> SpaceRelaxation:
         return self.engine.root(*self.rows.over(codes, range(self.system.p)))
 
 
 class PieceTree:
-    """Covers all solutions over an interval of alpha by boxes around curves, as far as it can.
+    """Covers all solutions over an interval of alpha by curves in boxes, as far as it can.
 
     Parameters
     ----------
     enclosure : CondensedEnclosure
     interval : (a, b), Fractions
     units : force and length, (p,) arrays of powers of two
-    boxes : sequence of CurveBox
-        Each holds exactly one curve of solutions.
     more : callable, optional
-        Called with a solution (forces and alpha, in the units of the problem) that lies in none of them; gives boxes
-        along its curve, which lie in ``boxes`` then.
+        Called with a solution (forces and alpha, in the units of the problem) that lies in no known box; gives the
+        whole curve through it, if there is one and it is new.
     max_nodes : int, optional
     tick : callable, optional
         Called with the share of the tree that is done, every child of a node being as large as the others.
-    alone : whether pieces with one solution at every alpha need no box
-    spanned : callable, optional
-        Tells whether a curve in ``boxes`` passes every alpha of the interval: then those of such pieces lie on it.
-        Without either such pieces are not sought.
     smallest : pieces are cut down to this share of the interval
 
     Attributes
     ----------
-    boxes : list of CurveBox
-    single : list of (low, high)
-        Pieces with one solution at every alpha.
+    curves : list of KnownCurve
     nodes : int
     stopped : StopReason or None
     """
@@ -137,39 +137,40 @@ class PieceTree:
         enclosure: CondensedEnclosure,
         interval: tuple[Fraction, Fraction],
         units: tuple[Array, Array],
-        boxes: Sequence[CurveBox] = (),
-        more: Callable[[Array], Sequence[CurveBox]] | None = None,
+        more: Callable[[Array], CurveChain | None] | None = None,
         max_nodes: int | None = None,
         tick: Callable[[float], object] | None = None,
         smallest: float = 2.0**-30,
-        *,
-        alone: bool = False,
-        spanned: Callable[[], bool] | None = None,
     ) -> None:
         self._enclosure, self._units, self.interval = enclosure, units, interval
         self._given = AlphaProblem.of(enclosure)
         self._more, self._most, self._tick = more, max_nodes, tick
-        self._needs_none, self._spanned = alone, spanned
         self._least = Fraction(smallest) * (interval[1] - interval[0])
         self._pieces: OrderedDict[tuple[Fraction, Fraction], _Examined] = OrderedDict()
         self.nodes = 0
         #: Why the search ended early, if it did.
         self.stopped: StopReason | None = None
-        self.boxes: list[CurveBox] = []
-        self.single: list[tuple[Fraction, Fraction]] = []
-        self._take(boxes)
+        self.curves: list[KnownCurve] = []
+        #: The curve of every box, numbered as in a proof.
+        self._boxes: list[SolutionCurve] = []
+        self._sought = 0
 
-    def _take(self, boxes: Sequence[CurveBox]) -> None:
-        """Boxes more, and all of them as arrays."""
-        self.boxes += boxes
-        if not self.boxes:
-            return
-        self._c, self._d, self._e, self._b = (
-            np.array([getattr(box, name) for box in self.boxes]) for name in ("centre", "direction", "border", "radius")
+    def _follow(self, x: Array) -> bool:
+        """Whether there is a new curve through a solution."""
+        chain = None if self._more is None else self._more(x)
+        if chain is None:
+            return False
+        self.curves.append(KnownCurve(self._given, chain))
+        self._boxes += [link.curve for link in chain.links]
+        boxes = [curve.box for curve in self._boxes]
+        self._c, self._d, self._e = (
+            np.array([getattr(box, name) for box in boxes]) for name in ("centre", "direction", "border")
         )
-        self._h = np.array([box.half for box in self.boxes])
+        self._b = np.array([curve.reach for curve in self._boxes])
+        self._h = np.array([box.half for box in boxes])
         reach = np.abs(self._d[:, -1]) * self._h + self._b[:, -1]
         self._low, self._high = self._c[:, -1] - reach, self._c[:, -1] + reach
+        return True
 
     def _examined(self, low: Fraction, high: Fraction) -> _Examined:
         key = low, high
@@ -213,8 +214,7 @@ class PieceTree:
         self, low: Fraction, high: Fraction, codes: Codes, parent: Any, changed: int, last: bool
     ) -> tuple[Any, list[Any]]:
         at = self._examined(low, high) if parent is None else parent[0]
-        seeks = self._needs_none or self._spanned is not None
-        if seeks and set(codes) == {UNDECIDED} and (done := self._alone(at, codes)) is not None:
+        if (done := self._certified(at, codes)) is not None:
             return done
         final = not {CONTACT, UNDECIDED} & set(codes)
         if final and parent is None:
@@ -286,33 +286,43 @@ class PieceTree:
     def _met(self, piece: AlphaPiece, root: SpaceRoot) -> int | None:
         """The box of a root in a point of alpha, along whose curve new ones are put if there is none."""
         number = self._box(piece, root)
-        if number is None and self._more is not None:
-            self._take(self._more(np.append(piece.forces(root.y).mid, float(piece.middle))))
+        if number is None and self._follow(np.append(piece.forces(root.y).mid, float(piece.middle))):
             number = self._box(piece, root)
         return number
 
-    def _alone(self, at: _Examined, codes: Codes) -> tuple[Any, list[Any]] | None:
-        """A piece with one solution at every alpha, or one that is cut since its middle has only one; or None."""
-        piece = at.piece
-        small = piece.high - piece.low <= Fraction(_ALONE) * (self.interval[1] - self.interval[0])
-        found = None if small else at.certificate
-        if found is None:
+    def _certified(self, at: _Examined, codes: Codes) -> tuple[Any, list[Any]] | None:
+        """One certificate for all that is below an assignment, or the piece is cut since it is too long for that."""
+        piece, statuses = at.piece, tuple(CONTACT if code > SECTORS else code for code in codes)
+        if piece.high - piece.low <= Fraction(_ALONE) * (self.interval[1] - self.interval[0]):
             return None
-        numbers, leaf, normal = found
-        for held in (leaf, ()) if leaf else ((),):
-            if piece.has_one(numbers, held, _WIDER, normal, 2.0):
-                if not self._on_curve(piece, leaf):
-                    return None
-                self.single.append((piece.low, piece.high))
-                return OnlyOverPiece(numbers, held, _WIDER, normal), []
-        return self._halved(at, codes) if piece.point.has_one(numbers, (), 0.0, normal, 2.0) else None
+        passages = [passage for passage in self._passages(at, statuses) if passage.parts.allowed(statuses)]
+        # where two curves have these statuses no form is definite
+        if len(passages) != 1 or statuses in at.hopeless:
+            return None
+        (passage,) = passages
+        numbers, hopeful = at.proposals.numbers(statuses, passage.parts)
+        if not hopeful:
+            at.hopeless.add(statuses)
+            return None
+        known = self.curves[passage.curve]
+        if numbers is not None and piece.lies_on(known, passage.run, statuses, numbers, ERRORS):
+            before = sum(len(other.chain.links) for other in self.curves[: passage.curve])
+            return OnlyOnCurve(numbers, before + passage.run.first, before + passage.run.last), []
+        return self._halved(at, codes)
 
-    def _on_curve(self, piece: AlphaPiece, leaf: Codes) -> bool:
-        """Whether solutions that are the only ones over a piece lie on a curve, as far as they have to."""
-        if self._spanned is None or self._spanned():
-            return True
-        there = piece.point.held(leaf) if leaf else None
-        return isinstance(there, SpaceRoot) and self._met(piece.point, there) is not None and self._spanned()
+    def _passages(self, at: _Examined, statuses: tuple[int, ...]) -> list[Passage]:
+        """Runs of known curves that pass a piece; the first ones are sought where no status is assigned."""
+        low, high = at.piece.low, at.piece.high
+        for number in range(at.curves, len(self.curves)):
+            known = self.curves[number]
+            at.passages += [Passage(number, run, known.over(run, low, high)) for run in runs_over(known, low, high)]
+        at.curves = len(self.curves)
+        if at.passages or self._sought == _SOUGHT or set(statuses) != {UNDECIDED}:
+            return at.passages
+        self._sought += 1
+        forces = at.solution()
+        found = forces is not None and self._follow(np.append(forces, float(at.piece.middle)))
+        return self._passages(at, statuses) if found else []
 
     def _leaf(self, at: _Examined, codes: Codes) -> tuple[Any, list[Any]] | None:
         """A leaf that is decided, or halved; None where statuses are to be split further."""
@@ -337,7 +347,7 @@ class PieceTree:
 
     def _box(self, piece: AlphaPiece, found: SpaceRoot | Open) -> int | None:
         """The box in which forces lie."""
-        place = piece.place(found, self._given) if self.boxes else None
+        place = piece.place(found, self._given) if self._boxes else None
         if place is None:
             return None
         near = np.flatnonzero((self._low <= float(piece.low)) & (float(piece.high) <= self._high))
@@ -349,6 +359,6 @@ class PieceTree:
         beside = np.abs(x - t[:, None] * self._d[near])
         inside &= np.all(beside <= self._b[near], axis=1)
         for k in near[inside].tolist():
-            if piece.lies_in(place, self.boxes[k], 2.0):
+            if lies_in(place, self._boxes[k], 2.0):
                 return int(k)
         return None

@@ -271,12 +271,17 @@ class Point:
         better : whether better numbers than the plain ones are sought
         held : rows whose squares are added to Q
         """
-        form = _Definite(self, held)
-        logs, shares = form.plain
-        least = form.least(logs, shares)
-        if least <= enough and better and (least > _HOPELESS or self.slack <= NEAR):
-            logs, shares, least = form.improved(logs, shares, least)
-        return form.values(logs, shares) if least > enough else None
+        tau, opened, size = self.system.tau, self.gap > 0, np.linalg.norm(self.slip, axis=1)
+        need = 1.0 - _SHARED * self.gap / np.where(size > 0, size, 1.0)
+        theta = np.where(opened[:, None], self.theta * np.maximum(need, 0.0)[:, None], self.theta)
+        theta = np.where((tau >= 0) & ~self.wide[:, None], theta, 0.0)
+        form = DefiniteForm(self.system, [theta], opened, self.wide.astype(np.float64), held=held)
+        found = form.best(enough, better=better, hopeless=_HOPELESS if self.slack > NEAR else -np.inf)
+        if found is None:
+            return None
+        mu, kappa, nu = found
+        wide = np.where(self.wide, kappa * np.maximum(form.reach, NEAR), 0.0)
+        return np.concatenate([mu, kappa, wide, nu[tau >= 0], theta[tau >= 0]])
 
 
 def _allows(code: int, final: int) -> bool:
@@ -295,43 +300,74 @@ def _sector(direction: Array, level: int) -> int:
     return first + (number - first - 1) % first
 
 
-class _Definite:
-    """Q = (D'S + S D) / 2 of a solution, as a function of logarithms of mu and kappa, and of nu.
+class DefiniteForm:
+    """Q = (D'S + S D) / 2 less what is lost, as a function of logarithms of mu and kappa, and of nu; no claim.
 
     Where a node is open mu = kappa and nu = 0, so that the same theta serves whatever they are. Elsewhere nu = mu z /
-    (1 + |z|^2)^(1/2) for a z in the plane.
+    (1 + |z|^2)^(1/2) for a z in the plane, over the largest radius of the disc.
+
+    Parameters
+    ----------
+    system : SpaceSystem
+    turns : (p, 2) arrays
+        theta, or theta times the radii of the discs at both ends of a piece of alpha: the form is to be definite for
+        each.
+    opened : (p,) bool array
+    off : (p,) array
+        How far these may be off.
+    discs : (p,) array, optional
+        Largest radii of the discs, one by default.
+    held : rows whose squares are added to Q
+
+    Attributes
+    ----------
+    reach : (p,) array
+        Norms of the rows of S that give v, where ``off`` is positive.
     """
 
-    def __init__(self, point: Point, held: Array | None = None) -> None:
-        system = point.system
+    def __init__(
+        self,
+        system: SpaceSystem,
+        turns: Sequence[Array],
+        opened: NDArray[np.bool_],
+        off: Array,
+        discs: Array | None = None,
+        held: Array | None = None,
+    ) -> None:
         self._held = None if held is None else held.T @ held
-        self._system, self._S, self._point = system, system.S, point
-        tau, p = system.tau, system.p
-        self._open = point.gap > 0
-        size = np.linalg.norm(point.slip, axis=1)
-        need = 1.0 - _SHARED * point.gap / np.where(size > 0, size, 1.0)
-        theta = np.where(self._open[:, None], point.theta * np.maximum(need, 0.0)[:, None], point.theta)
-        self._theta = np.where((tau >= 0) & ~point.wide[:, None], theta, 0.0)
+        self._system, self._S, self._open, self._off = system, system.S, opened, off
+        self._discs = np.ones(system.p) if discs is None else discs
+        tau = system.tau
         self._unit = np.where(tau >= 0, system.unit[tau], 1.0)
-        self._turn = self._theta / self._unit
+        self._turns = [turn / self._unit for turn in turns]
         rows = [np.where((tau[:, k] >= 0)[:, None], system.S[tau[:, k]] / self._unit[:, k, None], 0.0) for k in (0, 1)]
         self._rows = np.stack(rows, axis=1)
-        self._reach = np.where(point.wide, np.sqrt(np.sum(self._rows**2, axis=(1, 2))), 0.0)
+        self.reach = np.where(off > 0, np.sqrt(np.sum(self._rows**2, axis=(1, 2))), 0.0)
         self._pushes = (tau >= 0) & ~self._open[:, None]
-        self.plain = np.zeros((2, p)), np.zeros((p, 2))
 
-    def values(self, logs: Array, shares: Array) -> Array:
-        """The numbers as a proof has them."""
-        mu, kappa, nu = self._numbers(logs, shares)
-        places = self._system.tau >= 0
-        wide = np.where(self._point.wide, kappa * np.maximum(self._reach, NEAR), 0.0)
-        return np.concatenate([mu, kappa, wide, nu[places], self._theta[places]])
+    def best(self, enough: float, *, better: bool, hopeless: float = _HOPELESS) -> tuple[Array, Array, Array] | None:
+        """mu, kappa and nu for which the smallest eigenvalue relative to S is more than ``enough``, or None.
+
+        Plain ones, or better ones if these are asked for and plain ones are not below ``hopeless``.
+        """
+        logs, shares = np.zeros((2, self._system.p)), np.zeros((self._system.p, 2))
+        least = self.least(logs, shares)
+        if least <= enough and better and least > hopeless:
+            logs, shares, least = self.improved(logs, shares, least)
+        return self._numbers(logs, shares) if least > enough else None
 
     def least(self, logs: Array, shares: Array) -> float:
         """The smallest eigenvalue of Q relative to S."""
-        Q = self._matrix(*self._numbers(logs, shares))
+        numbers = self._numbers(logs, shares)
         try:
-            return float(scipy.linalg.eigh(Q, self._S, eigvals_only=True, subset_by_index=[0, 0])[0])
+            return min(
+                float(
+                    scipy.linalg.eigh(self._matrix(turn, *numbers), self._S, eigvals_only=True, subset_by_index=[0, 0])[
+                        0
+                    ]
+                )
+                for turn in self._turns
+            )
         except (np.linalg.LinAlgError, ValueError):
             return -np.inf
 
@@ -360,28 +396,29 @@ class _Definite:
     def _numbers(self, logs: Array, shares: Array) -> tuple[Array, Array, Array]:
         logs = np.where(self._open, np.mean(logs, axis=0), logs)
         mu, kappa = np.exp(logs - np.mean(logs))
-        return mu, kappa, np.where(self._pushes, mu[:, None] * self._disc(shares)[0] * (1.0 - NEAR), 0.0)
+        most = mu / self._discs
+        return mu, kappa, np.where(self._pushes, most[:, None] * self._disc(shares)[0] * (1.0 - NEAR), 0.0)
 
     @staticmethod
     def _disc(shares: Array) -> tuple[Array, Array]:
         root = np.sqrt(1.0 + np.sum(shares * shares, axis=1, keepdims=True))
         return shares / root, root
 
-    def _matrix(self, mu: Array, kappa: Array, nu: Array) -> Array:
+    def _matrix(self, turn: Array, mu: Array, kappa: Array, nu: Array) -> Array:
         S, tau, p = self._S, self._system.tau, self._system.p
         form = S.copy()
         form[:p] = mu[:, None] * S[:p]
         for k in range(2):
             has = tau[:, k] >= 0
             t = tau[has, k]
-            form[:p][has] -= (kappa[has] * self._turn[has, k])[:, None] * S[t]
+            form[:p][has] -= (kappa[has] * turn[has, k])[:, None] * S[t]
             form[t] = kappa[has, None] * S[t] + (nu[has, k] * self._unit[has, k])[:, None] * S[:p][has]
-        wide = np.flatnonzero(self._point.wide)
-        reach = np.maximum(self._reach[wide], NEAR)
+        lost = np.flatnonzero(self._off > 0)
+        reach, share = np.maximum(self.reach[lost], NEAR), kappa[lost] * self._off[lost]
         for k in range(2):
-            rows = self._rows[wide, k] * np.sqrt(kappa[wide] / reach)[:, None]
+            rows = self._rows[lost, k] * np.sqrt(share / reach)[:, None]
             form -= 0.5 * rows.T @ rows
-        form[wide, wide] -= 0.5 * kappa[wide] * reach
+        form[lost, lost] -= 0.5 * share * reach
         if self._held is not None:
             form += self._held
         return 0.5 * (form + form.T)
@@ -390,28 +427,31 @@ class _Definite:
         """The logarithm of sum exp(-hardness e) over the eigenvalues e, by the hardness, and its gradient."""
         logs, shares = self._split(x)
         mu, kappa, nu = self._numbers(logs, shares)
-        sizes, vectors = np.linalg.eigh(columns.T @ self._matrix(mu, kappa, nu) @ columns)
-        parts = np.exp(-hardness * (sizes - sizes[0]))
-        vectors = columns @ vectors
-        P = (vectors * (parts / np.sum(parts))) @ vectors.T
-        return float(np.log(np.sum(parts)) / hardness - sizes[0]), self._gradient(P, mu, kappa, nu, shares)
+        found = [np.linalg.eigh(columns.T @ self._matrix(turn, mu, kappa, nu) @ columns) for turn in self._turns]
+        least = min(sizes[0] for sizes, _ in found)
+        parts = [np.exp(-hardness * (sizes - least)) for sizes, _ in found]
+        total, gradient = sum(float(np.sum(part)) for part in parts), np.zeros_like(x)
+        for turn, (_, vectors), part in zip(self._turns, found, parts, strict=True):
+            turned = columns @ vectors
+            gradient += self._gradient(turn, (turned * (part / total)) @ turned.T, mu, kappa, nu, shares)
+        return float(np.log(total) / hardness - least), gradient
 
-    def _gradient(self, P: Array, mu: Array, kappa: Array, nu: Array, shares: Array) -> Array:
+    def _gradient(self, turn: Array, P: Array, mu: Array, kappa: Array, nu: Array, shares: Array) -> Array:
         tau, p, SP = self._system.tau, self._system.p, self._S @ P
         node = np.arange(p)
         by_mu, by_kappa, by_nu = np.diagonal(SP)[:p].copy(), np.zeros(p), np.zeros((p, 2))
         for k in range(2):
             has = tau[:, k] >= 0
             t = tau[has, k]
-            by_kappa[has] += SP[t, t] - self._turn[has, k] * SP[t, node[has]]
+            by_kappa[has] += SP[t, t] - turn[has, k] * SP[t, node[has]]
             by_nu[has, k] = SP[node[has], t] * self._unit[has, k]
-        for i in np.flatnonzero(self._point.wide):
-            reach, rows = max(self._reach[i], NEAR), self._rows[i]
-            by_kappa[i] -= 0.5 * (reach * P[i, i] + float(np.sum((rows @ P) * rows)) / reach)
+        for i in np.flatnonzero(self._off > 0):
+            reach, rows = max(self.reach[i], NEAR), self._rows[i]
+            by_kappa[i] -= 0.5 * self._off[i] * (reach * P[i, i] + float(np.sum((rows @ P) * rows)) / reach)
         by_nu = np.where(self._pushes, by_nu, 0.0)
         logs = np.stack([by_mu * mu + np.sum(by_nu * nu, axis=1), by_kappa * kappa])
         logs = np.where(self._open, np.mean(logs, axis=0), logs)
         z, root = self._disc(shares)
-        pulled = by_nu * mu[:, None] * (1.0 - NEAR)
+        pulled = by_nu * (mu / self._discs)[:, None] * (1.0 - NEAR)
         pulled = (pulled - z * np.sum(z * pulled, axis=1, keepdims=True)) / root
         return -np.concatenate([(logs - np.mean(logs)).ravel(), pulled.ravel()])

@@ -134,13 +134,10 @@ class Open:
     mode: int | None = None
 
 
-def settle(system: EnclosedSpace, codes: Sequence[int], wider: float = 0.0) -> SpaceRoot | Open | None:
-    """What a leaf holds: exactly one root in its box, no root (None), or it is not settled.
-
-    ``wider``: by how much of an angle its sectors are wider, on both sides.
-    """
+def settle(system: EnclosedSpace, codes: Sequence[int]) -> SpaceRoot | Open | None:
+    """What a leaf holds: exactly one root in its box, no root (None), or it is not settled."""
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        return _Leaf(system, codes, wider).settle()
+        return _Leaf(system, codes).settle()
 
 
 def unsettled(system: EnclosedSpace, codes: Sequence[int]) -> Open:
@@ -173,7 +170,7 @@ class _Leaf:
     beside psi, and their rows of equilibrium are zeros beside G (theory, section 14.6).
     """
 
-    def __init__(self, system: EnclosedSpace, codes: Sequence[int], wider: float = 0.0) -> None:
+    def __init__(self, system: EnclosedSpace, codes: Sequence[int]) -> None:
         self.system = system
         tau = system.tau
         self.open = [i for i, code in enumerate(codes) if code == OPEN]
@@ -203,7 +200,6 @@ class _Leaf:
             E[along, self.closed.index(i)] = sign / system.unit[along]
         self.E = E
         self.centre, self.half = self._boxes()
-        self.half = self.half + wider
         self._last: tuple[bytes, Turning | None] | None = None
 
     def _free_modes(self) -> list[int]:

@@ -12,8 +12,8 @@ import numpy as np
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
 from enumsol.condensation.space_condensed import PieceSpace
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
+from enumsol.trusted.space.piece_forms import only_on_curve
 from enumsol.trusted.space.sector_rows import sector_margin
-from enumsol.trusted.space.space_uniqueness import only_root, only_solution_in_space
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,8 +21,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.enclosure import CondensedEnclosure
+    from enumsol.trusted.space.curve_runs import KnownCurve, Run
     from enumsol.trusted.space.sector_rows import Row
-    from enumsol.trusted.space.solution_curve import AlphaProblem, CurveBox
+    from enumsol.trusted.space.solution_curve import AlphaProblem, SolutionCurve
 
     Array = NDArray[np.float64]
 
@@ -121,37 +122,38 @@ class AlphaPiece:
         """What a leaf holds at every alpha of the piece: exactly one root, none (None), or it is not settled."""
         return settle(self.whole, codes)
 
-    def has_one(self, numbers: Array, leaf: Sequence[int], wider: float, normal: Array, errors: float = 1.0) -> bool:
-        """Whether there is exactly one solution at every alpha of the piece.
+    def lies_on(self, known: KnownCurve, run: Run, codes: Sequence[int], numbers: Array, errors: float = 1.0) -> bool:
+        """Whether all solutions with the statuses of an assignment, at every alpha of the piece, are those of a run.
 
         Parameters
         ----------
-        numbers : of the form (see ``SpaceWeights.of``)
-        leaf : codes of a leaf that holds the solutions, or none: then they are near ``normal``
-        wider : by how much of an angle its sectors are wider, on both sides
-        normal : (p,) array, lambda_n, scaled
+        known, run : links of a curve that pass every alpha of the piece
+        codes : (partial) status codes; a sector counts as contact
+        numbers : of the form (see ``PieceWeights.of``)
+        errors : see ``only_on_curve``
         """
-        if leaf:
-            return only_root(self.whole, numbers, leaf, errors, wider) is not None
-        return only_solution_in_space(self.whole, numbers, normal, errors) is not None
+        if not known.passes(run, self.low, self.high):
+            return False
+        parts = known.over(run, self.low, self.high)
+        return only_on_curve(self.whole, (self.low, self.high), codes, numbers, parts, errors)
 
     @cached_property
     def point(self) -> AlphaPiece:
         """The middle alone."""
         return AlphaPiece(self.enclosure, self.middle, self.middle, self.units)
 
-    def meets(self, codes: Sequence[int], given: AlphaProblem, box: CurveBox, errors: float = 1.0) -> bool:
-        """Whether the roots of a leaf, one at every alpha, are an arc that is in a box at the middle of the piece."""
+    def meets(self, codes: Sequence[int], given: AlphaProblem, curve: SolutionCurve, errors: float = 1.0) -> bool:
+        """Whether the roots of a leaf, one at every alpha, are an arc that is on a curve at the middle of the piece."""
         if not isinstance(self.held(codes), SpaceRoot):
             return False
         there = self.point.held(codes)
-        return isinstance(there, SpaceRoot) and self.point.lies_in(self.point.place(there, given), box, errors)
+        return isinstance(there, SpaceRoot) and lies_in(self.point.place(there, given), curve, errors)
 
-    def holds_all(self, codes: Sequence[int], given: AlphaProblem, box: CurveBox, errors: float = 1.0) -> bool:
-        """Whether all roots of a leaf are in a box, at every alpha of the piece."""
+    def holds_all(self, codes: Sequence[int], given: AlphaProblem, curve: SolutionCurve, errors: float = 1.0) -> bool:
+        """Whether all roots of a leaf are on the curve of a box, at every alpha of the piece."""
         found = self.held(codes)
         place = None if found is None else self.place(found, given)
-        return found is None or self.lies_in(place, box, errors)
+        return found is None or lies_in(place, curve, errors)
 
     def place(self, found: SpaceRoot | Open, given: AlphaProblem) -> Ball | None:
         """Bounds of (zeta, alpha) of what a leaf holds, (3p + 1,); None where there are none."""
@@ -160,23 +162,13 @@ class AlphaPiece:
         zeta = given.coordinates(self.forces(found.y), self.displacements(found.y, found.w))
         return Ball.joined(zeta, self.alphas[None])
 
-    def lies_in(self, place: Ball | None, box: CurveBox, errors: float = 1.0) -> bool:
-        """Whether all points within bounds lie in a box around a curve.
 
-        A point x lies in it if |t| <= h and |x - c - t d| <= b, t = e'(x - c); see ``CurveBox``.
-        """
-        if place is None:
-            return False
-        x = place - Ball.exact(box.centre)
-        share = 1.0 - (errors - 1.0) * _MARGIN
-        d, e, n = box.direction, box.border, len(box.centre)
-        along = (Ball.exact(e[None, :]) @ x[:, None])[0, 0]
-        if not (abs(along.mid) + along.rad) * SAFE <= share * box.half:
-            return False
-        # x - c - d e'(x - c), of every number once
-        turn = Ball.exact(np.eye(n)) - Ball.exact(d[:, None]) * Ball.exact(e[None, :])
-        beside = (turn @ x[:, None])[:, 0]
-        return bool(np.all(beside.size * SAFE <= share * box.radius))
+def lies_in(place: Ball | None, curve: SolutionCurve, errors: float = 1.0) -> bool:
+    """Whether all solutions within bounds are on the curve of a box: they lie where it has the only ones.
+
+    ``errors``: 1 proves, a writer of proofs takes more.
+    """
+    return place is not None and curve.holds(place, 1.0 - (errors - 1.0) * _MARGIN)
 
 
 def _inverse(F: Ball) -> Ball:

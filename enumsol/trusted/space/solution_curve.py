@@ -189,7 +189,7 @@ class AlphaProblem:
         """
         m = 3 * self.p
         out = Ball(np.eye(m + 1), np.zeros((m + 1, m + 1)))
-        out[:m] = Ball.exact(1.0 + rho)[:, None] * self.part - Ball.exact(rho[:, None] * np.eye(m, m + 1))
+        out[:m] = _one_more(rho)[:, None] * self.part - Ball.exact(rho[:, None] * np.eye(m, m + 1))
         return out
 
     def forces_at(self, x: Ball) -> Ball:
@@ -202,7 +202,7 @@ class AlphaProblem:
 
     def arguments(self, x: Ball, y: Ball, rho: Array) -> Ball:
         """z at points (zeta, alpha) with forces y / q, for steps relative to its own."""
-        return Ball.exact(1.0 + rho) * y - Ball.exact(rho) * x[: len(rho)]
+        return _one_more(rho) * y - Ball.exact(rho) * x[: len(rho)]
 
     # -- coordinates -----------------------------------------------------------------------------------------------
 
@@ -289,6 +289,13 @@ class AlphaProblem:
         return SLIP if least > max(F_high, 0.0) * high * SAFE else None
 
 
+def _one_more(rho: Array) -> Ball:
+    """1 + rho, which is a float for powers of two near one."""
+    total = 1.0 + rho
+    exact = (total - rho == 1.0) & (total - 1.0 == rho)
+    return Ball(total, np.where(exact, 0.0, UNIT * total))
+
+
 def _steps(S: Array, tau: Sequence[NDArray[np.intp]]) -> Array:
     rho = np.sqrt(np.diagonal(np.linalg.inv(S)) / np.diagonal(S))
     for t in tau:
@@ -323,6 +330,12 @@ class SolutionCurve:
         """The solution at t is no farther from centre + t direction, (3p + 1,)."""
         return np.asarray(self.found.spread[0] * self.found.near.unit)
 
+    @property
+    def reach(self) -> Array:
+        """How far from centre + t direction the set goes in which the curve has the only solutions, (3p + 1,)."""
+        found = self.found
+        return np.asarray(found.step.reach(found.radius, found.shares) * found.near.unit)
+
     @cached_property
     def slope(self) -> Ball:
         """A ball, (3p + 1,), of all (x(t) - x(t')) / (t - t'); without bounds where none are known."""
@@ -339,21 +352,37 @@ class SolutionCurve:
         point = Ball.exact(self.box.centre) + where * Ball.exact(self.box.direction)
         return Ball(point.mid, (point.rad + self.spread) * SAFE)
 
-    def holds(self, x: Ball) -> bool:
+    def holds(self, x: Ball, share: float = 1.0) -> bool:
         """Whether all points of a ball lie in the set in which the curve has the only solution for every t.
 
         It is larger than the box where nodes change their status: the curve bends there by more than the radius.
+        ``share`` is of the size of that set; what a ball leaves of the box is bounded by every number of the ball once.
         """
-        if lies_in(self.box, x):
-            return True
-        found, t = self.found, self.parameter(x)
-        G, unit = found.step.G.mid, Ball.exact(1.0 / found.near.unit)
-        if not (G.shape[1] and t.size <= self.box.half):
+        found, unit = self.found, Ball.exact(1.0 / self.found.near.unit)
+        if not self.parameter(x).size <= share * self.box.half:
             return False
-        beside = unit * ((x - Ball.exact(self.box.centre)) - t * Ball.exact(self.box.direction))
-        shares = np.clip(np.linalg.lstsq(G, beside.mid)[0], -found.shares, found.shares)
-        rest = beside - (Ball.exact(G) @ Ball.exact(shares[:, None]))[:, 0]
-        return bool(np.all(rest.size <= found.radius))
+        off = unit * (x - Ball.exact(self.box.centre))
+        turn, shares_of, rest_of = self._beside
+        beside = (turn @ Ball.exact(off.mid)[:, None])[:, 0]
+        radius = share * found.radius
+        if np.all((beside.size + upper_product(turn.size, off.rad)) * SAFE <= radius):
+            return True
+        # G s + b: what the ball adds has an s of its own
+        room = share * found.shares - upper_product(shares_of.size, off.rad) * SAFE
+        if not len(room) or np.any(room < 0):
+            return False
+        G = found.step.G.mid
+        s = np.clip(np.linalg.lstsq(G, beside.mid)[0], -room, room)
+        rest = beside - (Ball.exact(G) @ Ball.exact(s[:, None]))[:, 0]
+        return bool(np.all((rest.size + upper_product(rest_of.size, off.rad)) * SAFE <= radius))
+
+    @cached_property
+    def _beside(self) -> tuple[Ball, Ball, Ball]:
+        """1 - d e' in the units of the nodes, and the same times P and 1 - G P, with P near the inverse of G."""
+        near, G = self.found.near, self.found.step.G.mid
+        turn = Ball.exact(np.eye(len(near.c))) - Ball.exact(near.d[:, None]) * Ball.exact(near.e[None, :])
+        shares_of = Ball.exact(np.asarray(np.linalg.pinv(G), dtype=np.float64)) @ turn
+        return turn, shares_of, turn - Ball.exact(G) @ shares_of
 
     def parameter(self, x: Ball) -> Ball:
         """Bounds of t at points within a ball."""

@@ -2,8 +2,8 @@
 
 A solution that is known well enough is the only one where a matrix is positive definite. That there is one follows from
 the degree. It is enclosed by a leaf, where it is regular, or by a point near it, whatever statuses hold there. Below an
-assignment the matrix has to be definite on the subspace of its equations (theory, section 12.6). All this may be about
-one alpha, or about every alpha of a piece (theory, section 12.9).
+assignment the matrix has to be definite on the subspace of its equations (theory, section 12.6). Over a piece of alpha
+the solution is known from a curve of solutions (theory, section 12.9).
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class LooseSolution:
                 continue
             scale = system.unit[t] * system.disc_scale[i]
             tau = upper_norm((np.abs(y.mid[t]) + y.rad[t]) * scale * SAFE + TINY)
-            if tau < (y.mid[i] - y.rad[i]) * system.disc_scale[i] * system.smallest_discs[i] / SAFE:
+            if tau < (y.mid[i] - y.rad[i]) * system.disc_scale[i] / SAFE:
                 slip[i] = False
                 w.mid[t], w.rad[t] = 0.0, 0.0
             stick[i] &= bool(np.all(np.abs(w.mid[t]) <= w.rad[t]))
@@ -106,19 +106,16 @@ def only_solution_in_space(
         return None if form is None else form.enclosed(normal, errors)
 
 
-def only_root(
-    system: EnclosedSpace, numbers: Array, codes: Sequence[int], errors: float = 1.0, wider: float = 0.0
-) -> SpaceRoot | None:
+def only_root(system: EnclosedSpace, numbers: Array, codes: Sequence[int], errors: float = 1.0) -> SpaceRoot | None:
     """The regular root of a leaf, if it is proven that it has one and that there is no other solution at all.
 
-    Parameters and errors as for ``only_solution_in_space``; ``codes`` are those of the leaf, ``wider`` as for
-    ``settle``.
+    Parameters and errors as for ``only_solution_in_space``; ``codes`` are those of the leaf.
     """
     if not is_complete(system, codes):
         return None
     with np.errstate(all="ignore"):
         form = _Form.of(system, numbers)
-        root = None if form is None else settle(system, codes, wider)
+        root = None if form is None else settle(system, codes)
         # the degree of a problem is +1
         if form is None or not isinstance(root, SpaceRoot) or root.index != 1:
             return None
@@ -221,8 +218,7 @@ class SpaceWeights:
     def of(cls, system: EnclosedSpace, numbers: Array) -> SpaceWeights | None:
         """From one array: mu, kappa and wide of all nodes, then nu and theta of all tau, in the order of y.
 
-        mu and kappa are positive, wide is not negative, |nu| <= mu over the radius of the disc, |theta| <= 1, and
-        theta = 0 where wide is positive.
+        mu and kappa are positive, wide is not negative, |nu| <= mu, |theta| <= 1, and theta = 0 where wide is positive.
         None where this is not so.
         """
         p, m = len(system.tau), len(system.g)
@@ -233,7 +229,7 @@ class SpaceWeights:
         nu, theta = (np.append(pair, 0.0)[place] for pair in pairs)
         square = np.sum(theta * theta, axis=1)
         whole = np.abs(square - 1.0) < _UNIT_LENGTH
-        wrong = (mu <= 0) | (kappa <= 0) | (wide < 0) | (upper_norm(nu, axis=1) * system.largest_discs > mu)
+        wrong = (mu <= 0) | (kappa <= 0) | (wide < 0) | (upper_norm(nu, axis=1) > mu)
         wrong |= ~whole & (square > 1.0 - _UNIT_LENGTH)
         wrong |= (wide > 0) & (np.any(theta != 0, axis=1) | np.all(system.tau < 0, axis=1))
         # | |theta| - 1 | <= | |theta|^2 - 1 |
@@ -251,20 +247,15 @@ class _Form:
         Positive lower bound of the eigenvalues of Q, for every theta that ``numbers`` stand for.
     turn : Ball of shape (p, 2)
         theta over the unit of the tau.
-    reach : Ball of shape (p, 2)
-        The same times the radius of the disc.
     push : (p, 2) array
         nu times that unit.
-    ends : ``reach`` at both ends of a piece of alpha
     held : rows that are held at zero
     """
 
     system: EnclosedSpace
     numbers: SpaceWeights
     turn: Ball
-    reach: Ball
     push: Array
-    ends: Sequence[Ball]
     held: Ball | None
     least: float
 
@@ -276,26 +267,25 @@ class _Form:
             return None
         if np.max(np.maximum(system.unit, 1.0 / system.unit)) > LARGEST_UNIT:
             return None
+        # what follows is about discs of the radius one
+        if np.any((system.discs.mid != 1.0) | (system.discs.rad > 0)):
+            return None
         unit = np.where(system.tau >= 0, system.unit[system.tau], 1.0)
         # units are powers of two: what is rounded is less than TINY
         turn = Ball(numbers.theta / unit, numbers.off[:, None] / unit * SAFE + TINY)
         turn = Ball(turn.mid, np.where(system.tau >= 0, turn.rad, 0.0))
-        push = numbers.nu * unit
-        ends = [_times(turn, discs, system.tau) for discs in system.end_discs]
-        reach = ends[0] if len(ends) == 1 else _times(turn, system.discs, system.tau)
-        form = cls(system, numbers, turn, reach, push, ends, held, 0.0)
+        form = cls(system, numbers, turn, numbers.nu * unit, held, 0.0)
         least = form.smallest(np.zeros(len(unit)), np.zeros(len(unit)))
         return replace(form, least=least) if least > 0 else None
 
     def smallest(self, off: Array, lost: Array) -> float:
         """Lower bound of the eigenvalues of Q less what is lost where theta is off, at most 0 where none is positive.
 
-        Where theta is not off ``lost`` is 0; elsewhere any positive numbers are right. Q is affine in the radii of the
-        discs, and these in alpha.
+        Where theta is not off ``lost`` is 0; elsewhere any positive numbers are right.
         """
-        unit = np.where(self.system.tau >= 0, self.system.unit[self.system.tau], 1.0)
-        rest = off, lost
-        return min(_least(self.system, self.numbers, end, self.push, unit, self.held, rest) for end in self.ends)
+        numbers, wide = self.numbers, self.numbers.wide > 0
+        off, lost = np.where(wide, 1.0, off), np.where(wide, numbers.wide, lost)
+        return least_eigenvalue(self.system, (numbers.mu, numbers.kappa), self.turn, self.push, (off, lost), self.held)
 
     # -- enclosure -------------------------------------------------------------------------------------------------
 
@@ -309,7 +299,7 @@ class _Form:
         y.mid[:p] = n
         for k in range(2):
             has = (tau[:, k] >= 0) & (n > 0)
-            part = Ball.exact(n[has]) * self.reach[has, k]
+            part = Ball.exact(n[has]) * self.turn[has, k]
             y.mid[tau[has, k]], y.rad[tau[has, k]] = part.mid, part.rad
         reach = self._moved(self._change(n, self._displacements(y))) / self.least * SAFE
         if not np.isfinite(reach):
@@ -354,7 +344,7 @@ class _Form:
         v = Ball(w.mid[t] / unit, w.rad[t] / unit * SAFE + TINY)
         slip = float(upper_norm(v.size)) - float(theta @ v.mid) + float(np.abs(theta) @ v.rad)
         slip += 32 * UNIT * float(np.sum(v.size)) + float(numbers.off[i] * np.sum(v.size))
-        room = (numbers.mu[i] / self.system.largest_discs[i] - float(upper_norm(numbers.nu[i])) * SAFE) / SAFE
+        room = (numbers.mu[i] - float(upper_norm(numbers.nu[i])) * SAFE) / SAFE
         return bool(room * gap / SAFE >= numbers.kappa[i] * slip * SAFE * SAFE + TINY)
 
     def _moved(self, change: Array) -> float:
@@ -365,7 +355,7 @@ class _Form:
         for k in range(2):
             has = tau[:, k] >= 0
             t, kappa = tau[has, k], numbers.kappa[has]
-            moved[:p][has] += kappa * self.reach.size[has, k] * change[t]
+            moved[:p][has] += kappa * self.turn.size[has, k] * change[t]
             moved[t] = np.abs(self.push[has, k]) * change[:p][has] + kappa * change[t]
         return float(upper_norm(moved * SAFE + TINY) * SAFE)
 
@@ -375,13 +365,7 @@ class _Form:
         """Whether any solution within these balls is the only one, given that all lie there or that it exists."""
         numbers, system = self.numbers, self.system
         off = np.array([self._off(i, y, w) for i in range(len(system.tau))])
-        slopes = np.zeros((len(off), 2))
-        size = (np.abs(system.S) + system.S_rad) * SAFE
-        for k in range(2):
-            has = system.tau[:, k] >= 0
-            t = system.tau[has, k]
-            slopes[has, k] = upper_norm(size[t], axis=1) / system.unit[t] * SAFE
-        lost = numbers.kappa * off * system.largest_discs * upper_norm(slopes, axis=1)
+        lost = numbers.kappa * off * slip_sizes(system)
         if not np.all(np.isfinite(lost)):
             return False
         if self.least > errors * upper_norm(lost * SAFE + TINY) * SAFE:
@@ -408,52 +392,66 @@ class _Form:
             off = float(apart * SAFE + 32 * UNIT)
         low = float(y.mid[i] - y.rad[i]) / SAFE
         if low > 0:
-            # |tau / (r lambda_n) - theta| = |tau - theta r lambda_n| / (r lambda_n)
+            # |tau / lambda_n - theta| = |tau - theta lambda_n| / lambda_n
             scale, most = unit * system.disc_scale[i], system.disc_scale[i]
             tau, n = Ball(y.mid[t] * scale, y.rad[t] * scale * SAFE + TINY), Ball(y.mid[i] * most, y.rad[i] * most)
-            n = n * system.discs[i]
-            apart = upper_norm((tau - Ball.exact(theta) * n).size + TINY) / (low * most * system.smallest_discs[i])
-            apart = apart * SAFE * SAFE
-            off = min(off, float(apart))
+            apart = upper_norm((tau - Ball.exact(theta) * n).size + TINY) / (low * most)
+            off = min(off, float(apart * SAFE * SAFE))
         return off
 
 
-def _times(turn: Ball, discs: Ball, tau: NDArray[np.intp]) -> Ball:
-    """Directions times radii of discs; 0 where there is no tau."""
-    reach = turn * discs[:, None]
-    return Ball(reach.mid, np.where(tau >= 0, reach.rad, 0.0))
+def slip_sizes(system: EnclosedSpace) -> Array:
+    """Upper bounds of the norms of the rows of S that give v, node by node, (p,)."""
+    found = np.zeros(system.tau.shape)
+    size = (np.abs(system.S) + system.S_rad) * SAFE
+    for k in range(2):
+        has = system.tau[:, k] >= 0
+        t = system.tau[has, k]
+        found[has, k] = upper_norm(size[t], axis=1) / system.unit[t] * SAFE
+    return np.asarray(upper_norm(found, axis=1))
 
 
-def _least(
+def least_eigenvalue(
     system: EnclosedSpace,
-    numbers: SpaceWeights,
-    reach: Ball,
+    factors: tuple[Array, Array],
+    turn: Ball,
     push: Array,
-    unit: Array,
-    held: Ball | None,
     rest: tuple[Array, Array],
+    held: Ball | None = None,
 ) -> float:
-    """Lower bound of the smallest eigenvalue of Q + held'held, at most 0 where none positive is proven."""
-    tau, p = system.tau, len(system.tau)
+    """Lower bound of the smallest eigenvalue of Q, less what is lost, plus held'held; at most 0 if none is positive.
+
+    D d has mu d_n + push . d_tau for lambda_n, and kappa (d_tau - turn d_n) for tau (theory, (12.7)).
+
+    Parameters
+    ----------
+    system : EnclosedSpace
+    factors : mu and kappa, (p,) arrays
+    turn, push : Ball and array of shape (p, 2)
+        Over the unit of the tau, and times that unit.
+    rest : (off, lost), (p,) arrays
+        How far ``turn``, times the unit, may be off, and what is subtracted for this, theory, (12.8): where ``off`` is
+        positive any positive ``lost`` is right, elsewhere both are 0.
+    held : rows, as balls, that are zero on the subspace of which Q is asked
+    """
+    tau, p, (mu, kappas), (off, wide) = system.tau, len(system.tau), factors, rest
+    unit = np.where(tau >= 0, system.unit[tau], 1.0)
     S = Ball(system.S, system.S_rad)
     form = Ball(S.mid.copy(), S.rad.copy())
-    along = S[:p] * Ball.exact(numbers.mu[:, None])
+    along = S[:p] * Ball.exact(mu[:, None])
     form.mid[:p], form.rad[:p] = along.mid, along.rad
     spread = Ball.exact(np.zeros_like(S.mid))
-    off, lost = rest
-    wide, off = np.where(numbers.wide > 0, numbers.wide, lost), np.where(numbers.wide > 0, 1.0, off)
     for k in range(2):
         has = np.flatnonzero(tau[:, k] >= 0)
-        t, kappa = tau[has, k], numbers.kappa[has]
-        turned = form[has] - S[t] * (reach[has, k] * Ball.exact(kappa))[:, None]
+        t, kappa = tau[has, k], kappas[has]
+        turned = form[has] - S[t] * (turn[has, k] * Ball.exact(kappa))[:, None]
         pushed = S[t] * Ball.exact(kappa[:, None]) + S[has] * Ball(push[has, k], np.full(len(has), TINY))[:, None]
         for rows, part in ((has, turned), (t, pushed)):
             form.mid[rows], form.rad[rows] = part.mid, part.rad
         used = np.flatnonzero(wide[has] > 0)
-        # weights at least r kappa rho / sqrt(s), for any rounding
+        # weights at least kappa off / sqrt(s), for any rounding
         weight = kappa[used] * off[has[used]] / np.sqrt(wide[has[used]]) / unit[has[used], k]
-        weight = weight * system.largest_discs[has[used]] * SAFE + TINY
-        rows = S[t[used]] * Ball.exact(weight[:, None])
+        rows = S[t[used]] * Ball.exact((weight * SAFE + TINY)[:, None])
         spread = spread + Ball(rows.mid.T, rows.rad.T) @ rows
     Q = form - Ball(0.5 * spread.mid, 0.5 * spread.rad)
     if held is not None:

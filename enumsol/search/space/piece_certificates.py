@@ -1,0 +1,154 @@
+"""Certificates in 3D that a known curve has all solutions over a piece of alpha (theory, section 12.9).
+
+Nothing here is trusted: what is proposed is proven, or the tree goes on.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations_with_replacement
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from enumsol.arithmetic.balls import Ball
+from enumsol.model.statuses import UNDECIDED
+from enumsol.search.space.space_fathoming import DefiniteForm
+from enumsol.trusted.space.curve_runs import CurveParts, KnownCurve, Run
+from enumsol.trusted.space.piece_forms import PieceWeights, how_far_off
+from enumsol.trusted.space.space_uniqueness import equations
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from fractions import Fraction
+
+    from numpy.typing import NDArray
+
+    from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
+    from enumsol.selections.solution import Codes
+    from enumsol.trusted.space.pieces import AlphaPiece
+
+    Array = NDArray[np.float64]
+    Flags = NDArray[np.bool_]
+
+#: Smallest eigenvalue relative to S from which a form counts as definite, nodes from which better ones are sought.
+_DEFINITE, _MANY = 1e-9, 8
+#: Weight of the equations of an assignment, by the largest entry of S; what of a gap may serve for its slip.
+_WEIGHT, _SHARED = 1024.0, 0.5
+#: How often large distances get more weight in the fit of psi, and by how little the least ones count.
+_ROUNDS, _LEAST = 4, 1e-3
+#: By how much more a writer of proofs has theta vary.
+ERRORS = 1.0 + 2.0**-6
+
+
+class Passage(NamedTuple):
+    """A run of a known curve that passes every alpha of a piece, and its parts there."""
+
+    curve: int
+    run: Run
+    parts: CurveParts
+
+
+def runs_over(known: KnownCurve, low: Fraction, high: Fraction) -> list[Run]:
+    """The runs of a curve that pass every alpha of a piece, each as short as may be."""
+    joints, count = known.chain.joints, len(known.chain.links)
+    sides = [int(joint.alphas[0] >= high) - int(joint.alphas[1] <= low) for joint in joints[:-1]]
+    if known.chain.closed:
+        sides += sides
+    else:
+        sides.append(int(joints[-1].alphas[0] >= high) - int(joints[-1].alphas[1] <= low))
+    found: dict[Run, None] = {}
+    last, where = 0, 0
+    for k, side in enumerate(sides):
+        if side and last == -side:
+            found[Run(where % count, (k - 1) % count)] = None
+        if side:
+            last, where = side, k
+    return list(found)
+
+
+class PieceProposals:
+    """Numbers of forms over one piece of alpha.
+
+    Parameters
+    ----------
+    piece : AlphaPiece
+    system : SpaceSystem
+        At the middle of the piece.
+    middle : EnclosedSpace
+        The same as balls.
+    """
+
+    def __init__(self, piece: AlphaPiece, system: SpaceSystem, middle: EnclosedSpace) -> None:
+        self._piece, self._system, self._middle = piece, system, middle
+
+    def numbers(self, codes: Codes, parts: CurveParts) -> tuple[Array | None, bool]:
+        """Those of a form that seems to serve all over the piece, or None, and whether a shorter piece may have one."""
+        p, places, whole = self._system.p, self._system.tau >= 0, self._piece.whole
+        rows = None
+        if any(code != UNDECIDED for code in codes):
+            rows = equations(self._middle, codes, _WEIGHT).mid
+        with np.errstate(all="ignore"):
+            thetas, apart = self._thetas(parts)
+            discs, better = whole.largest_discs, p >= _MANY
+            psi = [Ball.exact(x * disc.mid[:, None]) for x, disc in zip(thetas, whole.end_discs, strict=True)]
+            plain = PieceWeights(np.ones(p), np.ones(p), np.zeros((p, 2)), (thetas[0], thetas[1]))
+            off = ERRORS * how_far_off(whole, (self._piece.low, self._piece.high), plain, psi, parts)
+            form = DefiniteForm(self._system, [end.mid for end in psi], apart, off, discs, rows)
+            found = form.best(_DEFINITE, better=better)
+            if found is None:
+                # nothing is off in a piece that is short enough
+                turn = self._turn(parts)
+                form = DefiniteForm(self._system, [turn], apart, np.zeros(p), None, rows)
+                return None, form.best(_DEFINITE, better=better) is not None
+        mu, kappa, nu = found
+        return np.concatenate([mu, kappa, nu[places], *(theta[places] for theta in thetas)]), True
+
+    def _turn(self, parts: CurveParts) -> Array:
+        """theta of the curve at the middle of the piece, (p, 2)."""
+        k = int(np.argmin(np.abs(parts.alpha.mid - float(self._piece.middle))))
+        theta, far = self._served(parts)
+        return np.where((self._system.tau >= 0) & far[k][:, None], theta[k], 0.0)
+
+    def _reference(self) -> Array:
+        """F at the middle, of the first component that has friction."""
+        system = self._system
+        F = np.where(system.tau >= 0, system.F / np.where(system.tau >= 0, system.unit[system.tau], 1.0), 0.0)
+        return np.asarray(np.where(system.tau[:, 0] >= 0, F[:, 0], np.where(system.tau[:, 1] >= 0, F[:, 1], 1.0)))
+
+    def _served(self, parts: CurveParts) -> tuple[Array, Flags]:
+        """theta that serves, and where one is known: a shorter one than v / |v| where a node is open all the time."""
+        (theta, far), normal, slip = parts.thetas, *(part.mid for part in parts.slips)
+        r = np.maximum(parts.F.mid, 0.0) / self._reference()
+        pushed = self._reference() * r * np.linalg.norm(slip, axis=2)
+        shorter = np.maximum(1.0 - _SHARED * np.maximum(-normal, 0.0) / np.maximum(pushed, 1e-300), 0.0)
+        apart = self._apart(parts)
+        return np.where(apart[:, None], shorter[:, :, None] * theta, theta), np.isfinite(far) | apart
+
+    @staticmethod
+    def _apart(parts: CurveParts) -> Flags:
+        """Nodes that are open all the time."""
+        return np.asarray(np.all(parts.open & (parts.slips[0].mid < 0), axis=0))
+
+    def _thetas(self, parts: CurveParts) -> tuple[Sequence[Array], Flags]:
+        """Those at both ends whose psi is near to that of the curve all over the piece, (p, 2) each, and open nodes."""
+        low, high, reference = float(self._piece.low), float(self._piece.high), self._reference()
+        share = np.clip((parts.alpha.mid - low) / (high - low), 0.0, 1.0)
+        r = np.maximum(parts.F.mid, 0.0) / reference
+        ends = [np.maximum(end.mid, 0.0) for end in self._piece.whole.end_discs]
+        (theta, known), apart = self._served(parts), self._apart(parts)
+        psi = np.where(known[:, :, None], r[:, :, None] * theta, 0.0)
+        basis = (1.0 - share)[:, None] * ends[0], share[:, None] * ends[1]
+        weight = np.ones_like(r)
+        fitted = [np.zeros_like(theta[0]), np.zeros_like(theta[0])]
+        for _ in range(_ROUNDS):
+            a, b, c = (np.sum(weight * x * y, axis=0) for x, y in combinations_with_replacement(basis, 2))
+            a, c = a + 1e-12 * (a + c) + 1e-300, c + 1e-12 * (a + c) + 1e-300
+            one, other = (np.sum((weight * x)[:, :, None] * psi, axis=0) for x in basis)
+            det = (a * c - b * b)[:, None]
+            fitted = [(c[:, None] * one - b[:, None] * other) / det, (a[:, None] * other - b[:, None] * one) / det]
+            missed = np.linalg.norm(psi - sum(x[:, :, None] * y for x, y in zip(basis, fitted, strict=True)), axis=2)
+            weight *= missed / np.maximum(np.max(missed, axis=0), 1e-300) + _LEAST
+        size = [np.linalg.norm(theta, axis=1) for theta in fitted]
+        shrunk = [np.where(apart & (x > 1.0), (1.0 - 4e-16) / np.maximum(x, 1.0), 1.0) for x in size]
+        places = self._system.tau >= 0
+        return [np.where(places, theta * by[:, None], 0.0) for theta, by in zip(fitted, shrunk, strict=True)], apart
