@@ -1,7 +1,9 @@
 """What a graph leaves open is told with the reason and with a remedy, and the remedy helps."""
 
 import re
+from fractions import Fraction
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,13 +17,16 @@ from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery
 from enumsol.arithmetic.rationals import rational
 from enumsol.branches import ways
 from enumsol.branches.enclosed import following, tracing
+from enumsol.branches.enclosed.arc_parts import AlphaBox, ArcPart, ArcPartKind, Trace
+from enumsol.branches.enclosed.joining import join
 from enumsol.branches.exact import known_selections
 from enumsol.branches.exact.gluing import glue
-from enumsol.branches.exact.known_selections import KnownSelections, named
+from enumsol.branches.exact.known_selections import KnownSelections
+from enumsol.branches.remedies import DEFECT, named
 from enumsol.branches.space import cover
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.errors import IncompleteGraphError
-from enumsol.model.statuses import STATUSES
+from enumsol.model.statuses import OPEN, SLIP_PLUS, STATUSES
 from enumsol.selections.solution import VertexLimitError
 
 
@@ -32,6 +37,22 @@ def large_pitchfork(n=256):
     A[:4, :4], rows[0, :, :4], rows[1, :, :4] = small.A.toarray(), small.Bn.toarray(), small.Bt.toarray()
     load = np.append(small.f, np.zeros(n - 4))
     return ContactProblem(A, *rows, load, friction=small.friction, node_ids=["left", "right"])
+
+
+@pytest.mark.parametrize(
+    ("kinds", "where"), [(("h", "n"), "0.5"), (("n", "h"), "0.5"), (("h", "e"), "0.5"), (("n", "e"), "0.5")]
+)
+def test_an_arc_without_an_end_names_its_statuses(kinds, where):
+    codes = (OPEN, OPEN, SLIP_PLUS)
+    rows = SimpleNamespace(codes=codes, conditions=[(0, 4), (2, 0)])
+    parts = [
+        ArcPart(ArcPartKind(kind), low, low + 0.5, condition=0, zero=(low + 0.2, low + 0.3), rising=kinds[0] == "h")
+        for kind, low in zip(kinds, (0.0, 0.5), strict=True)
+    ]
+    trace = Trace(SimpleNamespace(rows=rows), 0.0, 1.0, boxes=[AlphaBox(0.0, 1.0, tuple(parts))])
+    joined = join([trace], (Fraction(0), Fraction(1)), None, lambda *_: None)
+    (reason,) = [text for text in joined.reasons if "no event" in text]
+    assert reason == f"the selection 2 open, 1 slip+ begins or ends at no event near alpha = {where}; {DEFECT}"
 
 
 @pytest.mark.slow

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 from networkx.utils import UnionFind
 
 from enumsol.branches.enclosed.arc_parts import ArcPartKind, OpenCause, parts_between
+from enumsol.branches.remedies import DEFECT, named
 from enumsol.model.statuses import ACROSS
 
 if TYPE_CHECKING:
@@ -383,10 +384,8 @@ class _Joining:
         self._joined.arcs.append(arc)
 
     def _contradiction(self, trace: Trace, part: ArcPart) -> None:
-        codes = "".join(map(str, trace.selection.rows.codes))
-        self._complain(f"selection {codes} begins or ends near alpha = {float(part.low):.17g} for no reason")
-
-    def _complain(self, reason: str) -> None:
+        where = f"begins or ends at no event near alpha = {float(part.low):.17g}"
+        reason = f"{named(trace.selection.rows.codes)} {where}; {DEFECT}"
         if reason not in self._joined.reasons:
             self._joined.reasons.append(reason)
 

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 from networkx.utils import UnionFind
 
 from enumsol.arithmetic.algebraic import CriticalAlpha, merge
-from enumsol.branches.exact.known_selections import KnownSelections, named
-from enumsol.branches.remedies import TOLD_APART
+from enumsol.branches.exact.known_selections import KnownSelections
+from enumsol.branches.remedies import TOLD_APART, named
 from enumsol.model.statuses import FINAL, OPEN
 from enumsol.roots.components import connected_components
 from enumsol.search.outcome import Stop, StopReason

@@ -8,10 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from enumsol.arithmetic.number_field import exact_value
 from enumsol.branches.exact.selection_arcs import SelectionArcs, SelectionEvent, active_sets, selection_arcs
-from enumsol.branches.remedies import DEFECT, FEWER
+from enumsol.branches.remedies import DEFECT, FEWER, named
 from enumsol.branches.sheets import sheet_arcs
-from enumsol.model.statuses import contact_status
-from enumsol.roots.root import summary
 from enumsol.selections.rational_selections import FiberSelections
 from enumsol.selections.solution import VertexLimitError
 from enumsol.support.deadlines import look
@@ -20,11 +18,6 @@ if TYPE_CHECKING:
     from enumsol.arithmetic.algebraic import CriticalAlpha
     from enumsol.condensation.exact import ExactCondensed
     from enumsol.selections.solution import ActiveSets, Codes
-
-
-def named(codes: Codes) -> str:
-    """A selection as text, with the statuses of its nodes in their order."""
-    return f"the selection {summary([contact_status(code, 0.0) for code in codes])}"
 
 
 class KnownSelections:
