@@ -129,18 +129,10 @@ def test_forged_numbers(name):
         _, mu, kappa, nu = records[k]
         F = np.maximum(*body.friction) if name == "everything" else np.ones(p)
         wrong = [
-            ["m"],
-            ["m", mu, kappa],
-            ["m", mu, kappa, nu, nu],
-            ["m", mu[1:], kappa, nu],
-            ["m", mu, [*kappa, 1.0], nu],
-            ["m", mu, kappa, []],
-            ["m", None, kappa, nu],
-            ["m", "1" * p, kappa, nu],
-            ["m", mu, kappa, 0.0],
-            ["m", mu, [kappa], nu],
-            ["M", mu, kappa, nu],
-        ]
+            ["m"], ["m", mu, kappa], ["m", mu, kappa, nu, nu], ["m", mu[1:], kappa, nu], ["m", mu, [*kappa, 1.0], nu],
+            ["m", mu, kappa, []], ["m", None, kappa, nu], ["m", "1" * p, kappa, nu], ["m", mu, kappa, 0.0],
+            ["m", mu, [kappa], nu], ["M", mu, kappa, nu],
+        ]  # fmt: skip
         for bad in (0.0, -0.0, -1.0, True, None, "1"):
             wrong += [["m", [*mu[:-1], bad], kappa, nu], ["m", mu, [bad, *kappa[1:]], nu]]
         wrong += [["m", mu, kappa, [bad, *nu[1:]]] for bad in (True, None, "0")]

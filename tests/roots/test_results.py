@@ -13,15 +13,9 @@ from enumsol import ContactProblem, ContactStatus, PiecewiseSmoothEquation, bran
 from enumsol.support.messages import html_lines, html_table
 
 CASES = [
-    ("one-node-6.1", None),
-    ("two-node-5", None),
-    ("two-node-6.7-minus", None),
-    ("two-node-6.7-plus", None),
-    ("wedge-8-3", None),
-    ("wedge-8-5", None),
-    ("clamped-block-16", None),
-    ("clamped-block-16", 0.0),
-]
+    ("one-node-6.1", None), ("two-node-5", None), ("two-node-6.7-minus", None), ("two-node-6.7-plus", None),
+    ("wedge-8-3", None), ("wedge-8-5", None), ("clamped-block-16", None), ("clamped-block-16", 0.0),
+]  # fmt: skip
 
 
 def load(name, alpha):
