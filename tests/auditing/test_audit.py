@@ -125,8 +125,7 @@ def test_jump_of_the_printed_algorithm_is_found(graph, path):
     """With long steps and without checks, corrections beyond the fold converge to the open branch."""
     options = ContinuationOptions(check_steps=False, h_max=0.5)
     jumped = follow(graph.problem, path[0], -1, (0, 20), options)
-    report = audit(jumped, graph)
-    (jump,) = report.jumps
+    (jump,) = audit(jumped, graph).jumps
     assert jump.branches == (1, 0)
     assert jump.alpha[1] < 8 / 3 < jump.alpha[0]
     assert audit(follow(graph.problem, path[0], -1, (0, 20), ContinuationOptions(h_max=0.5)), graph).ok

@@ -136,8 +136,7 @@ def test_a_spike_is_shown_larger(graphs):
         (float(a), float(b)) for a, b, n in zip(alphas, alphas[1:], between, strict=False) if n == 5 and b - a > 1e-9
     )
     assert high - low < 1e-3
-    figure = graph.plot()
-    main, counts, zoomed, zoomed_counts = figure.axes
+    main, counts, zoomed, zoomed_counts = graph.plot().axes
     assert main.get_xlim() == (0, 1)
     a, b = zoomed.get_xlim()
     assert 0 <= a < low < high < b <= 1

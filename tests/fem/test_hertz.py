@@ -33,8 +33,7 @@ def pressed_discs(upper, lower, friction=0.0):
         mesh, young=E, poisson=NU, pairs=[("upper.bottom", "lower.bottom")], clamp="lower.top",
         symmetry=["upper.left", "lower.left"], displacement={"upper.top": ("free", -0.02)}, friction=friction,
     )  # fmt: skip
-    roots = all_roots(problem, 0)
-    (root,) = roots
+    (root,) = all_roots(problem, 0)
     order = np.argsort(problem.coordinates[:, 0])
     x, forces = problem.coordinates[order, 0], root.lambda_n[order]
     load = 2 * forces.sum()

@@ -23,8 +23,7 @@ def halves(mesh, axis=1):
 
 
 def only_root(problem, alpha=0):
-    roots = all_roots(problem, alpha)
-    (root,) = roots
+    (root,) = all_roots(problem, alpha)
     return root
 
 

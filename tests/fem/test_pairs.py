@@ -49,8 +49,7 @@ def stresses(problem, root):
 @pytest.mark.parametrize("kind", PLANE_KINDS)
 def test_a_constant_pressure_passes_exactly_where_meshes_match(kind):
     problem = pressed(blocks(kind, shake=0.05))
-    roots = all_roots(problem, 0)
-    (root,) = roots
+    (root,) = all_roots(problem, 0)
     assert np.array_equal(problem.gap, np.zeros(problem.p))
     assert np.allclose(stresses(problem, root), np.diag([0.0, -0.1]), rtol=0, atol=1e-6)
     assert np.isclose(root.lambda_n.sum(), 0.2, rtol=1e-6)

@@ -142,8 +142,7 @@ def test_sheet_of_families_on_a_loading_path(method):
     # theory, section 7.5: F = 2, f = alpha (1, -2): a family at every alpha > 0
     problem = ContactProblem([[2, -1], [-1, 2]], [[1, 0]], [[0, 1]], [0.0, 0.0], friction=2.0, load_slope=[1.0, -2.0])
     for alpha in (Fraction(1, 3), 1, 7.5):
-        roots = enumsol.enumerate_roots(problem, alpha, "exact", method)
-        (family,) = roots.families
+        (family,) = enumsol.enumerate_roots(problem, alpha, "exact", method).families
         np.testing.assert_allclose(family.vertices[1], [[float(alpha), -2 * float(alpha)]], rtol=1e-16)
     (root,) = enumsol.enumerate_roots(problem, 0, "exact", method)
     assert root.index == 1

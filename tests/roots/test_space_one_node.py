@@ -65,8 +65,7 @@ def test_slip_along_the_end_of_a_sector_is_one_root(number):
     # the end is a rational point: with S = 1 and this load the root slips exactly along it
     direction = np.array([float(x * (1 << 53)) for x in start_of(number)]) / (1 << 53)
     problem = ContactProblem3D(np.eye(3), *np.eye(3)[:, None], [1, *(2 * direction)], friction=0.5)
-    roots = all_roots(problem, 0)
-    (root,) = roots
+    (root,) = all_roots(problem, 0)
     np.testing.assert_allclose(forces(root), [1, *(0.5 * direction)], rtol=0, atol=1e-10)
 
 
