@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from trees import by_the_tree, without_boxes
 
+from enumsol import gallery
 from enumsol.condensation.enclosure import CondensedEnclosure
 
 # a suite started in the background inherits an ignored SIGINT, and so would the programs whose Ctrl-C is tested
@@ -25,6 +26,13 @@ def pytest_configure(config):
 @pytest.fixture
 def rng():
     return np.random.default_rng(20121)
+
+
+@pytest.fixture(scope="module")
+def wedge():
+    """A wedge with eight contact nodes, and an alpha at which it has five roots."""
+    entry = gallery.get("wedge-8-5")
+    return entry.build(), entry.alpha
 
 
 @pytest.fixture

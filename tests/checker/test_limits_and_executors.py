@@ -19,12 +19,6 @@ from enumsol.condensation.exact import ExactSystem
 from enumsol.proof.proof_file import fraction_text
 
 
-@pytest.fixture(scope="module")
-def wedge():
-    entry = gallery.get("wedge-8-5")
-    return entry.build(), entry.alpha
-
-
 @pytest.fixture(scope="module", params=["processes", "threads"])
 def executor(request):
     pool = ProcessPoolExecutor(2) if request.param == "processes" else ThreadPoolExecutor(2)

@@ -14,12 +14,6 @@ from enumsol.branches import branch_graph
 from enumsol.search.outcome import Stop, StopReason
 
 
-@pytest.fixture(scope="module")
-def wedge():
-    entry = gallery.get("wedge-8-5")
-    return entry.build(), entry.alpha
-
-
 def test_stop_after(wedge):
     whole = enumsol.enumerate_roots(*wedge, "fast")
     assert len(whole) == 5

@@ -37,12 +37,6 @@ def small_tasks(monkeypatch):
 
 
 @pytest.fixture(scope="module")
-def wedge():
-    entry = gallery.get("wedge-8-5")
-    return entry.build(), entry.alpha
-
-
-@pytest.fixture(scope="module")
 def square():
     return gallery.two_node_square()
 
