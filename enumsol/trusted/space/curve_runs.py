@@ -196,8 +196,9 @@ class KnownCurve:
         least, most = (float(np.nextafter(float(x), y)) for x, y in ((low, -np.inf), (high, np.inf)))
         for _ in range(_HALVINGS):
             alpha = self._alphas(where, t)
-            meets = (alpha.mid + alpha.rad * SAFE >= least) & (alpha.mid - alpha.rad * SAFE <= most)
-            where, t, alpha = where[meets], t[meets], alpha[meets]
+            # what overflows is not known to be beyond the piece, and stays
+            beyond = (alpha.mid + alpha.rad * SAFE < least) | (alpha.mid - alpha.rad * SAFE > most)
+            where, t, alpha = where[~beyond], t[~beyond], alpha[~beyond]
             if len(where) >= wanted or not len(where):
                 break
             half = 0.5 * t.rad

@@ -87,6 +87,8 @@ def only_on_curve(
     weights = PieceWeights.of(system, numbers)
     if weights is None or not len(parts.alpha.mid) or not parts.allowed(codes):
         return False
+    if not float(piece[1] - piece[0]) > TINY:
+        return False
     if np.max(np.maximum(system.unit, 1.0 / system.unit)) > LARGEST_UNIT:
         return False
     with np.errstate(all="ignore"):
@@ -117,7 +119,7 @@ def _shares(piece: tuple[Fraction, Fraction], alpha: Ball) -> Ball:
     near, inverse = float(middle), 1.0 / float(half)
     # rounded to nearest
     factor = Ball(np.array(inverse), np.array(4 * UNIT * inverse))
-    share = (alpha - Ball(np.array(near), np.array(UNIT * abs(near)))) * factor
+    share = (alpha - Ball(np.array(near), np.array(UNIT * abs(near) + TINY))) * factor
     low, high = np.maximum(share.mid - share.rad * SAFE, -1.0), np.minimum(share.mid + share.rad * SAFE, 1.0)
     return Ball(0.5 * (low + high), (0.5 * np.maximum(high - low, 0.0) + 4 * UNIT) * SAFE)
 
