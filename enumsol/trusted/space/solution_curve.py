@@ -271,22 +271,19 @@ class AlphaProblem:
         here = length - self.friction(z[m]) * z[:p] + Ball(np.zeros(p), np.full(p, half)) * slope
         return Ball(here.mid, np.where(known & np.isfinite(here.mid), (here.rad + moved) * SAFE + TINY, np.inf))
 
-    def status(self, z: Ball, i: int) -> int | None:
-        """The status that a node has strictly at all arguments (z, alpha) of P, if it has one."""
-        t, F = self.tau[i], self.friction(z[-1])[i]
-        low, high = float(z.mid[i] - z.rad[i] * SAFE), float(z.mid[i] + z.rad[i] * SAFE)
-        if high < 0:
-            return OPEN
-        if low <= 0:
-            return None
-        if not len(t):
-            return FRICTIONLESS
-        length, away = float(np.linalg.norm(z.mid[t])), float(upper_norm(z.rad[t]))
+    def statuses(self, z: Ball) -> tuple[int | None, ...]:
+        """The status that every node has strictly at all arguments (z, alpha) of P, None where it has none."""
+        p, rubs, plain = self.p, np.any(self.places >= 0, axis=1), Discs(self.places, self.friction(z[-1]))
+        low, high = z.mid[:p] - z.rad[:p] * SAFE, z.mid[:p] + z.rad[:p] * SAFE
+        tangent = plain.tangents(z[:-1])
+        length, away = np.linalg.norm(tangent.mid, axis=1), upper_norm(tangent.rad, axis=1)
         least, most = (length - away) / SAFE - 8 * UNIT * length, (length + away) * SAFE + 8 * UNIT * length
-        F_low, F_high = float(F.mid - F.rad) / SAFE, float(F.mid + F.rad) * SAFE
-        if F_low > 0 and most < F_low * low / SAFE:
-            return STICK
-        return SLIP if least > max(F_high, 0.0) * high * SAFE else None
+        F_low, F_high = (plain.F.mid - plain.F.rad) / SAFE, (plain.F.mid + plain.F.rad) * SAFE
+        touches = low > 0
+        sticks = touches & rubs & (F_low > 0) & (most < F_low * low / SAFE)
+        slips = touches & rubs & ~sticks & (least > np.maximum(F_high, 0.0) * high * SAFE)
+        codes = np.select([high < 0, touches & ~rubs, sticks, slips], [OPEN, FRICTIONLESS, STICK, SLIP], -1)
+        return tuple(None if code < 0 else code for code in codes.tolist())
 
 
 def _one_more(rho: Array) -> Ball:
@@ -495,15 +492,11 @@ def curve_point(problem: AlphaProblem, x: Array, border: Array) -> CurvePoint | 
     asked[m, 1] = 1.0
     with np.errstate(all="ignore"):
         for _ in range(_STEPS):
-            y, alpha = problem.part.mid @ x + problem.offset.mid, Ball.exact(x[m])
-            z = Ball.exact(2.0 * y - x[:m])
-            discs = Discs(problem.places, Ball.exact(problem.friction(alpha).mid), Ball.exact(problem.F1))
-            corners = discs.corners(z)
-            if corners is None:
-                return None
-            M = problem.plain_moves
-            asked[:m, 0] = discs.projected(z).mid - y
-            B = np.vstack([problem.part.mid - corners.core.mid @ M, row])
+            y = problem.part.mid @ x + problem.offset.mid
+            z = np.append(2.0 * y - x[:m], x[m])
+            projected, D = _projected(problem, z)
+            asked[:m, 0] = projected - y
+            B = np.vstack([problem.part.mid - D @ problem.plain_moves, row])
             try:
                 found = np.linalg.solve(B, asked)
             except np.linalg.LinAlgError:
@@ -511,9 +504,32 @@ def curve_point(problem: AlphaProblem, x: Array, border: Array) -> CurvePoint | 
             x = x + found[:, 0]
             if np.all(np.abs(found[:, 0]) <= 4 * UNIT * np.max(np.abs(x))):
                 break
-        along = Ball.joined(z, alpha[None])
-        statuses = tuple(problem.status(along, i) for i in range(problem.p))
+        statuses = problem.statuses(Ball.exact(z))
     return CurvePoint(x * unit, found[:, 1] * unit, statuses) if np.all(np.isfinite(found)) else None
+
+
+def _projected(problem: AlphaProblem, z: Array) -> tuple[Array, Array]:
+    """P of arguments (z, alpha) and a derivative of it, (3p,) and (3p, 3p + 1), in floats."""
+    p, m = problem.p, len(z) - 1
+    has, nodes = problem.places >= 0, np.arange(p)
+    normal, tangent = np.maximum(z[:p], 0.0), np.where(has, z[problem.places], 0.0)
+    most, length = (problem.F0 + z[m] * problem.F1) * normal, np.linalg.norm(tangent, axis=1)
+    touches = z[:p] > 0
+    sticks = touches & (length <= most)
+    ratio = np.where(sticks, 1.0, most / np.where(length > 0, length, 1.0))
+    e = np.where(sticks, 0.0, 1.0)[:, None] * tangent / np.where(length > 0, length, 1.0)[:, None]
+    P, D = np.zeros(m), np.zeros((m, m + 1))
+    P[:p], D[nodes, nodes] = normal, touches
+    for k in (0, 1):
+        own = nodes[has[:, k]]
+        at = problem.places[own, k]
+        P[at] = ratio[own] * tangent[own, k]
+        D[at, own] = np.where(touches[own], (problem.F0 + z[m] * problem.F1)[own] * e[own, k], 0.0)
+        D[at, m] = problem.F1[own] * normal[own] * e[own, k]
+        for l in (0, 1):
+            both = own[has[own, l]]
+            D[problem.places[both, k], problem.places[both, l]] = ratio[both] * ((k == l) - e[both, k] * e[both, l])
+    return P, D
 
 
 @dataclass(frozen=True, eq=False)
@@ -557,7 +573,7 @@ class _Proven:
         """Codes where a status holds strictly along all of the curve."""
         with np.errstate(all="ignore"):
             z = self.near.along(self.spread[1])
-            return tuple(self.near.problem.status(z, i) for i in range(self.near.problem.p))
+            return self.near.problem.statuses(z)
 
     @cached_property
     def slope(self) -> Array:
