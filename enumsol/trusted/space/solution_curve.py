@@ -52,7 +52,8 @@ _ROOMS, _LEAST, _STEPS = (1.2, 1.3, 1.5, 1.5, 1.5, 1.5, 1.5), 1e-3, 8
 _SHARES = (1.0, 0.5, 0.25, 0.0)
 #: Loads whose exponents are larger have no unit of their own.
 _LARGEST = 200
-#: Factors of the steps of the natural map at a node that changes its status.
+#: Factors of the steps of the natural map at a node that changes its status, and how wide corners may be without them.
+_TURNED = 0.5
 _FACTORS = (1.0, 4.0, 16.0, 64.0, 256.0, 0.25, 0.0625, 0.015625)
 
 
@@ -458,9 +459,13 @@ def curve_around(
     """
     with np.errstate(all="ignore"):
         rho = np.ones(3 * problem.p)
+
+        def turned(steps: Array) -> float:
+            return _CurveMap(problem, x, direction, border, half, steps).turned()
+
         # all nodes alike, then each of them by itself
         for nodes in [changing, *([[i] for i in changing] if len(changing) > 1 else [])]:
-            if not len(nodes):
+            if not len(nodes) or turned(rho) < _TURNED:
                 continue
             tau = [int(t) for i in nodes for t in problem.tau[i]]
             found: list[tuple[float, Array]] = []
@@ -468,7 +473,7 @@ def curve_around(
                 for places in (list(nodes), tau, [*nodes, *tau]):
                     other = rho.copy()
                     other[places] *= factor
-                    found.append((_CurveMap(problem, x, direction, border, half, other).turned(), other))
+                    found.append((turned(other), other))
             rho = min(found, key=lambda pair: pair[0])[1]
         return _CurveMap(problem, x, direction, border, half, rho).proposed(roomy=roomy)
 
@@ -511,9 +516,9 @@ def curve_point(problem: AlphaProblem, x: Array, border: Array) -> CurvePoint | 
 def _projected(problem: AlphaProblem, z: Array) -> tuple[Array, Array]:
     """P of arguments (z, alpha) and a derivative of it, (3p,) and (3p, 3p + 1), in floats."""
     p, m = problem.p, len(z) - 1
-    has, nodes = problem.places >= 0, np.arange(p)
+    has, nodes, F = problem.places >= 0, np.arange(p), problem.F0 + z[m] * problem.F1
     normal, tangent = np.maximum(z[:p], 0.0), np.where(has, z[problem.places], 0.0)
-    most, length = (problem.F0 + z[m] * problem.F1) * normal, np.linalg.norm(tangent, axis=1)
+    most, length = F * normal, np.linalg.norm(tangent, axis=1)
     touches = z[:p] > 0
     sticks = touches & (length <= most)
     ratio = np.where(sticks, 1.0, most / np.where(length > 0, length, 1.0))
@@ -524,11 +529,11 @@ def _projected(problem: AlphaProblem, z: Array) -> tuple[Array, Array]:
         own = nodes[has[:, k]]
         at = problem.places[own, k]
         P[at] = ratio[own] * tangent[own, k]
-        D[at, own] = np.where(touches[own], (problem.F0 + z[m] * problem.F1)[own] * e[own, k], 0.0)
-        D[at, m] = problem.F1[own] * normal[own] * e[own, k]
-        for l in (0, 1):
-            both = own[has[own, l]]
-            D[problem.places[both, k], problem.places[both, l]] = ratio[both] * ((k == l) - e[both, k] * e[both, l])
+        D[at, own] = np.where(touches, F, 0.0)[own] * e[own, k]
+        D[at, m] = (problem.F1 * normal)[own] * e[own, k]
+        for j in (0, 1):
+            both = own[has[own, j]]
+            D[problem.places[both, k], problem.places[both, j]] = ratio[both] * ((k == j) - e[both, k] * e[both, j])
     return P, D
 
 
