@@ -30,6 +30,7 @@ from enumsol.branches.space import cover
 from enumsol.branches.space.chains import chain_through
 from enumsol.branches.space.make_curved import unordered
 from enumsol.branches.space.pieces import Run, Turn, orders, runs_and_turns
+from enumsol.trusted.space.curve_chains import leaves_interval
 from enumsol.trusted.space.curve_events import CurveMotion
 from enumsol.trusted.space.sector_rows import OPEN, STICK
 from enumsol.trusted.space.solution_curve import SLIP, AlphaProblem, curve_point
@@ -324,3 +325,14 @@ def test_folds_of_one_node_are_those_of_the_closed_form(way):
     assert low - Fraction(1, 10**14) < Fraction(fold) < high + Fraction(1, 10**14)
     assert sorted((parts[0].index, parts[2].index)) == [-1, 1]
     assert parts[0].rises == -parts[2].rises
+
+
+def test_a_curve_is_whole_over_an_interval_in_which_continuation_has_to_take_very_short_steps():
+    node = OneNode(20, load=True)
+    phi = node.folds()[-1]
+    fold, (alpha, n, t) = node.alpha(phi), node.at(phi + 0.01)
+    reach = Fraction(5 * abs(alpha - fold))
+    interval = Fraction(fold) - reach, Fraction(fold) + reach
+    chain = chain_through(AlphaProblem.of(node.problem.enclosure), node.problem, np.array([n, *t, alpha]), interval)
+    assert chain.whole
+    assert leaves_interval(chain.links, chain.joints, interval)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.continuation.continuation_options import ContinuationOptions
 from enumsol.continuation.follow import follow
 from enumsol.continuation.path_data import PathStatus
 from enumsol.errors import EnumsolError
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from enumsol.continuation.path import Path
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.trusted.space.solution_curve import AlphaProblem, CurveBox, CurvePoint, SolutionCurve
 
@@ -39,6 +41,8 @@ _BESIDE, _ASIDE = 1e-3, 0.1
 _EVEN = 0.125
 #: Where directions at the ends of an edge of the skeleton are taken, relative to the edge: not at a corner itself.
 _INSIDE = 2.0**-10
+#: The shortest step of continuation where it stalls with that of its own.
+_LEAST_STEP = 1e-8
 #: How far a skeleton is prolonged beyond the interval, relative to its last step.
 _BEYOND = 0.05
 
@@ -95,9 +99,9 @@ def skeleton_through(problem: ContactProblem3D, x: Array, span: tuple[float, flo
     p = problem.p
     start = float(x[-1]), x[:p], x[p:-1].reshape(2, p).T
     try:
-        ahead = follow(problem, start, 1, span)
+        ahead = _path(problem, start, 1, span)
         closed = ahead.status == PathStatus.CLOSED
-        paths = [ahead] if closed else [follow(problem, start, -1, span), ahead]
+        paths = [ahead] if closed else [_path(problem, start, -1, span), ahead]
     except EnumsolError:
         return None
     lines = [
@@ -112,6 +116,14 @@ def skeleton_through(problem: ContactProblem3D, x: Array, span: tuple[float, flo
     back, last = lines[0][::-1], len(lines[0]) - 1
     places = {last - k for k in corners[0]} | {last + k for k in corners[1]}
     return Skeleton(np.vstack([back, lines[1][1:]]), sorted(places), closed=False)
+
+
+def _path(problem: ContactProblem3D, start: tuple[float, Array, Array], way: int, span: tuple[float, float]) -> Path:
+    """A path that may take shorter steps where it stalls: near a fold of a short interval it has to."""
+    path = follow(problem, start, way, span)
+    if path.status == PathStatus.STALLED:
+        path = follow(problem, start, way, span, ContinuationOptions(h_min=_LEAST_STEP))
+    return path
 
 
 class ChainBuilder:
@@ -209,7 +221,9 @@ class ChainBuilder:
                 further -= _ASIDE * (further - place)
             end = joints[0] if closed and further == last else None
             found = self._link(line, place, further, joints[-1], links[-1] if links else None, end)
-            if found is None:
+            # that what a box at an end holds is beyond the interval is seen where alpha goes one way
+            outer = not closed and (not links or further == len(line) - 1.0)
+            if found is None or (outer and not found[0].curve.rises):
                 way, failed = 0.5 * (further - place), True
                 if way < _SHORTEST:
                     return False
