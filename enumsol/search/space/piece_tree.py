@@ -156,8 +156,8 @@ class PieceTree:
         self._sought = 0
 
     def _follow(self, x: Array) -> bool:
-        """Whether there is a new curve through a solution."""
-        chain = None if self._more is None else self._more(x)
+        """Whether there is a new curve through a solution, which is not followed where a known one seems to have it."""
+        chain = None if self._more is None or self._is_known(x) else self._more(x)
         if chain is None:
             return False
         self.curves.append(KnownCurve(self._given, chain))
@@ -171,6 +171,15 @@ class PieceTree:
         reach = np.abs(self._d[:, -1]) * self._h + self._b[:, -1]
         self._low, self._high = self._c[:, -1] - reach, self._c[:, -1] + reach
         return True
+
+    def _is_known(self, x: Array) -> bool:
+        """Whether a solution seems to lie on a known curve; no claim."""
+        if not self._boxes:
+            return False
+        off = self._given.placed(x) - self._c
+        t = np.sum(self._e * off, axis=1)
+        beside = np.abs(off - t[:, None] * self._d)
+        return bool(np.any((np.abs(t) <= self._h) & np.all(beside <= self._b, axis=1)))
 
     def _examined(self, low: Fraction, high: Fraction) -> _Examined:
         key = low, high
@@ -286,9 +295,14 @@ class PieceTree:
     def _met(self, piece: AlphaPiece, root: SpaceRoot) -> int | None:
         """The box of a root in a point of alpha, along whose curve new ones are put if there is none."""
         number = self._box(piece, root)
-        if number is None and self._follow(np.append(piece.forces(root.y).mid, float(piece.middle))):
+        if number is None and self._follow(self._middle(piece, root)):
             number = self._box(piece, root)
         return number
+
+    @staticmethod
+    def _middle(piece: AlphaPiece, root: SpaceRoot) -> Array:
+        """Forces and alpha of a root in the middle of a piece, in the units of the problem."""
+        return np.append(piece.forces(root.y).mid, float(piece.middle))
 
     def _certified(self, at: _Examined, codes: Codes) -> tuple[Any, list[Any]] | None:
         """One certificate for all that is below an assignment, or the piece is cut since it is too long for that."""
@@ -338,9 +352,9 @@ class PieceTree:
             return None if self._is_wide(codes) else self._halved(at, codes)
         if isinstance(there, SpaceRoot):
             number = self._met(piece.point, there)
-            if number is None:
+            if number is None and not self._is_known(self._middle(piece, there)):
                 return self._open(at, codes, piece.forces(there.y).mid), []
-            if isinstance(found, SpaceRoot):
+            if number is not None and isinstance(found, SpaceRoot):
                 return ThroughCurveBox(number), []
             return None if self._is_wide(codes) else self._halved(at, codes)
         return None if self._box(piece.point, there) is None else self._halved(at, codes)
