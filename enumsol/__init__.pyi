@@ -72,8 +72,7 @@ from .model.friction import FrictionTable as FrictionTable
 from .model.mesh import BodyMesh as BodyMesh
 from .model.mirrors import Mirror as Mirror
 from .model.problem import ContactProblem as ContactProblem
-from .model.problem3d import ContactProblem3D as ContactProblem3D
-from .model.slip_mean import SlipMean as SlipMean
+from .model.problem3d import ContactProblem3D as ContactProblem3D, SlipMean as SlipMean
 from .model.statuses import ContactStatus as ContactStatus, sign_array as sign_array
 from .proof.proof_file import Proof as Proof, ProofFormatError as ProofFormatError
 from .report import write_report as write_report

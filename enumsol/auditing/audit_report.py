@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.auditing.graph_map import GraphPlaceKind
+from enumsol.auditing.graph_map import GraphPlace, GraphPlaceKind
 from enumsol.roots.root import summary
 from enumsol.support.messages import TextEnum, counted
 
@@ -16,10 +16,9 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     import pandas as pd
-    from numpy.typing import NDArray
 
-    from enumsol.auditing.graph_map import GraphPlace
     from enumsol.model.statuses import ContactStatus
+    from enumsol.support.array_types import Floats
 
 #: How rows are counted, printed with a report.
 ROWS = "rows are counted from 0: in a file from the first row below the names of the columns, in a frame as by iloc"
@@ -211,12 +210,12 @@ class AuditReport:
     # -- arrays over points ------------------------------------------------------------------------------------------
 
     @cached_property
-    def alpha(self) -> NDArray[np.float64]:
+    def alpha(self) -> Floats:
         """Alpha of every point, shape (m,)."""
         return np.array([point.alpha for point in self.points], dtype=np.float64)
 
     @cached_property
-    def distances(self) -> NDArray[np.float64]:
+    def distances(self) -> Floats:
         """Distance of every point from the nearest arc or vertex, shape (m,) [-]; nan outside the graph's interval."""
         return np.array([point.distance for point in self.points], dtype=np.float64)
 

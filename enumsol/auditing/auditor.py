@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from enumsol.branches.graph import BranchGraph
-    from enumsol.continuation.condensed_equation import Vector
+    from enumsol.support.array_types import Floats
 
 #: A point further than this from every arc and vertex lies off the graph: ten times the tolerance of the corrections.
 POINT_TOLERANCE = 1e-5
@@ -135,7 +135,7 @@ class _Tally:
             if previous is not None and here is not None:
                 self._connect(run, k - 1, (points[k - 1], x), (previous, here))
 
-    def _locate(self, run: PointRun, k: int, x: Vector, near: GraphPlace | None) -> GraphPlace | None:
+    def _locate(self, run: PointRun, k: int, x: Floats, near: GraphPlace | None) -> GraphPlace | None:
         """GraphPlace of one point; None unless it lies on the graph."""
         chart, alpha = self.chart, float(run.alpha[k])
         if chart.outside(alpha):
@@ -162,7 +162,7 @@ class _Tally:
         return self._branch_of.get(place.number, -1) if place.kind is GraphPlaceKind.ARC else -1
 
     def _connect(
-        self, run: PointRun, k: int, points: tuple[Vector, Vector], places: tuple[GraphPlace, GraphPlace]
+        self, run: PointRun, k: int, points: tuple[Floats, Floats], places: tuple[GraphPlace, GraphPlace]
     ) -> None:
         """Arcs passed whole between two neighbouring points, or the break between them."""
         chart, (x, y) = self.chart, points
@@ -185,7 +185,7 @@ class _Tally:
         )
 
 
-def _between(chart: GraphMap, points: tuple[Vector, Vector], places: tuple[GraphPlace, GraphPlace]) -> set[int]:
+def _between(chart: GraphMap, points: tuple[Floats, Floats], places: tuple[GraphPlace, GraphPlace]) -> set[int]:
     """The arc that joins two neighbouring vertices on which the points lie: passed although no point is inside."""
     if any(place.kind is not GraphPlaceKind.VERTEX for place in places) or places[0].number == places[1].number:
         return set()

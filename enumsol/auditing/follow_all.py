@@ -11,24 +11,21 @@ from enumsol.auditing.audit_report import AuditReport
 from enumsol.auditing.auditor import DETOUR, POINT_TOLERANCE, audit_on
 from enumsol.auditing.graph_map import GraphMap, GraphPlaceKind, checked_graph
 from enumsol.auditing.points import read_points
-from enumsol.continuation.follow import follow, start_tangents
-from enumsol.continuation.not_converged import AmbiguousStart
+from enumsol.continuation.follow import AmbiguousStart, follow, start_tangents
 from enumsol.continuation.path import Path
 from enumsol.continuation.path_data import PathStats, PathStatus
 from enumsol.errors import InvalidArgumentError, TooLargeError
-from enumsol.model.problem import ContactProblem, check_is_problem
+from enumsol.model.problem import check_is_problem
 from enumsol.support.arguments import alpha_interval, optional_callable, positive_integer, shown
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from numpy.typing import NDArray
-
     from enumsol.branches.elements import Arc
     from enumsol.branches.graph import BranchGraph
     from enumsol.continuation.continuation_options import ContinuationOptions
-    from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.support.arguments import AlphaLike
+    from enumsol.model.problem3d import AnyProblem
+    from enumsol.support.array_types import AlphaLike, Floats
 
 #: Where on a missed arc it is started anew, as fractions of its interval; its ends are transition points.
 _SEEDS = (0.5, 0.25, 0.75)
@@ -78,7 +75,7 @@ class FollowAllResult:
 
 
 def follow_all(
-    problem: ContactProblem | ContactProblem3D,
+    problem: AnyProblem,
     interval: tuple[AlphaLike, AlphaLike],
     options: ContinuationOptions | None = None,
     *,
@@ -142,7 +139,7 @@ def follow_all(
 class _Coverage:
     """Paths so far, and the arcs that they passed."""
 
-    problem: ContactProblem | ContactProblem3D
+    problem: AnyProblem
     interval: tuple[float, float]
     options: ContinuationOptions | None
     chart: GraphMap
@@ -188,9 +185,9 @@ class _Seed(NamedTuple):
     """A root of the graph, to start from."""
 
     alpha: float
-    lambda_n: NDArray[np.float64]
-    lambda_t: NDArray[np.float64]
-    rigid_coordinates: NDArray[np.float64] | None
+    lambda_n: Floats
+    lambda_t: Floats
+    rigid_coordinates: Floats | None
 
 
 def _seed(chart: GraphMap, arc: Arc, alpha: float) -> _Seed:
@@ -198,7 +195,7 @@ def _seed(chart: GraphMap, arc: Arc, alpha: float) -> _Seed:
 
 
 def follow_arc(
-    problem: ContactProblem | ContactProblem3D,
+    problem: AnyProblem,
     graph: BranchGraph,
     vertex: int,
     arc: int,

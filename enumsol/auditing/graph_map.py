@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.continuation.equations import equation_on
-from enumsol.continuation.start import ALPHA_FRACTION
+from enumsol.continuation.start import ALPHA_FRACTION, equation_on
 from enumsol.continuation.transitions import selection_distance
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.contact_body import ContactBody
@@ -23,8 +22,8 @@ if TYPE_CHECKING:
 
     from enumsol.branches.elements import Arc, Vertex
     from enumsol.branches.graph import BranchGraph
-    from enumsol.continuation.condensed_equation import Vector
     from enumsol.roots.root import Polytope
+    from enumsol.support.array_types import Floats
 
 #: Points at which the length of an arc is measured.
 _SAMPLES = 9
@@ -128,7 +127,7 @@ class GraphMap:
         self.curves = [arc for arc in self.arcs.values() if not arc.dimension]
         self._corners = {number: self._corner_points(vertex) for number, vertex in self.vertices.items()}
 
-    def point(self, alpha: float, lambda_n: Vector, lambda_t: Vector, rigid: Vector | None = None) -> Vector:
+    def point(self, alpha: float, lambda_n: Floats, lambda_t: Floats, rigid: Floats | None = None) -> Floats:
         """Scaled point of the condensed equation; ``rigid``: coordinates of the rigid displacement, if there is one."""
         return self.equation.point(alpha, np.concatenate([lambda_n, lambda_t.ravel(order="F")]), rigid)
 
@@ -140,11 +139,11 @@ class GraphMap:
         slack = self.tolerance * self.equation.alpha_scale
         return not low - slack <= alpha <= high + slack
 
-    def beyond(self, rigid: Vector) -> bool:
+    def beyond(self, rigid: Floats) -> bool:
         """Whether the body has moved farther than the graph asks for, by more than the tolerance."""
         return bool(np.any(np.abs(rigid) > self.equation.reach * (1 + self.tolerance)))
 
-    def place(self, x: Vector, near: GraphPlace | None = None) -> GraphPlace:
+    def place(self, x: Floats, near: GraphPlace | None = None) -> GraphPlace:
         """Nearest arc or vertex; the arc of the point before is tried first, until one is close enough."""
         vertex = min(
             (GraphPlace(GraphPlaceKind.VERTEX, number, self.vertex_distance(x, number)) for number in self.vertices),
@@ -163,13 +162,13 @@ class GraphMap:
                     break
         return vertex if vertex.distance < _NEARER * best.distance else best
 
-    def _at_vertex(self, x: Vector, place: GraphPlace) -> GraphPlace:
+    def _at_vertex(self, x: Floats, place: GraphPlace) -> GraphPlace:
         """A place at a vertex with the distance from it or from an arc that ends there."""
         ends = [arc for arc in self.curves if place.number in (arc.tail, arc.head)]
         distance = min((self.arc_distance(x, arc) for arc in ends), default=math.inf)
         return GraphPlace(GraphPlaceKind.VERTEX, place.number, min(place.distance, distance))
 
-    def _gap(self, x: Vector, arc: Arc) -> float:
+    def _gap(self, x: Floats, arc: Arc) -> float:
         """Distance in alpha alone, a lower bound."""
         alpha = self.equation.alpha(x)
         return max(arc.lo - alpha, alpha - arc.hi, 0.0) / self.equation.alpha_scale
@@ -184,7 +183,7 @@ class GraphMap:
             ends, first = {near.number}, -1
         return sorted(self.arcs.values(), key=lambda a: (a.number != first, not ends & {a.tail, a.head}, a.number))
 
-    def arc_distance(self, x: Vector, arc: Arc) -> float:
+    def arc_distance(self, x: Floats, arc: Arc) -> float:
         """Distance of a point from an arc (from a sheet: at the alpha of the point)."""
         low, high = arc.lo, arc.hi
         alpha = min(max(self.equation.alpha(x), low), high)
@@ -207,43 +206,43 @@ class GraphMap:
             alpha = min(max(alpha + self.equation.dot(x - y, slope) / self.equation.dot(slope, slope), low), high)
         return best
 
-    def _sheet_distance(self, x: Vector, arc: Arc, alpha: float) -> float:
+    def _sheet_distance(self, x: Floats, arc: Arc, alpha: float) -> float:
         y = np.append(x[:-1], alpha / self.equation.alpha_scale)
         across = min(selection_distance(self.equation, codes, y) for codes in arc.selections)
         return math.hypot(across, float(x[-1] - y[-1]))
 
-    def on_arc(self, arc: Arc, alpha: float) -> Vector:
+    def on_arc(self, arc: Arc, alpha: float) -> Floats:
         """Scaled point of an arc."""
         if not self.equation.modes:
             return self.point(alpha, *arc.values(alpha))
         return self.equation.point_of(alpha, *arc.state(alpha))
 
-    def at_vertex(self, vertex: Vertex) -> Vector:
+    def at_vertex(self, vertex: Vertex) -> Floats:
         """Scaled point of a vertex that is no family."""
         if not self.equation.modes:
             return self.point(vertex.alpha, vertex.lambda_n, vertex.lambda_t)
         forces, moves = np.append(vertex.lambda_n, vertex.lambda_t), np.append(vertex.u_n, vertex.u_t)
         return self.equation.point_of(vertex.alpha, forces, moves)
 
-    def rigid(self, x: Vector) -> Vector | None:
+    def rigid(self, x: Floats) -> Floats | None:
         """Coordinates of the rigid displacement at a scaled point; None of a body that is held."""
         return self.equation.rigid(x) if self.equation.modes else None
 
-    def vertex_distance(self, x: Vector, number: int) -> float:
+    def vertex_distance(self, x: Floats, number: int) -> float:
         """Distance of a point from a vertex, or from the nearest polytope of a family."""
         return min(self._hull_distance(x, corners) for corners in self._corners[number])
 
-    def _corner_points(self, vertex: Vertex) -> list[Vector]:
+    def _corner_points(self, vertex: Vertex) -> list[Floats]:
         if vertex.family is None:
             return [self.at_vertex(vertex)[None, :]]
         return [self._corners_of(vertex.alpha, part) for part in vertex.family.polytopes]
 
-    def _corners_of(self, alpha: float, part: Polytope) -> Vector:
+    def _corners_of(self, alpha: float, part: Polytope) -> Floats:
         rigid = [None] * len(part.vertices) if part.rigid_coordinates is None else part.rigid_coordinates
         corners = zip(part.vertices, rigid, strict=True)
         return np.array([self.point(alpha, corner[:, 0], corner[:, 1], q) for corner, q in corners])
 
-    def _hull_distance(self, x: Vector, corners: Vector) -> float:
+    def _hull_distance(self, x: Floats, corners: Floats) -> float:
         if len(corners) == 1:
             return self.equation.norm(x - corners[0])
         from scipy.optimize import nnls  # only families need it
@@ -274,7 +273,7 @@ class GraphMap:
         points = [self.on_arc(arc, alpha) for alpha in np.linspace(arc.lo, arc.hi, _SAMPLES)]
         return sum(self.equation.norm(b - a) for a, b in pairwise(points))
 
-    def way(self, x: Vector, start: GraphPlace, y: Vector, end: GraphPlace) -> tuple[float, tuple[int, ...]]:
+    def way(self, x: Floats, start: GraphPlace, y: Floats, end: GraphPlace) -> tuple[float, tuple[int, ...]]:
         """Length of the shortest way along the graph between two points, and the arcs that it passes whole.
 
         The length is infinite when no way leads from one to the other.
@@ -292,7 +291,7 @@ class GraphMap:
                     best = (head + lengths[last] + tail, self._passed(routes[last]))
         return best
 
-    def _exits(self, x: Vector, place: GraphPlace) -> dict[int, float]:
+    def _exits(self, x: Floats, place: GraphPlace) -> dict[int, float]:
         """Vertices next to a point with their distances."""
         if place.kind is GraphPlaceKind.VERTEX:
             return {place.number: 0.0}

@@ -18,11 +18,11 @@ from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     import pandas as pd
-    from numpy.typing import NDArray
 
-    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import AnyProblem
+    from enumsol.support.array_types import Floats, Indices
 
-    Body = ContactProblem | ContactProblem3D
+    Body = AnyProblem
 
 
 #: How the names of columns tell the contact nodes apart; "auto" takes the one for which all columns are there.
@@ -52,10 +52,10 @@ class PointRun:
     """
 
     path: Any
-    rows: NDArray[np.intp]
-    alpha: NDArray[np.float64]
-    forces: NDArray[np.float64]
-    rigid: NDArray[np.float64]
+    rows: Indices
+    alpha: Floats
+    forces: Floats
+    rigid: Floats
 
 
 def read_points(
@@ -171,7 +171,7 @@ def _from_frame(frame: pd.DataFrame, problem: Body, columns: Columns, name: str)
     )
 
 
-def _rigid(frame: pd.DataFrame, problem: Body, name: str) -> NDArray[np.float64]:
+def _rigid(frame: pd.DataFrame, problem: Body, name: str) -> Floats:
     """Columns with the coordinates of the rigid displacement, (rows, r)."""
     known, titles = list(frame.columns), [f"rigid_{mode}" for mode in range(_modes(problem))]
     for title in titles:
@@ -247,7 +247,7 @@ def _listed(known: Sequence[str]) -> str:
 # -- cells -------------------------------------------------------------------------------------------------------------
 
 
-def _numbers(frame: pd.DataFrame, title: str, name: str) -> NDArray[np.float64]:
+def _numbers(frame: pd.DataFrame, title: str, name: str) -> Floats:
     """One column as finite floats."""
     column = frame[title]
     if column.dtype.kind in "iuf":
@@ -279,7 +279,7 @@ def _empty(cell: Any) -> bool:
     return bool(pd.api.types.is_scalar(cell) and pd.isna(cell))
 
 
-def _rows_by_path(frame: pd.DataFrame, name: str) -> dict[Any, NDArray[np.intp]]:
+def _rows_by_path(frame: pd.DataFrame, name: str) -> dict[Any, Indices]:
     """Rows of every path, paths in the order of their first rows."""
     if "path" not in frame.columns:
         return {0: np.arange(len(frame))} if len(frame) else {}

@@ -8,28 +8,20 @@ from typing import TYPE_CHECKING
 
 from enumsol.branches.graph import BranchGraph
 from enumsol.branches.graph_data import GraphStats
-from enumsol.branches.ways import way_of
+from enumsol.branches.ways import Arithmetic, way_of
 from enumsol.condensation.data import EXACT_DOF_LIMIT, exactly_at
 from enumsol.errors import Interrupted, InvalidArgumentError, TooLargeError
 from enumsol.model.problem import ContactProblem, check_is_problem
 from enumsol.search.outcome import Stop, StopReason
-from enumsol.support.arguments import (
-    alpha_interval,
-    one_of,
-    optional_callable,
-    optional_count,
-    optional_executor,
-    optional_seconds,
-)
+from enumsol.support import arguments
 from enumsol.support.deadlines import Deadline, TimeOverError, within
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from concurrent.futures import Executor
 
-    from enumsol.branches.ways import Arithmetic
-    from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.support.arguments import AlphaLike
+    from enumsol.model.problem3d import AnyProblem, ContactProblem3D
+    from enumsol.support.array_types import AlphaLike
 
 #: Of the time that is left when arcs are begun: for working them out, and for joining them too, where there is a limit.
 #: To join them takes a fifth as long as to work them out by exact algebra, to make a graph of them another tenth.
@@ -37,7 +29,7 @@ _WORKED_OUT, _JOINED = 0.55, 0.75
 
 
 def branch_graph(
-    problem: ContactProblem | ContactProblem3D,
+    problem: AnyProblem,
     interval: tuple[AlphaLike, AlphaLike],
     arithmetic: Arithmetic = "verified",
     *,
@@ -110,11 +102,11 @@ def branch_graph(
     complete: yes (proven)
     """
     check_is_problem(problem)
-    a, b = (Fraction(end) for end in alpha_interval(interval))
-    one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
-    optional_callable(progress, "progress")
-    optional_executor(executor)
-    max_nodes, time_limit = optional_count(max_nodes, "max_nodes"), optional_seconds(time_limit)
+    a, b = (Fraction(end) for end in arguments.alpha_interval(interval))
+    arguments.one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
+    arguments.optional_callable(progress, "progress")
+    arguments.optional_executor(executor)
+    max_nodes, time_limit = arguments.optional_count(max_nodes, "max_nodes"), arguments.optional_seconds(time_limit)
     started = time.perf_counter()
     limits = Deadline.after(started, time_limit)
     if not isinstance(problem, ContactProblem):

@@ -14,21 +14,17 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK, ContactStatus
-from enumsol.roots.root import ContactState
+from enumsol.roots.root import ContactState, RootFamily
 from enumsol.support.arguments import alpha_value
 from enumsol.support.messages import TextEnum
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence, Set
 
-    from numpy.typing import NDArray
-
     from enumsol.arithmetic.algebraic import CriticalAlpha
-    from enumsol.roots.root import RootFamily
-    from enumsol.selections.solution import Codes
-    from enumsol.support.arguments import AlphaLike
+    from enumsol.support.array_types import AlphaLike, Codes, Floats
 
-    Pair = tuple[NDArray[np.float64], NDArray[np.float64]]
+    Pair = tuple[Floats, Floats]
 
 
 class VertexKind(TextEnum):
@@ -61,7 +57,7 @@ class VertexKind(TextEnum):
     END = "end"
 
 
-def tangential(values: NDArray[np.float64], p: int) -> NDArray[np.float64]:
+def tangential(values: Floats, p: int) -> Floats:
     """The tangential part of forces or displacements of p nodes: (p,), in 3D (p, 2)."""
     return values[p:] if len(values) == 2 * p else values[p:].reshape(2, p).T
 
@@ -226,7 +222,7 @@ class Arc:
         moves, p = self.state(alpha)[1], len(self.statuses)
         return moves[:p], tangential(moves, p)
 
-    def sampled(self, count: int = 33) -> NDArray[np.float64]:
+    def sampled(self, count: int = 33) -> Floats:
         """Values of alpha along the arc, denser towards its ends (Chebyshev points), ends included."""
         points = 0.5 * (1 - np.cos(np.linspace(0.0, np.pi, count)))
         alphas = self.lo + points * (self.hi - self.lo)

@@ -9,11 +9,10 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from enumsol.branches.claims import Multiplicity, MultiplicitySteps, uniqueness_bound
-from enumsol.branches.elements import VertexKind
+from enumsol.branches.elements import Arc, Branch, Vertex, VertexKind
 from enumsol.branches.figures.graph_plots import plot_graph
-from enumsol.branches.graph_data import GraphData
+from enumsol.branches.graph_data import GraphData, arcs_frame, graph_html, graph_text, vertices_frame
 from enumsol.branches.graph_files import load_graph, save_graph, write_graphml
-from enumsol.branches.graph_text import arcs_frame, graph_html, graph_text, vertices_frame
 from enumsol.branches.roots_at import roots_at, roots_on
 from enumsol.errors import IncompleteGraphError, InvalidArgumentError
 from enumsol.support.arguments import alpha_value
@@ -21,9 +20,8 @@ from enumsol.support.arguments import alpha_value
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from enumsol.branches.elements import Arc, Branch, Vertex
     from enumsol.roots.root import Root, RootFamily
-    from enumsol.support.arguments import AlphaLike
+    from enumsol.support.array_types import AlphaLike
 
 
 class BranchGraph(GraphData):

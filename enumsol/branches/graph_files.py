@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from flint import fmpq, fmpz, fmpz_poly
 
 from enumsol.arithmetic.algebraic import CriticalAlpha, EnclosedAlpha
-from enumsol.branches.elements import Arc, Vertex, VertexKind
+from enumsol.branches.elements import Arc, ArcValues, Vertex, VertexKind
 from enumsol.branches.enclosed.following import TracedProblem
 from enumsol.branches.enclosed.make_traced import TracedArcValues
 from enumsol.branches.exact.make_elements import ExactArcValues
@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
-    from enumsol.branches.elements import ArcValues
-    from enumsol.selections.solution import Codes
+    from enumsol.model.problem3d import AnyProblem
+    from enumsol.support.array_types import Codes
 
 _Graph = TypeVar("_Graph", bound=GraphData)
 FORMAT, VERSION = "enumsol-branch-graph", 3
@@ -47,6 +47,8 @@ _READ = (1, 2, 3)
 _ROWS = ("Bn", "Bt1", "Bt2"), ("Bn", "Bt")
 #: Arrays of a vertex.
 _VALUES = ("lambda_n", "lambda_t", "u_n", "u_t")
+#: What the file holds of an arc as it is.
+_OF_ARC = ("tail", "head", "index", "dimension", "grazing")
 _FRACTION = re.compile(r"-?\d+(/\d+)?", re.ASCII)
 
 
@@ -110,7 +112,7 @@ def _from_record(kind: type[_Graph], record: dict[str, Any]) -> _Graph:
 
 
 def _values(
-    problem: ContactProblem | ContactProblem3D, record: dict[str, Any], interval: tuple[Fraction, Fraction]
+    problem: AnyProblem, record: dict[str, Any], interval: tuple[Fraction, Fraction]
 ) -> tuple[ExactCondensed | None, Callable[[dict[str, Any]], ArcValues]]:
     """The condensed problem in rationals, if arcs rest on it, and what gives the arc of a record its values."""
     if not isinstance(problem, ContactProblem):
@@ -143,7 +145,7 @@ def _values(
 # -- the problem -------------------------------------------------------------------------------------------------------
 
 
-def _problem_record(problem: ContactProblem | ContactProblem3D) -> dict[str, Any]:
+def _problem_record(problem: AnyProblem) -> dict[str, Any]:
     plane = isinstance(problem, ContactProblem)
     return {
         **{name: _matrix_record(getattr(problem, name)) for name in (*_ROWS[plane], "A")},
@@ -165,7 +167,7 @@ def _space_record(problem: ContactProblem3D) -> dict[str, Any]:
     }
 
 
-def _rigid_record(problem: ContactProblem | ContactProblem3D) -> dict[str, Any]:
+def _rigid_record(problem: AnyProblem) -> dict[str, Any]:
     if problem.rigid_modes is None:
         return {}
     return {"rigid_modes": problem.rigid_modes.tolist(), "max_rigid_displacement": problem.max_rigid_displacement}
@@ -186,7 +188,7 @@ def _matrix_record(matrix: Any) -> dict[str, Any]:
     return {"shape": list(coo.shape), "row": rows.tolist(), "col": columns.tolist(), "value": coo.data.tolist()}
 
 
-def _problem(record: dict[str, Any]) -> ContactProblem | ContactProblem3D:
+def _problem(record: dict[str, Any]) -> AnyProblem:
     def matrix(item: dict[str, Any]) -> sp.csc_array:
         return sp.csc_array(sp.coo_array((item["value"], (item["row"], item["col"])), shape=tuple(item["shape"])))
 
@@ -304,11 +306,7 @@ def _vertex(number: int, item: dict[str, Any], *, balls: bool) -> Vertex:
 def _arc_record(arc: Arc, vertices: Sequence[Vertex]) -> dict[str, Any]:
     return {
         "statuses": _names(arc.statuses),
-        "tail": arc.tail,
-        "head": arc.head,
-        "index": arc.index,
-        "dimension": arc.dimension,
-        "grazing": arc.grazing,
+        **{name: getattr(arc, name) for name in _OF_ARC},
         "selections": [list(codes) for codes in arc.selections],
         "sample": str(arc.sample),
         **arc._values.record(),
@@ -331,7 +329,7 @@ def _arc(number: int, item: dict[str, Any], vertices: Sequence[Vertex], values: 
         statuses=_statuses(item["statuses"]),
         lo=lo,
         hi=hi,
-        **{name: item[name] for name in ("tail", "head", "index", "dimension", "grazing")},
+        **{name: item[name] for name in _OF_ARC},
         selections=selections,
         begin=begin,
         end=end,

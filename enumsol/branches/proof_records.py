@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.branches.enclosed.arc_parts import ArcPartKind
+from enumsol.branches.enclosed.cutting import ArcPart, ArcPartKind
 from enumsol.proof.proof_file import Proof, packed
 from enumsol.proof.reading import fits
 from enumsol.proof.writer import ProofWriter, unit_exponents
@@ -16,11 +16,10 @@ from enumsol.proof.writer import ProofWriter, unit_exponents
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from enumsol.branches.enclosed.arc_parts import ArcPart
     from enumsol.branches.enclosed.following import Followed
     from enumsol.model.problem import ContactProblem
     from enumsol.search.interval.subintervals import SearchedPiece
-    from enumsol.selections.solution import Codes
+    from enumsol.support.array_types import Codes
 
 
 #: Begins the record of a form, which is no leaf.

@@ -8,7 +8,7 @@ from enumsol.model.statuses import contact_status
 from enumsol.roots.root import summary
 
 if TYPE_CHECKING:
-    from enumsol.selections.solution import Codes
+    from enumsol.support.array_types import Codes
 
 END_ELSEWHERE = "an interval that ends elsewhere decides it"
 ANOTHER_INTERVAL = "another interval, or data that differ by a little, may decide it"

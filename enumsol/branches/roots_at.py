@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
     from enumsol.branches.elements import Arc, Vertex
     from enumsol.branches.graph_data import GraphData
-    from enumsol.selections.solution import Codes, SelectionSolution
-    from enumsol.support.arguments import Alpha, AlphaLike
+    from enumsol.selections.solution import SelectionSolution
+    from enumsol.support.array_types import Alpha, AlphaLike, Codes
 
 
 def roots_at(data: GraphData, alpha: AlphaLike) -> RootSet:

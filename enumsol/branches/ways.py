@@ -15,7 +15,7 @@ import numpy as np
 from flint import fmpq_mat
 
 from enumsol.arithmetic.rationals import rational
-from enumsol.branches.enclosed.following import TracedProblem, follow_selections
+from enumsol.branches.enclosed.following import Followed, TracedProblem, follow_selections
 from enumsol.branches.enclosed.make_traced import make_traced
 from enumsol.branches.enclosed.single_branches import ClosedPieces
 from enumsol.branches.exact.gluing import glue
@@ -27,11 +27,15 @@ from enumsol.condensation.exact import FAST_EXACT_DOF, ExactCondensed, check_def
 from enumsol.condensation.unloaded import never_loaded, vanishing_alpha
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.search.certifiers.interval_certifiers import ExactIntervalCertifier, VerifiedIntervalCertifier
-from enumsol.search.interval.floating_interval import FloatingIntervalCertifier, on_weak_springs
 from enumsol.search.interval.interval_parallel import run_parallel
-from enumsol.search.interval.subintervals import FastIntervalCertifier, IntervalSearch
+from enumsol.search.interval.subintervals import (
+    FastIntervalCertifier,
+    FloatingIntervalCertifier,
+    IntervalSearch,
+    on_weak_springs,
+)
 from enumsol.search.outcome import Stop, StopReason
-from enumsol.support.deadlines import Deadline, TimeOverError, over, within
+from enumsol.support.deadlines import Deadline, Limited, TimeOverError, over, within
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -39,13 +43,14 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
     from enumsol.branches.elements import Arc, Vertex
-    from enumsol.branches.enclosed.following import Followed
     from enumsol.condensation.condensed import CondensedProblem
     from enumsol.model.problem import ContactProblem
     from enumsol.proof.proof_file import Proof
     from enumsol.search.interval.subintervals import IntervalCertifier, SearchedPiece
-    from enumsol.selections.solution import Codes
-    from enumsol.support.deadlines import Limited
+    from enumsol.support.array_types import Codes
+
+    #: Told the share of the work that is done.
+    Tick = Callable[[float], object]
 
 Arithmetic = Literal["fast", "verified", "exact"]
 
@@ -140,12 +145,7 @@ class Way:
         """Find pieces that need no tree, while there is time; none are known here."""
 
     def made(
-        self,
-        search: IntervalSearch,
-        candidates: set[Codes],
-        tick: Callable[[float], object] | None,
-        limits: Limited,
-        stops: list[Stop],
+        self, search: IntervalSearch, candidates: set[Codes], tick: Tick | None, limits: Limited, stops: list[Stop]
     ) -> Made:
         """Arcs worked out by the deadline of ``limits``; what is not joined by the one that holds here stays open."""
         raise NotImplementedError
@@ -176,12 +176,7 @@ class ByAlgebra(Way):
         return self.exact.zero
 
     def made(
-        self,
-        search: IntervalSearch,
-        candidates: set[Codes],
-        tick: Callable[[float], object] | None,
-        limits: Limited,
-        stops: list[Stop],
+        self, search: IntervalSearch, candidates: set[Codes], tick: Tick | None, limits: Limited, stops: list[Stop]
     ) -> Made:
         """See ``Way.made``."""
         a, b = (rational(end) for end in search.interval)
@@ -234,12 +229,7 @@ class ByBalls(Way):
             self.closed.find(self.traced)
 
     def made(
-        self,
-        search: IntervalSearch,
-        candidates: set[Codes],
-        tick: Callable[[float], object] | None,
-        limits: Limited,
-        stops: list[Stop],
+        self, search: IntervalSearch, candidates: set[Codes], tick: Tick | None, limits: Limited, stops: list[Stop]
     ) -> Made:
         """See ``Way.made``."""
         problem = self.problem

@@ -9,16 +9,15 @@ What a verified proof says
     from every start in its ball, and that the ends of all roots are such starts. All this rests on the energy bound
     (theory, (5.2)), on branchings that cover (``trusted.status_rows.children_of``), on the a-priori error bounds of
     IEEE double arithmetic with rounding to nearest in ``arithmetic.balls``, ``condensation.enclosure`` and
-    ``trusted``, and on rational arithmetic in ``checker.rational`` and ``checker.hull``. Linear algebra kernels may
-    sum in any order and fuse multiplications and additions; fast matrix multiplication of Strassen's kind and
-    changed rounding modes are excluded.
+    ``trusted``, and on rational arithmetic in ``checker.rational``. Linear algebra kernels may sum in any order and
+    fuse multiplications and additions; fast matrix multiplication of Strassen's kind and changed rounding modes are
+    excluded.
 
 What checker and search share
     The checkers (``checker.verify``, ``checker.graph_checker``, ``checker.history_checker``, ``checker.space_checker``,
-    ``checker.floating``, ``checker.floating_graphs``, ``checker.space_floating``) import nothing of the search, neither
-    its trees and relaxations nor its arcs and results, and a test guards that. They are not independent of all that it
-    uses. These serve both, and an error in one of them may write a false proof
-    and accept it:
+    ``checker.floating``) import nothing of the search, neither its trees and relaxations nor its arcs and results, and
+    a test guards that. They are not independent of all that it uses. These serve both, and an error in one of them may
+    write a false proof and accept it:
 
     - ``trusted.status_rows``: the codes, the rows and the branchings that cover, on which writer and reader have to
       agree;
@@ -40,7 +39,7 @@ What checker and search share
       interval as a series with bounds of its error; ``trusted.arcs.precise`` and ``trusted.arcs.many_digits``, the same
       with many digits, loaded only where a box asks for it;
       ``trusted.arcs.only_branch``, the test by which the roots of arcs are the only solutions over a piece, with the
-      form of ``trusted.piece_form`` (on maps, of which no proof is written, ``trusted.data_box`` has it, too);
+      form of ``trusted.over_interval`` (on maps, of which no proof is written, ``trusted.data_box`` has it, too);
     - for problems in 3D, and loaded for their proofs only: ``trusted.space.sector_rows``, the rows and branchings
       and the exclusion inequality; ``trusted.space.slip_forms``, forms other than the energy;
       ``trusted.space.leaves`` and ``trusted.space.turning``, what a complete assignment holds and which leaves
@@ -55,8 +54,8 @@ What checker and search share
       ``trusted.space.curve_events``: a proof does not hold that, and it is not checked);
       ``model.sectors``, the ends of sectors; ``condensation.space_condensed``, balls for S and g in the
       variables in which friction is isotropic; of bodies that nothing holds the same with G and h,
-      and ``trusted.space.resultants``, what multipliers and balance prove; ``model.problem3d``,
-      ``model.slip_mean`` and ``model.friction``, the data and their checks;
+      and ``trusted.space.resultants``, what multipliers and balance prove; ``model.problem3d``
+      and ``model.friction``, the data and their checks;
     - for histories: ``trusted.positions``, where a root leaves the contact nodes; ``model.restart``, the problem of a
       step;
     - ``condensation.unloaded`` and ``condensation.free_displacements``: the alpha at which g vanishes, and for the
@@ -67,7 +66,7 @@ What checker and search share
     - ``proof.records`` and, for problems in 3D, ``proof.space_records``: what a record of each kind may say. The search
       writes records by these classes, the checkers read them by the same ones, strictly, and so does a search that
       resumes from an earlier proof. It takes what ``proof.begun`` finds, and proves it again before ``proof.writer``
-      and ``proof.compressed_parts`` have it. What a record makes of a leaf is not in these classes: a checker tests it;
+      writes it. What a record makes of a leaf is not in these classes: a checker tests it;
     - ``model.problem``, ``model.mesh``, ``model.cells``, ``model.contact_body``, ``condensation.data``,
       ``condensation.condensed``, ``condensation.factorization``, ``support.deadlines``, ``support.immutable``,
       ``support.arguments``, ``support.array_arguments``, ``support.array_types``, ``support.files``,

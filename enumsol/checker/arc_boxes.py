@@ -8,12 +8,11 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from enumsol.proof.reading import quoted, rational_from
-from enumsol.trusted.arcs.over_parts import expansions, over_parts
+from enumsol.trusted.arcs.over_parts import OverInterval, expansions, over_parts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from enumsol.trusted.arcs.over_parts import OverInterval
     from enumsol.trusted.arcs.selection_balls import ArcSelection
 
     #: A part as it is in the proof, and both its ends.

@@ -10,25 +10,21 @@ from enumsol.arithmetic.balls import SAFE
 from enumsol.arithmetic.rationals import to_fraction
 from enumsol.proof.reading import same
 from enumsol.trusted.status_rows import BACKWARD, CONTACT, FORWARD, OPEN
-from enumsol.trusted.uniqueness import closed_solution, only_solution, same_solution
+from enumsol.trusted.uniqueness import ClosedSolution, closed_solution, only_solution, same_solution
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from enumsol.checker.rational import RationalBody
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.proof.records import Closed, ClosedInRationals
-    from enumsol.trusted.uniqueness import ClosedSolution
+    from enumsol.support.array_types import Codes, Floats
 
-    Codes = tuple[int, ...]
-    Array = NDArray[np.float64]
     #: The core of a solution, and per node the codes that may hold there.
     Known = tuple[Codes, Sequence[frozenset[int]]]
 
 
-def closed_by_balls(system: EnclosedSystem, said: Closed, force: Array) -> tuple[str | None, ClosedSolution | None]:
+def closed_by_balls(system: EnclosedSystem, said: Closed, force: Floats) -> tuple[str | None, ClosedSolution | None]:
     """Why a record proves nothing, or None; and the root that it proves, if it claims one."""
     ball = _solution(system, said, force)
     if ball is None:
@@ -45,13 +41,13 @@ def closed_by_balls(system: EnclosedSystem, said: Closed, force: Array) -> tuple
     return refusal, ball if np.all(inside) else None
 
 
-def one_regular_root(system: EnclosedSystem, said: Closed, force: Array) -> bool:
+def one_regular_root(system: EnclosedSystem, said: Closed, force: Floats) -> bool:
     """Whether a record proves that all data in the balls have one root, regular and in its selection."""
     ball = _solution(system, said, force)
     return ball is not None and ball.regular is not None
 
 
-def _solution(system: EnclosedSystem, said: Closed, force: Array) -> ClosedSolution | None:
+def _solution(system: EnclosedSystem, said: Closed, force: Floats) -> ClosedSolution | None:
     return closed_solution(system, said.selection, said.free, said.weights, said.force / force)
 
 

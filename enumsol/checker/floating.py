@@ -13,21 +13,18 @@ from enumsol.proof import records
 from enumsol.proof.reading import RefusedError, quoted, same
 from enumsol.trusted.at_alpha import holds_no_root, solve_selection
 from enumsol.trusted.confinement import without_bound
-from enumsol.trusted.exclusion import exclusion_margins
+from enumsol.trusted.exclusion import Leaves, exclusion_margins
 from enumsol.trusted.floating_bounds import is_unbalanced
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from fractions import Fraction
 
-    import numpy as np
-    from numpy.typing import NDArray
-
     from enumsol.checker.rational import RationalSystem
-    from enumsol.checker.walk import Codes, Test
+    from enumsol.checker.walk import Test
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.proof.records import Record
-    from enumsol.trusted.exclusion import Leaves
+    from enumsol.support.array_types import Codes, Indices
 
 
 @dataclass
@@ -85,7 +82,7 @@ class FloatingChecker(WithinReach, Checker):
     @cached_property
     def rational(self) -> RationalSystem:
         """The condensed problem in rationals; computed only if a leaf needs it."""
-        from enumsol.checker.floating_rational import FloatingRationalSystem  # python-flint, not always needed
+        from enumsol.checker.rational import FloatingRationalSystem  # python-flint, not always needed
 
         return FloatingRationalSystem(self.problem, self.alpha)
 
@@ -95,7 +92,7 @@ class FloatingChecker(WithinReach, Checker):
     def _tests(self) -> dict[type[Record], Test]:
         return super()._tests() | {records.Unbalanced: self._unbalanced}
 
-    def _check_exclusions(self, numbers: NDArray[np.intp], leaves: Leaves) -> None:
+    def _check_exclusions(self, numbers: Indices, leaves: Leaves) -> None:
         free = exclusion_margins(self.free, leaves) > 0
         margins = exclusion_margins(self.system, leaves)
         self.bounded |= bool((~free).any())

@@ -24,27 +24,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.checker.arcs import ArcChecker, ArcCount
-from enumsol.checker.only_branches import ClosedPiece
+from enumsol.checker.arcs import ArcChecker, ArcCount, ClosedPiece
+from enumsol.checker.floating import check_bound
 from enumsol.checker.reports import MAX_FAILURES, GraphVerificationReport
 from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
 from enumsol.condensation.unloaded import vanishing_alpha
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.proof.reading import (
-    RefusedError,
-    codes_from,
-    data_of,
-    friction_at,
-    multipliers_from,
-    names_only,
-    numbers_from,
-    quoted,
-    rational_from,
-    same,
-    units_from,
-)
+from enumsol.proof import reading
 from enumsol.support.deadlines import tell
-from enumsol.trusted.exclusion import Leaves, exclusion_margin, exclusion_margins
+from enumsol.trusted.exclusion import Leaves, Terms, exclusion_margin, exclusion_margins
 from enumsol.trusted.over_interval import KINDS, EnclosedPiece, as_computed
 from enumsol.trusted.status_rows import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, STICK, UNDECIDED, children_of
 
@@ -52,14 +40,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
     from fractions import Fraction
 
-    from numpy.typing import NDArray
-
     from enumsol.condensation.data import Data
     from enumsol.model.problem import ContactProblem
-    from enumsol.trusted.exclusion import Terms
+    from enumsol.support.array_types import Floats, Mask, NDArray
 
-    Array = NDArray[np.float64]
     Codes = NDArray[np.uint8]
+
 
 #: Leaves read and checked together.
 _BATCH = 256
@@ -79,8 +65,8 @@ class Piece:
 
     a: Fraction
     b: Fraction
-    force: Array
-    length: Array
+    force: Floats
+    length: Floats
     roots: Codes
     #: of every leaf its kind, and its p codes as bytes
     kinds: bytearray = field(default_factory=bytearray)
@@ -89,7 +75,7 @@ class Piece:
     #: made when there is something to exclude
     enclosed: EnclosedPiece | None = None
     #: multipliers of the form declared last, and the piece with it
-    declared: Array | None = None
+    declared: Floats | None = None
     with_form: EnclosedPiece | None = None
     closed: ClosedPiece | None = None
 
@@ -97,7 +83,7 @@ class Piece:
         """Read a form."""
         if len(record) != _FORM_ENTRIES:
             raise ValueError(f"a form has {len(record)} entries; expected {_FORM_ENTRIES}")
-        declared = np.array([numbers_from(values, self.roots.shape[1]) for values in record[1:]])
+        declared = np.array([reading.numbers_from(values, self.roots.shape[1]) for values in record[1:]])
         if np.any(declared[2:] < 0):
             raise ValueError("a multiplier of a form is negative and must not be")
         self.declared, self.with_form = declared, None
@@ -142,7 +128,7 @@ class GraphChecker:
         """Check all records after the header."""
         try:
             self._check(self._read_header(), records)
-        except RefusedError as refusal:
+        except reading.RefusedError as refusal:
             self.failures.append(str(refusal))
         except (NotEnclosedError, InvalidProblemError, InvalidArgumentError) as error:
             self.failures.append(f"the problem's data cannot be enclosed: {error}")
@@ -190,8 +176,8 @@ class GraphChecker:
             claim |= {"traces": checker.traces, "arcs": self.arcs.arcs}
         elif self._closed:
             self._fail("pieces are said to be decided by their arcs, but there are none")
-        if not same(record, claim):
-            found = quoted(record) if isinstance(record, (dict, list)) else "missing"
+        if not reading.same(record, claim):
+            found = reading.quoted(record) if isinstance(record, (dict, list)) else "missing"
             self._fail(f"the counts at the end are {found}; the pieces give {claim!r}")
         if next(records, _END) is not _END:
             self._fail("records follow after the end of the proof")
@@ -206,12 +192,12 @@ class GraphChecker:
         return vanishing_alpha(self.problem, self.data)
 
     def _read_header(self) -> tuple[Fraction, Fraction]:
-        self.data = data_of(self.header, self.problem, "graph")
+        self.data = reading.data_of(self.header, self.problem, "graph")
         try:
             a, b = _interval_from(self.header.get("interval"))
-            ends = [friction_at(self.problem, end) for end in (a, b)]
+            ends = [reading.friction_at(self.problem, end) for end in (a, b)]
         except ValueError as error:
-            raise RefusedError(f"the header cannot be read: {error}") from None
+            raise reading.RefusedError(f"the header cannot be read: {error}") from None
         self.interval = (a, b)
         self._friction = [max(pair) > 0 for pair in zip(*ends, strict=True)]
         return a, b
@@ -219,7 +205,7 @@ class GraphChecker:
     def _fail(self, message: str) -> None:
         self.failures.append(message)
         if len(self.failures) == MAX_FAILURES:
-            raise RefusedError(f"the check ends after {MAX_FAILURES} failures")
+            raise reading.RefusedError(f"the check ends after {MAX_FAILURES} failures")
 
     # -- pieces ----------------------------------------------------------------------------------------------------
 
@@ -229,9 +215,9 @@ class GraphChecker:
         try:
             piece = self._begin(record)
         except ValueError as error:
-            raise RefusedError(f"piece {number} is missing or cannot be read: {error}") from None
+            raise reading.RefusedError(f"piece {number} is missing or cannot be read: {error}") from None
         if (piece.a, piece.b) != due[:2] or not np.array_equal(_sorted(piece.roots), _sorted(due[2])):
-            raise RefusedError(f"piece {number} is not the next one: the interval is not covered")
+            raise reading.RefusedError(f"piece {number} is not the next one: the interval is not covered")
         self.pieces = number
         record = next(records, _END)
         while isinstance(record, list):
@@ -244,7 +230,7 @@ class GraphChecker:
             try:
                 self._read_leaves(piece, batch)
             except ValueError as error:
-                raise RefusedError(f"a leaf of piece {number} cannot be read: {error}") from None
+                raise reading.RefusedError(f"a leaf of piece {number} cannot be read: {error}") from None
         _check_repetitions(piece)
         handed = piece.leaves("s")
         if np.any(handed >= CONTACT):
@@ -267,10 +253,10 @@ class GraphChecker:
     def _begin(self, record: Any) -> Piece:
         if not isinstance(record, dict):
             raise ValueError("no piece begins here")  # noqa: TRY004 (as in reading)
-        names_only(record, ("piece", "force", "length", "roots"))
+        reading.names_only(record, ("piece", "force", "length", "roots"))
         a, b = _interval_from(record["piece"])
-        units = units_from(record, self.problem.p)
-        return Piece(a, b, *units, codes_from(record["roots"], self.problem.p))
+        units = reading.units_from(record, self.problem.p)
+        return Piece(a, b, *units, reading.codes_from(record["roots"], self.problem.p))
 
     def _read_leaves(self, piece: Piece, batch: list[list[Any]]) -> None:
         """Record some leaves, the first perhaps a form or the piece's numbers, and check those claimed to be empty."""
@@ -285,12 +271,12 @@ class GraphChecker:
         for record in batch:
             kind = record[0] if record else None
             if not isinstance(kind, str) or kind not in _ENTRIES:
-                raise ValueError(f"unknown kind of record {quoted(kind)}")
+                raise ValueError(f"unknown kind of record {reading.quoted(kind)}")
             if len(record) != _ENTRIES[kind]:
                 raise ValueError(f"a record of kind {kind!r} has {len(record)} entries; expected {_ENTRIES[kind]}")
         if not batch:
             return
-        codes = codes_from([record[1] for record in batch], self.problem.p)
+        codes = reading.codes_from([record[1] for record in batch], self.problem.p)
         piece.codes += codes.tobytes()
         piece.kinds += "".join(record[0] for record in batch).encode()
         if len(piece.kinds) >= piece.look:
@@ -301,7 +287,7 @@ class GraphChecker:
             if empty:
                 within = self._enclosed(piece) if kind == "x" else self._with_form(piece)
                 texts = (batch[k][2:] for k in empty)
-                terms = [multipliers_from(text, KINDS * self.problem.p) for text in texts]
+                terms = [reading.multipliers_from(text, KINDS * self.problem.p) for text in texts]
                 self._exclusions(within, codes[empty], terms)
 
     def _exclusions(self, within: EnclosedPiece, codes: Codes, terms: list[Terms]) -> None:
@@ -326,7 +312,7 @@ class GraphChecker:
         if piece.enclosed is None:
             piece.enclosed = self._data_on(piece)
             if not all(end.smallest_eigenvalue > 0 for end in piece.enclosed.ends):
-                raise RefusedError("S is not proven positive definite")
+                raise reading.RefusedError("S is not proven positive definite")
         return piece.enclosed
 
     def _data_on(self, piece: Piece) -> EnclosedPiece:
@@ -336,8 +322,8 @@ class GraphChecker:
 
 def _interval_from(ends: Any) -> tuple[Fraction, Fraction]:
     if not isinstance(ends, list) or len(ends) != 2:
-        raise ValueError(f"{quoted(ends)} is not an interval")
-    a, b = (rational_from(end) for end in ends)
+        raise ValueError(f"{reading.quoted(ends)} is not an interval")
+    a, b = (reading.rational_from(end) for end in ends)
     if not a < b:
         raise ValueError("an interval is empty")
     return a, b
@@ -347,7 +333,7 @@ def _check_repetitions(piece: Piece) -> None:
     """Refuse a piece that gives a leaf twice: the leaves of a tree are different, and so bounded in number."""
     leaves = piece.leaves()
     if len(np.unique(leaves, axis=0)) < len(leaves):
-        raise RefusedError("a piece has a leaf twice")
+        raise reading.RefusedError("a piece has a leaf twice")
 
 
 def _sorted(codes: Codes) -> Codes:
@@ -395,7 +381,43 @@ def _split(cell: Codes, refinements: Codes, friction: Sequence[bool]) -> int | N
     return None
 
 
-def _refines(codes: Codes, coarse: int | Codes) -> NDArray[np.bool_]:
+def _refines(codes: Codes, coarse: int | Codes) -> Mask:
     """Which codes are ``coarse`` or refine it."""
     held = (coarse == CONTACT) & (codes >= STICK) & (codes <= SLIP_MINUS)
     return np.asarray((codes == coarse) | (coarse == UNDECIDED) | held)
+
+
+#: Kinds of leaves: excluded, a surviving selection, left to both halves.
+_KINDS = ("x", "s", "c")
+
+
+class FloatingGraphChecker(GraphChecker):
+    """Checks that every solution within the bound of the rigid displacement lies in one of the surviving selections."""
+
+    follows_arcs = False
+
+    @property
+    def within(self) -> float | None:
+        """Bound of the rigid displacement."""
+        reach: float = self.problem.rigid_reach
+        return reach
+
+    def _read_header(self) -> tuple[Fraction, Fraction]:
+        interval = super()._read_header()
+        if self.data != "problem":
+            raise reading.RefusedError("a proof about S and g as computed, of a body that nothing holds")
+        check_bound(self.header, self.problem)
+        return interval
+
+    def _vanishing(self) -> None:
+        """Where g vanishes the body may still be moved."""
+
+    def _read_leaves(self, piece: Piece, batch: list[list[Any]]) -> None:
+        for record in batch:
+            kind = record[0] if record else None
+            if kind not in _KINDS:
+                raise ValueError(f"unknown kind of record {reading.quoted(kind)}")
+        super()._read_leaves(piece, batch)
+
+    def _data_on(self, piece: Piece) -> EnclosedPiece:
+        return EnclosedPiece.floating(self.problem, piece.a, piece.b, piece.force, piece.length)

@@ -19,9 +19,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from fractions import Fraction
 
-    from numpy.typing import NDArray
-
     from enumsol.arithmetic.balls import Ball
+    from enumsol.support.array_types import Floats
 
 _HEADER = {"format", "version", "kind", "problem", "p", "steps", "stages"}
 _END = object()
@@ -32,8 +31,8 @@ class _Step:
     """What a header says of a step."""
 
     alpha: Fraction
-    load: NDArray[np.float64] | None
-    friction: NDArray[np.float64] | None
+    load: Floats | None
+    friction: Floats | None
 
 
 @dataclass

@@ -20,24 +20,19 @@ from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.proof import records
 from enumsol.proof.proof_file import fraction_text
 from enumsol.proof.reading import RefusedError, data_of, friction_at, rational_from, same, units_from
-from enumsol.trusted.at_alpha import holds_no_root, solve_selection
-from enumsol.trusted.exclusion import Leaves, exclusion_margins
+from enumsol.trusted.at_alpha import VerifiedSelection, holds_no_root, solve_selection
+from enumsol.trusted.exclusion import Leaves, Terms, exclusion_margins
 from enumsol.trusted.positions import certain_statuses
 from enumsol.trusted.quadratic_forms import EnclosedForm
 from enumsol.trusted.status_rows import ROW_KINDS, UNDECIDED, is_covering, row_signs
-from enumsol.trusted.uniqueness import lone_root
+from enumsol.trusted.uniqueness import ClosedSolution, lone_root
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from enumsol.checker.hull import Hull
-    from enumsol.checker.rational import RationalBody, RationalSystem
-    from enumsol.checker.walk import Codes, Test
+    from enumsol.checker.rational import Hull, RationalBody, RationalSystem
+    from enumsol.checker.walk import Test
     from enumsol.proof.records import EnclosureRecord, Record
-    from enumsol.trusted.at_alpha import VerifiedSelection
-    from enumsol.trusted.exclusion import Terms
+    from enumsol.support.array_types import Codes, Indices
     from enumsol.trusted.precise_at_alpha import PreciseAtAlpha
-    from enumsol.trusted.uniqueness import ClosedSolution
 
     #: codes of a selection, the vertices of its root set, and its dimension
     Polytope = tuple[tuple[int, ...], list[Any], int]
@@ -165,7 +160,7 @@ class Checker(TreeChecker):
         self._waiting.clear()
         self._check_exclusions(np.array(numbers), Leaves.of(codes, terms))
 
-    def _check_exclusions(self, numbers: NDArray[np.intp], leaves: Leaves) -> None:
+    def _check_exclusions(self, numbers: Indices, leaves: Leaves) -> None:
         margins = exclusion_margins(self.system, leaves)
         for number in numbers[~(margins > 0)]:
             self.fail(f"leaf {number}: its multipliers do not exclude it")
@@ -336,7 +331,7 @@ class Checker(TreeChecker):
     def _hull(self, codes: Codes) -> Hull:
         """All that a selection holds; S is computed only where its equations are singular."""
         from enumsol.arithmetic.rationals import to_fraction
-        from enumsol.checker.hull import Hull, hull_of_selections
+        from enumsol.checker.rational import Hull, hull_of_selections
 
         regular = self.problem.modes is None and self._definite
         point = self._body.point(codes) if regular else None
@@ -388,6 +383,6 @@ class Checker(TreeChecker):
 
     def _meet(self, k: int, m: int) -> bool:
         """Whether two root sets have a point in common."""
-        from enumsol.checker.hull import hull_of_selections
+        from enumsol.checker.rational import hull_of_selections
 
         return bool(hull_of_selections(self.rational, self.polytopes[k][0], self.polytopes[m][0]).points)

@@ -1,8 +1,16 @@
-"""A problem in rationals, condensed or not, as the checker computes it; the search has its own code for this."""
+"""A problem in rationals, condensed or not, as the checker computes it; the search has its own code for this.
+
+All roots of a selection are an affine solution set cut by the conditions. A body that nothing holds is condensed with
+the rows of its equilibrium.
+"""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import combinations
+from math import comb
+from typing import TYPE_CHECKING, Any, Protocol
 
 from flint import fmpq, fmpq_mat
 
@@ -13,13 +21,13 @@ from enumsol.condensation.free_displacements import exact_matrices, free_displac
 from enumsol.trusted.status_rows import CONDITIONS, FORBIDDEN, NONNEGATIVE
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from fractions import Fraction
+    from collections.abc import Iterator, Sequence
 
     import numpy as np
-    from numpy.typing import NDArray
 
     from enumsol.model.problem import ContactProblem
+    from enumsol.support.array_types import NDArray
+
 
 Vector = list[Any]
 
@@ -188,3 +196,231 @@ class RationalBody:
         bound, t = self.F[node] * point[node], point[p + node]
         rows = (point[node], t, bound - t, bound + t, -w[node], w[p + node], -w[p + node])
         return min(rows[kind] for kind in CONDITIONS[code][1])
+
+
+Point = tuple[Fraction, ...]
+
+#: Candidate vertices beyond which a root set is not enumerated: a leaf that needs more is refused.
+MAX_CANDIDATES = 200_000
+
+
+class HullTooLargeError(ValueError):
+    """A root set has more than MAX_CANDIDATES candidate vertices."""
+
+
+class Conditions(Protocol):
+    """Equations and inequalities of selections, as of a RationalSystem."""
+
+    @property
+    def size(self) -> int:
+        """Numbers of a point."""
+
+    def equations(self, codes: Sequence[int]) -> tuple[Any, Sequence[Any]]:
+        """Matrix and right-hand side."""
+
+    def conditions(self, codes: Sequence[int], point: list[Any]) -> Sequence[Any]:
+        """Values of the inequalities at a point, which must not be negative; affine in the point."""
+
+
+@dataclass(frozen=True)
+class Hull:
+    """The points that solve one selection, or several at once.
+
+    Attributes
+    ----------
+    points : list of points
+        All vertices, without repetition; the root set is their convex hull.
+    dimension : int
+    """
+
+    points: list[Point]
+    dimension: int
+
+
+def hull_of_selections(system: Conditions, *selections: Sequence[int]) -> Hull:
+    """The root set that the given selections have in common, a polytope.
+
+    It is bounded, and therefore the hull of its vertices, because S is positive definite (theory, section 5.1), and
+    where nothing holds the body its rigid displacement is (theory, section 14.2). Every
+    vertex is the only common zero of some of the conditions on the affine solution set.
+
+    Raises
+    ------
+    HullTooLargeError
+        More than MAX_CANDIDATES sets of conditions would have to be tried.
+    """
+    affine = _solution_set(system, selections)
+    if affine is None:
+        return Hull([], 0)
+    origin, directions = affine
+    values = [x for codes in selections for x in system.conditions(codes, origin)]
+    moved = [
+        [x for codes in selections for x in system.conditions(codes, _sum(origin, [(1, direction)]))]
+        for direction in directions
+    ]
+    # each condition is affine: value + slopes . t >= 0
+    rows = {tuple([m[k] - value for m in moved] + [value]) for k, value in enumerate(values)}
+    flat = [row for row in rows if not any(row[:-1])]
+    if any(row[-1] < 0 for row in flat):
+        return Hull([], 0)
+    steep = sorted((row for row in rows if any(row[:-1])), key=str)
+    found = {_as_point(_sum(origin, zip(t, directions, strict=True))) for t in _corners(steep, len(directions))}
+    return Hull(sorted(found), _dimension(sorted(found)))
+
+
+def _solution_set(system: Conditions, selections: Sequence[Sequence[int]]) -> tuple[list[Any], list[Any]] | None:
+    """A point that solves all equations and a basis of their kernel, or None if they contradict each other."""
+    size = system.size
+    table = []
+    for codes in selections:
+        M, b = system.equations(codes)
+        table += [[*row, x] for row, x in zip(M.tolist(), b, strict=True)]
+    reduced, rank = fmpq_mat(table).rref()
+    rows = reduced.tolist()[:rank]
+    pivots = [next(j for j, x in enumerate(row) if x != 0) for row in rows]
+    if size in pivots:
+        return None
+    origin, directions = [fmpq(0)] * size, []
+    for row, pivot in zip(rows, pivots, strict=True):
+        origin[pivot] = row[size]
+    for free in (j for j in range(size) if j not in pivots):
+        direction = [fmpq(0)] * size
+        direction[free] = fmpq(1)
+        for row, pivot in zip(rows, pivots, strict=True):
+            direction[pivot] = -row[free]
+        directions.append(direction)
+    return origin, directions
+
+
+def _corners(rows: list[tuple[Any, ...]], size: int) -> Iterator[list[Any]]:
+    """Parameters t of the vertices of {value + slopes . t >= 0}."""
+    if comb(len(rows), size) > MAX_CANDIDATES:
+        raise HullTooLargeError(f"its root set has {comb(len(rows), size)} candidate vertices")
+    for chosen in combinations(rows, size):
+        t: list[Any] = []
+        if size:
+            matrix = fmpq_mat([list(row[:-1]) for row in chosen])
+            if matrix.det() == 0:
+                continue
+            t = matrix.solve(fmpq_mat([[-row[-1]] for row in chosen])).entries()
+        if all(sum((a * x for a, x in zip(row[:-1], t, strict=True)), row[-1]) >= 0 for row in rows):
+            yield t
+
+
+def _sum(origin: list[Any], steps: Any) -> list[Any]:
+    total = list(origin)
+    for factor, direction in steps:
+        total = [x + factor * d for x, d in zip(total, direction, strict=True)]
+    return total
+
+
+def _as_point(vector: list[Any]) -> Point:
+    return tuple(Fraction(int(x.p), int(x.q)) for x in vector)
+
+
+def _dimension(points: list[Point]) -> int:
+    if len(points) < 2:
+        return 0
+    first = points[0]
+    rows = [[x - y for x, y in zip(point, first, strict=True)] for point in points[1:]]
+    return int(fmpq_mat([[fmpq(x.numerator, x.denominator) for x in row] for row in rows]).rank())
+
+
+class FloatingRationalSystem(RationalSystem):
+    """S, g and F of the body on springs, and the rows of its equilibrium as a whole (theory, section 14.2).
+
+    Points have 2p + r numbers: the contact forces, then -q.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    alpha : Fraction
+    """
+
+    def __init__(self, problem: ContactProblem, alpha: Fraction) -> None:
+        super().__init__(problem.on_springs, alpha)
+        modes, a = problem.modes, rational(alpha)
+        if modes is None:
+            raise AssertionError("the body is held")
+        columns = [[rational(x) for x in column] for column in modes.N.T.tolist()]
+        rows = problem.contact_rows.toarray().tolist()
+        slope = [0.0] * problem.n if problem.load_slope is None else problem.load_slope.tolist()
+        load = [rational(x) + a * rational(y) for x, y in zip(problem.f.tolist(), slope, strict=True)]
+        #: G, a row for each mode, and h.
+        self.G = [[_dot(row, column) for row in rows] for column in columns]
+        self.h = [sum((x * y for x, y in zip(load, column, strict=True)), fmpq(0)) for column in columns]
+        self.reach = [rational(float(x)) for x in modes.reach(problem.rigid_reach)]
+
+    @property
+    def size(self) -> int:
+        """Numbers of a point."""
+        return 2 * self.p + len(self.G)
+
+    def row(self, kind: int, node: int) -> tuple[Vector, Any]:
+        """A row as an affine function of a point."""
+        form, constant = super().row(kind, node)
+        if kind < 4:
+            return [*form, *(self.zero for _ in self.G)], constant
+        # w = g - S lambda + G'q
+        place, sign = (node, -1) if kind == 4 else (self.p + node, 1 if kind == 5 else -1)
+        return [*form, *(-sign * mode[place] for mode in self.G)], constant
+
+    def equations(self, codes: Sequence[int]) -> tuple[Any, Vector]:
+        """Matrix and right-hand side of the selection's equations and of G lambda = h."""
+        M, b = super().equations(codes)
+        none = [self.zero for _ in self.G]
+        return fmpq_mat([*M.tolist(), *([*mode, *none] for mode in self.G)]), [*b, *self.h]
+
+    def conditions(self, codes: Sequence[int], point: Vector) -> Vector:
+        """The selection's inequalities at a point, then the bounds of the rigid displacement."""
+        return [*self.contact_conditions(codes, point), *self.bounds(point)]
+
+    def contact_conditions(self, codes: Sequence[int], point: Vector) -> Vector:
+        """The selection's inequalities at a point."""
+        return super().conditions(codes, point)
+
+    def bounds(self, point: Vector) -> Vector:
+        """What is left to the bounds of the rigid displacement."""
+        moved = list(zip(point[2 * self.p :], self.reach, strict=True))
+        return [*(most - x for x, most in moved), *(most + x for x, most in moved)]
+
+    def rests_on_reach(self, codes: Sequence[int], points: Sequence[Sequence[Fraction]]) -> bool:
+        """Whether a selection, which holds these points, holds others without the bounds.
+
+        True as well if it has too many candidate vertices to find out.
+        """
+        if points:
+            ends = [[rational(x) for x in point[2 * self.p :]] for point in points]
+            return any(abs(x) == most for end in ends for x, most in zip(end, self.reach, strict=True))
+        try:
+            return any(point[-1] > 0 for point in hull_of_selections(_Shares(self), codes).points)
+        except HullTooLargeError:
+            return True
+
+
+class _Shares:
+    """Points (s x, s) with x in a selection without the bounds, 0 <= s <= 1, and s x within the bounds.
+
+    Parameters
+    ----------
+    system : FloatingRationalSystem
+    """
+
+    def __init__(self, system: FloatingRationalSystem) -> None:
+        self._system, self.size = system, system.size + 1
+
+    def equations(self, codes: Sequence[int]) -> tuple[Any, Vector]:
+        """Matrix and right-hand side, which is zero."""
+        M, b = self._system.equations(codes)
+        return fmpq_mat([[*row, -x] for row, x in zip(M.tolist(), b, strict=True)]), [fmpq(0)] * len(b)
+
+    def conditions(self, codes: Sequence[int], point: Vector) -> Vector:
+        """The selection's inequalities times s, then the bounds of s x and of s."""
+        *x, share = point
+        there, constant = (self._system.contact_conditions(codes, at) for at in (x, [fmpq(0)] * len(x)))
+        scaled = [value + (share - 1) * more for value, more in zip(there, constant, strict=True)]
+        return [*scaled, *self._system.bounds(x), share, 1 - share]
+
+
+def _dot(row: list[float], column: Vector) -> Any:
+    return sum((rational(x) * y for x, y in zip(row, column, strict=True) if x), fmpq(0))

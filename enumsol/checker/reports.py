@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from fractions import Fraction
 
 from enumsol.proof.reading import shown_alpha
 from enumsol.support.messages import counted, html_lines
-
-if TYPE_CHECKING:
-    from fractions import Fraction
 
 #: Failures after which a checker reads no further.
 MAX_FAILURES = 20

@@ -1,4 +1,7 @@
-"""The checker of proofs about problems in 3D: leaves are statuses and sectors of slip directions."""
+"""The checker of proofs about problems in 3D: leaves are statuses and sectors of slip directions.
+
+Bodies that nothing holds (theory, section 14.6) have a checker of their own.
+"""
 
 from __future__ import annotations
 
@@ -9,25 +12,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, Ball
+from enumsol.checker.floating import WithinReach
 from enumsol.checker.walk import TreeChecker
 from enumsol.condensation.data import exactly_at
-from enumsol.condensation.space_condensed import EnclosedSpace
+from enumsol.condensation.space_condensed import EnclosedSpace, FloatingSpace
+from enumsol.proof import records, space_records
 from enumsol.proof.reading import RefusedError, data_of, exponents_from, rational_from, shown_alpha
-from enumsol.proof.records import Limits, NoRoot, RegularRoot
-from enumsol.proof.space_records import (
-    LEAVES,
-    BoxedRoot,
-    DeclaredProductForm,
-    DeclaredSlipForm,
-    EnclosedByProducts,
-    ExcludedBySlipForm,
-    ExcludedInSpace,
-    MissedByProducts,
-    OnlyRoot,
-)
-from enumsol.trusted.space.boxed_solution import Box, apart_in_boxes, is_inside, solution_in_box
-from enumsol.trusted.space.leaves import Open, distinct_roots, settle
+from enumsol.proof.records import EnclosureRecord, Limits, NoRoot, Record, RegularRoot
+from enumsol.trusted.space.boxed_solution import Box, BoxedSolution, apart_in_boxes, is_inside, solution_in_box
+from enumsol.trusted.space.leaves import Open, SpaceRoot, distinct_roots, settle
 from enumsol.trusted.space.product_forms import Ellipsoid, refines
+from enumsol.trusted.space.resultants import floating_margin, is_unbalanced_in_space, unbounded
 from enumsol.trusted.space.sector_rows import STICK, UNDECIDED, is_sector_covering, sector_margin
 from enumsol.trusted.space.slip_forms import SlipForm
 from enumsol.trusted.space.space_uniqueness import OnlySolution, lone_root, only_root, only_solution_in_space
@@ -35,13 +30,10 @@ from enumsol.trusted.space.space_uniqueness import OnlySolution, lone_root, only
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
-    from enumsol.checker.walk import Codes, Test
-    from enumsol.proof.records import EnclosureRecord, Record
-    from enumsol.trusted.space.boxed_solution import BoxedSolution
-    from enumsol.trusted.space.leaves import SpaceRoot
+    from enumsol.checker.walk import Test
+    from enumsol.support.array_types import Codes, Floats, Mask
     from enumsol.trusted.space.space_uniqueness import LooseSolution
+
 
 _OPEN = "what it holds is not proven"
 _NO_FORM = "no form that is convex was declared over it"
@@ -51,7 +43,7 @@ _NO_FORM = "no form that is convex was declared over it"
 class SpaceChecker(TreeChecker):
     """Checks one proof of a problem in 3D."""
 
-    kinds = LEAVES
+    kinds = space_records.LEAVES
 
     roots: list[tuple[tuple[int, ...], SpaceRoot]] = field(default_factory=list)
     boxed: list[tuple[tuple[int, ...], BoxedSolution]] = field(default_factory=list)
@@ -93,25 +85,25 @@ class SpaceChecker(TreeChecker):
     # -- leaves ----------------------------------------------------------------------------------------------------
 
     def _limits(self, codes: Codes, kind: type[Record]) -> Limits:
-        return Limits(codes, components=len(self.system.g) if kind is OnlyRoot else 0)
+        return Limits(codes, components=len(self.system.g) if kind is space_records.OnlyRoot else 0)
 
     def _tests(self) -> dict[type[Record], Test]:
         return {
-            ExcludedInSpace: self._excluded,
-            ExcludedBySlipForm: self._excluded_by_form,
+            space_records.ExcludedInSpace: self._excluded,
+            space_records.ExcludedBySlipForm: self._excluded_by_form,
             NoRoot: self._no_root,
             RegularRoot: self._regular_root,
-            BoxedRoot: self._in_box,
-            MissedByProducts: self._missed,
-            EnclosedByProducts: self._in_ellipsoid,
-            OnlyRoot: self._only,
+            space_records.BoxedRoot: self._in_box,
+            space_records.MissedByProducts: self._missed,
+            space_records.EnclosedByProducts: self._in_ellipsoid,
+            space_records.OnlyRoot: self._only,
         }
 
     def _at_rest(self) -> None:
         self.regular += 1
         self.locate(Ball.exact(np.zeros(3 * self.problem.p)), np.ones(2 * self.problem.p, dtype=bool))
 
-    def _excluded(self, codes: Codes, said: ExcludedInSpace) -> str | None:
+    def _excluded(self, codes: Codes, said: space_records.ExcludedInSpace) -> str | None:
         positive = sector_margin(self.system, codes, said.rows, said.values) > 0
         return None if positive else "its multipliers do not exclude it"
 
@@ -119,19 +111,19 @@ class SpaceChecker(TreeChecker):
         system = self.system
         try:
             limits = Limits((UNDECIDED,) * self.problem.p, components=len(system.g))
-            if len(record) in DeclaredProductForm.sizes:
-                said = DeclaredProductForm.read(record, limits)
+            if len(record) in space_records.DeclaredProductForm.sizes:
+                said = space_records.DeclaredProductForm.read(record, limits)
                 with np.errstate(over="ignore", invalid="ignore"):
                     centre = said.centre / system.unit
                 self.ellipsoid = Ellipsoid.of(system, said.codes, centre, said.numbers)
                 return
-            numbers = DeclaredSlipForm.read(record, limits).numbers
+            numbers = space_records.DeclaredSlipForm.read(record, limits).numbers
             if self.form is None or not np.array_equal(self.form.numbers, numbers):
                 self.form = SlipForm.of(system, numbers)
         except ValueError as error:
             raise RefusedError(str(error)) from None
 
-    def _excluded_by_form(self, codes: Codes, said: ExcludedBySlipForm) -> str | None:
+    def _excluded_by_form(self, codes: Codes, said: space_records.ExcludedBySlipForm) -> str | None:
         if self.form is None:
             return "its form was not declared"
         positive = sector_margin(self.system, codes, said.rows, said.values, form=self.form) > 0
@@ -154,21 +146,21 @@ class SpaceChecker(TreeChecker):
         self._locate(found.y, np.array(codes) == STICK)
         return self._placed(found, said.enclosure)
 
-    def _missed(self, codes: Codes, said: MissedByProducts) -> str | None:
+    def _missed(self, codes: Codes, said: space_records.MissedByProducts) -> str | None:
         del said
         ellipsoid = self.ellipsoid
         if ellipsoid is None or not refines(codes, ellipsoid.codes):
             return _NO_FORM
         return None if ellipsoid.misses(codes) else "its ellipsoid does not exclude it"
 
-    def _in_ellipsoid(self, codes: Codes, said: EnclosedByProducts) -> str | None:
+    def _in_ellipsoid(self, codes: Codes, said: space_records.EnclosedByProducts) -> str | None:
         """The only solution of a box that holds an ellipsoid in which all roots of the assignment lie."""
         ellipsoid = self.ellipsoid
         if ellipsoid is None or not refines(codes, ellipsoid.codes):
             return _NO_FORM
         return self._of_box(codes, said, ellipsoid.is_in)
 
-    def _in_box(self, codes: Codes, said: BoxedRoot) -> str | None:
+    def _in_box(self, codes: Codes, said: space_records.BoxedRoot) -> str | None:
         """The only solution of a box, in which all roots of the leaf lie."""
         leaf = settle(self.system, codes)
         bounds = None if leaf is None else (leaf.y, leaf.w)
@@ -181,7 +173,7 @@ class SpaceChecker(TreeChecker):
 
         return self._of_box(codes, said, within)
 
-    def _of_box(self, codes: Codes, said: BoxedRoot, within: Callable[[Box], bool]) -> str | None:
+    def _of_box(self, codes: Codes, said: space_records.BoxedRoot, within: Callable[[Box], bool]) -> str | None:
         """The only solution of a box, of which ``within`` tells whether all roots of the leaf lie in it."""
         (mid, rad, rho), unit = said.box(len(self.system.g)), self.system.unit
         with np.errstate(over="ignore", invalid="ignore"):
@@ -198,7 +190,7 @@ class SpaceChecker(TreeChecker):
         self._locate(found.y, ~(found.slip | found.open))
         return self._placed(found, said.enclosure)
 
-    def _only(self, codes: Codes, said: OnlyRoot) -> str | None:
+    def _only(self, codes: Codes, said: space_records.OnlyRoot) -> str | None:
         """The only solution of all, or of an assignment."""
         found: LooseSolution | SpaceRoot | None
         if any(code != UNDECIDED for code in codes):
@@ -239,7 +231,7 @@ class SpaceChecker(TreeChecker):
     def locate_rational_roots(self) -> None:
         """Nothing: in 3D there are none."""
 
-    def _locate(self, y: Ball, still: NDArray[np.bool_]) -> None:
+    def _locate(self, y: Ball, still: Mask) -> None:
         """Take note of a root's forces in the problem's units; ``still`` tells nodes that stick for certain."""
         if self.located is None:
             return
@@ -257,9 +249,58 @@ class SpaceChecker(TreeChecker):
         return {"roots": self.regular + isolated, "undecided": self.undecided, "leaves": self.leaves}
 
 
-def _units(header: dict[str, Any], p: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _units(header: dict[str, Any], p: int) -> tuple[Floats, Floats]:
     """Units of forces and displacements of the nodes, powers of two with one product."""
     force, length = (exponents_from(header.get(key), p) for key in ("force", "length"))
     if len({a + b for a, b in zip(force, length, strict=True)}) != 1:
         raise ValueError("the units are not a common scaling of energy")
     return np.ldexp(1.0, np.array(force)), np.ldexp(1.0, np.array(length))
+
+
+@dataclass
+class FloatingSpaceChecker(WithinReach, SpaceChecker):
+    """Checks one proof of a body in 3D that nothing holds."""
+
+    kinds = space_records.FLOATING_LEAVES
+
+    @cached_property
+    def system(self) -> FloatingSpace:
+        """Balls for S, g, F, G and h in the proof's units."""
+        enclosed = FloatingSpace.of(self.problem, self.alpha, self.force, self.length)
+        if not enclosed.smallest_eigenvalue > 0:
+            raise RefusedError("S is not proven positive definite")
+        return enclosed
+
+    @cached_property
+    def free(self) -> FloatingSpace:
+        """The same without bounds of the rigid displacement."""
+        return unbounded(self.system)
+
+    def _limits(self, codes: Codes, kind: type[Record]) -> records.Limits:
+        del kind
+        return records.Limits(codes, modes=self.problem.modes.r)
+
+    def _tests(self) -> dict[type[Record], Test]:
+        return super()._tests() | {records.Unbalanced: self._unbalanced}
+
+    def _excluded(self, codes: Codes, said: space_records.ExcludedInSpace) -> str | None:
+        if floating_margin(self.free, codes, said.rows, said.values) > 0:
+            return None
+        self.bounded = True
+        positive = floating_margin(self.system, codes, said.rows, said.values) > 0
+        return None if positive else "its multipliers do not exclude it"
+
+    def _unbalanced(self, codes: Codes, said: records.Unbalanced) -> str | None:
+        if is_unbalanced_in_space(self.system, codes, said.direction):
+            return None
+        return "forces below it may be in balance with the load"
+
+    def _no_root(self, codes: Codes, said: records.NoRoot) -> str | None:
+        if settle(self.free, codes) is None:
+            return None
+        self.bounded = True
+        return super()._no_root(codes, said)
+
+    def _regular_root(self, codes: Codes, said: records.RegularRoot) -> str | None:
+        self.bounded |= not isinstance(settle(self.free, codes), SpaceRoot)
+        return super()._regular_root(codes, said)

@@ -29,11 +29,10 @@ from enumsol.trusted.uniqueness import lone_root
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
-    from enumsol.checker.walk import Codes, Test
+    from enumsol.checker.walk import Test
     from enumsol.proof.proof_file import Proof
     from enumsol.proof.records import Record
+    from enumsol.support.array_types import Codes, Floats, Indices
 
 #: Largest radius that is tried; below 1 a positive friction coefficient stays positive.
 LARGEST = 0.5
@@ -109,14 +108,14 @@ class _WidenedChecker(Checker):
     _systems: dict[float, EnclosedSystem | None] = field(default_factory=dict)
 
     @cached_property
-    def _sizes(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _sizes(self) -> tuple[Floats, Floats]:
         """Upper bounds of what changes of S and g are measured by."""
         system = self.system
         root = np.sqrt(np.diagonal(system.S) + np.diagonal(system.S_rad)) * SAFE
         return np.outer(root, root) * SAFE, root * self._load * SAFE
 
     @cached_property
-    def _roots(self) -> NDArray[np.float64]:
+    def _roots(self) -> Floats:
         """Lower bounds of the roots of S_ii."""
         return np.asarray(np.sqrt(np.diagonal(self.system.S) - np.diagonal(self.system.S_rad)) / SAFE)
 
@@ -172,7 +171,7 @@ class _WidenedChecker(Checker):
         self.radius = good if good >= SMALLEST else 0.0
         return self.radius > 0
 
-    def _check_exclusions(self, numbers: NDArray[np.intp], leaves: Leaves) -> None:
+    def _check_exclusions(self, numbers: Indices, leaves: Leaves) -> None:
         sturdy = leaves.times(_sturdiest(self.system, leaves))
 
         def excluded(system: EnclosedSystem) -> bool:
@@ -223,7 +222,7 @@ class _WidenedFloating(_WidenedChecker, FloatingChecker):
     """The same for a body that nothing holds, within its bound of the rigid displacement."""
 
     @cached_property
-    def _weights(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _weights(self) -> tuple[Floats, Floats]:
         """Lower and upper bounds of what changes of h are measured by, for a load of size one, (r,)."""
         G, S, k = self.system.rows.G, self.system, gamma(len(self.system.g) + 2)
         most = np.sqrt(np.diagonal(S.S) + np.diagonal(S.S_rad)) * SAFE
@@ -252,7 +251,7 @@ class _WidenedFloating(_WidenedChecker, FloatingChecker):
         return self._for_all(lambda system: is_unbalanced(cast("FloatingSystem", system), codes, said.direction))
 
 
-def _sturdiest(system: EnclosedSystem, leaves: Leaves) -> NDArray[np.float64]:
+def _sturdiest(system: EnclosedSystem, leaves: Leaves) -> Floats:
     """Positive factors of the leaves' multipliers that make their bounds large against their errors.
 
     With multipliers stretched by t the bound is -a + b t - c t^2, known from three points, and its error grows like

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, cast
 
-from enumsol.checker.graph_checker import GraphChecker
+from enumsol.checker.floating import FloatingChecker
+from enumsol.checker.graph_checker import FloatingGraphChecker, GraphChecker
 from enumsol.checker.plane_checker import Checker
 from enumsol.model.problem import ContactProblem
 from enumsol.proof.proof_file import Proof
@@ -18,11 +19,11 @@ if TYPE_CHECKING:
 
     from enumsol.checker.reports import GraphVerificationReport, HistoryVerificationReport, VerificationReport
     from enumsol.checker.walk import TreeChecker
-    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import AnyProblem, ContactProblem3D
 
 
 def verify(
-    problem: ContactProblem | ContactProblem3D, proof: Proof, progress: Callable[[int], object] | None = None
+    problem: AnyProblem, proof: Proof, progress: Callable[[int], object] | None = None
 ) -> VerificationReport | GraphVerificationReport | HistoryVerificationReport:
     """Check a proof, of a root set, of a branch graph or of a history, against a problem.
 
@@ -63,19 +64,12 @@ def verify(
     instance_of(proof, Proof, "proof")
     optional_callable(progress, "progress")
     proof.check_integrity()
-    checker: type[TreeChecker] = Checker
-    if problem.modes is not None and not in_space:
-        from enumsol.checker.floating import FloatingChecker  # for bodies that nothing holds only
-
-        checker = FloatingChecker
+    checker: type[TreeChecker] = Checker if problem.modes is None else FloatingChecker
     if in_space:
-        from enumsol.checker.space_checker import SpaceChecker  # with its trusted core, for problems in 3D only
+        # with its trusted core, for problems in 3D only
+        from enumsol.checker.space_checker import FloatingSpaceChecker, SpaceChecker
 
-        checker = SpaceChecker
-        if problem.modes is not None:
-            from enumsol.checker.space_floating import FloatingSpaceChecker  # as above
-
-            checker = FloatingSpaceChecker
+        checker = SpaceChecker if problem.modes is None else FloatingSpaceChecker
     lines = proof.records()
     header = next(lines, None)
     if isinstance(header, dict) and header.get("kind") == "history":
@@ -84,11 +78,7 @@ def verify(
         problem.check_held("a history")
         return HistoryChecker(problem, header, checker, progress).run(lines)
     if isinstance(header, dict) and header.get("kind") == "graph" and not in_space:
-        graphs = GraphChecker
-        if problem.modes is not None:
-            from enumsol.checker.floating_graphs import FloatingGraphChecker  # for bodies that nothing holds only
-
-            graphs = FloatingGraphChecker
+        graphs = GraphChecker if problem.modes is None else FloatingGraphChecker
         return graphs(cast("ContactProblem", problem), header, progress).run(lines)
     if isinstance(header, dict) and header.get("kind") == "graph":
         from enumsol.checker.space_graph import SpaceGraphChecker  # for graphs in 3D only

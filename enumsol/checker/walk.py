@@ -18,15 +18,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from fractions import Fraction
 
-    import numpy as np
-    from numpy.typing import NDArray
-
     from enumsol.arithmetic.balls import Ball
     from enumsol.condensation.data import Data
     from enumsol.proof.proof_file import Proof
     from enumsol.proof.records import Record
+    from enumsol.support.array_types import Codes, Mask
 
-    Codes = tuple[int, ...]
     #: Checks what a leaf of one kind says; the reason when it proves nothing.
     Test = Callable[[Codes, Any], str | None]
 
@@ -54,7 +51,7 @@ class TreeChecker:
     data: Data = "problem"
     #: What was found of the roots, if someone wants to know where they leave the contact nodes: forces in the
     #: problem's units, and tangential components with u_t = 0 for certain.
-    located: list[tuple[Ball, NDArray[np.bool_], tuple[int, ...] | None]] | None = None
+    located: list[tuple[Ball, Mask, tuple[int, ...] | None]] | None = None
     #: The problem's balls, where whoever asks for the check has made them already.
     enclosure: CondensedEnclosure | None = None
 
@@ -225,7 +222,7 @@ class TreeChecker:
         self._at_rest()
         return None if unloaded else "the problem is not unloaded"
 
-    def locate(self, forces: Ball, still: NDArray[np.bool_], codes: tuple[int, ...] | None = None) -> None:
+    def locate(self, forces: Ball, still: Mask, codes: tuple[int, ...] | None = None) -> None:
         """Take note of where a root is, and of its statuses if they are certain, if anybody wants to know."""
         if self.located is not None:
             self.located.append((forces, still, codes))

@@ -5,7 +5,8 @@ from __future__ import annotations
 import difflib
 import sys
 import warnings
-from typing import TYPE_CHECKING, Annotated, Any
+from collections.abc import Sequence
+from typing import Annotated, Any
 
 import typer
 
@@ -24,13 +25,9 @@ from enumsol.cli import (
     verify,
 )
 from enumsol.cli.common import ExitStatus
-from enumsol.cli.quiet import loud_again
-from enumsol.cli.streams import guarded_streams
+from enumsol.cli.streams import guarded_streams, loud_again
 from enumsol.errors import EnumsolError, OutputError
 from enumsol.support.messages import listed
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 #: Raised on options that typer cannot make sense of; it comes with click or with typer, by the version of typer.
 _UsageError: type[Exception] = typer.BadParameter.__bases__[0]

@@ -19,9 +19,8 @@ if TYPE_CHECKING:
 
     from enumsol.auditing import AuditReport, PointRun
     from enumsol.branches import BranchGraph
-    from enumsol.model.problem import ContactProblem
-    from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.support.arguments import Alpha
+    from enumsol.model.problem3d import AnyProblem
+    from enumsol.support.array_types import Alpha
 
 #: As of ``read_points``, which is not imported for --help.
 Columns = Literal["auto", "rows", "labels"]
@@ -105,7 +104,7 @@ def audit(
     finish(ended, _status(report))
 
 
-def _read_runs(points: str, problem: ContactProblem | ContactProblem3D, columns: Columns) -> Sequence[PointRun]:
+def _read_runs(points: str, problem: AnyProblem, columns: Columns) -> Sequence[PointRun]:
     from enumsol.auditing import read_points
 
     source, name = (sys.stdin, "stdin") if points == "-" else (points, points)

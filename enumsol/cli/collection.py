@@ -7,9 +7,8 @@ from typing import Annotated
 import typer
 
 from enumsol.cli.common import ExitStatus
-from enumsol.cli.listing import list_entries, named_group
 from enumsol.cli.options import JsonFile, Quiet, csv
-from enumsol.cli.output import check_outputs, deliver
+from enumsol.cli.output import check_outputs, deliver, list_entries, named_group
 
 app = named_group("Problems with certified solutions, and a check of what other solvers find.")
 

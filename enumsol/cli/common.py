@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 import typer
 
 from enumsol.cli.progress import Display
-from enumsol.cli.quiet import is_quiet
+from enumsol.cli.streams import is_quiet
 from enumsol.errors import EnumsolError, Interrupted, InvalidArgumentError, OutputError
 
 if TYPE_CHECKING:
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
     from enumsol.fem import Scene
     from enumsol.model.problem import ContactProblem
-    from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.support.arguments import Alpha
+    from enumsol.model.problem3d import AnyProblem
+    from enumsol.support.array_types import Alpha
 
 T = TypeVar("T")
 
@@ -93,7 +93,7 @@ def load_problem(name: str) -> ContactProblem:
     return instance_of(load_any_problem(name), ContactProblem, name)
 
 
-def load_any_problem(name: str) -> ContactProblem | ContactProblem3D:
+def load_any_problem(name: str) -> AnyProblem:
     """As load_problem, of 2D and 3D.
 
     Raises
@@ -105,7 +105,7 @@ def load_any_problem(name: str) -> ContactProblem | ContactProblem3D:
         return _any_problem(name)
 
 
-def _any_problem(name: str) -> ContactProblem | ContactProblem3D:
+def _any_problem(name: str) -> AnyProblem:
     if name.startswith(COLLECTION):
         from enumsol import collection  # numpy and scipy: not for --help
 
@@ -188,7 +188,7 @@ def parse_interval(first: str, last: str) -> tuple[Alpha, Alpha]:
     return low, high
 
 
-def node_row(problem: ContactProblem | ContactProblem3D, label: str | None) -> int:
+def node_row(problem: AnyProblem, label: str | None) -> int:
     """Row number of a contact node that is named by its label; the first one for None.
 
     Raises

@@ -6,17 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from enumsol.cli import output
 from enumsol.cli.common import ExitStatus, finish, load_any_problem, parse_alpha, so_far
 from enumsol.cli.options import JsonFile, PlotFile, ProblemArgument, Quiet, VtuFile, count, csv, file, number
-from enumsol.cli.output import (
-    check_named_files,
-    check_outputs,
-    check_places,
-    check_plot,
-    check_vtu,
-    deliver,
-    write_figure,
-)
 from enumsol.cli.progress import Display
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.messages import counted
@@ -26,8 +18,8 @@ if TYPE_CHECKING:
 
     from enumsol.fixed_points import FixedPoint, FixedPointProgress
     from enumsol.model.problem import ContactProblem
-    from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.support.arguments import Alpha
+    from enumsol.model.problem3d import AnyProblem
+    from enumsol.support.array_types import Alpha
 
 
 #: What a body that nothing holds has beside forces and displacements of its contact nodes.
@@ -72,16 +64,16 @@ def fixed_point(
     Ctrl-C, after printing the last iterate; 74 if a result could not be written; 141 if the program that read it has
     ended.
     """
-    check_outputs(json=json_file, csv=csv_file, npz=npz_file)
-    check_vtu(vtu_file)
-    check_plot(plot_file)
+    output.check_outputs(json=json_file, csv=csv_file, npz=npz_file)
+    output.check_vtu(vtu_file)
+    output.check_plot(plot_file)
     _check_combination(starts, npz_file, vtu_file, plot_file)
     body = load_any_problem(problem)
     value = _alpha(alpha, problem, body)
     options: dict[str, Any] = {"tolerance": tolerance, "max_iterations": max_iterations, "anderson": anderson}
     if starts is not None:
         _basins(_in_2d(body, problem), problem, value, starts, options, json_file, csv_file, plot_file)
-    check_places(vtu_file, body, problem)
+    output.check_places(vtu_file, body, problem)
     found, ended = so_far(lambda: _approximate(body, value, start, options))
 
     def show(path: str) -> None:
@@ -89,7 +81,7 @@ def fixed_point(
 
         write_vtu(body, found, path)
 
-    deliver(
+    output.deliver(
         (npz_file, found.save),
         (vtu_file, show),
         json_file=json_file,
@@ -104,13 +96,13 @@ def fixed_point(
 def _check_combination(starts: int | None, npz_file: str | None, vtu_file: str | None, plot_file: str | None) -> None:
     if starts is None and plot_file is not None:
         raise InvalidArgumentError("--plot is given without --starts; expected both, for a picture of what is reached")
-    check_named_files(", but it is a binary file", npz=npz_file)
+    output.check_named_files(", but it is a binary file", npz=npz_file)
     for option, path in (("--npz", npz_file), ("--vtu", vtu_file)):
         if starts is not None and path is not None:
             raise InvalidArgumentError(f"{option} and --starts are both given; expected one of them")
 
 
-def _alpha(text: str | None, name: str, body: ContactProblem | ContactProblem3D) -> Alpha:
+def _alpha(text: str | None, name: str, body: AnyProblem) -> Alpha:
     """The alpha that was given, or any where the problem does not depend on it."""
     if text is not None:
         return parse_alpha(text)
@@ -121,7 +113,7 @@ def _alpha(text: str | None, name: str, body: ContactProblem | ContactProblem3D)
     return 0.0
 
 
-def _in_2d(body: ContactProblem | ContactProblem3D, name: str) -> ContactProblem:
+def _in_2d(body: AnyProblem, name: str) -> ContactProblem:
     from enumsol.model.problem import ContactProblem  # as below
 
     if not isinstance(body, ContactProblem):
@@ -129,9 +121,7 @@ def _in_2d(body: ContactProblem | ContactProblem3D, name: str) -> ContactProblem
     return body
 
 
-def _approximate(
-    body: ContactProblem | ContactProblem3D, alpha: Alpha, start: float | None, options: dict[str, Any]
-) -> FixedPoint:
+def _approximate(body: AnyProblem, alpha: Alpha, start: float | None, options: dict[str, Any]) -> FixedPoint:
     from enumsol.fixed_points import successive_approximations  # numpy and scipy: not for --help
 
     with Display("iterating") as display:
@@ -181,8 +171,8 @@ def _basins(
             "reach; expected one"
         )
     table, ended = so_far(lambda: basin_table(body, roots, starts, **options))
-    deliver(
-        (plot_file, lambda path: write_figure(path, plot_basins(table))),
+    output.deliver(
+        (plot_file, lambda path: output.write_figure(path, plot_basins(table))),
         json_file=json_file,
         csv_file=csv_file,
         text=lambda: _basin_text(table, len(roots), roots.completeness()),

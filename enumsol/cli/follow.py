@@ -22,10 +22,9 @@ if TYPE_CHECKING:
 
     from enumsol.branches import BranchGraph
     from enumsol.continuation import ContinuationOptions, Path
-    from enumsol.model.problem import ContactProblem
-    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import AnyProblem
     from enumsol.roots.root import Root
-    from enumsol.support.arguments import Alpha
+    from enumsol.support.array_types import Alpha
 
 OneRoot = Annotated[
     int | None, typer.Option(min=0, metavar="K", help="Start from root K of enumsol roots; default: from all roots.")
@@ -141,11 +140,7 @@ def _directions(text: str) -> tuple[int, ...]:
 
 
 def _starts(
-    problem: ContactProblem | ContactProblem3D,
-    interval: tuple[Alpha, Alpha],
-    alpha: Alpha,
-    arithmetic: options.Arithmetic,
-    root: int | None,
+    problem: AnyProblem, interval: tuple[Alpha, Alpha], alpha: Alpha, arithmetic: options.Arithmetic, root: int | None
 ) -> list[tuple[int, Root]]:
     if not interval[0] <= alpha <= interval[1]:
         low, high = (float(end) for end in interval)
@@ -172,7 +167,7 @@ def _starts(
 class _Followed:
     """Paths from one root after the other."""
 
-    problem: ContactProblem | ContactProblem3D
+    problem: AnyProblem
     interval: tuple[float, float]
     steps: ContinuationOptions
     tangent: int | None
@@ -261,7 +256,7 @@ class _Followed:
         return figure
 
 
-def _passes(path: Path, root: Root, problem: ContactProblem | ContactProblem3D) -> bool:
+def _passes(path: Path, root: Root, problem: AnyProblem) -> bool:
     """Whether the path runs through a regular root, which in 2D is the only one of its selection at that alpha."""
     if not root.regular:
         return False
@@ -275,7 +270,7 @@ def _passes(path: Path, root: Root, problem: ContactProblem | ContactProblem3D) 
     )
 
 
-def _leads_to(path: Path, k: int, root: Root, problem: ContactProblem | ContactProblem3D) -> bool:
+def _leads_to(path: Path, k: int, root: Root, problem: AnyProblem) -> bool:
     """Whether Newton's method from between two points of a path finds a root."""
     import numpy as np  # not for --help
 

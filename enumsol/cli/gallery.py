@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from enumsol.cli.listing import list_entries, named_group
 from enumsol.cli.options import JsonFile, Quiet
-from enumsol.cli.output import check_outputs, deliver
+from enumsol.cli.output import check_outputs, deliver, list_entries, named_group
 
 if TYPE_CHECKING:
     from enumsol.gallery import GalleryEntry

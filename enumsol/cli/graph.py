@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from enumsol.branches import BranchGraph
     from enumsol.model.problem import ContactProblem
     from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.support.arguments import Alpha
+    from enumsol.support.array_types import Alpha
 
 
 HowExact = Annotated[

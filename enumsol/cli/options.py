@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from inspect import Parameter, signature
 from os.path import isdir
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
-from enumsol.cli.quiet import set_quiet
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
+from enumsol.cli.streams import set_quiet
 
 #: Groups of options in the help of every command.
 LIMITS, OUTPUT, PLOT, STEPS = "Limits", "Output", "Plot", "Steps"

@@ -10,6 +10,8 @@ import json
 import math
 import os
 import shlex
+import sys
+from dataclasses import fields
 from fractions import Fraction
 from importlib.util import find_spec
 from io import BytesIO
@@ -18,17 +20,16 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from enumsol.cli.quiet import is_quiet
+from enumsol.cli.streams import is_quiet
 from enumsol.errors import InvalidArgumentError, MissingDependencyError, OutputError
 from enumsol.support.files import writing
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     import pandas as pd
 
-    from enumsol.model.problem import ContactProblem
-    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import AnyProblem
 
     #: Where a result goes, None where it is not asked for, and what writes it there.
     Output = tuple[str | None, Callable[[str], object]]
@@ -164,7 +165,7 @@ def check_vtu(path: str | None) -> None:
         )
 
 
-def check_places(path: str | None, problem: ContactProblem | ContactProblem3D, name: str) -> None:
+def check_places(path: str | None, problem: AnyProblem, name: str) -> None:
     """Refuse files for ParaView of a problem that has no places, before the search.
 
     Raises
@@ -176,7 +177,7 @@ def check_places(path: str | None, problem: ContactProblem | ContactProblem3D, n
         raise InvalidArgumentError(f"--vtu is given, but {name} has neither mesh nor coordinates; expected one of them")
 
 
-def check_scripts(path: str | None, problem: ContactProblem | ContactProblem3D) -> None:
+def check_scripts(path: str | None, problem: AnyProblem) -> None:
     """Refuse a page that plotly's script draws, before the search.
 
     Raises
@@ -255,3 +256,63 @@ def plain(value: Any) -> Any:
     if hasattr(value, "tolist"):  # arrays and numbers of numpy, which is not imported for --help
         return plain(value.tolist())
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def named_group(text: str) -> typer.Typer:
+    """A group of commands that prints its help when none of them is asked for."""
+    app = typer.Typer(help=text, no_args_is_help=False)
+
+    @app.callback(invoke_without_command=True)
+    def _group(context: typer.Context) -> None:
+        if context.invoked_subcommand is None:
+            typer.echo(context.get_help())
+
+    return app
+
+
+def list_entries(
+    columns: Sequence[str], rows: Sequence[Sequence[str]], *, json_file: str | None, content: Sequence[Any], hint: str
+) -> None:
+    """Print a table of entries, whose last column is a text of any length, and write them as JSON.
+
+    ``content`` are the entries, dataclasses; what cannot be printed (a function) is left out.
+    """
+    if json_file is not None:
+        entries = [{name: getattr(entry, name) for name in _shown(entry)} for entry in content]
+        write_text(json_file, as_json(entries))
+        if json_file == "-":
+            return
+    if not sys.stdout.isatty():
+        # for other programs: one line per problem, however long
+        widths = [max(len(row[k]) for row in rows) for k in range(len(columns) - 1)]
+        # written at once: nothing is left to write when a reader has read enough (| head)
+        typer.echo(
+            "\n".join(
+                "  ".join(
+                    [
+                        f"{row[0]:<{widths[0]}}",
+                        *(f"{item:>{width}}" for item, width in zip(row[1:-1], widths[1:], strict=True)),
+                        row[-1],
+                    ]
+                )
+                for row in rows
+            )
+        )
+        return
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    table.add_column(columns[0], no_wrap=True)
+    for name in columns[1:-1]:
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column(columns[-1])
+    for row in rows:
+        table.add_row(*row)
+    console = Console(highlight=False)
+    console.print(table, markup=False)
+    console.print(f"\n{hint}", style="dim", markup=False)
+
+
+def _shown(entry: Any) -> list[str]:
+    return [item.name for item in fields(entry) if item.repr]

@@ -7,9 +7,9 @@ import os
 import signal
 import threading
 import time
-from concurrent.futures import BrokenExecutor, Executor
+from concurrent.futures import BrokenExecutor, Executor, Future
 from contextlib import contextmanager, suppress
-from multiprocessing.connection import wait as wait_for
+from multiprocessing.connection import Connection, wait as wait_for
 from typing import TYPE_CHECKING, Any
 
 import loky
@@ -18,8 +18,6 @@ from enumsol.support.deadlines import heard_by, listening
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
-    from concurrent.futures import Future
-    from multiprocessing.connection import Connection
 
     from enumsol.support.deadlines import Listener
 

@@ -7,7 +7,7 @@ import time
 from threading import Lock, Timer
 from typing import TYPE_CHECKING, Any, Self
 
-from enumsol.cli.quiet import is_quiet
+from enumsol.cli.streams import is_quiet
 from enumsol.support.deadlines import heard_by
 
 if TYPE_CHECKING:

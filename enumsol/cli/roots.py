@@ -9,37 +9,16 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 
 import typer
 
-from enumsol.cli import options, root_report
-from enumsol.cli.common import (
-    ExitStatus,
-    finish,
-    load_any_problem,
-    note,
-    parse_alpha,
-    parse_units,
-    scene_of,
-    so_far,
-    workers,
-)
-from enumsol.cli.output import (
-    check_named_files,
-    check_outputs,
-    check_places,
-    check_scripts,
-    check_vtu,
-    checking_commands,
-    deliver,
-)
+from enumsol.cli import common, options, output, root_report
 from enumsol.cli.progress import SearchDisplay
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from enumsol.fem import Scene
-    from enumsol.model.problem import ContactProblem
-    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import AnyProblem
     from enumsol.roots.root_set import RootSet
-    from enumsol.support.arguments import Alpha
+    from enumsol.support.array_types import Alpha
 
 Method = Literal["tree", "exhaustive"]
 AtAlpha = Annotated[
@@ -130,40 +109,35 @@ class Search:
             raise InvalidArgumentError(
                 f"--jobs is {self.jobs} with the exhaustive method; expected 1 job, or the method tree"
             )
-        check_outputs(json=self.json_file, csv=self.csv_file)
-        check_named_files(", but a proof is a binary file", proof=self.proof_file)
-        check_vtu(self.vtu_file)
-        check_named_files(report=self.report_file)
+        output.check_outputs(json=self.json_file, csv=self.csv_file)
+        output.check_named_files(", but a proof is a binary file", proof=self.proof_file)
+        output.check_vtu(self.vtu_file)
+        output.check_named_files(report=self.report_file)
         if self.resume and self.proof_file is None:
             raise InvalidArgumentError(
                 "--resume is given without --proof; expected the file of the proof to resume from"
             )
-        parse_units(self.units)
+        common.parse_units(self.units)
         if self.unique and self.stop_after is not None:
             raise InvalidArgumentError(
                 f"--stop-after is {self.stop_after} with --unique, which stops at the second root"
             )
 
     def answer(
-        self,
-        name: str,
-        problem: ContactProblem | ContactProblem3D,
-        alpha: Alpha,
-        source: str | None,
-        scene: Scene | None = None,
+        self, name: str, problem: AnyProblem, alpha: Alpha, source: str | None, scene: Scene | None = None
     ) -> NoReturn:
         """Search, write what was found, and end the command.
 
         ``source`` is what other commands take for the problem, None where there is no such file; ``scene`` is what the
         problem was made of, where it was not read from ``source``.
         """
-        check_places(self.vtu_file, problem, name)
-        check_scripts(self.report_file, problem)
+        output.check_places(self.vtu_file, problem, name)
+        output.check_scripts(self.report_file, problem)
         check_mirror(problem, alpha, self.mirror)
-        found, ended = so_far(lambda: self._found(problem, alpha))
+        found, ended = common.so_far(lambda: self._found(problem, alpha))
         if self.mirror is not None and len(found):
             found = found.mirrored(self.mirror)
-        deliver(
+        output.deliver(
             (self.vtu_file, lambda path: _write_vtu(problem, found, path)),
             (self.report_file, lambda path: self._write_page(found, path, name, source, scene)),
             json_file=self.json_file,
@@ -176,25 +150,25 @@ class Search:
         if partly and found.families:
             families = counted(len(found.families), "family", "families")
             holds = "hold" if len(partly) > 1 else "holds"
-            note(f"{' and '.join(partly)} {holds} the isolated roots only, --json the {families} too")
-        finish(ended, ExitStatus.DONE if self.unique and found.unique is not None else _status(found))
+            common.note(f"{' and '.join(partly)} {holds} the isolated roots only, --json the {families} too")
+        common.finish(ended, common.ExitStatus.DONE if self.unique and found.unique is not None else _status(found))
 
     def _write_page(self, found: RootSet, path: str, name: str, source: str | None, scene: Scene | None) -> None:
         from enumsol.report import write_report  # numpy: not for --help
 
         # -1 would be read as an option
         place = f"--alpha={shlex.quote(str(found.alpha))}"
-        commands = checking_commands(found.proof is not None, source, "roots", place, self.proof_file)
-        about = scene_of(name) if scene is None else scene
-        write_report(found, path, title=name, units=parse_units(self.units), commands=commands, scene=about)
+        commands = output.checking_commands(found.proof is not None, source, "roots", place, self.proof_file)
+        about = common.scene_of(name) if scene is None else scene
+        write_report(found, path, title=name, units=common.parse_units(self.units), commands=commands, scene=about)
 
-    def _found(self, problem: ContactProblem | ContactProblem3D, alpha: Alpha) -> RootSet:
+    def _found(self, problem: AnyProblem, alpha: Alpha) -> RootSet:
         from enumsol.roots.enumerate import enumerate_roots  # numpy and scipy: not for --help
 
         names = ("arithmetic", "method", "max_nodes", "time_limit", "resume")
         asked: dict[str, Any] = {name: getattr(self, name) for name in names}
         asked |= {"stop_after": 2 if self.unique else self.stop_after, "proof_path": self.proof_file}
-        with workers(self.jobs) as executor, SearchDisplay() as display:
+        with common.workers(self.jobs) as executor, SearchDisplay() as display:
             return enumerate_roots(problem, alpha, executor=executor, progress=display, **asked)
 
 
@@ -212,11 +186,11 @@ def roots(problem: options.ProblemArgument, alpha: AtAlpha, *, quiet: options.Qu
     """
     search = Search(**chosen)
     search.check()
-    value = parse_alpha(alpha)
-    search.answer(problem, load_any_problem(problem), value, problem)
+    value = common.parse_alpha(alpha)
+    search.answer(problem, common.load_any_problem(problem), value, problem)
 
 
-def check_mirror(problem: ContactProblem | ContactProblem3D, alpha: Alpha, mirror: str | None) -> None:
+def check_mirror(problem: AnyProblem, alpha: Alpha, mirror: str | None) -> None:
     """Refuse a mirror under which the problem changes, before the search.
 
     Raises
@@ -232,16 +206,16 @@ def check_mirror(problem: ContactProblem | ContactProblem3D, alpha: Alpha, mirro
     problem_asymmetry(problem, alpha, Mirror.across(problem, mirror), SYMMETRIC)
 
 
-def _write_vtu(problem: ContactProblem | ContactProblem3D, found: RootSet, path: str) -> None:
+def _write_vtu(problem: AnyProblem, found: RootSet, path: str) -> None:
     if not len(found):
-        note("--vtu: no isolated root was found, so no file is written for ParaView")
+        common.note("--vtu: no isolated root was found, so no file is written for ParaView")
         return
     from enumsol.io.vtu import write_vtu  # numpy: not for --help
 
     write_vtu(problem, found, path)
 
 
-def _status(found: RootSet) -> ExitStatus:
+def _status(found: RootSet) -> common.ExitStatus:
     if found.stopped is not None or found.undecided or not found.adds_up:
-        return ExitStatus.INCOMPLETE
-    return ExitStatus.DONE
+        return common.ExitStatus.INCOMPLETE
+    return common.ExitStatus.DONE

@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from enumsol.fem.scenes import Scene
-    from enumsol.model.problem import ContactProblem
-    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import AnyProblem
 
 _BODY, _SUPPORT, _LOAD = "Body and contact", "Supports", "Loads"
 
@@ -333,7 +332,7 @@ def _scene(mesh: str, options: dict[str, Any]) -> Scene:
     return fem.mesh_scene(mesh, **options)
 
 
-def _problem(mesh: str, scene: Scene) -> ContactProblem | ContactProblem3D:
+def _problem(mesh: str, scene: Scene) -> AnyProblem:
     try:
         return scene.problem()
     except (InvalidArgumentError, InvalidProblemError) as error:
@@ -345,7 +344,7 @@ def _problem(mesh: str, scene: Scene) -> ContactProblem | ContactProblem3D:
         raise type(error)(message) from error
 
 
-def _write(problem: ContactProblem | ContactProblem3D, place: str) -> None:
+def _write(problem: AnyProblem, place: str) -> None:
     from enumsol.io import write_problem  # as above
 
     write_problem(problem, place)

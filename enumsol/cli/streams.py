@@ -1,4 +1,4 @@
-"""stdout and stderr that may be full, closed, or read by nobody any more.
+"""stdout and stderr that may be full, closed, or read by nobody any more, and whether results are printed there.
 
 One line says that what was printed got lost; tracebacks, and the interpreter's complaint when it empties its buffers at
 exit, do not.
@@ -10,13 +10,13 @@ import contextlib
 import io
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TextIO, cast
+from typing import Any, TextIO, cast
 
 from enumsol.errors import OutputError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 
 class _Guarded:
@@ -97,3 +97,28 @@ def guarded_streams() -> Iterator[None]:
             yield
         finally:
             sys.stdout, sys.stderr = before
+
+
+_QUIET = ContextVar("enumsol_quiet", default=False)
+
+
+def is_quiet() -> bool:
+    """Whether texts, notes and progress are left out."""
+    return _QUIET.get()
+
+
+def set_quiet(value: bool) -> bool:
+    """Take the option of the command that is running."""
+    if value:
+        _QUIET.set(True)
+    return value
+
+
+@contextmanager
+def loud_again() -> Iterator[None]:
+    """A block that begins loud, and after which everything is as before."""
+    token = _QUIET.set(False)
+    try:
+        yield
+    finally:
+        _QUIET.reset(token)

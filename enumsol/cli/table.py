@@ -16,9 +16,8 @@ from enumsol.errors import EnumsolError, InvalidArgumentError
 if TYPE_CHECKING:
     import pandas as pd
 
-    from enumsol.model.problem import ContactProblem
-    from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.support.arguments import Alpha
+    from enumsol.model.problem3d import AnyProblem
+    from enumsol.support.array_types import Alpha
 
 #: Names of the columns on the terminal, explained by `_CAPTION` underneath.
 _NAMES = {
@@ -99,11 +98,7 @@ def _alphas(first: str | None, last: str | None, samples: int, listed: str | Non
 
 
 def _search(
-    problem: ContactProblem | ContactProblem3D,
-    alphas: list[Alpha],
-    arithmetic: Arithmetic,
-    jobs: int,
-    options: dict[str, Any],
+    problem: AnyProblem, alphas: list[Alpha], arithmetic: Arithmetic, jobs: int, options: dict[str, Any]
 ) -> pd.DataFrame:
     from enumsol.branches import multiplicity_table
 

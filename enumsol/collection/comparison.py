@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.collection.entries import COLLECTION
+from enumsol.collection.entries import COLLECTION, CertifiedSolutions, CollectionEntry
 from enumsol.collection.reports import CollectionReport, JudgedSolution, ProblemReport
-from enumsol.collection.submissions import read_submissions
+from enumsol.collection.submissions import Submission, read_submissions
 from enumsol.errors import InvalidArgumentError
 from enumsol.fixed_points.state import TrescaState
 from enumsol.support.arguments import file_path, positive_number
@@ -17,8 +17,6 @@ from enumsol.support.arguments import file_path, positive_number
 if TYPE_CHECKING:
     import os
 
-    from enumsol.collection.entries import CertifiedSolutions, CollectionEntry
-    from enumsol.collection.submissions import Submission
     from enumsol.model.problem import ContactProblem
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.support.array_types import Floats

@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Mapping, Sequence
 
-    from enumsol.model.problem import ContactProblem
-    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import Floats
 
 #: Where the collection is kept: the index, and the folders of the problems and of what is certified about them.
@@ -108,7 +107,7 @@ class CollectionEntry:
     degenerate: int
     fingerprint: str
 
-    def problem(self) -> ContactProblem | ContactProblem3D:
+    def problem(self) -> AnyProblem:
         """The problem."""
         return read_problem(DATA / PROBLEMS / f"{self.name}.npz")
 

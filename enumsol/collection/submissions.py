@@ -6,22 +6,18 @@ A file belongs to the problem that its name begins with, up to the first dot. do
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from enumsol.collection.entries import INDEX, get
+from enumsol.collection.entries import INDEX, CollectionEntry, get
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.support.array_arguments import real_array
+from enumsol.support.array_types import Floats
 from enumsol.support.files import reading, unreadable
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-    from pathlib import Path
-
-    from enumsol.collection.entries import CollectionEntry
-    from enumsol.support.array_types import Floats
 
 #: Arrays that give solutions, the first ones that are there count: forces, those in the order of fclib, displacements.
 _GIVEN = (("lambda_n", "lambda_t"), ("r",), ("u",))

@@ -10,15 +10,13 @@ import numpy as np
 
 from enumsol.arithmetic.balls import factor_above
 from enumsol.errors import InvalidArgumentError, InvalidProblemError, NotHeldError
-from enumsol.support.arguments import Alpha, alpha_value
+from enumsol.support.arguments import alpha_value
 from enumsol.support.immutable import Sealed, sealed
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from enumsol.condensation.data import CondensableData, FloatingData, ProblemData
     from enumsol.condensation.products import WithProducts
-    from enumsol.support.arguments import AlphaLike
+    from enumsol.support.array_types import Alpha, AlphaLike, Floats
 
 #: Units of force and length lie between 2^-900 and 2^900; products and quotients of two of them and proofs need that.
 UNIT_EXPONENT = 900
@@ -43,9 +41,9 @@ class CondensedSystem:
     F : (p,) friction coefficients [-]
     """
 
-    S: NDArray[np.float64]
-    g: NDArray[np.float64]
-    F: NDArray[np.float64]
+    S: Floats
+    g: Floats
+    F: Floats
 
     @property
     def p(self) -> int:
@@ -80,12 +78,12 @@ class ScaledSystem:
         Factors of forces and displacements.
     """
 
-    S: NDArray[np.float64]
-    g: NDArray[np.float64]
-    F: NDArray[np.float64]
-    force: NDArray[np.float64]
-    length: NDArray[np.float64]
-    cholesky: NDArray[np.float64] = field(repr=False)
+    S: Floats
+    g: Floats
+    F: Floats
+    force: Floats
+    length: Floats
+    cholesky: Floats = field(repr=False)
 
     @classmethod
     def from_system(cls, system: CondensedSystem, *, proposals: bool = False) -> ScaledSystem:
@@ -124,12 +122,12 @@ class ScaledSystem:
         return len(self.F)
 
 
-def node_units(S: NDArray[np.float64], p: int) -> NDArray[np.float64]:
+def node_units(S: Floats, p: int) -> Floats:
     """Powers of two, shape (p,), that scale the compliance of every node near one, alike in all its directions."""
     return np.asarray(np.exp2(-np.round(0.5 * np.mean(np.log2(np.diagonal(S).reshape(-1, p)), axis=0))))
 
 
-def load_unit(g: NDArray[np.float64], cholesky: NDArray[np.float64]) -> float:
+def load_unit(g: Floats, cholesky: Floats) -> float:
     """The power of two that scales g' S^{-1} g into [1, 4); 1 where g = 0."""
     largest = float(np.max(np.abs(g)))
     if largest == 0:
@@ -140,7 +138,7 @@ def load_unit(g: NDArray[np.float64], cholesky: NDArray[np.float64]) -> float:
     return float(first * np.exp2(np.floor(np.log2(energy))))
 
 
-def cholesky_factor(S: NDArray[np.float64]) -> NDArray[np.float64]:
+def cholesky_factor(S: Floats) -> Floats:
     """L with S = L L', for an S that is positive definite beyond rounding (theory, (4.9)).
 
     Raises
@@ -156,7 +154,7 @@ def cholesky_factor(S: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.linalg.cholesky(S))
 
 
-def lifted(S: NDArray[np.float64]) -> NDArray[np.float64]:
+def lifted(S: Floats) -> Floats:
     """S, or where it is not positive definite beyond rounding the least S + t diag(S) that surely is."""
     if _definite(S):
         return S
@@ -165,12 +163,12 @@ def lifted(S: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(S + least * np.diag(np.diagonal(S)))
 
 
-def _definite(S: NDArray[np.float64]) -> bool:
+def _definite(S: Floats) -> bool:
     """Whether S less its rounding is positive definite."""
     return factor_above(S - _rounding(S) * np.diag(np.diagonal(S))) is not None
 
 
-def _rounding(S: NDArray[np.float64]) -> float:
+def _rounding(S: Floats) -> float:
     """Eigenvalues of S with a unit diagonal that may be rounding are smaller."""
     return _ROUNDINGS * len(S) * float(np.finfo(np.float64).eps)
 
@@ -187,9 +185,9 @@ class Condensation(Sealed):
         B A^{-1} f - (gap, slip_offset), and B A^{-1} load_slope [length].
     """
 
-    S: NDArray[np.float64]
-    g0: NDArray[np.float64]
-    g1: NDArray[np.float64]
+    S: Floats
+    g0: Floats
+    g1: Floats
     problem: CondensableData = field(repr=False)
 
     @classmethod
@@ -215,7 +213,7 @@ class Condensation(Sealed):
         return _definite(self.S * factor[:, None] * factor)
 
     @cached_property
-    def node_scale(self) -> NDArray[np.float64]:
+    def node_scale(self) -> Floats:
         """Roots of the geometric means of every node's normal and tangential compliances, as often, shape (m,)."""
         p = len(self.problem.gap)
         compliances = np.diagonal(self.S).reshape(-1, p)
@@ -223,17 +221,17 @@ class Condensation(Sealed):
         return sealed(np.tile(np.prod(compliances, axis=0) ** (0.5 / count), count))
 
     @cached_property
-    def balanced(self) -> NDArray[np.float64]:
+    def balanced(self) -> Floats:
         """S in units in which every node has compliance one, shape (m, m)."""
         scale = self.node_scale
         return sealed(np.asarray(self.S / scale[:, None] / scale[None, :]))
 
     @property
-    def bordered(self) -> NDArray[np.float64]:
+    def bordered(self) -> Floats:
         """``balanced``, or of a body that nothing holds the matrix of theory, (14.9)."""
         return self.balanced
 
-    def free_displacements(self, alpha: AlphaLike) -> NDArray[np.float64]:
+    def free_displacements(self, alpha: AlphaLike) -> Floats:
         """g(alpha), shape (m,) [length].
 
         Raises
@@ -248,7 +246,7 @@ class Condensation(Sealed):
             raise InvalidArgumentError(f"alpha = {value:g} makes the load overflow float64; expected a smaller value")
         return np.asarray(g)
 
-    def displacement(self, alpha: AlphaLike, forces: NDArray[np.float64]) -> NDArray[np.float64]:
+    def displacement(self, alpha: AlphaLike, forces: Floats) -> Floats:
         """u = A^{-1} (f(alpha) - B' lambda), shape (n,), for forces of shape (m,)."""
         problem = self.problem
         rhs = problem.load_at(alpha) - problem.contact_rows.T @ forces
@@ -262,12 +260,12 @@ class CondensedProblem(Condensation):
     problem: ProblemData = field(repr=False)
 
     @property
-    def F0(self) -> NDArray[np.float64]:  # noqa: N802 (the field's letter)
+    def F0(self) -> Floats:  # noqa: N802 (the field's letter)
         """Friction coefficients at alpha = 0, shape (p,) [-]."""
         return self.problem.friction[0]
 
     @property
-    def F1(self) -> NDArray[np.float64]:  # noqa: N802 (as above)
+    def F1(self) -> Floats:  # noqa: N802 (as above)
         """Derivatives of the friction coefficients with respect to alpha, shape (p,) [-]."""
         return self.problem.friction[1]
 
@@ -299,19 +297,19 @@ class FloatingCondensation(Condensation):
         return cls(held.S, held.g0, held.g1, problem)
 
     @cached_property
-    def G(self) -> NDArray[np.float64]:  # noqa: N802 (the field's letter)
+    def G(self) -> Floats:  # noqa: N802 (the field's letter)
         """(B N)', shape (r, m)."""
         return sealed(np.asarray((self.problem.contact_rows @ self.problem.rigid_modes).T))
 
     @cached_property
-    def h(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def h(self) -> tuple[Floats, Floats]:
         """N'f at alpha = 0 and its derivative, shapes (r,)."""
         N, slope = self.problem.rigid_modes, self.problem.load_slope
         change = np.zeros(N.shape[1]) if slope is None else N.T @ slope
         return sealed(np.asarray(N.T @ self.problem.f)), sealed(np.asarray(change))
 
     @cached_property
-    def mixing(self) -> NDArray[np.float64]:
+    def mixing(self) -> Floats:
         """L with L L' = G S^-1 G', the units of rigid displacements (theory, section 14.7), shape (r, r).
 
         Raises
@@ -330,22 +328,22 @@ class FloatingCondensation(Condensation):
         return sealed(np.asarray(np.linalg.cholesky(G @ solved(self.balanced, G.T))))
 
     @cached_property
-    def moves(self) -> NDArray[np.float64]:
+    def moves(self) -> Floats:
         """G in the units of ``balanced`` and of ``mixing``, shape (r, m); raises as ``mixing``."""
         return sealed(np.asarray(np.linalg.solve(self.mixing, self.G / self.node_scale)))
 
     @cached_property
-    def bordered(self) -> NDArray[np.float64]:
+    def bordered(self) -> Floats:
         """The matrix of theory, (14.9), shape (m + r, m + r); raises as ``mixing``."""
         G = self.moves
         return sealed(np.block([[self.balanced, -G.T], [G, np.zeros((len(G), len(G)))]]))
 
-    def displacement(self, alpha: AlphaLike, forces: NDArray[np.float64]) -> NDArray[np.float64]:
+    def displacement(self, alpha: AlphaLike, forces: Floats) -> Floats:
         """u less the rigid displacement: A_k^-1 (f(alpha) - B' lambda), shape (n,)."""
         return np.asarray(self.problem.on_springs.condensed.displacement(alpha, forces))
 
 
-def solved(S: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
+def solved(S: Floats, right: Floats) -> Floats:
     """S^-1 times columns; of least length where S is singular within rounding."""
     try:
         return np.asarray(np.linalg.solve(S, right))

@@ -10,14 +10,11 @@ from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 if TYPE_CHECKING:
-    import numpy as np
     import scipy.sparse as sp
-    from numpy.typing import NDArray
 
     from enumsol.condensation.factorization import Factorization
-    from enumsol.support.arguments import AlphaLike
+    from enumsol.support.array_types import AlphaLike, Floats
 
-    Vector = NDArray[np.float64]
 
 #: What a proof is about: A, Bn, Bt, f as given, or S and g as computed from them in floats.
 Data = Literal["problem", "condensed"]
@@ -40,11 +37,11 @@ class CondensableData(Protocol):
         The slip offset where no floats hold it.
     """
 
-    f: Vector
-    load_slope: Vector | None
-    gap: Vector
-    slip_offset: Vector
-    offset_radius: Vector | None
+    f: Floats
+    load_slope: Floats | None
+    gap: Floats
+    slip_offset: Floats
+    offset_radius: Floats | None
     exact_offset: tuple[Fraction, ...] | None
 
     @property
@@ -63,7 +60,7 @@ class CondensableData(Protocol):
     def factorization(self) -> Factorization:
         """Factors of A."""
 
-    def load_at(self, alpha: AlphaLike) -> Vector:
+    def load_at(self, alpha: AlphaLike) -> Floats:
         """f(alpha), shape (n,)."""
 
 
@@ -76,14 +73,14 @@ class ProblemData(CondensableData, Protocol):
     node_ids : tuple of p labels
     """
 
-    friction: tuple[Vector, Vector]
+    friction: tuple[Floats, Floats]
     node_ids: tuple[Any, ...]
 
     @property
     def p(self) -> int:
         """Number of contact nodes."""
 
-    def friction_at(self, alpha: AlphaLike) -> Vector:
+    def friction_at(self, alpha: AlphaLike) -> Floats:
         """F(alpha), shape (p,)."""
 
 
@@ -91,7 +88,7 @@ class FloatingData(CondensableData, Protocol):
     """A problem of a body that nothing holds, in 2D or 3D."""
 
     @property
-    def rigid_modes(self) -> Vector:
+    def rigid_modes(self) -> Floats:
         """Rigid modes, (n, r)."""
 
     @property
@@ -99,6 +96,6 @@ class FloatingData(CondensableData, Protocol):
         """The problem of the body on springs."""
 
 
-def exactly_at(alpha: Fraction, first: NDArray[np.float64], slope: NDArray[np.float64]) -> list[Fraction]:
+def exactly_at(alpha: Fraction, first: Floats, slope: Floats) -> list[Fraction]:
     """The values first + alpha slope of floats, exactly: F(alpha) for the parts of ``problem.friction``."""
     return [Fraction(x) + alpha * Fraction(y) for x, y in zip(first.tolist(), slope.tolist(), strict=True)]

@@ -5,10 +5,11 @@ S and g as computed, with the bounds of their errors, are in ``condensation.prod
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -23,21 +24,13 @@ from enumsol.arithmetic.balls import (
     sparse_eigenvalue_bound,
     upper_norm,
 )
-from enumsol.condensation.data import exactly_at
+from enumsol.condensation.data import CondensableData, exactly_at
 from enumsol.condensation.products import Products, scaled
 from enumsol.errors import EnumsolError
 from enumsol.support.arguments import alpha_value
+from enumsol.support.array_types import AlphaLike, Floats, Mask
 from enumsol.support.deadlines import attended
 from enumsol.support.immutable import Sealed
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from enumsol.arithmetic.balls import Array
-    from enumsol.condensation.data import CondensableData
-    from enumsol.support.arguments import AlphaLike
 
 
 class NotEnclosedError(EnumsolError):
@@ -59,15 +52,15 @@ class CondensedEnclosure(Sealed):
         B A^-1 f and its radii: g0 without gap and slip offset; None where the balls are not those of a whole problem.
     """
 
-    S: Array
-    S_rad: Array
-    g0: Array
-    g0_rad: Array
-    g1: Array
-    g1_rad: Array
+    S: Floats
+    S_rad: Floats
+    g0: Floats
+    g0_rad: Floats
+    g1: Floats
+    g1_rad: Floats
     stiffness_bound: float
     problem: Any = field(repr=False)  # in 2D or 3D
-    free: tuple[Array, Array] | None = field(default=None, repr=False)
+    free: tuple[Floats, Floats] | None = field(default=None, repr=False)
 
     @classmethod
     def from_problem(cls, problem: CondensableData, products: Products | None = None) -> CondensedEnclosure:
@@ -139,7 +132,7 @@ class CondensedEnclosure(Sealed):
         g0, g0_rad, g1, g1_rad, *free = _displaced(problem, products, rad)
         return cls(sym, S_rad, g0, g0_rad, g1, g1_rad, bound, problem, (free[0], free[1]))
 
-    def at(self, alpha: AlphaLike, force: Array, length: Array) -> EnclosedSystem:
+    def at(self, alpha: AlphaLike, force: Floats, length: Floats) -> EnclosedSystem:
         """The enclosed system of a 2D problem at one alpha, in units given by powers of two (see ScaledSystem)."""
         a = alpha if isinstance(alpha, Fraction) else Fraction(alpha_value(alpha))
         exact = exactly_at(a, *self.problem.friction)
@@ -153,7 +146,7 @@ class CondensedEnclosure(Sealed):
         none = np.zeros_like(self.g1)
         return replace(self, g0=side * self.g1, g0_rad=self.g1_rad, g1=none, g1_rad=none)
 
-    def in_units(self, alpha: Fraction, force: Array, length: Array) -> tuple[Array, Array, Array, Array]:
+    def in_units(self, alpha: Fraction, force: Floats, length: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """S and g(alpha) with radii, in units of every row given by powers of two.
 
         Raises
@@ -182,7 +175,7 @@ _LEAST_PAIR = 2.0**-1000
 _OVERFLOW = "the condensed problem over- or underflows float64; expected data in other units"
 
 
-def nearest_floats(exact: Sequence[Fraction]) -> tuple[Array, NDArray[np.bool_]]:
+def nearest_floats(exact: Sequence[Fraction]) -> tuple[Floats, Mask]:
     """Friction coefficients in floats, and which of them are rounded.
 
     Raises
@@ -215,7 +208,7 @@ def float_at(alpha: Fraction) -> tuple[float, float]:
     return value, 0.0 if Fraction(value) == alpha else 2 * UNIT * abs(value) + TINY
 
 
-def _displaced(problem: CondensableData, products: Products, rad: Array) -> tuple[Array, ...]:
+def _displaced(problem: CondensableData, products: Products, rad: Floats) -> tuple[Floats, ...]:
     """g0, g1 and B A^-1 f, each with its radius, from products with the radii ``rad``."""
     size, offset = len(products.mid), np.concatenate([problem.gap, problem.slip_offset.ravel(order="F")])
     free, free_rad = products.mid[:, size:] * products.lift, rad[:, size:] * products.lift + TINY
@@ -229,7 +222,7 @@ def _displaced(problem: CondensableData, products: Products, rad: Array) -> tupl
     return g0, g0_rad, free[:, 1], free_rad[:, 1], free[:, 0], free_rad[:, 0]
 
 
-def _smallest_eigenvalue(problem: CondensableData, scale: Array) -> float:
+def _smallest_eigenvalue(problem: CondensableData, scale: Floats) -> float:
     """Estimate of the smallest eigenvalue of the scaled A by inverse iteration."""
     vector = np.random.default_rng(1).normal(size=problem.n)
     value = 1.0
@@ -252,15 +245,15 @@ class EnclosedSystem:
     F, F_rad : (p,) arrays
     """
 
-    S: Array
-    S_rad: Array
-    g: Array
-    g_rad: Array
-    F: Array
-    F_rad: Array
+    S: Floats
+    S_rad: Floats
+    g: Floats
+    g_rad: Floats
+    F: Floats
+    F_rad: Floats
 
     @classmethod
-    def as_computed(cls, S: Array, g: Array, F: Array, *, exactly: bool = False) -> EnclosedSystem:
+    def as_computed(cls, S: Floats, g: Floats, F: Floats, *, exactly: bool = False) -> EnclosedSystem:
         """S and g as they were computed in floats, without radii; F too, or within its rounding."""
         return cls(S, np.zeros_like(S), g, np.zeros_like(g), F, np.zeros_like(F) if exactly else 4 * np.spacing(F))
 
@@ -290,7 +283,7 @@ class EnclosedSystem:
         return bound
 
     @property
-    def reach(self) -> Array:
+    def reach(self) -> Floats:
         """Bounds of the coordinates of a rigid displacement; none of a body that is held."""
         return np.zeros(0)
 
@@ -310,7 +303,7 @@ class EnclosedSystem:
         return float(upper_norm(np.abs(self.g) + self.g_rad) / self.smallest_eigenvalue * SAFE)
 
     @cached_property
-    def inverse(self) -> Array:
+    def inverse(self) -> Floats:
         """Approximate inverse of S; no claim rests on its accuracy."""
         return np.asarray(np.linalg.inv(self.S))
 

@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from math import lcm
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from flint import fmpq, fmpq_mat
 
 from enumsol.arithmetic.rationals import is_positive_definite, rational, rational_matrix
-from enumsol.condensation.data import EXACT_DOF_LIMIT
+from enumsol.condensation.data import EXACT_DOF_LIMIT, ProblemData
 from enumsol.condensation.free_displacements import solved
-from enumsol.condensation.unloaded import vanishing_alpha
+from enumsol.condensation.unloaded import CondensedData, vanishing_alpha
 from enumsol.errors import InvalidProblemError, TooLargeError
+from enumsol.support.array_types import Alpha
 from enumsol.support.deadlines import look, tell
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from fractions import Fraction
-
-    from enumsol.condensation.data import ProblemData
-    from enumsol.condensation.unloaded import CondensedData
-    from enumsol.support.arguments import Alpha
 
 #: Most degrees of freedom for which "fast" condenses without rounding; beyond, S and g as computed in floats are used.
 FAST_EXACT_DOF = 24

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
 from enumsol.errors import InvalidProblemError
+from enumsol.support.array_types import Floats
 from enumsol.support.deadlines import attended
 from enumsol.support.immutable import Immutable, SealedMatrix, sealed
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 #: A pivot of A below this fraction of its diagonal entry is rounding: A is singular in float64.
 PIVOT_TOLERANCE = 64 * float(np.finfo(np.float64).eps)
@@ -71,7 +68,7 @@ class Factorization(Immutable):
             raise InvalidProblemError(_RIGID.format(ratio=max(float(np.min(pivots)), 0.0)))
 
     @cached_property
-    def _pivots(self) -> NDArray[np.float64]:
+    def _pivots(self) -> Floats:
         """The pivots relative to the diagonal entries of A, shape (n,).
 
         Asking SuperLU for U makes sparse copies of L and of U, as large as the factors, which it keeps as long as it
@@ -84,7 +81,7 @@ class Factorization(Immutable):
             copy.indptr = np.zeros_like(copy.indptr)
         return sealed(np.asarray(pivots))
 
-    def solve(self, rhs: NDArray[np.float64], *, refined: bool = True) -> NDArray[np.float64]:
+    def solve(self, rhs: Floats, *, refined: bool = True) -> Floats:
         """A^{-1} rhs for rhs of shape (n,) or (n, k), by default with one step of iterative refinement."""
         d = self._scale if rhs.ndim == 1 else self._scale[:, None]
         x = d * self._lu.solve(d * rhs)

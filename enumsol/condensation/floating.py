@@ -12,16 +12,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 import numpy as np
 import scipy.sparse as sp
 
 from enumsol.arithmetic.balls import SAFE, TINY, Ball, gamma, upper_norm
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, float_at
-
-if TYPE_CHECKING:
-    from enumsol.arithmetic.balls import Array
+from enumsol.support.array_types import Floats
 
 
 @dataclass(frozen=True)
@@ -40,11 +38,11 @@ class RigidRows:
 
     G: Ball
     h: Ball
-    unit: Array
-    reach: Array
+    unit: Floats
+    reach: Floats
 
     @classmethod
-    def of(cls, problem: Any, alpha: Fraction, force: Array, length: Array) -> RigidRows:
+    def of(cls, problem: Any, alpha: Fraction, force: Floats, length: Floats) -> RigidRows:
         """Those of a problem at one alpha, enclosed.
 
         Raises
@@ -74,7 +72,7 @@ class RigidRows:
         return cls(rows, loads, unit, reach)
 
 
-def _product(left: Any, right: Array) -> Ball:
+def _product(left: Any, right: Floats) -> Ball:
     """The product of two matrices, the first of which may be sparse, with the error of its sums; zeros are exact."""
     mid = np.asarray(left @ right)
     size = np.asarray(abs(left) @ np.abs(right))
@@ -100,7 +98,7 @@ class FloatingSystem(EnclosedSystem):
         return cls(system.S, system.S_rad, system.g, system.g_rad, system.F, system.F_rad, rows=rows)
 
     @property
-    def reach(self) -> Array:
+    def reach(self) -> Floats:
         """Bounds of the coordinates of a rigid displacement, (r,)."""
         return self.rows.reach
 
@@ -115,7 +113,7 @@ class FloatingSystem(EnclosedSystem):
         )
         return Ball(mid, rad), Ball.joined(Ball(self.g, self.g_rad), h), Ball(self.F, self.F_rad)
 
-    def reaching(self, reach: Array) -> Self:
+    def reaching(self, reach: Floats) -> Self:
         """The same with other bounds of the rigid displacement."""
         return replace(self, rows=replace(self.rows, reach=reach))
 
@@ -139,7 +137,7 @@ class FloatingSystem(EnclosedSystem):
         return float(np.hypot(self.largest_forces, upper_norm(self.reach)) * SAFE)
 
     @cached_property
-    def mode_inverse(self) -> Array:
+    def mode_inverse(self) -> Floats:
         """Approximate inverse of G S^-1 G'; no claim rests on its accuracy."""
         G = self.rows.G.mid
         return np.asarray(np.linalg.pinv(G @ self.inverse @ G.T, hermitian=True))

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, SlicedMatrix, gamma, upper_norm
 from enumsol.condensation.data import CondensableData
+from enumsol.support.array_types import Floats, Mask
 from enumsol.support.deadlines import look, tell
 from enumsol.support.immutable import Sealed
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from enumsol.arithmetic.balls import Array
 
 #: Columns that are made dense together.
 _COLUMNS = 16
@@ -58,13 +54,13 @@ class Products(Sealed):
         Whether the data could be scaled without rounding. Without it nothing bounds the errors.
     """
 
-    mid: Array
-    rounded: Array
-    lengths: Array
-    left: Array
-    scale: Array
-    lift: Array
-    still: NDArray[np.bool_]
+    mid: Floats
+    rounded: Floats
+    lengths: Floats
+    left: Floats
+    scale: Floats
+    lift: Floats
+    still: Mask
     bounded: bool
 
     @classmethod
@@ -99,7 +95,7 @@ class Products(Sealed):
             K = sp.hstack([B.T[:, :columns], sp.csc_array(np.ldexp(loads, power))], format="csc")
             exact_loads = np.array_equal(np.ldexp(np.ldexp(loads, power), -power), loads)
 
-            def solve(columns: Array) -> Array:
+            def solve(columns: Floats) -> Floats:
                 # not refined: what is left is bounded
                 return np.asarray(problem.factorization.solve(columns / scale[:, None], refined=False) / scale[:, None])
 
@@ -124,14 +120,14 @@ class Products(Sealed):
             bounded = exact_A and exact_B and exact_loads
             return cls(mid, rounded, lengths, left, scale, np.ldexp(1.0, lift), ~np.any(loads, axis=0), bounded)
 
-    def radii(self, bound: float) -> Array:
+    def radii(self, bound: float) -> Floats:
         """Bounds of all errors, for a lower bound on the smallest eigenvalue of the scaled A."""
         rows = len(self.mid)
         lengths = (self.lengths[:rows] + self.left[:rows] / bound) * SAFE
         return (self.rounded + lengths[:, None] * self.left) * SAFE + (len(self.scale) + 2) * TINY
 
 
-def scaled(matrix: sp.csr_array, left: Array, right: Array) -> tuple[sp.csr_array, bool]:
+def scaled(matrix: sp.csr_array, left: Floats, right: Floats) -> tuple[sp.csr_array, bool]:
     """diag(left) matrix diag(right) for powers of two, and whether that is exact."""
     rows = np.repeat(np.arange(matrix.shape[0]), np.diff(matrix.indptr))
     factor = left[rows] * right[matrix.indices]

@@ -20,13 +20,9 @@ from enumsol.condensation.floating import FloatingSystem, RigidRows
 from enumsol.errors import InvalidProblemError
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from enumsol.condensation.enclosure import CondensedEnclosure
+    from enumsol.support.array_types import Floats, Indices, Mask
 
-    Vector = NDArray[np.float64]
-    Matrix = NDArray[np.float64]
-    from enumsol.arithmetic.balls import Array
 
 #: Coefficients between 2^-9 and 2^8 keep tau as it is: S loses no more than twice so many binary digits by them.
 _NEAR_ONE = 8
@@ -45,48 +41,48 @@ class FrictionUnits:
         A tau is ``unit`` times its entry in y and a v its entry in w over ``unit``; powers of two, 1 for normals.
     """
 
-    tau: NDArray[np.intp]
-    unit: Vector
+    tau: Indices
+    unit: Floats
 
     @cached_property
-    def row_unit(self) -> Vector:
+    def row_unit(self) -> Floats:
         """Factors that take rows on (lambda_n, tau) and (w_n, v) to rows on y and w, shape (2 m,)."""
         return np.concatenate([self.unit, 1.0 / self.unit])
 
-    def tangential(self, values: Vector) -> Matrix:
+    def tangential(self, values: Floats) -> Floats:
         """The parts of y or w that belong to tau, shape (p, 2), 0 where it does not occur."""
         return np.where(self.tau >= 0, values[self.tau], 0.0)
 
     @cached_property
-    def _units(self) -> Matrix:
+    def _units(self) -> Floats:
         """Units of tau, shape (p, 2), 1 where it does not occur."""
         return np.where(self.tau >= 0, self.unit[self.tau], 1.0)
 
     @cached_property
-    def disc_scale(self) -> Vector:
+    def disc_scale(self) -> Floats:
         """By what |tau| <= lambda_n is multiplied so that nothing in it is large, shape (p,)."""
         return np.asarray(1.0 / np.maximum(np.max(self._units, axis=1), 1.0))
 
     @cached_property
-    def slip_scale(self) -> Vector:
+    def slip_scale(self) -> Floats:
         """By what v is multiplied so that its larger component has the size of w_t, shape (p,)."""
         return np.asarray(np.min(self._units, axis=1))
 
     @cached_property
-    def tau_scale(self) -> Matrix:
+    def tau_scale(self) -> Floats:
         """By what entries of y are multiplied for ``taus``, shape (p, 2)."""
         return self._units * self.disc_scale[:, None]
 
-    def taus(self, y: Vector) -> Matrix:
+    def taus(self, y: Floats) -> Floats:
         """tau times ``disc_scale``, shape (p, 2)."""
         return self.tangential(y) * self.tau_scale
 
-    def slips(self, w: Vector) -> Matrix:
+    def slips(self, w: Floats) -> Floats:
         """v times ``slip_scale``, shape (p, 2)."""
         return self.tangential(w) * (self.slip_scale[:, None] / self._units)
 
 
-def friction_units(F: Matrix) -> Matrix:
+def friction_units(F: Floats) -> Floats:
     """Powers of two that take coefficients to a size near one; 1 where they have it or are 0."""
     exponent = np.frexp(F)[1]
     return np.ldexp(1.0, np.where(np.abs(exponent) > _NEAR_ONE, -exponent, 0))
@@ -111,16 +107,16 @@ class SpaceSystem(FrictionUnits):
         Forces of a node are ``force`` times the scaled ones, displacements ``length`` times; powers of two.
     """
 
-    S: Matrix = field(repr=False)
-    g: Vector
-    F: Matrix
-    tau: NDArray[np.intp]
-    unit: Vector
-    force: Vector
-    length: Vector
+    S: Floats = field(repr=False)
+    g: Floats
+    F: Floats
+    tau: Indices
+    unit: Floats
+    force: Floats
+    length: Floats
 
     @classmethod
-    def scaled(cls, S: Matrix, g: Vector, F: Matrix) -> SpaceSystem:
+    def scaled(cls, S: Floats, g: Floats, F: Floats) -> SpaceSystem:
         """From S (3p, 3p) and g (3p,), all normals first, then both tangents, and coefficients F (p, 2).
 
         Raises
@@ -148,7 +144,7 @@ class SpaceSystem(FrictionUnits):
         return len(self.F)
 
 
-def _out_of_range(F: Matrix) -> str | None:
+def _out_of_range(F: Floats) -> str | None:
     """Why coefficients are too small or too large for float64, or None."""
     for wrong, limit in (
         (F[F > LARGEST_FRICTION], f"where float64 overflows; expected at most {LARGEST_FRICTION:g}"),
@@ -159,7 +155,7 @@ def _out_of_range(F: Matrix) -> str | None:
     return None
 
 
-def places(occurs: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+def places(occurs: Mask) -> tuple[Indices, Indices, Indices, Indices]:
     """Where the components of tau are in y, (p, 2); the rows of S in 3p that y takes; nodes and axes of its tau."""
     p = len(occurs)
     node, axis = np.nonzero(occurs)
@@ -197,8 +193,8 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
         As in SpaceSystem.
     """
 
-    tau: NDArray[np.intp]
-    unit: Vector
+    tau: Indices
+    unit: Floats
 
     @property
     def discs(self) -> Ball:
@@ -211,7 +207,7 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
         return (self.discs,)
 
     @cached_property
-    def largest_discs(self) -> Vector:
+    def largest_discs(self) -> Floats:
         """Upper bounds of ``discs``."""
         return np.where(self.discs.rad > 0, self.discs.size, self.discs.mid)
 
@@ -226,7 +222,7 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
         return float(upper_norm(self.S) + upper_norm(self.S_rad)) * SAFE
 
     @cached_property
-    def product_error(self) -> Matrix:
+    def product_error(self) -> Floats:
         """By how much a computed S y, with the terms of a sum that it is part of, may be off, as a factor of |y|."""
         return np.asarray((gamma(len(self.g) + 4) * np.abs(self.S) + self.S_rad) * SAFE)
 
@@ -237,7 +233,7 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
         return cls(S, np.zeros_like(S), g, np.zeros_like(g), F, np.zeros_like(F), system.tau, system.unit)
 
     @classmethod
-    def of_problem(cls, enclosure: CondensedEnclosure, alpha: Fraction, force: Vector, length: Vector) -> EnclosedSpace:
+    def of_problem(cls, enclosure: CondensedEnclosure, alpha: Fraction, force: Floats, length: Floats) -> EnclosedSpace:
         """Balls for the exact data at alpha, in units of the nodes given by powers of two (see SpaceSystem).
 
         Raises
@@ -288,8 +284,8 @@ class PieceSpace(EnclosedSpace):
         See ``turn``.
     """
 
-    disc: Vector
-    disc_rad: Vector
+    disc: Floats
+    disc_rad: Floats
     along: PieceTurn | None
 
     @property
@@ -315,7 +311,7 @@ class PieceSpace(EnclosedSpace):
         enclosure: CondensedEnclosure,
         piece: tuple[Fraction, Fraction],
         alpha: Fraction,
-        units: tuple[Vector, Vector],
+        units: tuple[Floats, Floats],
     ) -> PieceSpace:
         """Balls for the exact data over a piece, a point perhaps, with F the float next to that at ``alpha``.
 
@@ -360,7 +356,7 @@ class PieceSpace(EnclosedSpace):
         return cls(S, S_rad * SAFE, whole.mid, whole.rad, F, F_rad, tau, unit, disc.mid, rad, along)
 
 
-def _references(problem: Any, alpha: Fraction) -> tuple[Matrix, Matrix]:
+def _references(problem: Any, alpha: Fraction) -> tuple[Floats, Floats]:
     """Coefficients at alpha, (p, 2), with radii: the first of a node that occurs is a float, the other one follows.
 
     Raises
@@ -391,7 +387,7 @@ def _affine(value: float, slope: float) -> tuple[Fraction, Fraction]:
     return Fraction(value), Fraction(slope)
 
 
-def _quotients(problem: Any, piece: tuple[Fraction, Fraction], F: Matrix) -> tuple[Ball, Ball]:
+def _quotients(problem: Any, piece: tuple[Fraction, Fraction], F: Floats) -> tuple[Ball, Ball]:
     """The coefficients in the middle of a piece and half their changes, over those of ``F``; 1 and 0 without any.
 
     Raises
@@ -426,7 +422,7 @@ class FloatingSpace(FloatingSystem, EnclosedSpace):
     """
 
     @classmethod
-    def of(cls, problem: Any, alpha: Fraction, force: Array, length: Array) -> Self:
+    def of(cls, problem: Any, alpha: Fraction, force: Floats, length: Floats) -> Self:
         """That of a problem, in units of the nodes given by powers of two.
 
         Raises

@@ -13,17 +13,14 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from enumsol.condensation.data import EXACT_DOF_LIMIT, ProblemData
-from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.condensation.data import EXACT_DOF_LIMIT, Data, ProblemData
+from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from enumsol.condensation.condensed import CondensedProblem
-    from enumsol.condensation.data import Data
-    from enumsol.condensation.enclosure import CondensedEnclosure
+    from enumsol.support.array_types import Floats
 
 
 class CondensedData(ProblemData, Protocol):
@@ -91,7 +88,7 @@ def never_loaded(problem: CondensedData) -> bool:
     return not any(x != 0 for part in free_displacements(problem) for x in part)
 
 
-def _of_floats(constant: NDArray[np.float64], slope: NDArray[np.float64]) -> Fraction | None:
+def _of_floats(constant: Floats, slope: Floats) -> Fraction | None:
     """The only alpha at which constant + alpha slope vanishes, exactly."""
     zero = _common_zero(*([Fraction(x) for x in part.tolist()] for part in (constant, slope)))
     return None if zero is None else Fraction(zero)

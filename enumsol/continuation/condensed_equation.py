@@ -5,8 +5,8 @@ H is the residual of a contact problem; with it come its test functions and sele
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -23,28 +23,16 @@ from enumsol.model.statuses import (
     SLIP_MINUS,
     SLIP_PLUS,
     STICK,
+    ContactStatus,
     RowKind,
     active_within,
     contact_status,
 )
-from enumsol.roots.local_branch import coherent_orientation
+from enumsol.roots.local_branch import LocalBranchTest, coherent_orientation
 from enumsol.support.arguments import instance_of, positive_number
 from enumsol.support.array_arguments import plain_array, real_array
+from enumsol.support.array_types import AlphaLike, ArrayLike, Codes, Floats, Mask, NDArray
 from enumsol.trusted.selection import row_values
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from enumsol.model.statuses import ContactStatus
-    from enumsol.roots.local_branch import LocalBranchTest
-
-    Vector = NDArray[np.float64]
-    Codes = tuple[int, ...]
-    from numpy.typing import ArrayLike, NDArray
-
-    from enumsol.support.arguments import AlphaLike
 
 
 @dataclass(frozen=True)
@@ -90,7 +78,7 @@ class PiecewiseSmoothEquation:
         """Number of unknowns and equations, n + 2p."""
         return self.problem.n + 2 * self.problem.p
 
-    def split(self, x: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def split(self, x: ArrayLike) -> tuple[Floats, Floats, Floats]:
         """u (n,), lambda_n (p,) and lambda_t (p,) as parts of x (n + 2p,)."""
         n, p = self.problem.n, self.problem.p
         array = real_array(x, "x", error=InvalidArgumentError, finite=False)
@@ -98,7 +86,7 @@ class PiecewiseSmoothEquation:
             raise InvalidArgumentError(f"x has shape {array.shape}; expected (n + 2p,) = ({n + 2 * p},)")
         return array[:n], array[n : n + p], array[n + p :]
 
-    def test_functions(self, x: ArrayLike, alpha: AlphaLike) -> NDArray[np.float64]:
+    def test_functions(self, x: ArrayLike, alpha: AlphaLike) -> Floats:
         """theta1 = lambda_n + r u_n and theta2, theta3 = lambda_t + r u_t -+ F lambda_n, shape (p, 3)."""
         u, lambda_n, lambda_t = self.split(x)
         problem = self.problem
@@ -110,7 +98,7 @@ class PiecewiseSmoothEquation:
         """Signs in {-1, 0, 1} of the test functions, shape (p, 3)."""
         return np.sign(self.test_functions(x, alpha)).astype(np.int8)
 
-    def residual(self, x: ArrayLike, alpha: AlphaLike) -> NDArray[np.float64]:
+    def residual(self, x: ArrayLike, alpha: AlphaLike) -> Floats:
         """H(x, alpha), shape (n + 2p,), evaluated from the projections themselves."""
         u, lambda_n, lambda_t = self.split(x)
         problem, r = self.problem, self.r
@@ -127,7 +115,7 @@ class PiecewiseSmoothEquation:
             ]
         )
 
-    def selection_residual(self, signs: ArrayLike, x: ArrayLike, alpha: AlphaLike) -> NDArray[np.float64]:
+    def selection_residual(self, signs: ArrayLike, x: ArrayLike, alpha: AlphaLike) -> Floats:
         """The selection function of H that ``signs`` (p, 3) names, at x; equals H where the test functions agree."""
         u, lambda_n, lambda_t = self.split(x)
         problem, r = self.problem, self.r
@@ -160,7 +148,7 @@ class PiecewiseSmoothEquation:
             sp.hstack([sp.block_array(blocks, format="csc"), sp.csc_array(column[:, None])], format="csc")
         )
 
-    def _rows(self, signs: ArrayLike) -> NDArray[np.bool_]:
+    def _rows(self, signs: ArrayLike) -> Mask:
         array = plain_array(signs, "signs", error=InvalidArgumentError)
         if array.shape != (self.problem.p, 3) or not np.all(np.isin(array, (-1, 1))):
             raise InvalidArgumentError(
@@ -168,16 +156,14 @@ class PiecewiseSmoothEquation:
             )
         return np.asarray(array > 0)
 
-    def _equilibrium(
-        self, u: NDArray[np.float64], lambda_n: NDArray[np.float64], lambda_t: NDArray[np.float64], alpha: AlphaLike
-    ) -> NDArray[np.float64]:
+    def _equilibrium(self, u: Floats, lambda_n: Floats, lambda_t: Floats, alpha: AlphaLike) -> Floats:
         problem = self.problem
         return np.asarray(
             problem.A @ u + problem.Bn.T @ lambda_n + problem.Bt.T @ lambda_t - problem.load_at(alpha), dtype=np.float64
         )
 
 
-def pieces(rows: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.float64], NDArray[np.float64]]:
+def pieces(rows: Mask) -> tuple[Mask, Floats, Floats]:
     """What a selection takes, by the signs of its test functions, shape (p, 3), True where one is positive.
 
     Contact, the slip sign, and how often lambda_t + r u_t enters P: with P = [bound or trial] + [trial or -bound] -
@@ -202,29 +188,29 @@ class CondensedEquation(ScaledEquation):
 
     # -- H and its selections ----------------------------------------------------------------------------------------
 
-    def test_functions(self, x: Vector) -> Vector:
+    def test_functions(self, x: Floats) -> Floats:
         """theta1, theta2, theta3 as columns, shape (p, 3): their signs depend on the r of H."""
         return self._test_functions(x, self.r)
 
-    def _test_functions(self, x: Vector, r: Vector) -> Vector:
+    def _test_functions(self, x: Floats, r: Floats) -> Floats:
         p = self.p
         trial = x[: self.m] + r * self.w(x)
         bound = self.at(x).F * x[:p]
         return np.column_stack([trial[:p], trial[p:] - bound, trial[p:] + bound])
 
-    def selection_at(self, x: Vector) -> NDArray[np.bool_]:
+    def selection_at(self, x: Floats) -> Mask:
         """Sign rows of the selection that is active at x, shape (p, 3)."""
         return np.asarray(self.test_functions(x) > 0)
 
-    def residual(self, x: Vector) -> Vector:
+    def residual(self, x: Floats) -> Floats:
         """H(x) for each node's own r, shape (2p + r,)."""
         return self._projected(x, np.ones(2 * self.p))
 
-    def merit(self, x: Vector) -> float:
+    def merit(self, x: Floats) -> float:
         """Norm of H(x) for the given r, which its Newton directions lower."""
         return float(np.linalg.norm(self._projected(x, self.r)))
 
-    def _projected(self, x: Vector, r: Vector) -> Vector:
+    def _projected(self, x: Floats, r: Floats) -> Floats:
         """H(x), piece by piece: no digits of w are lost where r is small, nor of lambda where it is large."""
         p, w = self.p, self.w(x)
         closed, slips, count = pieces(self._test_functions(x, r) > 0)
@@ -232,11 +218,11 @@ class CondensedEquation(ScaledEquation):
         tangential = (1 - count) * x[p : 2 * p] - slips * bound - count * r[p:] * w[p:]
         return np.concatenate([np.where(closed, -r[:p] * w[:p], x[:p]), tangential, -self.left(x)])
 
-    def selection(self, codes: Codes) -> NDArray[np.bool_]:
+    def selection(self, codes: Codes) -> Mask:
         """Sign rows of the selection in which the nodes have these statuses, shape (p, 3)."""
         return np.array([SIGNS[code] for code in codes]).reshape(-1, 3) > 0
 
-    def selection_residual(self, rows: NDArray[np.bool_], x: Vector) -> Vector:
+    def selection_residual(self, rows: Mask, x: Floats) -> Floats:
         """The named selection function of H, shape (2p + r,), its rows scaled by positive factors to size one."""
         p = self.p
         closed, slips, count = pieces(rows)
@@ -246,14 +232,14 @@ class CondensedEquation(ScaledEquation):
         bound = self.at(x).F * x[:p]
         return np.concatenate([normal, forces * x[p : 2 * p] - slips * bound - lengths * w[p:], -self.left(x)])
 
-    def _shares(self, count: Vector) -> tuple[Vector, Vector]:
+    def _shares(self, count: Floats) -> tuple[Floats, Floats]:
         """Factors of w_t and lambda_t in the tangential rows; only the fourth piece, 2 lambda_t + r w_t, needs r."""
         r = self.r[self.p :]
         fourth = count < 0
         scale = np.where(fourth, 2.0 / (1.0 + r), 1.0)
         return np.where(fourth, -r * scale, count), (1 - count) * scale
 
-    def jacobian(self, rows: NDArray[np.bool_], x: Vector) -> Vector:
+    def jacobian(self, rows: Mask, x: Floats) -> Floats:
         """Gradient of the named selection function (see selection_residual), shape (2p + r, 2p + r + 1)."""
         p, values = self.p, self.at(x)
         closed, slips, count = pieces(rows)
@@ -271,22 +257,22 @@ class CondensedEquation(ScaledEquation):
 
     # -- statuses and their conditions -------------------------------------------------------------------------------
 
-    def _row_values(self, x: Vector) -> Vector:
+    def _row_values(self, x: Floats) -> Floats:
         """Values of all rows in the order of RowKind, those of the cone over 1 + F, shape (7, p)."""
         F = self.at(x).F
-        rows: Vector = row_values(x[: self.m], self.w(x), F)
+        rows: Floats = row_values(x[: self.m], self.w(x), F)
         rows[[RowKind.CONE_PLUS, RowKind.CONE_MINUS]] /= 1.0 + F
         return rows
 
-    def _of_inequalities(self, codes: Codes, rows: Vector, missing: float) -> Vector:
+    def _of_inequalities(self, codes: Codes, rows: Floats, missing: float) -> Floats:
         kinds = _KINDS[np.array(codes, dtype=np.intp)]
         return np.where(kinds < 0, missing, rows[kinds, np.arange(self.p)[:, None]])
 
-    def slacks(self, codes: Codes, x: Vector) -> Vector:
+    def slacks(self, codes: Codes, x: Floats) -> Floats:
         """What must be >= 0 for the statuses to hold at a root, shape (p, 2); infinite where there is one condition."""
         return self._of_inequalities(codes, self._row_values(x), np.inf)
 
-    def slack_gradient(self, codes: Codes, x: Vector, which: tuple[int, int]) -> Vector:
+    def slack_gradient(self, codes: Codes, x: Floats, which: tuple[int, int]) -> Floats:
         """Gradient of one slack with respect to x, shape (2p + r + 1,)."""
         (i, k), p, values = which, self.p, self.at(x)
         row, kind = np.zeros(len(x)), CONDITIONS[codes[i]].inequalities[k]
@@ -304,7 +290,7 @@ class CondensedEquation(ScaledEquation):
             row[:-1], row[-1] = -sign * self.bordered[at], sign * values.dg[at]
         return row
 
-    def slack_rates(self, codes: Codes, x: Vector, tangent: Vector) -> Vector:
+    def slack_rates(self, codes: Codes, x: Floats, tangent: Floats) -> Floats:
         """Derivatives of the slacks along a tangent, shape (p, 2); zero where there is one condition."""
         p, values, da = self.p, self.at(x), tangent[-1]
         F, dF, cone = values.F, values.dF * da, 1.0 + values.F
@@ -320,7 +306,7 @@ class CondensedEquation(ScaledEquation):
         conditions = CONDITIONS[code].inequalities
         return [other for other, _ in ACROSS[code, conditions[k]]] if k < len(conditions) else []
 
-    def flip(self, codes: Codes, x: Vector, which: tuple[int, int]) -> Codes:
+    def flip(self, codes: Codes, x: Floats, which: tuple[int, int]) -> Codes:
         """Statuses after one slack vanished: the selection whose sign row has that one sign changed."""
         i, k = which
         new = self.across(codes[i], k)[0]
@@ -329,11 +315,11 @@ class CondensedEquation(ScaledEquation):
             new = FRICTIONLESS if self.frictionless[i] else (SLIP_PLUS if slip > 0 else SLIP_MINUS)
         return (*codes[:i], new, *codes[i + 1 :])
 
-    def active(self, x: Vector, tolerance: float = STATUS_TOLERANCE) -> tuple[frozenset[int], ...]:
+    def active(self, x: Floats, tolerance: float = STATUS_TOLERANCE) -> tuple[frozenset[int], ...]:
         """Per node the status codes whose equations and conditions hold within the tolerance."""
         return active_within(self._row_values(x), ~self.frictionless, tolerance)
 
-    def codes(self, x: Vector, prefer: Codes | None = None, tolerance: float = STATUS_TOLERANCE) -> Codes:
+    def codes(self, x: Floats, prefer: Codes | None = None, tolerance: float = STATUS_TOLERANCE) -> Codes:
         """Statuses at a solution by the signs of the test functions; ``prefer`` is kept where it holds too."""
         # statuses of a solution do not depend on r
         theta = self._test_functions(x, np.ones(2 * self.p))
@@ -352,11 +338,11 @@ class CondensedEquation(ScaledEquation):
                 out.append(SLIP_PLUS if theta[i, 1] + theta[i, 2] > 0 else SLIP_MINUS)
         return tuple(out)
 
-    def statuses(self, codes: Sequence[int], slip: Vector) -> tuple[ContactStatus, ...]:
+    def statuses(self, codes: Sequence[int], slip: Floats) -> tuple[ContactStatus, ...]:
         """Names of the statuses; a frictionless node in contact is named by the sign of its u_t."""
         return tuple(contact_status(code, float(u)) for code, u in zip(codes, slip, strict=True))
 
-    def local_test(self, x: Vector) -> LocalBranchTest:
+    def local_test(self, x: Floats) -> LocalBranchTest:
         """The local branch test at a point of a path; see ScaledEquation."""
         F, slip = self.at(x).F, self.w(x)[self.p :]
         return coherent_orientation(self.bordered, F, self.active(x), slip, self.alpha(x))

@@ -9,7 +9,8 @@ import numpy as np
 
 if TYPE_CHECKING:
     from enumsol.continuation.continuation_options import ContinuationOptions
-    from enumsol.continuation.scaled_equation import Codes, ScaledEquation, Vector
+    from enumsol.continuation.scaled_equation import ScaledEquation
+    from enumsol.support.array_types import Codes, Floats
 
 #: Smooth Newton iterations inside a selection; quadratic convergence needs about five.
 MAX_SMOOTH_ITERATIONS = 20
@@ -35,17 +36,17 @@ class Correction:
         Unit tangent of the last selection, turned from the prediction's by less than a right angle a correction.
     """
 
-    x: Vector
+    x: Floats
     count: int
     converged: bool
     residual: float
-    tangent: Vector
+    tangent: Floats
 
 
-def moore_penrose(equation: ScaledEquation, x: Vector, tangent: Vector, options: ContinuationOptions) -> Correction:
+def moore_penrose(equation: ScaledEquation, x: Floats, tangent: Floats, options: ContinuationOptions) -> Correction:
     """Steps 3-6 of the paper's Algorithm 5.1 from x: Newton's method across selections with a rotating tangent."""
     size = len(x) - 1
-    T: Vector = tangent
+    T: Floats = tangent
     residual = np.inf
     for count in range(1, options.k_max + 2):
         rows = equation.selection_at(x)
@@ -57,12 +58,12 @@ def moore_penrose(equation: ScaledEquation, x: Vector, tangent: Vector, options:
         if not (np.all(np.isfinite(bordered)) and np.all(np.isfinite(right))):
             break
         try:
-            steps: Vector = np.asarray(np.linalg.solve(bordered, right), dtype=np.float64)
+            steps: Floats = np.asarray(np.linalg.solve(bordered, right), dtype=np.float64)
         except np.linalg.LinAlgError:
             break  # a selection whose gradient does not fit the tangent: a shorter step is tried
         if not np.max(np.abs(steps)) <= MAX_CORRECTION:
             break
-        turned: Vector = np.asarray(T - steps[:, 0], dtype=np.float64)
+        turned: Floats = np.asarray(T - steps[:, 0], dtype=np.float64)
         length = equation.norm(turned)
         x = x - steps[:, 1]
         if length == 0:
@@ -75,8 +76,8 @@ def moore_penrose(equation: ScaledEquation, x: Vector, tangent: Vector, options:
 
 
 def smooth_newton(
-    equation: ScaledEquation, codes: Codes, x: Vector, row: Vector | tuple[int, int], value: float, tolerance: float
-) -> Vector | None:
+    equation: ScaledEquation, codes: Codes, x: Floats, row: Floats | tuple[int, int], value: float, tolerance: float
+) -> Floats | None:
     """Point of a selection's solution curve at which one more condition holds, by Newton's method from x.
 
     Parameters
@@ -114,7 +115,7 @@ def smooth_newton(
     return None
 
 
-def _solve(matrix: Vector, right: Vector) -> Vector:
+def _solve(matrix: Floats, right: Floats) -> Floats:
     """Newton step; of least length where the matrix is singular (a vertical segment ends in a bifurcation point)."""
     try:
         return np.asarray(np.linalg.solve(matrix, right))

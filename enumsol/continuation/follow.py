@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from enumsol.continuation.follower import Follower
-from enumsol.continuation.not_converged import AmbiguousStart
 from enumsol.continuation.path import Path
 from enumsol.continuation.start import Start
 from enumsol.continuation.tangents import Tangent, admissible_tangents
@@ -18,13 +17,26 @@ if TYPE_CHECKING:
 
     from enumsol.continuation.continuation_options import ContinuationOptions
     from enumsol.continuation.parameter_path import SmoothPath
-    from enumsol.model.problem import ContactProblem
-    from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.support.arguments import AlphaLike
+    from enumsol.model.problem3d import AnyProblem
+    from enumsol.support.array_types import AlphaLike
+
+
+class AmbiguousStart(InvalidArgumentError):  # noqa: N818 (reads as a state of the start)
+    """The direction does not single out one tangent at the start; ``tangents`` lists all that are admissible.
+
+    Attributes
+    ----------
+    tangents : tuple of Tangent
+        Pass the index of one of them as ``tangent=`` to `follow`.
+    """
+
+    def __init__(self, message: str, tangents: Sequence[Any]) -> None:
+        super().__init__(message)
+        self.tangents = tuple(tangents)
 
 
 def follow(
-    problem: ContactProblem | ContactProblem3D,
+    problem: AnyProblem,
     start: Any,
     direction: int = +1,
     interval: tuple[AlphaLike, AlphaLike] | None = None,
@@ -100,7 +112,7 @@ def follow(
 
 
 def start_tangents(
-    problem: ContactProblem | ContactProblem3D,
+    problem: AnyProblem,
     start: Any,
     interval: tuple[AlphaLike, AlphaLike] | None = None,
     options: ContinuationOptions | None = None,

@@ -11,8 +11,8 @@ import numpy as np
 from enumsol.continuation.corrector import Correction, moore_penrose, smooth_newton
 from enumsol.continuation.path_data import PathData, PathStatus, PointKind
 from enumsol.continuation.recorder import PathRecorder
-from enumsol.continuation.scaled_equation import STATUS_TOLERANCE
-from enumsol.continuation.tangents import RATE_TOLERANCE, curve_tangent, orientation
+from enumsol.continuation.scaled_equation import STATUS_TOLERANCE, ScaledEquation
+from enumsol.continuation.tangents import RATE_TOLERANCE, Tangent, curve_tangent, orientation
 from enumsol.continuation.transitions import (
     FORWARD_TOLERANCE,
     CurvePoint,
@@ -30,9 +30,8 @@ from enumsol.support.messages import counted
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from enumsol.continuation.scaled_equation import Codes, ScaledEquation, Vector
     from enumsol.continuation.start import Start
-    from enumsol.continuation.tangents import Tangent
+    from enumsol.support.array_types import Codes, Floats
 
 _Path = TypeVar("_Path", bound=PathData)
 
@@ -343,7 +342,7 @@ class Follower(Generic[_Path]):
             f"alpha = {self._alpha():g}: contact does not hold it there",
         )
 
-    def _inside(self, x: Vector) -> bool:
+    def _inside(self, x: Floats) -> bool:
         return bool(self._low <= x[-1] <= self._high)
 
     def _border(self, start: CurvePoint, end: CurvePoint) -> _Stop | None:
@@ -375,7 +374,7 @@ class Follower(Generic[_Path]):
                 return self._visited(x)
         return None
 
-    def _passes(self, start: CurvePoint, end: CurvePoint, x: Vector, codes: Codes) -> bool:
+    def _passes(self, start: CurvePoint, end: CurvePoint, x: Floats, codes: Codes) -> bool:
         """Whether the piece from start to end of one curve goes through a known point of the same selection."""
         equation = self.equation
         if codes != start.codes or equation.dot(x - start.x, start.tangent) <= FORWARD_TOLERANCE:
@@ -421,7 +420,7 @@ class Follower(Generic[_Path]):
     def _closed(self) -> _Stop:
         return _Stop(PathStatus.CLOSED, f"the path returned to its start at alpha = {self._alpha():g}: a closed branch")
 
-    def _visited(self, x: Vector) -> _Stop:
+    def _visited(self, x: Floats) -> _Stop:
         return _Stop(
             PathStatus.VISITED, f"the path arrived at a point already visited, at alpha = {self.equation.alpha(x):g}"
         )
@@ -443,7 +442,7 @@ class Follower(Generic[_Path]):
         )
 
 
-def _landmarks(equation: ScaledEquation, visited: Sequence[PathData]) -> Iterator[tuple[Vector, Codes, bool]]:
+def _landmarks(equation: ScaledEquation, visited: Sequence[PathData]) -> Iterator[tuple[Floats, Codes, bool]]:
     """Starts, transition points and ends of other paths, with the statuses on both sides."""
     for path in visited:
         for k, kind in enumerate(path.kinds):

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.condensation.condensed import condensation_of
 from enumsol.continuation.condensed_equation import CondensedEquation
-from enumsol.continuation.equations import check_problem, equation_on
-from enumsol.continuation.not_converged import NewtonIteration, NotConverged
 from enumsol.continuation.space_equation import SLIP, SpaceEquation
-from enumsol.errors import InvalidArgumentError
+from enumsol.continuation.start import check_problem, equation_on
+from enumsol.errors import EnumsolError, InvalidArgumentError
 from enumsol.model.statuses import OPEN, STICK
 from enumsol.roots.local_branch import SINGULAR_TOLERANCE
 from enumsol.roots.root import Root
@@ -20,13 +20,13 @@ from enumsol.support.array_arguments import real_array
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
+    from collections.abc import Sequence
 
     from enumsol.continuation.parameter_path import SmoothPath
-    from enumsol.continuation.scaled_equation import Codes, ScaledEquation, Vector
+    from enumsol.continuation.scaled_equation import ScaledEquation
     from enumsol.model.problem import ContactProblem
-    from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.support.arguments import Alpha, AlphaLike
+    from enumsol.model.problem3d import AnyProblem
+    from enumsol.support.array_types import Alpha, AlphaLike, ArrayLike, Codes, Floats, Mask
 
 #: Norm of H, relative to the load, at which an iterate is a root: well above rounding for any conditioning seen.
 RESIDUAL_TOLERANCE = 1e-10
@@ -36,8 +36,58 @@ MIN_FRACTION = 2.0**-12
 SUFFICIENT_DECREASE = 1e-4
 
 
+@dataclass(frozen=True)
+class NewtonIteration:
+    """One iteration of the piecewise smooth Newton method.
+
+    Attributes
+    ----------
+    residual : float
+        Norm of H before the step, in forces relative to the load [-].
+    step : float
+        Fraction of the Newton step that was taken.
+    changes : int
+        Contact nodes whose selection differs from that of the iteration before.
+    """
+
+    residual: float
+    step: float
+    changes: int
+
+
+class NotConverged(EnumsolError, ArithmeticError):  # noqa: N818 (the name is part of the public interface)
+    """Newton's method found no root from this start; the message says why and what may help.
+
+    Attributes
+    ----------
+    alpha : float
+    history : tuple of NewtonIteration
+    reason : str
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> try:
+    ...     enumsol.newton(enumsol.gallery.one_node_triangle(), 5, start=(-8.0, 3.0), max_iterations=1)
+    ... except enumsol.NotConverged as error:
+    ...     error.alpha, len(error.history)
+    (5.0, 1)
+    """
+
+    def __init__(self, alpha: float, history: Sequence[NewtonIteration], reason: str) -> None:
+        self.alpha = alpha
+        self.history = tuple(history)
+        self.reason = reason
+        last = f"residual {self.history[-1].residual:.2e}" if self.history else "no iteration"
+        super().__init__(
+            f"Newton's method did not converge at alpha = {alpha:g} "
+            f"({reason}; {counted(len(self.history), 'iteration')}, {last}); "
+            "try another start, for example a root at a nearby alpha, or enumerate_roots, which needs no start"
+        )
+
+
 def newton(
-    problem: ContactProblem | ContactProblem3D,
+    problem: AnyProblem,
     alpha: AlphaLike,
     start: Root | ArrayLike | None = None,
     *,
@@ -105,9 +155,7 @@ def newton(
     return build_root(frozen, exact if smooth_path is None else value, equation, x)
 
 
-def _start_values(
-    start: Root | ArrayLike | None, p: int, d: int, modes: int
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _start_values(start: Root | ArrayLike | None, p: int, d: int, modes: int) -> tuple[Floats, Floats]:
     """Forces in d components at every node, (d p,), and the coordinates of the rigid displacement, (modes,)."""
     none = np.zeros(modes)
     if start is None:
@@ -131,7 +179,7 @@ def _start_values(
     return values[: d * p], values[d * p :]
 
 
-def _iterate(equation: ScaledEquation, x: Vector, alpha: float, max_iterations: int) -> Vector:
+def _iterate(equation: ScaledEquation, x: Floats, alpha: float, max_iterations: int) -> Floats:
     history: list[NewtonIteration] = []
     seen: set[bytes] = set()
     rows = equation.selection_at(x)
@@ -155,7 +203,7 @@ def _iterate(equation: ScaledEquation, x: Vector, alpha: float, max_iterations: 
     raise NotConverged(alpha, history, f"the limit of {counted(max_iterations, 'iteration')} was reached")
 
 
-def _newton_step(equation: ScaledEquation, rows: NDArray[np.bool_], x: Vector) -> Vector:
+def _newton_step(equation: ScaledEquation, rows: Mask, x: Floats) -> Floats:
     """Newton step in the active selection; the shortest least-squares one where it is singular."""
     J = equation.jacobian(rows, x)[:, :-1]
     residual = equation.selection_residual(rows, x)
@@ -168,7 +216,7 @@ def _newton_step(equation: ScaledEquation, rows: NDArray[np.bool_], x: Vector) -
     return np.asarray(step)
 
 
-def _fraction(equation: ScaledEquation, x: Vector, step: Vector) -> float:
+def _fraction(equation: ScaledEquation, x: Floats, step: Floats) -> float:
     """Largest 2^-k that lowers the residual sufficiently."""
     fraction, residual = 1.0, equation.merit(x)
     while fraction >= MIN_FRACTION:
@@ -180,7 +228,7 @@ def _fraction(equation: ScaledEquation, x: Vector, step: Vector) -> float:
     return 0.0
 
 
-def build_root(problem: ContactProblem, alpha: Alpha, equation: CondensedEquation, x: Vector) -> Root:
+def build_root(problem: ContactProblem, alpha: Alpha, equation: CondensedEquation, x: Floats) -> Root:
     """The Root at a point x of the condensed equation, with its index, margin and derivative."""
     # the enumeration is not needed to follow paths, and slow to import
     from enumsol.roots.builder import RootBuilder
@@ -196,7 +244,7 @@ def build_root(problem: ContactProblem, alpha: Alpha, equation: CondensedEquatio
     return _root_of_floats(problem, alpha, equation, x, isolated=False)
 
 
-def _root_of_floats(problem: Any, alpha: Alpha, equation: ScaledEquation, x: Vector, *, isolated: bool = True) -> Root:
+def _root_of_floats(problem: Any, alpha: Alpha, equation: ScaledEquation, x: Floats, *, isolated: bool = True) -> Root:
     """The Root at a point x of the condensed equation; not regular where a condition holds with equality.
 
     ``isolated``: it is not known to belong to a continuum.
@@ -232,7 +280,7 @@ def _root_of_floats(problem: Any, alpha: Alpha, equation: ScaledEquation, x: Vec
     )
 
 
-def _slip_angles(codes: Codes, driven: Vector) -> Vector:
+def _slip_angles(codes: Codes, driven: Floats) -> Floats:
     """Angles of F u_t (p, 2) of the nodes that slip in 3D, each as two equal bounds; nan of the others."""
     slips = np.array([code == SLIP for code in codes]) & np.any(driven != 0, axis=1)
     angle = np.arctan2(driven[:, 1], driven[:, 0])[:, None]

@@ -16,10 +16,8 @@ from enumsol.support.arguments import alpha_value, optional_callable
 from enumsol.support.array_arguments import real_array
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.support.arguments import AlphaLike
+    from enumsol.model.problem3d import AnyProblem, ContactProblem3D
+    from enumsol.support.array_types import AlphaLike, Floats, Mask
 
 #: A user's derivative may differ from a central difference by this fraction of its size: wrong formulas differ by more.
 DERIVATIVE_TOLERANCE = 1e-4
@@ -93,16 +91,16 @@ class PathValues:
     equilibrium as a whole, and dg with their derivatives.
     """
 
-    g: NDArray[np.float64]
-    F: NDArray[np.float64]
-    dg: NDArray[np.float64]
-    dF: NDArray[np.float64]  # noqa: N815 (as above)
+    g: Floats
+    F: Floats
+    dg: Floats
+    dF: Floats  # noqa: N815 (as above)
 
 
 class AffinePath:
     """The problem's own F0 + alpha F1 and f + alpha load_slope, also where friction would be negative (iterates)."""
 
-    def __init__(self, problem: ContactProblem | ContactProblem3D) -> None:
+    def __init__(self, problem: AnyProblem) -> None:
         self.problem: Any = problem
         self.condensed = condensed = condensation_of(problem)
         self.friction = affine_friction(problem)
@@ -115,13 +113,13 @@ class AffinePath:
         return PathValues(g0 + alpha * g1, F0 + alpha * F1, g1, F1)
 
     @property
-    def frictionless(self) -> NDArray[np.bool_]:
+    def frictionless(self) -> Mask:
         """Nodes, in 3D nodes and axes, with F0 = F1 = 0."""
         F0, F1 = self.friction
         return np.asarray((F0 == 0) & (F1 == 0))
 
 
-def affine_friction(problem: ContactProblem | ContactProblem3D) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def affine_friction(problem: AnyProblem) -> tuple[Floats, Floats]:
     """Coefficients at alpha = 0 and their derivatives, (p,) both, in 3D (p, 2).
 
     Raises
@@ -139,7 +137,7 @@ def affine_friction(problem: ContactProblem | ContactProblem3D) -> tuple[NDArray
 class CallablePath:
     """A SmoothPath condensed to the contact nodes; a load given by callables costs 2 p n multiplications per alpha."""
 
-    def __init__(self, problem: ContactProblem | ContactProblem3D, smooth: SmoothPath, alpha: float) -> None:
+    def __init__(self, problem: AnyProblem, smooth: SmoothPath, alpha: float) -> None:
         self.problem: Any = problem
         self._smooth = smooth
         self._affine = AffinePath(problem)
@@ -162,7 +160,7 @@ class CallablePath:
             raise InvalidArgumentError(f"SmoothPath.f is not finite at alpha = {alpha:g}; expected a load")
 
     @cached_property
-    def _influence(self) -> NDArray[np.float64]:
+    def _influence(self) -> Floats:
         """B A^{-1}, shape (2p, n), and N' of a body that nothing holds: dense, but only few rows."""
         problem = self.problem
         B = problem.contact_rows
@@ -188,7 +186,7 @@ class CallablePath:
         return PathValues(g, F, dg, dF)
 
     @cached_property
-    def frictionless(self) -> NDArray[np.bool_]:
+    def frictionless(self) -> Mask:
         """Nodes, in 3D nodes and axes, with F = 0 and dF = 0 at the start, assumed to stay without friction."""
         if self._smooth.F is None:
             return self._affine.frictionless
@@ -222,7 +220,7 @@ class CallablePath:
 ParameterPath = AffinePath | CallablePath
 
 
-def _evaluate(function: PathFunction, alpha: float, name: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
+def _evaluate(function: PathFunction, alpha: float, name: str, shape: tuple[int, ...]) -> Floats:
     what = f"the value of SmoothPath.{name} at alpha = {alpha:g}"
     value = real_array(function(alpha), what, error=InvalidArgumentError, finite=False)
     if value.shape != shape:
@@ -232,10 +230,10 @@ def _evaluate(function: PathFunction, alpha: float, name: str, shape: tuple[int,
     return value
 
 
-def _coefficients(function: PathFunction, alpha: float, name: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
+def _coefficients(function: PathFunction, alpha: float, name: str, shape: tuple[int, ...]) -> Floats:
     """Coefficients of all nodes, and in 3D of both axes, also where one number, or one for every node, is given."""
 
-    def spread(given: float) -> NDArray[np.float64]:
+    def spread(given: float) -> Floats:
         what = f"the value of SmoothPath.{name} at alpha = {given:g}"
         value = real_array(function(given), what, error=InvalidArgumentError, finite=False)
         if value.ndim == 0:

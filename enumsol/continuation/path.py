@@ -23,9 +23,8 @@ if TYPE_CHECKING:
     import os
 
     from enumsol.continuation.parameter_path import SmoothPath
-    from enumsol.model.problem import ContactProblem
-    from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.support.arguments import AlphaLike
+    from enumsol.model.problem3d import AnyProblem
+    from enumsol.support.array_types import AlphaLike
 
 
 #: Version of the files of paths.
@@ -230,7 +229,7 @@ class Path(PathData):
 
     def resume(
         self,
-        problem: ContactProblem | ContactProblem3D | None = None,
+        problem: AnyProblem | None = None,
         *,
         interval: tuple[AlphaLike, AlphaLike] | None = None,
         options: ContinuationOptions | None = None,

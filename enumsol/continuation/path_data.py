@@ -16,15 +16,14 @@ from enumsol.support.messages import TextEnum, counted
 
 if TYPE_CHECKING:
     import pandas as pd
-    from numpy.typing import NDArray
 
     from enumsol.continuation.continuation_options import ContinuationOptions
     from enumsol.continuation.parameter_path import SmoothPath
     from enumsol.continuation.tangents import Tangent
-    from enumsol.model.problem import ContactProblem
-    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import AnyProblem
     from enumsol.model.statuses import ContactStatus
     from enumsol.roots.local_branch import LocalBranchTest
+    from enumsol.support.array_types import Floats, Integers, NDArray
 
 #: |d alpha / ds| below this is a vertical piece of the path: at a regular point it is well above rounding.
 VERTICAL_TOLERANCE = 1e-9
@@ -82,13 +81,13 @@ class PathPoint(Sealed):
     """
 
     alpha: float
-    lambda_n: NDArray[np.float64]
-    lambda_t: NDArray[np.float64]
-    u_n: NDArray[np.float64]
-    u_t: NDArray[np.float64]
+    lambda_n: Floats
+    lambda_t: Floats
+    u_n: Floats
+    u_t: Floats
     statuses: tuple[ContactStatus, ...]
     kind: PointKind
-    rigid_coordinates: NDArray[np.float64] | None = None
+    rigid_coordinates: Floats | None = None
 
 
 @dataclass(frozen=True)
@@ -162,16 +161,16 @@ class PathStats:
 class PathData(Sequence[PathPoint], Sealed):
     """The points of a path, its transition points and how it ended; for its attributes see Path."""
 
-    alpha: NDArray[np.float64]
-    lambda_n: NDArray[np.float64]
-    lambda_t: NDArray[np.float64]
-    u_n: NDArray[np.float64]
-    u_t: NDArray[np.float64]
+    alpha: Floats
+    lambda_n: Floats
+    lambda_t: Floats
+    u_n: Floats
+    u_t: Floats
     codes: NDArray[np.int8]
     kinds: tuple[PointKind, ...]
-    steps: NDArray[np.float64]
-    corrections: NDArray[np.int64]
-    arclength: NDArray[np.float64]
+    steps: Floats
+    corrections: Integers
+    arclength: Floats
     transitions: tuple[Transition, ...]
     status: PathStatus
     message: str
@@ -182,8 +181,8 @@ class PathData(Sequence[PathPoint], Sealed):
     stats: PathStats
     node_ids: tuple[Any, ...]
     _names: tuple[tuple[ContactStatus, ...], ...] = field(repr=False)
-    rigid_coordinates: NDArray[np.float64] | None = None
-    _problem: ContactProblem | ContactProblem3D | None = field(default=None, repr=False, compare=False)
+    rigid_coordinates: Floats | None = None
+    _problem: AnyProblem | None = field(default=None, repr=False, compare=False)
     _smooth_path: SmoothPath | None = field(default=None, repr=False, compare=False)
 
     # -- a sequence of points ----------------------------------------------------------------------------------------

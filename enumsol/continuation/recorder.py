@@ -13,9 +13,10 @@ from enumsol.continuation.path_data import RIGID, PathStats, PointKind, Transiti
 from enumsol.errors import TooLargeError
 
 if TYPE_CHECKING:
-    from enumsol.continuation.scaled_equation import ScaledEquation, Vector
+    from enumsol.continuation.scaled_equation import ScaledEquation
     from enumsol.continuation.transitions import CurvePoint, Kink
     from enumsol.roots.local_branch import LocalBranchTest
+    from enumsol.support.array_types import Floats
 
 #: Slip along a tangent, for the name of a frictionless node that starts to slip: any small step serves.
 _AHEAD = 1e-6
@@ -88,10 +89,10 @@ class PathRecorder:
             RIGID: np.array([equation.rigid(point.x) for point in self.points]) if equation.modes else None,
         }
 
-    def _slip(self, point: CurvePoint, step: float) -> Vector:
+    def _slip(self, point: CurvePoint, step: float) -> Floats:
         return self.equation.w(point.x + step * point.tangent)[self.equation.p :]
 
-    def _local_test(self, x: Vector) -> LocalBranchTest | None:
+    def _local_test(self, x: Floats) -> LocalBranchTest | None:
         try:
             return self.equation.local_test(x)
         except TooLargeError:

@@ -32,14 +32,11 @@ from enumsol.condensation.condensed import FloatingCondensation, solved
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from enumsol.continuation.parameter_path import ParameterPath, PathValues
     from enumsol.model.statuses import ContactStatus
     from enumsol.roots.local_branch import LocalBranchTest
+    from enumsol.support.array_types import Codes, Floats, Mask
 
-    Vector = NDArray[np.float64]
-    Codes = tuple[int, ...]
 
 #: A condition within this of zero counts as met with equality; forces and displacements are of size one after scaling,
 #: points are converged to about 1e-12.
@@ -101,7 +98,7 @@ class ScaledEquation(ABC):
         self.r = np.ones(len(sigma)) if r is None else r * sigma**2
         self._last: tuple[float, PathValues] | None = None
 
-    def _load_energy(self, interval: tuple[float, float], start: float, sigma: Vector) -> float:
+    def _load_energy(self, interval: tuple[float, float], start: float, sigma: Floats) -> float:
         low, high = interval
         samples = [start]
         if math.isfinite(low) and math.isfinite(high):
@@ -117,34 +114,34 @@ class ScaledEquation(ABC):
         energy = float(np.max(np.einsum("ij,ji->i", loads, forces)))
         return size * math.sqrt(energy) if energy > 0 else size
 
-    def _per_unit(self, values: Vector, length: Vector | float, load: float) -> Vector:
+    def _per_unit(self, values: Floats, length: Floats | float, load: float) -> Floats:
         """Displacements (m,) by their units, followed by loads of the body as a whole (r,) by theirs."""
         return np.append(values[: self.m] / length, np.linalg.solve(self._mixing, values[self.m :]) / load)
 
     # -- values ----------------------------------------------------------------------------------------------------
 
     @cached_property
-    def metric(self) -> Vector:
+    def metric(self) -> Floats:
         """W, shape (m + r + 1, m + r + 1)."""
         W = np.zeros((len(self._energy) + 1,) * 2)
         W[:-1, :-1] = self._energy
         W[-1, -1] = 1.0
         return W
 
-    def dot(self, a: Vector, b: Vector) -> float:
+    def dot(self, a: Floats, b: Floats) -> float:
         """Inner product of two vectors in the metric W."""
         return float(a[:-1] @ (self._energy @ b[:-1]) + a[-1] * b[-1])
 
-    def norm(self, a: Vector) -> float:
+    def norm(self, a: Floats) -> float:
         """Length of a vector."""
         return math.sqrt(max(self.dot(a, a), 0.0))
 
-    def point(self, alpha: float, forces: Vector, rigid: Vector | None = None) -> Vector:
+    def point(self, alpha: float, forces: Floats, rigid: Floats | None = None) -> Floats:
         """The scaled point x of unscaled alpha, lambda (m,) and q (r,), by default zero."""
         q = np.zeros(self.modes) if rigid is None else self._mixing.T @ rigid / self._load
         return np.concatenate([forces / self.force, q, [alpha / self.alpha_scale]])
 
-    def point_of(self, alpha: float, forces: Vector, moves: Vector) -> Vector:
+    def point_of(self, alpha: float, forces: Floats, moves: Floats) -> Floats:
         """The scaled point x of a solution: q follows from its displacements, the unscaled (u_n, u_t), shape (m,)."""
         x = self.point(alpha, forces)
         if self.modes:
@@ -152,11 +149,11 @@ class ScaledEquation(ABC):
             x[self.m : -1] = np.linalg.lstsq(-self.bordered[: self.m, self.m :], rest, rcond=None)[0]
         return x
 
-    def alpha(self, x: Vector) -> float:
+    def alpha(self, x: Floats) -> float:
         """Unscaled alpha."""
         return float(x[-1] * self.alpha_scale)
 
-    def forces(self, x: Vector) -> Vector:
+    def forces(self, x: Floats) -> Floats:
         """Unscaled lambda, shape (m,)."""
         return np.asarray(x[: self.m] * self.force)
 
@@ -165,28 +162,28 @@ class ScaledEquation(ABC):
         """r, the number of rigid modes."""
         return len(self._mixing)
 
-    def rigid(self, x: Vector) -> Vector:
+    def rigid(self, x: Floats) -> Floats:
         """Unscaled q, shape (r,): coordinates of the rigid displacement."""
         return np.asarray(self.rigid_rows @ x)
 
     @cached_property
-    def rigid_rows(self) -> Vector:
+    def rigid_rows(self) -> Floats:
         """q by x, shape (r, m + r + 1)."""
         rows = np.zeros((self.modes, self.m + self.modes + 1))
         rows[:, self.m : -1] = self._load * np.linalg.inv(self._mixing).T
         return rows
 
     @cached_property
-    def reach(self) -> Vector:
+    def reach(self) -> Floats:
         """How large the components of q may be, (r,)."""
         return self.problem.modes.reach(self.problem.rigid_reach) if self.modes else np.zeros(0)
 
-    def moves_rigidly(self, tangent: Vector) -> bool:
+    def moves_rigidly(self, tangent: Floats) -> bool:
         """Whether a curve with this unit tangent changes the rigid displacement alone."""
         others = np.delete(tangent, slice(self.m, self.m + self.modes))
         return self.modes > 0 and bool(np.max(np.abs(others)) <= _RIGID_TOLERANCE)
 
-    def at(self, x: Vector) -> PathValues:
+    def at(self, x: Floats) -> PathValues:
         """Scaled values of the paths; derivatives are with respect to the scaled alpha."""
         alpha = self.alpha(x)
         if self._last is None or self._last[0] != alpha:
@@ -197,19 +194,19 @@ class ScaledEquation(ABC):
             self._last = (alpha, scaled)
         return self._last[1]
 
-    def w(self, x: Vector) -> Vector:
+    def w(self, x: Floats) -> Floats:
         """Scaled (u_n, u_t), shape (m,)."""
         return np.asarray(self.at(x).g[: self.m] - self.bordered[: self.m] @ x[:-1])
 
-    def left(self, x: Vector) -> Vector:
+    def left(self, x: Floats) -> Floats:
         """Scaled h - G lambda, what contact does not carry of the load on the body as a whole, shape (r,)."""
         return np.asarray(self.at(x).g[self.m :] - self.bordered[self.m :] @ x[:-1])
 
-    def displacements(self, x: Vector) -> Vector:
+    def displacements(self, x: Floats) -> Floats:
         """Unscaled (u_n, u_t), shape (m,)."""
         return np.asarray(self.w(x) * self.length)
 
-    def split(self, values: Vector) -> tuple[Vector, Vector]:
+    def split(self, values: Floats) -> tuple[Floats, Floats]:
         """Normal and tangential parts of arrays (..., m or more): (..., p) both, in 3D (..., p, 2) the latter."""
         p = self.p
         normal, tangential = values[..., :p], values[..., p : self.m]
@@ -220,7 +217,7 @@ class ScaledEquation(ABC):
     # -- H and its selections ----------------------------------------------------------------------------------------
 
     @abstractmethod
-    def residual(self, x: Vector) -> Vector:
+    def residual(self, x: Floats) -> Floats:
         """H(x) for each node's own r, shape (m + r,).
 
         Solutions do not depend on r, and neither may the decision whether x is one: a tiny r would make any
@@ -228,37 +225,37 @@ class ScaledEquation(ABC):
         """
 
     @abstractmethod
-    def merit(self, x: Vector) -> float:
+    def merit(self, x: Floats) -> float:
         """Norm of H(x) for the given r, which its Newton directions lower."""
 
     @abstractmethod
-    def selection_at(self, x: Vector) -> NDArray[np.bool_]:
+    def selection_at(self, x: Floats) -> Mask:
         """Rows of the selection that is active at x; they depend on the r of H."""
 
     @abstractmethod
-    def selection(self, codes: Codes) -> NDArray[np.bool_]:
+    def selection(self, codes: Codes) -> Mask:
         """Rows of the selection in which the nodes have these statuses."""
 
     @abstractmethod
-    def selection_residual(self, rows: NDArray[np.bool_], x: Vector) -> Vector:
+    def selection_residual(self, rows: Mask, x: Floats) -> Floats:
         """The named selection function of H, shape (m + r,), its rows scaled by positive factors to size one."""
 
     @abstractmethod
-    def jacobian(self, rows: NDArray[np.bool_], x: Vector) -> Vector:
+    def jacobian(self, rows: Mask, x: Floats) -> Floats:
         """Gradient of the named selection function (see selection_residual), shape (m + r, m + r + 1)."""
 
     # -- statuses and their conditions -------------------------------------------------------------------------------
 
     @abstractmethod
-    def slacks(self, codes: Codes, x: Vector) -> Vector:
+    def slacks(self, codes: Codes, x: Floats) -> Floats:
         """What must be >= 0 for the statuses to hold at a root, shape (p, 2); infinite where there is one condition."""
 
     @abstractmethod
-    def slack_gradient(self, codes: Codes, x: Vector, which: tuple[int, int]) -> Vector:
+    def slack_gradient(self, codes: Codes, x: Floats, which: tuple[int, int]) -> Floats:
         """Gradient of one slack with respect to x, shape (m + r + 1,)."""
 
     @abstractmethod
-    def slack_rates(self, codes: Codes, x: Vector, tangent: Vector) -> Vector:
+    def slack_rates(self, codes: Codes, x: Floats, tangent: Floats) -> Floats:
         """Derivatives of the slacks along a tangent, shape (p, 2); zero where there is one condition."""
 
     @abstractmethod
@@ -266,24 +263,24 @@ class ScaledEquation(ABC):
         """The statuses on the other side of the k-th condition of a status; none where it has no such condition."""
 
     @abstractmethod
-    def flip(self, codes: Codes, x: Vector, which: tuple[int, int]) -> Codes:
+    def flip(self, codes: Codes, x: Floats, which: tuple[int, int]) -> Codes:
         """Statuses after one slack vanished: the selection next to it across that condition."""
 
     @abstractmethod
-    def active(self, x: Vector, tolerance: float = STATUS_TOLERANCE) -> tuple[frozenset[int], ...]:
+    def active(self, x: Floats, tolerance: float = STATUS_TOLERANCE) -> tuple[frozenset[int], ...]:
         """Per node the status codes whose equations and conditions hold within the tolerance."""
 
     @abstractmethod
-    def codes(self, x: Vector, prefer: Codes | None = None, tolerance: float = STATUS_TOLERANCE) -> Codes:
+    def codes(self, x: Floats, prefer: Codes | None = None, tolerance: float = STATUS_TOLERANCE) -> Codes:
         """Statuses at a solution by the signs of the test functions; ``prefer`` is kept where it holds too."""
 
     @abstractmethod
-    def statuses(self, codes: Sequence[int], slip: Vector) -> tuple[ContactStatus, ...]:
+    def statuses(self, codes: Sequence[int], slip: Floats) -> tuple[ContactStatus, ...]:
         """Names of the statuses; that of a frictionless node in contact follows from its u_t, ``slip`` (m - p,)."""
 
     # -- signs of determinants ---------------------------------------------------------------------------------------
 
-    def index(self, codes: Codes, x: Vector, singular: float) -> int:
+    def index(self, codes: Codes, x: Floats, singular: float) -> int:
         """Sign of the selection's determinant at fixed alpha, 0 where it is singular; rows scaled to length one."""
         J = self.jacobian(self.selection(codes), x)[:, :-1]
         size = np.linalg.norm(J, axis=1, keepdims=True)
@@ -293,7 +290,7 @@ class ScaledEquation(ABC):
         return int(np.linalg.slogdet(J)[0])
 
     @abstractmethod
-    def local_test(self, x: Vector) -> LocalBranchTest:
+    def local_test(self, x: Floats) -> LocalBranchTest:
         """The local branch test at a point of a path (theory, section 3.2).
 
         Raises

@@ -10,10 +10,10 @@ stays smooth where F = 0, where lambda_t tells no direction and the slip does, a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import prod
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,14 +22,7 @@ from enumsol.errors import TooLargeError
 from enumsol.model.sectors import SECTORS
 from enumsol.model.statuses import FRICTIONLESS, OPEN, STICK, ContactStatus
 from enumsol.roots.local_branch import LOCATED_SINGULAR_TOLERANCE, MAX_SELECTIONS, LocalBranchTest
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    Vector = NDArray[np.float64]
-    Codes = tuple[int, ...]
+from enumsol.support.array_types import Codes, Floats, Mask
 
 #: Slip in any direction: the sector that is the whole circle.
 SLIP = SECTORS + 1
@@ -47,19 +40,19 @@ _NAMES = {OPEN: ContactStatus.OPEN, STICK: ContactStatus.STICK, SLIP: ContactSta
 class _Cone:
     """Friction at one alpha: F = c q, c (p,) the mean coefficient of a node and q (p, 2), and derivatives."""
 
-    c: Vector
-    q: Vector
-    dc: Vector
-    dq: Vector
+    c: Floats
+    q: Floats
+    dc: Floats
+    dq: Floats
 
 
 @dataclass(frozen=True)
 class _Trial:
     """zeta, its length and its direction, (p, 2), (p,) and (p, 2), and lambda_t / q."""
 
-    length: Vector
-    direction: Vector
-    force: Vector
+    length: Floats
+    direction: Floats
+    force: Floats
 
 
 class SpaceEquation(ScaledEquation):
@@ -72,7 +65,7 @@ class SpaceEquation(ScaledEquation):
 
     # -- friction ----------------------------------------------------------------------------------------------------
 
-    def _cone(self, x: Vector) -> _Cone:
+    def _cone(self, x: Floats) -> _Cone:
         values, rubs = self.at(x), ~self.without
         count = np.maximum(np.sum(rubs, axis=1), 1)
         F, dF = np.where(rubs, values.F, 0.0), np.where(rubs, values.dF, 0.0)
@@ -84,11 +77,11 @@ class SpaceEquation(ScaledEquation):
         dq = np.where(rubs & (c != 0)[:, None], (dF - q * dc[:, None]) / np.where(c != 0, c, 1.0)[:, None], 0.0)
         return _Cone(c, q, dc, dq)
 
-    def _inverse(self, cone: _Cone) -> Vector:
+    def _inverse(self, cone: _Cone) -> Floats:
         """1 / q of the components with friction, 0 of the others."""
         return np.where(self.without | (cone.q == 0), 0.0, 1.0 / np.where(cone.q != 0, cone.q, 1.0))
 
-    def _trial(self, x: Vector, r: Vector, cone: _Cone) -> _Trial:
+    def _trial(self, x: Floats, r: Floats, cone: _Cone) -> _Trial:
         slip, force = self.split(self.w(x))[1], self.split(x[:-1])[1] * self._inverse(cone)
         zeta = force + self.split(r)[1] * np.where(self.without, 0.0, cone.q * slip)
         length = np.linalg.norm(zeta, axis=1)
@@ -96,15 +89,15 @@ class SpaceEquation(ScaledEquation):
 
     # -- H and its selections ----------------------------------------------------------------------------------------
 
-    def residual(self, x: Vector) -> Vector:
+    def residual(self, x: Floats) -> Floats:
         """H(x) for each node's own r, shape (3p + r,)."""
         return self._projected(x, np.ones(3 * self.p))
 
-    def merit(self, x: Vector) -> float:
+    def merit(self, x: Floats) -> float:
         """Norm of H(x) for the given r, which its Newton directions lower."""
         return float(np.linalg.norm(self._projected(x, self.r)))
 
-    def _projected(self, x: Vector, r: Vector) -> Vector:
+    def _projected(self, x: Floats, r: Floats) -> Floats:
         """lambda - P(lambda + r w), P into lambda_n >= 0 and the disc of that lambda_n, in units of q."""
         cone = self._cone(x)
         trial, (normal, tangential), (w_n, w_t) = self._trial(x, r, cone), self.split(x[:-1]), self.split(self.w(x))
@@ -116,19 +109,19 @@ class SpaceEquation(ScaledEquation):
         found = _flat(np.where(most > 0, -r_n * w_n, normal), np.where(rubs, cone.q * left, tangential))
         return np.append(found, -self.left(x))
 
-    def selection_at(self, x: Vector) -> NDArray[np.bool_]:
+    def selection_at(self, x: Floats) -> Mask:
         """Rows of the selection that is active at x, shape (p, 2)."""
         cone = self._cone(x)
         normal = self.split(x[: self.m] + self.r * self.w(x))[0]
         slips = self._trial(x, self.r, cone).length > cone.c * np.maximum(normal, 0.0)
         return np.column_stack([normal > 0, slips & ~self.frictionless])
 
-    def selection(self, codes: Codes) -> NDArray[np.bool_]:
+    def selection(self, codes: Codes) -> Mask:
         """Rows of the selection in which the nodes have these statuses, shape (p, 2)."""
         named = np.array(codes)
         return np.column_stack([named != OPEN, named == SLIP])
 
-    def selection_residual(self, rows: NDArray[np.bool_], x: Vector) -> Vector:
+    def selection_residual(self, rows: Mask, x: Floats) -> Floats:
         """The named selection function of H, shape (3p + r,)."""
         (normal, tangential), (w_n, w_t) = self.split(x[:-1]), self.split(self.w(x))
         closed, slips = rows[:, 0], (rows[:, 0] & rows[:, 1])[:, None]
@@ -137,7 +130,7 @@ class SpaceEquation(ScaledEquation):
         free = ~closed[:, None] | self.without
         return np.append(_flat(np.where(closed, -w_n, normal), np.where(free, tangential, held)), -self.left(x))
 
-    def jacobian(self, rows: NDArray[np.bool_], x: Vector) -> Vector:
+    def jacobian(self, rows: Mask, x: Floats) -> Floats:
         """Gradient of the named selection function (see selection_residual), shape (3p + r, 3p + r + 1)."""
         p, values, cone = self.p, self.at(x), self._cone(x)
         closed, slips = rows[:, 0], (rows[:, 0] & rows[:, 1])[:, None, None]
@@ -154,13 +147,13 @@ class SpaceEquation(ScaledEquation):
         rest = np.column_stack([self.bordered[self.m :], -values.dg[self.m :]])
         return np.concatenate([np.where(closed[:, None], -dw_n, dn), tangential[:, 0], tangential[:, 1], rest])
 
-    def _slopes(self, x: Vector) -> tuple[Vector, Vector]:
+    def _slopes(self, x: Floats) -> tuple[Floats, Floats]:
         """Gradients of w_n and w_t with respect to x, (p, 3p + r + 1) and (p, 2, 3p + r + 1)."""
         p = self.p
         slope = np.column_stack([-self.bordered, self.at(x).dg])[: self.m]
         return slope[:p], np.stack([slope[p : 2 * p], slope[2 * p :]], axis=1)
 
-    def _turning(self, x: Vector, cone: _Cone, dw_t: Vector, dt: Vector) -> tuple[Vector, Vector]:
+    def _turning(self, x: Floats, cone: _Cone, dw_t: Floats, dt: Floats) -> tuple[Floats, Floats]:
         """Directions of slip, (p, 2), and their gradients, (p, 2, 3p + r + 1)."""
         trial, r, inverse = self._trial(x, self.r, cone), self.split(self.r)[1], self._inverse(cone)
         slip = self.split(self.w(x))[1]
@@ -173,20 +166,20 @@ class SpaceEquation(ScaledEquation):
 
     # -- statuses and their conditions -------------------------------------------------------------------------------
 
-    def _room(self, x: Vector, cone: _Cone) -> tuple[Vector, Vector]:
+    def _room(self, x: Floats, cone: _Cone) -> tuple[Floats, Floats]:
         """c lambda_n - |lambda_t / q| over 1 + c, (p,), and the direction of lambda_t / q."""
         force = self.split(x[:-1])[1] * self._inverse(cone)
         size = np.linalg.norm(force, axis=1)
         return (cone.c * x[: self.p] - size) / (1.0 + cone.c), force / np.where(size > 0, size, 1.0)[:, None]
 
-    def slacks(self, codes: Codes, x: Vector) -> Vector:
+    def slacks(self, codes: Codes, x: Floats) -> Floats:
         """What must be >= 0 for the statuses to hold at a root, shape (p, 2); infinite where there is one condition."""
         named, cone, (w_n, w_t) = np.array(codes), self._cone(x), self.split(self.w(x))
         along = np.sum(self._trial(x, self.r, cone).direction * cone.q * w_t, axis=1)
         first = np.select([named == OPEN, named == STICK], [-w_n, self._room(x, cone)[0]], x[: self.p])
         return np.column_stack([first, np.where(named == SLIP, along, np.inf)])
 
-    def _slack_gradients(self, codes: Codes, x: Vector) -> Vector:
+    def _slack_gradients(self, codes: Codes, x: Floats) -> Floats:
         """Gradients of all slacks, shape (p, 2, 3p + r + 1), 0 where there is one condition."""
         p, named, cone = self.p, np.array(codes), self._cone(x)
         dw_n, dw_t = self._slopes(x)
@@ -207,11 +200,11 @@ class SpaceEquation(ScaledEquation):
         found[:, 1] = np.where((named == SLIP)[:, None], along, 0.0)
         return found
 
-    def slack_gradient(self, codes: Codes, x: Vector, which: tuple[int, int]) -> Vector:
+    def slack_gradient(self, codes: Codes, x: Floats, which: tuple[int, int]) -> Floats:
         """Gradient of one slack with respect to x, shape (3p + r + 1,)."""
         return np.asarray(self._slack_gradients(codes, x)[which])
 
-    def slack_rates(self, codes: Codes, x: Vector, tangent: Vector) -> Vector:
+    def slack_rates(self, codes: Codes, x: Floats, tangent: Floats) -> Floats:
         """Derivatives of the slacks along a tangent, shape (p, 2); zero where there is one condition."""
         return np.asarray(self._slack_gradients(codes, x) @ tangent)
 
@@ -219,7 +212,7 @@ class SpaceEquation(ScaledEquation):
         """The statuses on the other side of the k-th condition of a status."""
         return _ACROSS[code][k] if k < len(_ACROSS[code]) else ()
 
-    def flip(self, codes: Codes, x: Vector, which: tuple[int, int]) -> Codes:
+    def flip(self, codes: Codes, x: Floats, which: tuple[int, int]) -> Codes:
         """Statuses after one slack vanished: a node that comes into contact slips at once."""
         i, k = which
         new = _ACROSS[codes[i]][k][0]
@@ -227,7 +220,7 @@ class SpaceEquation(ScaledEquation):
             new = FRICTIONLESS
         return (*codes[:i], new, *codes[i + 1 :])
 
-    def active(self, x: Vector, tolerance: float = STATUS_TOLERANCE) -> tuple[frozenset[int], ...]:
+    def active(self, x: Floats, tolerance: float = STATUS_TOLERANCE) -> tuple[frozenset[int], ...]:
         """Per node the status codes whose equations and conditions hold within the tolerance."""
         found: list[set[int]] = [set() for _ in range(self.p)]
         for code in (OPEN, STICK, SLIP, FRICTIONLESS):
@@ -242,7 +235,7 @@ class SpaceEquation(ScaledEquation):
                 found[i].add(code)
         return tuple(map(frozenset, found))
 
-    def codes(self, x: Vector, prefer: Codes | None = None, tolerance: float = STATUS_TOLERANCE) -> Codes:
+    def codes(self, x: Floats, prefer: Codes | None = None, tolerance: float = STATUS_TOLERANCE) -> Codes:
         """Statuses at a solution; ``prefer`` is kept where it holds too."""
         ones, cone = np.ones(3 * self.p), self._cone(x)
         normal = x[: self.p] + self.w(x)[: self.p]
@@ -254,13 +247,13 @@ class SpaceEquation(ScaledEquation):
             found = [old if old in held else new for old, new, held in zip(prefer, found, active, strict=True)]
         return tuple(found)
 
-    def statuses(self, codes: Sequence[int], slip: Vector) -> tuple[ContactStatus, ...]:
+    def statuses(self, codes: Sequence[int], slip: Floats) -> tuple[ContactStatus, ...]:
         """Names of the statuses; a frictionless node in contact slips wherever its u_t is not 0."""
         moves = np.any(np.reshape(slip, (2, -1)) != 0, axis=0)
         without = (ContactStatus.STICK, ContactStatus.SLIP)
         return tuple(_NAMES.get(code, without[bool(move)]) for code, move in zip(codes, moves, strict=True))
 
-    def local_test(self, x: Vector) -> LocalBranchTest:
+    def local_test(self, x: Floats) -> LocalBranchTest:
         """The local branch test at a point of a path; see ScaledEquation."""
         active, slip = self.active(x), self.w(x)[self.p :]
         count = prod(len(held) for held in active)
@@ -276,6 +269,6 @@ class SpaceEquation(ScaledEquation):
         return LocalBranchTest.from_signs(signs, premise=bool(np.all(self.at(x).F > 0)))
 
 
-def _flat(normal: Vector, tangential: Vector) -> Vector:
+def _flat(normal: Floats, tangential: Floats) -> Floats:
     """Of (p,) and (p, 2) one array (3p,), all normals first."""
     return np.concatenate([normal, tangential[:, 0], tangential[:, 1]])

@@ -7,20 +7,48 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.continuation.condensed_equation import CondensedEquation
 from enumsol.continuation.continuation_options import ContinuationOptions
-from enumsol.continuation.equations import check_problem, equation_on
-from enumsol.continuation.parameter_path import affine_friction
+from enumsol.continuation.parameter_path import AffinePath, CallablePath, SmoothPath, affine_friction
 from enumsol.continuation.path_data import PathData
+from enumsol.continuation.space_equation import SpaceEquation
 from enumsol.errors import InvalidArgumentError
-from enumsol.model.problem import ContactProblem
+from enumsol.model.problem import ContactProblem, check_is_problem
 from enumsol.support.arguments import alpha_value, instance_of, unbounded_interval
 from enumsol.support.array_arguments import real_array
 
 if TYPE_CHECKING:
-    from enumsol.continuation.parameter_path import SmoothPath
-    from enumsol.continuation.scaled_equation import Vector
-    from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.support.arguments import AlphaLike
+    from enumsol.continuation.scaled_equation import ScaledEquation
+    from enumsol.model.problem3d import AnyProblem
+    from enumsol.support.array_types import AlphaLike, Floats
+
+
+def check_problem(problem: Any, smooth_path: SmoothPath | None) -> None:
+    """Refuse what continuation does not take.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The problem is none, or the smooth path is none.
+    """
+    check_is_problem(problem)
+    if smooth_path is not None:
+        instance_of(smooth_path, SmoothPath, "smooth_path")
+
+
+def equation_on(
+    problem: Any,
+    smooth_path: SmoothPath | None,
+    start: float,
+    interval: tuple[float, float] = (-math.inf, math.inf),
+    r: float | None = None,
+    alpha_scale: float = 1.0,
+) -> ScaledEquation:
+    """The equation of a problem, on its own affine path or a smooth one; for the arguments see ScaledEquation."""
+    path = AffinePath(problem) if smooth_path is None else CallablePath(problem, smooth_path, start)
+    kind = CondensedEquation if isinstance(problem, ContactProblem) else SpaceEquation
+    return kind(path, interval, start, r, alpha_scale)
+
 
 #: The default alpha scale is this fraction of the interval.
 ALPHA_FRACTION = 0.05
@@ -38,7 +66,7 @@ class Start:
 
     def __init__(
         self,
-        problem: ContactProblem | ContactProblem3D,
+        problem: AnyProblem,
         start: Any,
         interval: tuple[AlphaLike, AlphaLike] | None,
         options: ContinuationOptions | None,
@@ -72,7 +100,7 @@ class Start:
                 f"by {change:.1e} of their size; expected at least {RESOLUTION:g} (branch_graph works without rounding)"
             )
 
-    def _on_solution(self, alpha: float, forces: Vector, rigid: Vector) -> Vector:
+    def _on_solution(self, alpha: float, forces: Floats, rigid: Floats) -> Floats:
         equation = self.equation
         x = equation.point(alpha, forces, rigid)
         if np.any(np.abs(rigid) > equation.reach):
@@ -91,7 +119,7 @@ class Start:
         return x
 
 
-def _start_values(start: Any, tangential: tuple[int, ...], modes: int) -> tuple[float, Vector, Vector]:
+def _start_values(start: Any, tangential: tuple[int, ...], modes: int) -> tuple[float, Floats, Floats]:
     """alpha, the forces (m,) and rigid coordinates (modes,) of a start whose lambda_t has that shape."""
     values = (*_NAMES, *((_RIGID,) if modes else ()))
     if isinstance(start, tuple) and len(start) == len(values):
@@ -111,10 +139,7 @@ def _start_values(start: Any, tangential: tuple[int, ...], modes: int) -> tuple[
 
 
 def _interval(
-    problem: ContactProblem | ContactProblem3D,
-    interval: tuple[AlphaLike, AlphaLike] | None,
-    start: float,
-    smooth_path: SmoothPath | None,
+    problem: AnyProblem, interval: tuple[AlphaLike, AlphaLike] | None, start: float, smooth_path: SmoothPath | None
 ) -> tuple[float, float]:
     affine = smooth_path is None or smooth_path.F is None
     if interval is None:
@@ -131,7 +156,7 @@ def _interval(
     return low, high
 
 
-def friction_domain(problem: ContactProblem | ContactProblem3D) -> tuple[float, float]:
+def friction_domain(problem: AnyProblem) -> tuple[float, float]:
     """The range of alpha in which no coefficient F0 + alpha F1 is negative."""
     F0, F1 = affine_friction(problem)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.continuation.scaled_equation import STATUS_TOLERANCE
+from enumsol.continuation.scaled_equation import STATUS_TOLERANCE, ScaledEquation
 from enumsol.errors import TooLargeError
 from enumsol.roots.local_branch import MAX_SELECTIONS
 from enumsol.support.immutable import Sealed
@@ -17,10 +17,8 @@ from enumsol.support.immutable import Sealed
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
-
-    from enumsol.continuation.scaled_equation import Codes, ScaledEquation, Vector
     from enumsol.model.statuses import ContactStatus
+    from enumsol.support.array_types import Codes, Floats, Mask
 
 #: A singular value of a selection's balanced gradient below this fraction of the largest counts as zero.
 RANK_TOLERANCE = 1e-10
@@ -54,10 +52,10 @@ class Tangent(Sealed):
 
     statuses: tuple[ContactStatus, ...]
     dalpha: float
-    dlambda: NDArray[np.float64]
+    dlambda: Floats
     orientation: int
     codes: Codes
-    vector: NDArray[np.float64]
+    vector: Floats
 
     def __repr__(self) -> str:
         names = ", ".join(status.value for status in self.statuses[:8])
@@ -65,14 +63,14 @@ class Tangent(Sealed):
         return f"Tangent(dalpha={self.dalpha:+.3g}, orientation={self.orientation:+d}, [{names}])"
 
 
-def orientation(equation: ScaledEquation, codes: Codes, x: Vector, tangent: Vector) -> int:
+def orientation(equation: ScaledEquation, codes: Codes, x: Floats, tangent: Floats) -> int:
     """Sign of det [grad H; tangent'] in a selection: +1, -1, or 0 where the matrix is singular."""
     J = equation.jacobian(equation.selection(codes), x)
     bordered = np.vstack([J, equation.metric @ tangent])
     return int(np.linalg.slogdet(bordered)[0])
 
 
-def curve_tangent(equation: ScaledEquation, codes: Codes, x: Vector, sign: int) -> Vector | None:
+def curve_tangent(equation: ScaledEquation, codes: Codes, x: Floats, sign: int) -> Floats | None:
     """Unit tangent of a selection's solution curve with the given orientation; None where it is not unique."""
     J = equation.jacobian(equation.selection(codes), x)
     if not np.all(np.isfinite(J)):
@@ -89,7 +87,7 @@ def curve_tangent(equation: ScaledEquation, codes: Codes, x: Vector, sign: int) 
 
 
 def admissible_tangents(
-    equation: ScaledEquation, x: Vector, tolerance: float = STATUS_TOLERANCE
+    equation: ScaledEquation, x: Floats, tolerance: float = STATUS_TOLERANCE
 ) -> tuple[Tangent, ...]:
     """All directions in which a solution curve leaves x, in the order of their selections.
 
@@ -119,7 +117,7 @@ def admissible_tangents(
     return tuple(found)
 
 
-def describe(equation: ScaledEquation, codes: Codes, x: Vector, vector: Vector) -> Tangent:
+def describe(equation: ScaledEquation, codes: Codes, x: Floats, vector: Floats) -> Tangent:
     """The tangent in the user's units, with its orientation."""
     p = equation.p
     sign = orientation(equation, codes, x, vector)
@@ -139,14 +137,14 @@ def describe(equation: ScaledEquation, codes: Codes, x: Vector, vector: Vector) 
     )
 
 
-def _leaves_into(equation: ScaledEquation, codes: Codes, x: Vector, vector: Vector, tolerance: float) -> bool:
+def _leaves_into(equation: ScaledEquation, codes: Codes, x: Floats, vector: Floats, tolerance: float) -> bool:
     """Whether the conditions of the selection that vanish at x do not become negative along the vector."""
     at_zero = equation.slacks(codes, x) <= tolerance
     rates = equation.slack_rates(codes, x, vector)
     return bool(np.all(rates[at_zero] >= -RATE_TOLERANCE))
 
 
-def _balanced(J: Vector) -> tuple[Vector, Vector]:
+def _balanced(J: Floats) -> tuple[Floats, Floats]:
     """Rows and columns of size one at most, and the columns' factors: ranks do not depend on how large F is.
 
     Kernel vectors of J are the factors times those of the balanced matrix. Columns are not scaled up: one of nearly
@@ -164,7 +162,7 @@ def _balanced(J: Vector) -> tuple[Vector, Vector]:
     return scaled, columns
 
 
-def _kernel(J: Vector) -> Vector:
+def _kernel(J: Floats) -> Floats:
     """Orthonormal basis of the kernel."""
     balanced, scale = _balanced(J)
     _, sigma, Vt = np.linalg.svd(balanced)
@@ -173,7 +171,7 @@ def _kernel(J: Vector) -> Vector:
     return np.asarray(np.linalg.qr(basis)[0])
 
 
-def _directions(equation: ScaledEquation, codes: Codes, x: Vector) -> Iterator[Vector]:
+def _directions(equation: ScaledEquation, codes: Codes, x: Floats) -> Iterator[Floats]:
     """Unit vectors, up to sign, along which the selection's solution set leaves x (none when it is a surface)."""
     rows = equation.selection(codes)
     J = equation.jacobian(rows, x)
@@ -188,9 +186,7 @@ def _directions(equation: ScaledEquation, codes: Codes, x: Vector) -> Iterator[V
             yield vector / equation.norm(vector)
 
 
-def _second_derivative(
-    equation: ScaledEquation, rows: NDArray[np.bool_], x: Vector, left: Vector, kernel: Vector
-) -> Vector:
+def _second_derivative(equation: ScaledEquation, rows: Mask, x: Floats, left: Floats, kernel: Floats) -> Floats:
     """The bifurcation form left' D2H(x)[a, b] on a two-dimensional kernel, by central differences of the gradient."""
     form = np.empty((2, 2))
     for k in range(2):
@@ -200,7 +196,7 @@ def _second_derivative(
     return np.asarray(0.5 * (form + form.T))
 
 
-def _isotropic_lines(form: Vector) -> Iterator[Vector]:
+def _isotropic_lines(form: Floats) -> Iterator[Floats]:
     """Unit vectors t with t' form t = 0, up to sign; none for a definite form or a zero one."""
     values, vectors = np.linalg.eigh(form)
     if np.max(np.abs(values)) <= RATE_TOLERANCE or values[0] * values[1] > 0:

@@ -8,13 +8,13 @@ before.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enumsol.continuation.corrector import smooth_newton
-from enumsol.continuation.scaled_equation import STATUS_TOLERANCE
+from enumsol.continuation.scaled_equation import STATUS_TOLERANCE, ScaledEquation
 from enumsol.continuation.tangents import (
     RATE_TOLERANCE,
     SAME_TANGENT,
@@ -23,12 +23,7 @@ from enumsol.continuation.tangents import (
     curve_tangent,
     orientation,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from enumsol.continuation.scaled_equation import Codes, ScaledEquation, Vector
-
+from enumsol.support.array_types import Codes, Floats
 
 #: Conditions within this of zero hold with equality at a located transition point.
 ACTIVE_TOLERANCE = 1e-8
@@ -46,9 +41,9 @@ LEAST_COSINE = 0.5
 class CurvePoint:
     """A point of a selection's solution curve with the curve's tangent in the direction of travel."""
 
-    x: Vector
+    x: Floats
     codes: Codes
-    tangent: Vector
+    tangent: Floats
 
 
 @dataclass(frozen=True)
@@ -132,7 +127,7 @@ def turning_point(equation: ScaledEquation, start: CurvePoint, end: CurvePoint, 
     return found.get(share)
 
 
-def _hermite_minimum(s0: Vector, s1: Vector, d0: Vector, d1: Vector) -> Vector:
+def _hermite_minimum(s0: Floats, s1: Floats, d0: Floats, d1: Floats) -> Floats:
     """Minima over [0, 1] of the cubics with these end values and derivatives."""
     a, b = 2 * (s0 - s1) + d0 + d1, 3 * (s1 - s0) - 2 * d0 - d1
     least = np.minimum(s0, s1)
@@ -189,7 +184,7 @@ def confirm(equation: ScaledEquation, start: CurvePoint, end: CurvePoint, sign: 
 
 
 def _vanishing(
-    equation: ScaledEquation, point: CurvePoint, size: Callable[[Vector], Vector]
+    equation: ScaledEquation, point: CurvePoint, size: Callable[[Floats], Floats]
 ) -> Iterator[tuple[int, int]]:
     """Slacks that fall along the tangent, in the order of the distances ``size`` of the slack by its rate."""
     slacks = equation.slacks(point.codes, point.x)
@@ -246,7 +241,7 @@ def continuations(equation: ScaledEquation, arrival: CurvePoint, sign: int) -> t
 _RANK = 1e-10
 
 
-def selection_distance(equation: ScaledEquation, codes: Codes, x: Vector) -> float:
+def selection_distance(equation: ScaledEquation, codes: Codes, x: Floats) -> float:
     """Distance of x from the solutions of one selection at the alpha of x; infinite when it has none there.
 
     The solutions are x + y for all y that solve the selection's equations and keep its conditions, both affine in y.
@@ -271,7 +266,7 @@ def selection_distance(equation: ScaledEquation, codes: Codes, x: Vector) -> flo
     return math.hypot(float(np.linalg.norm(step)), _least_norm(rates, needed))
 
 
-def _least_norm(matrix: Vector, bounds: Vector) -> float:
+def _least_norm(matrix: Floats, bounds: Floats) -> float:
     """Norm of the shortest z with matrix @ z >= bounds; infinite when there is none."""
     if not matrix.shape[1] or np.all(bounds <= 0):
         return 0.0 if np.all(bounds <= 0) else math.inf

@@ -7,6 +7,7 @@ from .assembly import (
     stiffness as stiffness,
     triangle_stiffness as triangle_stiffness,
 )
+from .bases import cell_stresses as cell_stresses
 from .basis_problems import basis_contact_problem as basis_contact_problem
 from .mesh_checks import lame as lame
 from .mesh_files import read_mesh as read_mesh, read_solid as read_solid
@@ -18,13 +19,14 @@ from .mesh_problems import (
 )
 from .meshes import (
     Mesh as Mesh,
+    PartedMesh as PartedMesh,
+    SolidMesh as SolidMesh,
     blocks as blocks,
     box as box,
     edges_along as edges_along,
     rectangle as rectangle,
     trapezoid as trapezoid,
 )
-from .named_parts import PartedMesh as PartedMesh, SolidMesh as SolidMesh
 from .norms import MeshNorms as MeshNorms, h1_norms as h1_norms
 from .scenes import Scene as Scene
 from .solid_problems import (
@@ -33,4 +35,3 @@ from .solid_problems import (
     solid_contact_problem as solid_contact_problem,
     solid_stiffness as solid_stiffness,
 )
-from .stresses import cell_stresses as cell_stresses

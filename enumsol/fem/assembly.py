@@ -18,18 +18,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
+from enumsol.fem import mesh_checks
 from enumsol.fem.bases import FLAT, nodal_basis
-from enumsol.fem.mesh_checks import (
-    elements,
-    held_mask,
-    lame_coefficients,
-    nodal_vectors,
-    node_numbers,
-    positions,
-    spring_stiffnesses,
-    unit_vectors,
-    vectors_of_all,
-)
 from enumsol.fem.restrained import Supports, axes_of, gathered, movable, plain_dofs, problem_of
 from enumsol.model.cells import numbers_of_nodes
 from enumsol.model.mesh import BodyMesh
@@ -72,7 +62,7 @@ def stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, float]) ->
     >>> fem.stiffness(mesh.points, mesh.triangles, lame=(1, 1)).shape
     (12, 12)
     """
-    lam, mu = lame_coefficients(lame, 2)
+    lam, mu = mesh_checks.lame_coefficients(lame, 2)
     return nodal_basis(*plane_mesh(points, cells)).stiffness(lam, mu)
 
 
@@ -84,8 +74,8 @@ def plane_mesh(points: ArrayLike, cells: ArrayLike) -> tuple[Floats, Integers]:
     InvalidArgumentError
         They are not of the form that `stiffness` takes.
     """
-    nodes = positions(points, 2)
-    return nodes, elements(cells, "cells", numbers_of_nodes(2), len(nodes))
+    nodes = mesh_checks.positions(points, 2)
+    return nodes, mesh_checks.elements(cells, "cells", numbers_of_nodes(2), len(nodes))
 
 
 def triangle_stiffness(corners: ArrayLike, lame: tuple[float, float]) -> Floats:
@@ -109,8 +99,8 @@ def triangle_stiffness(corners: ArrayLike, lame: tuple[float, float]) -> Floats:
     >>> fem.triangle_stiffness([[0, 0], [1, 0], [0, 1]], lame=(1, 1))[0].tolist()
     [2.0, 1.0, -1.5, -0.5, -0.5, -0.5]
     """
-    lam, mu = lame_coefficients(lame, 2)
-    nodes = positions(corners, 2)
+    lam, mu = mesh_checks.lame_coefficients(lame, 2)
+    nodes = mesh_checks.positions(corners, 2)
     if nodes.shape != (3, 2):
         raise InvalidArgumentError(f"corners has shape {nodes.shape}; expected (3, 2)")
     doubled = float(abs(np.linalg.det(nodes[1:] - nodes[0])))
@@ -147,9 +137,9 @@ def edge_forces(points: ArrayLike, edges: ArrayLike, traction: ArrayLike) -> Flo
     >>> fem.edge_forces([[0, 0], [2, 0]], [[0, 1]], traction=(0, -1)).tolist()
     [[0.0, -1.0], [0.0, -1.0]]
     """
-    nodes = positions(points, 2)
-    ends = elements(edges, "edges", (2, 3), len(nodes))
-    density = vectors_of_all(traction, "traction", (len(ends), 2))
+    nodes = mesh_checks.positions(points, 2)
+    ends = mesh_checks.elements(edges, "edges", (2, 3), len(nodes))
+    density = mesh_checks.vectors_of_all(traction, "traction", (len(ends), 2))
     if ends.shape[1] == 3:
         return gathered(ends, _quadratic_shares(nodes[ends]), density, len(nodes))
     lengths = np.linalg.norm(nodes[ends[:, 1]] - nodes[ends[:, 0]], axis=1)
@@ -188,7 +178,7 @@ def body_forces(points: ArrayLike, cells: ArrayLike, density: ArrayLike) -> Floa
     [[0.0, -1.0], [0.0, -1.0], [0.0, -1.0]]
     """
     nodes, bodies = plane_mesh(points, cells)
-    values = vectors_of_all(density, "density", (len(bodies), 2))
+    values = mesh_checks.vectors_of_all(density, "density", (len(bodies), 2))
     if bodies.shape[1] == 3:
         corners = nodes[bodies]
         third = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6.0
@@ -264,20 +254,20 @@ def contact_problem(
     (24, 4)
     """
     nodes, bodies = plane_mesh(points, cells)
-    supports = Supports.held(held_mask(held, nodes.shape))
-    touching = node_numbers(contact, "contact", len(nodes))
+    supports = Supports.held(mesh_checks.held_mask(held, nodes.shape))
+    touching = mesh_checks.node_numbers(contact, "contact", len(nodes))
     if np.any(entirely := np.all(supports.fixed[touching], axis=1)):
         node = int(touching[np.argmax(entirely)])
         raise InvalidArgumentError(f"contact names node {node}, which is held; expected free nodes only")
     A = stiffness(nodes, bodies, lame)
     if springs is not None:
-        A = sp.csc_array(A + sp.diags_array(spring_stiffnesses(springs, nodes.shape).ravel()))
-    normal = unit_vectors(vectors_of_all(normals, "normals", (len(touching), 2)), "normals")
+        A = sp.csc_array(A + sp.diags_array(mesh_checks.spring_stiffnesses(springs, nodes.shape).ravel()))
+    normal = mesh_checks.unit_vectors(mesh_checks.vectors_of_all(normals, "normals", (len(touching), 2)), "normals")
     contact_nodes = movable(touching, normal, supports)
     problem = problem_of(
         A,
-        nodal_vectors(forces, "forces", nodes.shape),
-        None if forces_slope is None else nodal_vectors(forces_slope, "forces_slope", nodes.shape),
+        mesh_checks.nodal_vectors(forces, "forces", nodes.shape),
+        None if forces_slope is None else mesh_checks.nodal_vectors(forces_slope, "forces_slope", nodes.shape),
         plain_dofs(nodes.shape),
         contact_nodes,
         axes_of(tangents, contact_nodes.normals),

@@ -16,8 +16,7 @@ from enumsol.support.array_arguments import plain_array, real_array, real_matrix
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from enumsol.model.problem import ContactProblem
-    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
 
 #: Of two places of one node, as a share of the extent of the mesh.
@@ -39,7 +38,7 @@ def basis_contact_problem(
     forces_slope: ArrayLike | None = None,
     gap: ArrayLike | Callable[[Floats], float] = 0.0,
     **more: Any,
-) -> ContactProblem | ContactProblem3D:
+) -> AnyProblem:
     """Contact problem of a body that scikit-fem assembled, in 2D or 3D; the held degrees of freedom are eliminated.
 
     ``u`` of the problem and of its roots holds the degrees of freedom of the basis that are not held, in their order.

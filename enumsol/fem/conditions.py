@@ -5,7 +5,7 @@ Each function checks its argument, names it in messages, and gives plain arrays 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -19,10 +19,8 @@ from enumsol.support.arguments import finite_number, one_of, shown
 from enumsol.support.array_arguments import real_array, short_vector
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from enumsol.fem.bases import NodalBasis
-    from enumsol.fem.named_parts import PartedMesh
+    from enumsol.fem.meshes import PartedMesh
     from enumsol.support.array_types import Floats, Integers, Mask
 
 #: Positions in a plane of symmetry may differ from it by this share of the extent of the body.

@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.basis_problems import outward_normal, pressed
-from enumsol.fem.conditions import Obstacle
+from enumsol.fem.conditions import Held, Obstacle
 from enumsol.fem.mesh_checks import unit_vectors
 from enumsol.fem.pairs import Pair, faced
 from enumsol.fem.restrained import ContactNodes, means_of_nodes, movable
@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.fem.bases import NodalBasis
-    from enumsol.fem.conditions import Held
-    from enumsol.fem.named_parts import PartedMesh
+    from enumsol.fem.meshes import PartedMesh
     from enumsol.support.array_types import Floats, Integers
 
 #: Cosine of the angle from which on a normal of the boundary points away from an obstacle, but for rounding.

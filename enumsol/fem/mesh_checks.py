@@ -5,16 +5,14 @@ Each function gives the value in a plain type and raises InvalidArgumentError fo
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.arguments import finite_number, one_of, positive_number, shown
 from enumsol.support.array_arguments import plain_array, real_array, short_vector
-
-if TYPE_CHECKING:
-    from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
+from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
 
 #: Largest coordinates of which areas and volumes are computed, by dimension.
 LARGEST_COORDINATE = {2: 1e150, 3: 1e100}

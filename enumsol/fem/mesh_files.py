@@ -7,27 +7,24 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 import struct
 import warnings
 import zlib
+from collections.abc import Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.fem.mesh_checks import positions
-from enumsol.fem.named_parts import ALL, PartedMesh, SolidMesh
+from enumsol.fem.meshes import ALL, PartedMesh, SolidMesh
 from enumsol.model.cells import KINDS, TRIANGLES, as_quadrilaterals, boundary_facets, facet_rows, numbers_of_nodes
 from enumsol.support.arguments import file_path, shown
+from enumsol.support.array_types import Floats, Integers, NDArray
 from enumsol.support.files import unreadable
 from enumsol.support.messages import shortened
-
-if TYPE_CHECKING:
-    import os
-    from collections.abc import Sequence
-
-    from enumsol.support.array_types import Floats, Integers, NDArray
 
 #: Third coordinates of a plane mesh may differ by this share of its extent.
 _PLANE = 1e-9

@@ -18,9 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
     from pathlib import Path
 
-    from enumsol.fem.named_parts import PartedMesh
-    from enumsol.model.problem import ContactProblem
-    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.fem.meshes import PartedMesh
+    from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import ArrayLike
 
     Names = str | Sequence[str]
@@ -60,7 +59,7 @@ def mesh_problem(
     obstacle: Mapping[str, Sequence[float]] | None = None,
     max_rigid_displacement: float | Literal["auto"] | None = None,
     groups: str | None = None,
-) -> ContactProblem | ContactProblem3D:
+) -> AnyProblem:
     """Contact problem of a body whose mesh has named parts.
 
     `mesh_scene` describes in words and in a picture what the arguments stand for.
@@ -196,7 +195,7 @@ def mesh_scene(mesh: PartedMesh | str | os.PathLike[str] | Any, **options: Any) 
     return Scene.of(mesh, {name: options.get(name, of.default) for name, of in known if name != "mesh"})
 
 
-def read_mesh_problem(path: str | os.PathLike[str]) -> ContactProblem | ContactProblem3D:
+def read_mesh_problem(path: str | os.PathLike[str]) -> AnyProblem:
     r"""Contact problem that a TOML file describes: the options of `mesh_problem`, with ``mesh`` a path from its folder.
 
     In the file, ``pairs`` may also be called ``contact_pair``.

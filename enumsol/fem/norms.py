@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -14,9 +14,7 @@ from enumsol.fem.bases import nodal_basis
 from enumsol.model.problem3d import ContactProblem3D
 from enumsol.support.arguments import instance_of
 from enumsol.support.array_arguments import vector_of
-
-if TYPE_CHECKING:
-    from enumsol.support.array_types import ArrayLike, Floats
+from enumsol.support.array_types import ArrayLike, Floats
 
 #: Columns that are solved for at a time.
 _BLOCK = 64

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,9 +11,7 @@ import scipy.sparse as sp
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.cells import KINDS
 from enumsol.support.arguments import finite_number, shown
-
-if TYPE_CHECKING:
-    from enumsol.support.array_types import Floats, Integers, Mask
+from enumsol.support.array_types import Floats, Integers, Mask
 
 #: A point may lie beyond the edge of a facet by this share of the facet: at ends that meet, but for rounding.
 _BEYOND = 1e-6

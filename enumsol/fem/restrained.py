@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from enumsol.model.mesh import BodyMesh
-    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import Floats, Integers, Mask
 
 #: Components of unit normals below this are rounding of a right angle.
@@ -217,7 +217,7 @@ def problem_of(
     mesh: Callable[[Integers], BodyMesh] | None = None,
     modes: Floats | None = None,
     **more: Any,
-) -> ContactProblem | ContactProblem3D:
+) -> AnyProblem:
     """The problem of a body with these contact rows.
 
     Parameters

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines
+from enumsol.support.array_types import Floats, Integers
 from enumsol.support.messages import counted
 from enumsol.support.plotting import new_figure
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from enumsol.support.array_types import Floats, Integers
 
 #: Width of the column of titles.
 _TITLES = 10

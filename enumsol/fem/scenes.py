@@ -5,7 +5,7 @@ A body is of one material, or of one for each of its named parts.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -14,39 +14,22 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.bases import nodal_basis
-from enumsol.fem.conditions import (
-    Held,
-    by_part,
-    check_held,
-    holding,
-    names_of,
-    part_forces,
-    part_springs,
-    pieces_of,
-    rigid_modes_of,
-)
-from enumsol.fem.contacts import contacts_of
+from enumsol.fem import conditions
+from enumsol.fem.bases import NodalBasis, nodal_basis
+from enumsol.fem.contacts import Contacts, Group, contacts_of
 from enumsol.fem.mesh_checks import lame, unit_vectors
 from enumsol.fem.mesh_files import read_mesh
-from enumsol.fem.named_parts import PartedMesh
+from enumsol.fem.meshes import PartedMesh
 from enumsol.fem.pairs import Pair
-from enumsol.fem.restrained import axes_of, plain_dofs, problem_of
+from enumsol.fem.restrained import ContactNodes, axes_of, plain_dofs, problem_of
 from enumsol.fem.scene_checks import refuse_pairs, refuse_walls, scene_notes
-from enumsol.fem.scene_text import described, sections_of
+from enumsol.fem.scene_text import described, draw_scene, sections_of
 from enumsol.model.mesh import BodyMesh
 from enumsol.support.arguments import exact_number, finite_number, one_of, positive_number, shown
 from enumsol.support.array_arguments import short_vector
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from enumsol.fem.bases import NodalBasis
-    from enumsol.fem.conditions import Piece
-    from enumsol.fem.contacts import Contacts, Group
-    from enumsol.fem.restrained import ContactNodes
-    from enumsol.model.problem import ContactProblem
-    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import Floats
 
 #: Options that say what a part of the boundary is for.
@@ -76,13 +59,13 @@ class Scene:
     mesh: PartedMesh
     options: Mapping[str, Any]
     body: NodalBasis
-    held: Held
+    held: conditions.Held
     contacts: Contacts
     forces: Floats
     slope: Floats
     springs: sp.csc_array
     lame: Floats
-    pieces: list[Piece]
+    pieces: list[conditions.Piece]
 
     @classmethod
     def of(cls, source: Any, options: Mapping[str, Any]) -> Scene:
@@ -98,13 +81,13 @@ class Scene:
         thickness = thickness_of(mesh, options["thickness"])
         body = replace(nodal_basis(mesh.points, mesh.cells), thickness=thickness)
         held = _held(mesh, options["clamp"], options["symmetry"], options["displacement"])
-        parts, pairs = names_of(options["contact"], "contact"), Pair.all_of(options["pairs"])
+        parts, pairs = conditions.names_of(options["contact"], "contact"), Pair.all_of(options["pairs"])
         contacts = contacts_of(body, mesh, parts, pairs, held, options["obstacle"])
-        forces = part_forces(body, mesh, options["load"], options["pressure"])
+        forces = conditions.part_forces(body, mesh, options["load"], options["pressure"])
         if options["body_force"] is not None:
             forces = forces + body.volume_forces(body_force_of(mesh, options["body_force"]))
-        slope = part_forces(body, mesh, options["load_slope"], options["pressure_slope"], "_slope")
-        springs, pieces = part_springs(body, mesh, options["spring"]), pieces_of(mesh)
+        slope = conditions.part_forces(body, mesh, options["load_slope"], options["pressure_slope"], "_slope")
+        springs, pieces = conditions.part_springs(body, mesh, options["spring"]), conditions.pieces_of(mesh)
         scene = cls(mesh, options, body, held, contacts, forces, slope, springs, coefficients, pieces)
         refuse_walls(scene)
         refuse_pairs(scene)
@@ -129,7 +112,7 @@ class Scene:
     @cached_property
     def hold(self) -> sp.csc_array:
         """A stiffness of supports and springs, (d N, d N)."""
-        return holding(self.held.supports, self.springs)
+        return conditions.holding(self.held.supports, self.springs)
 
     @cached_property
     def notes(self) -> list[str]:
@@ -141,7 +124,7 @@ class Scene:
         """What is printed of the scene, lines by their titles."""
         return sections_of(self)
 
-    def problem(self) -> ContactProblem | ContactProblem3D:
+    def problem(self) -> AnyProblem:
         """The contact problem; see `mesh_problem`.
 
         Raises
@@ -180,11 +163,11 @@ class Scene:
         """Rigid motions that nothing holds, if a bound for them is given; the bound joins the other arguments."""
         largest, about = self.options["max_rigid_displacement"], (self.pieces, self.mesh.points, self.hold)
         if largest is None:
-            check_held(*about)
+            conditions.check_held(*about)
             return None
         if largest != "auto":
             more["max_rigid_displacement"] = positive_number(largest, "max_rigid_displacement")
-        modes = rigid_modes_of(*about)
+        modes = conditions.rigid_modes_of(*about)
         if modes is None:
             more.pop("max_rigid_displacement", None)
         return modes
@@ -197,8 +180,6 @@ class Scene:
         MissingDependencyError
             matplotlib is not installed.
         """
-        from enumsol.fem.scene_text import draw_scene  # matplotlib takes a while
-
         return draw_scene(self)
 
     def uses(self, part: str) -> list[str]:
@@ -217,13 +198,13 @@ def _names(value: Any) -> Sequence[str]:
     return [value] if isinstance(value, str) else () if value is None else list(value)
 
 
-def _held(mesh: PartedMesh, clamp: Any, symmetry: Any, displacement: Any) -> Held:
-    held = Held(mesh)
-    for part in names_of(clamp, "clamp"):
+def _held(mesh: PartedMesh, clamp: Any, symmetry: Any, displacement: Any) -> conditions.Held:
+    held = conditions.Held(mesh)
+    for part in conditions.names_of(clamp, "clamp"):
         held.clamp(part)
-    for part in names_of(symmetry, "symmetry"):
+    for part in conditions.names_of(symmetry, "symmetry"):
         held.mirror(part)
-    for part, value in by_part(displacement, "displacement").items():
+    for part, value in conditions.by_part(displacement, "displacement").items():
         held.displace(part, value)
     return held
 
@@ -327,7 +308,7 @@ def body_force_of(mesh: PartedMesh, value: Any) -> Floats:
     if not isinstance(value, Mapping):
         return np.tile(short_vector(value, "body_force", dimension), (len(mesh.cells), 1))
     density = np.zeros((len(mesh.cells), dimension))
-    for part, force in by_part(value, "body_force").items():
+    for part, force in conditions.by_part(value, "body_force").items():
         density[mesh.body(part)] += short_vector(force, f"body_force of {part}", dimension)
     return density
 
@@ -338,7 +319,7 @@ def _of_cells(mesh: PartedMesh, value: Any, name: str, read: Callable[[Any, str]
         return read(value, name)
     found: list[T | None] = [None] * len(mesh.cells)
     of_part: dict[int, str] = {}
-    for part, given in by_part(value, name).items():
+    for part, given in conditions.by_part(value, name).items():
         own = read(given, f"{name} of {part}")
         for row in mesh.body(part).tolist():
             if found[row] is not None and found[row] != own:
@@ -369,7 +350,7 @@ def of_rows(value: Any, name: str, parts: Sequence[str], read: Callable[[Any, st
     """
     if not isinstance(value, Mapping):
         return np.array(read(value, name))
-    given = {part: read(own, f"{name} of {part}") for part, own in by_part(value, name).items()}
+    given = {part: read(own, f"{name} of {part}") for part, own in conditions.by_part(value, name).items()}
     present = list(dict.fromkeys(parts))
     for part in given:
         if part not in present:

@@ -5,17 +5,13 @@ Corners of hexahedra and quadrilaterals are in the order of VTK: around the bott
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.bases import FLAT
 from enumsol.fem.mesh_checks import check_every_node_is_used, elements, positions
 from enumsol.model.cells import HEXAHEDRON, KINDS, boundary_facets, facet_rows
-
-if TYPE_CHECKING:
-    from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
+from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
 
 _GAUSS_2 = (0.5 - np.sqrt(1 / 12), 0.5 + np.sqrt(1 / 12)), (0.5, 0.5)
 _GAUSS_3 = (0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15)), (5 / 18, 8 / 18, 5 / 18)

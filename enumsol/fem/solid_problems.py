@@ -15,38 +15,18 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.fem import mesh_checks, restrained
 from enumsol.fem.bases import nodal_basis
-from enumsol.fem.mesh_checks import (
-    elements,
-    held_mask,
-    lame_coefficients,
-    nodal_vectors,
-    positions,
-    spring_stiffnesses,
-    unit_vectors,
-    vectors_of_all,
-)
 from enumsol.fem.meshes import blocks
-from enumsol.fem.restrained import (
-    ContactRows,
-    Supports,
-    default_axes,
-    displacements_along,
-    gathered,
-    means_of_nodes,
-    plain_dofs,
-    problem_of,
-)
 from enumsol.fem.solid_geometry import facet_quadrature, facet_vectors, outward, shape_volumes, solid_mesh
 from enumsol.model.mesh import BodyMesh
-from enumsol.model.slip_mean import SlipMean
+from enumsol.model.problem3d import ContactProblem3D, SlipMean
 from enumsol.support.arguments import one_of, positive_integer
 from enumsol.support.array_arguments import plain_array, real_array
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from enumsol.model.problem3d import ContactProblem3D
     from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
 
     Field = ArrayLike | Callable[[Floats], ArrayLike]
@@ -166,9 +146,9 @@ def on_nodes(surface: ContactSurface, held: Mask) -> Multipliers:
     if not len(free):
         raise InvalidArgumentError("contact has held nodes only; expected free ones")
     facets, shares, count = surface.facets, surface.shares, len(surface.points)
-    areas = gathered(facets, shares, np.ones((len(facets), 1)), count)[free, 0]
-    vectors = gathered(facets, np.ones_like(shares), surface.vectors, count)[free]
-    return Multipliers(means_of_nodes(free, count), areas, surface.points[free], vectors, free.tolist())
+    areas = restrained.gathered(facets, shares, np.ones((len(facets), 1)), count)[free, 0]
+    vectors = restrained.gathered(facets, np.ones_like(shares), surface.vectors, count)[free]
+    return Multipliers(restrained.means_of_nodes(free, count), areas, surface.points[free], vectors, free.tolist())
 
 
 def on_patches(surface: ContactSurface, patches: ArrayLike, held: Mask) -> Multipliers:
@@ -242,15 +222,15 @@ def local_axes(multipliers: Multipliers, normals: ArrayLike | None, axes: Any) -
     """
     shape = multipliers.places.shape
     if normals is None:
-        normal = unit_vectors(multipliers.vectors, "normals of the contact surface")
+        normal = mesh_checks.unit_vectors(multipliers.vectors, "normals of the contact surface")
     else:
-        normal = unit_vectors(vectors_of_all(normals, "normals", shape), "normals")
+        normal = mesh_checks.unit_vectors(mesh_checks.vectors_of_all(normals, "normals", shape), "normals")
         inward = np.sum(normal * multipliers.vectors, axis=1) <= 0
         if np.any(inward):
             k = int(np.argmax(inward))
             raise InvalidArgumentError(f"normals row {k} does not point out of the body; expected outward normals")
     if axes is None:
-        return normal, *default_axes(normal)
+        return normal, *restrained.default_axes(normal)
     both = axes if isinstance(axes, tuple) and len(axes) == 2 else (axes,)
     given = [_field(field, multipliers.places) for field in both]
     triples = [normal, *given]
@@ -266,7 +246,7 @@ def local_axes(multipliers: Multipliers, normals: ArrayLike | None, axes: Any) -
 def _field(value: Any, places: Floats) -> Floats:
     if callable(value):
         value = [value(place) for place in places]
-    return vectors_of_all(real_array(value, "axes", error=InvalidArgumentError), "axes", places.shape)
+    return mesh_checks.vectors_of_all(real_array(value, "axes", error=InvalidArgumentError), "axes", places.shape)
 
 
 def _not_orthonormal(i: int, j: int, row: int, one: Floats, two: Floats) -> InvalidArgumentError:
@@ -313,7 +293,7 @@ def solid_stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, floa
     >>> fem.solid_stiffness(mesh.points, mesh.cells, lame=(1, 1)).shape
     (36, 36)
     """
-    lam, mu = lame_coefficients(lame, 3)
+    lam, mu = mesh_checks.lame_coefficients(lame, 3)
     return nodal_basis(*solid_mesh(points, cells)).stiffness(lam, mu)
 
 
@@ -340,8 +320,8 @@ def solid_body_forces(points: ArrayLike, cells: ArrayLike, density: ArrayLike) -
     [0.0, 0.0, -8.0]
     """
     nodes, bodies = solid_mesh(points, cells)
-    values = vectors_of_all(density, "density", (len(bodies), 3))
-    return gathered(bodies, shape_volumes(nodes, bodies), values, len(nodes))
+    values = mesh_checks.vectors_of_all(density, "density", (len(bodies), 3))
+    return restrained.gathered(bodies, shape_volumes(nodes, bodies), values, len(nodes))
 
 
 def facet_forces(points: ArrayLike, facets: ArrayLike, traction: ArrayLike) -> Floats:
@@ -368,11 +348,11 @@ def facet_forces(points: ArrayLike, facets: ArrayLike, traction: ArrayLike) -> F
     >>> fem.facet_forces(corners, [[0, 1, 2]], traction=(0, 0, -1)).round(12)[:, 2].tolist()
     [-1.0, -1.0, -1.0]
     """
-    nodes = positions(points, 3)
-    surface = elements(facets, "facets", (3, 4), len(nodes))
-    density = vectors_of_all(traction, "traction", (len(surface), 3))
+    nodes = mesh_checks.positions(points, 3)
+    surface = mesh_checks.elements(facets, "facets", (3, 4), len(nodes))
+    density = mesh_checks.vectors_of_all(traction, "traction", (len(surface), 3))
     values, weights = facet_quadrature(nodes, surface)
-    return gathered(surface, weights @ values, density, len(nodes))
+    return restrained.gathered(surface, weights @ values, density, len(nodes))
 
 
 def solid_contact_problem(
@@ -462,26 +442,26 @@ def solid_contact_problem(
     """
     nodes, bodies = solid_mesh(points, cells)
     surface = ContactSurface(nodes, outward(_contact_facets(contact, len(nodes)), bodies))
-    mask = held_mask(held, nodes.shape)
+    mask = mesh_checks.held_mask(held, nodes.shape)
     rows = _rows(surface, mask, one_of(multipliers, "multipliers", ("nodes", "elements")), ratio, patches)
     normal, first, second = local_axes(rows, normals, axes)
     A = solid_stiffness(nodes, bodies, lame)
     if springs is not None:
-        A = sp.csc_array(A + sp.diags_array(spring_stiffnesses(springs, nodes.shape).ravel()))
-    dofs, free = plain_dofs(nodes.shape), np.flatnonzero(~mask.ravel())
+        A = sp.csc_array(A + sp.diags_array(mesh_checks.spring_stiffnesses(springs, nodes.shape).ravel()))
+    dofs, free = restrained.plain_dofs(nodes.shape), np.flatnonzero(~mask.ravel())
     of_facets, mean = rows.rows_of_facets, None
     if of_facets is not None:
         weights = sp.csr_array(rows.means[:, surface.nodes] @ surface.return_operator())
         offset = real_array(slip_offset, "slip_offset")
         mean = SlipMean(*_slips(surface, of_facets, (first, second), offset, dofs, free), weights)
-    problem = problem_of(
+    problem = restrained.problem_of(
         A,
-        nodal_vectors(forces, "forces", nodes.shape),
-        None if forces_slope is None else nodal_vectors(forces_slope, "forces_slope", nodes.shape),
+        mesh_checks.nodal_vectors(forces, "forces", nodes.shape),
+        None if forces_slope is None else mesh_checks.nodal_vectors(forces_slope, "forces_slope", nodes.shape),
         dofs,
-        ContactRows(rows.means, normal, np.zeros_like(mask)),
+        restrained.ContactRows(rows.means, normal, np.zeros_like(mask)),
         (first, second),
-        Supports.held(mask),
+        restrained.Supports.held(mask),
         mesh=lambda left: BodyMesh.of_dofs(nodes, bodies, left, None, surface.facets, of_facets, lame),
         gap=gap,
         friction=friction,
@@ -498,7 +478,7 @@ def solid_contact_problem(
 def _contact_facets(contact: ArrayLike, count: int) -> Integers:
     if plain_array(contact, "contact", error=InvalidArgumentError).size == 0:
         raise InvalidArgumentError("contact has no facets; expected (k, 3) or (k, 4) node numbers of the surface")
-    return elements(contact, "contact", (3, 4), count)
+    return mesh_checks.elements(contact, "contact", (3, 4), count)
 
 
 def _rows(surface: ContactSurface, held: Mask, kind: str, ratio: int, patches: Any) -> Multipliers:
@@ -525,7 +505,7 @@ def _slips(
     values = surface.interpolation()
     patch = np.repeat(of_facets, values.shape[0] // len(surface.facets))
     moving = (patch >= 0)[:, None]
-    T1, T2 = (displacements_along(values, np.where(moving, axis[patch], 0.0), dofs, free) for axis in axes)
+    T1, T2 = (restrained.displacements_along(values, np.where(moving, axis[patch], 0.0), dofs, free) for axis in axes)
     if offset.shape != (len(axes[0]), 2):
         offset = np.zeros((len(axes[0]), 2))  # ContactProblem3D refuses a wrong shape
     return T1, T2, np.where(moving, offset[patch], 0.0)

@@ -22,12 +22,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     import pandas as pd
-    from numpy.typing import ArrayLike, NDArray
 
     from enumsol.fixed_points.system import Problem
-    from enumsol.support.arguments import Alpha
+    from enumsol.support.array_types import Alpha, ArrayLike, Floats
 
-    Vector = NDArray[np.float64]
 
 #: Most random starts of a table.
 MOST_STARTS = 1_000_000
@@ -197,7 +195,7 @@ def _common_alpha(roots: Sequence[Any]) -> Alpha:
     return alphas[0]
 
 
-def _starts(starts: int | ArrayLike, seed: int, roots: Sequence[Any], p: int) -> NDArray[np.float64]:
+def _starts(starts: int | ArrayLike, seed: int, roots: Sequence[Any], p: int) -> Floats:
     if plain_array(starts, "starts", error=InvalidArgumentError).ndim == 0:
         count = positive_integer(starts, "starts", most=MOST_STARTS)
         size = max(float(np.max(root.lambda_n)) for root in roots) or 1.0

@@ -13,19 +13,17 @@ import scipy.sparse as sp
 
 from enumsol.errors import MissingDependencyError
 from enumsol.fixed_points.system import checked_problem
-from enumsol.fixed_points.tresca_newton import TrescaNotSolved
+from enumsol.fixed_points.tresca_newton import TrescaData, TrescaNotSolved
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from enumsol.fixed_points.system import Problem
-    from enumsol.fixed_points.tresca_newton import TrescaData, Vector
+    from enumsol.support.array_types import Floats
 
 #: Tolerance of Clarabel; Newton's method improves the result.
 TOLERANCE = 1e-11
 
 
-def interior_point(data: TrescaData) -> tuple[Vector | None, Vector]:
+def interior_point(data: TrescaData) -> tuple[Floats | None, Floats]:
     """The x that solves a Tresca problem to about 1e-9, from scratch, None if Clarabel fails; and a rigid displacement.
 
     If no forces balance the load on a body that nothing holds, they do not along the latter, scaled and of shape (r,).
@@ -84,7 +82,7 @@ def interior_point(data: TrescaData) -> tuple[Vector | None, Vector]:
     return np.append(forces, rigid), rigid
 
 
-def _reach(data: TrescaData) -> Vector:
+def _reach(data: TrescaData) -> Floats:
     """Sizes that |tau| cannot exceed, by `largest_forces`, shape (p,): larger bounds are none.
 
     With them the solver meets no numbers that are large for no reason.
@@ -140,7 +138,7 @@ class TrescaReference:
             cp.Minimize(energy - self._load @ self._u + friction), [self._normal, *self._tangential]
         )
 
-    def solve(self, bound: Vector, F: NDArray[np.float64], load: Vector) -> tuple[Vector, NDArray[np.float64], Vector]:
+    def solve(self, bound: Floats, F: Floats, load: Floats) -> tuple[Floats, Floats, Floats]:
         """Contact forces and displacement for slip bounds and coefficients of friction.
 
         Parameters

@@ -14,18 +14,13 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.fixed_points.system import ContactSystem, checked_problem
 from enumsol.fixed_points.tresca import node_values
 from enumsol.model.friction import FrictionTable
-from enumsol.model.problem3d import ContactProblem3D
+from enumsol.model.problem3d import ContactProblem3D, SlipMean
 from enumsol.support.arguments import nonnegative_number
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
     from enumsol.fixed_points.system import Problem
-    from enumsol.model.slip_mean import SlipMean
-    from enumsol.support.arguments import Alpha, AlphaLike
+    from enumsol.support.array_types import Alpha, AlphaLike, ArrayLike, Floats
 
-    Vector = NDArray[np.float64]
-    Matrix = NDArray[np.float64]
 
 #: Slips per node at which a friction function is sampled for its largest values and slopes.
 _SAMPLES = 257
@@ -81,7 +76,7 @@ class LipschitzEstimate:
 class _Coefficients:
     """Over all slips: largest coefficients (p, d), Lipschitz constant [1 / length], largest ratio of F1 and F2."""
 
-    F: Matrix
+    F: Floats
     lipschitz: float = 0.0
     anisotropy: float = 1.0
     sampled: bool = False
@@ -96,13 +91,13 @@ class _Coefficients:
 class _Slips:
     """The slips that coefficients depend on, by tangential displacements at other places where they are means."""
 
-    S_tt: Matrix
+    S_tt: Floats
     mean: SlipMean | None
     rows: sp.csr_array | None = None
-    root: Matrix | None = None
+    root: Floats | None = None
 
     @classmethod
-    def of(cls, body: Problem, S_tt: Matrix) -> _Slips:
+    def of(cls, body: Problem, S_tt: Floats) -> _Slips:
         """Of a problem; compliances are condensed to the degrees of freedom that occur in the means."""
         mean = body.slip_mean if isinstance(body, ContactProblem3D) and body.depends_on_solution else None
         if mean is None:
@@ -115,7 +110,7 @@ class _Slips:
         compliance = np.hstack([solve(unit[:, k : k + RHS_BLOCK].toarray())[used] for k in starts])
         return cls(S_tt, mean, sp.csr_array(rows[:, used]), np.linalg.cholesky(0.5 * (compliance + compliance.T)))
 
-    def reach(self, body: ContactProblem3D, alpha: Alpha, load: float, c_inf: Vector) -> Vector:
+    def reach(self, body: ContactProblem3D, alpha: Alpha, load: float, c_inf: Floats) -> Floats:
         """What no slip of a solution exceeds, by the energy bound, shape (p,) [length]."""
         if self.mean is None or self.rows is None or self.root is None:
             return c_inf * load
@@ -125,7 +120,7 @@ class _Slips:
         free = np.hypot(self.mean.T1 @ u - self.mean.offset[:, 0], self.mean.T2 @ u - self.mean.offset[:, 1])
         return np.asarray(self.mean.weights @ (free + moved * load))
 
-    def largest(self, weights: Vector) -> float:
+    def largest(self, weights: Floats) -> float:
         """Largest sum of weights * slip^2 over displacements of unit energy, weights of shape (p,)."""
         if self.mean is None or self.rows is None or self.root is None:
             return _largest(_weighted(self.S_tt, np.tile(np.sqrt(weights), len(self.S_tt) // len(weights))))
@@ -207,7 +202,7 @@ def lipschitz_estimate(
     )
 
 
-def _relative(areas: Vector) -> Vector:
+def _relative(areas: Floats) -> Floats:
     """Areas as shares of the largest: a factor of all of them has no effect."""
     shares = areas / np.max(areas) if np.all(areas > 0) else np.zeros(1)
     if np.min(shares) < _LEAST_SHARE:
@@ -218,21 +213,21 @@ def _relative(areas: Vector) -> Vector:
     return np.asarray(shares)
 
 
-def _force_part(inverse_nn: Matrix, S_tt: Matrix, F: Matrix, theta: Vector) -> float:
+def _force_part(inverse_nn: Floats, S_tt: Floats, F: Floats, theta: Floats) -> float:
     """c_n c_t of (theory, (11.6)) for weights theta of shape (p,)."""
     c_n = _largest(_weighted(inverse_nn, theta))
     c_t = _largest(_weighted(S_tt, (F / theta[:, None]).ravel(order="F")))
     return float(np.sqrt(c_n * c_t))
 
 
-def _weights(inverse_nn: Matrix, blocks: Matrix, F: Matrix, m: Vector) -> list[Vector]:
+def _weights(inverse_nn: Floats, blocks: Floats, F: Floats, m: Floats) -> list[Floats]:
     """Weights theta to choose from (theory, section 11.5), of shape (p,) each."""
     tangential = np.max(F**2 * np.diagonal(blocks, axis1=1, axis2=2), axis=1)
     balanced = (np.maximum(tangential, 1e-12 * np.max(tangential)) / np.diagonal(inverse_nn)) ** 0.25
     return [1.0 / np.sqrt(m), balanced] if np.any(tangential) else [1.0 / np.sqrt(m)]
 
 
-def _coefficients(system: ContactSystem, reach: Vector, lipschitz: float | None) -> _Coefficients:
+def _coefficients(system: ContactSystem, reach: Floats, lipschitz: float | None) -> _Coefficients:
     """What (theory, section 11.5) needs of the coefficients, for slips up to ``reach`` of shape (p,) [length]."""
     body = system.problem
     if not isinstance(body, ContactProblem3D):
@@ -256,11 +251,11 @@ def _coefficients(system: ContactSystem, reach: Vector, lipschitz: float | None)
     return _Coefficients(most, slope, float(np.max(np.max(most, axis=1) / np.min(least, axis=1))))
 
 
-def _weighted(matrix: Matrix, weights: Vector) -> Matrix:
+def _weighted(matrix: Floats, weights: Floats) -> Floats:
     return np.asarray(weights[:, None] * matrix * weights[None, :])
 
 
-def _largest(matrix: Matrix) -> float:
+def _largest(matrix: Floats) -> float:
     """Largest eigenvalue of a symmetric positive semidefinite matrix."""
     last = len(matrix) - 1
     return max(float(eigh(matrix, eigvals_only=True, subset_by_index=(last, last))[0]), 0.0)

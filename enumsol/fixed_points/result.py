@@ -21,11 +21,9 @@ from enumsol.support.messages import counted
 if TYPE_CHECKING:
     import os
 
-    from numpy.typing import NDArray
-
     from enumsol.fixed_points.system import Problem
+    from enumsol.support.array_types import Floats
 
-    Vector = NDArray[np.float64]
 
 _FORMAT = 1
 _ARRAYS = ("slip_bound", "coefficients", "lambda_n", "lambda_t", "u_n", "u_t", "slip", "increments")
@@ -39,7 +37,7 @@ def _names(body: Problem) -> tuple[str, ...]:
     return _ARRAYS if body.modes is None else _ARRAYS + _RIGID_ARRAYS
 
 
-def _check_shapes(arrays: dict[str, Vector], body: Problem, path: str) -> None:
+def _check_shapes(arrays: dict[str, Floats], body: Problem, path: str) -> None:
     p, modes = body.p, 0 if body.modes is None else body.modes.r
     tangential = body.slip_offset.shape  # (p,) in 2D, (p, 2) in 3D
     shapes = {"coefficients": (p, len(tangential)), "lambda_t": tangential, "u_t": tangential}
@@ -112,12 +110,12 @@ class FixedPoint(TrescaState):
 
     outcome: Outcome
     iterations: int
-    slip: Vector
-    increments: NDArray[np.float64]
+    slip: Floats
+    increments: Floats
     tolerance: float
     rounding: float = field(default=float("nan"))
     period: int | None = field(default=None)
-    free_motion: Vector | None = field(default=None)
+    free_motion: Floats | None = field(default=None)
 
     @property
     def converged(self) -> bool:
@@ -136,7 +134,7 @@ class FixedPoint(TrescaState):
         return bool(np.any(np.abs(q) > body.modes.reach(body.rigid_reach)))
 
     @property
-    def contraction(self) -> Vector:
+    def contraction(self) -> Floats:
         """Ratios of successive increments of the sum of both norms, relative to the load, shape (iterations - 1,) [-].
 
         Below 1 where Psi contracted. Near a limit at rounding level they say nothing.
@@ -156,7 +154,7 @@ class FixedPoint(TrescaState):
         ratios = self.contraction[seen][-5:]
         return float(np.exp(np.mean(np.log(ratios)))) if len(ratios) else float("nan")
 
-    def _scales(self) -> Vector:
+    def _scales(self) -> Floats:
         largest = np.max(self.increments, axis=0, initial=0.0)
         return np.asarray(np.where(largest > 0, largest, 1.0))
 

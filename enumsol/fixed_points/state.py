@@ -20,13 +20,11 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     import pandas as pd
-    from numpy.typing import NDArray
 
     from enumsol.fixed_points.system import ContactSystem, Problem
     from enumsol.fixed_points.tresca_newton import TrescaData
-    from enumsol.support.arguments import Alpha
+    from enumsol.support.array_types import Alpha, Floats
 
-    Vector = NDArray[np.float64]
 
 #: For statuses: a force below this fraction of the largest is zero, and |tau| this close to its bound has reached it.
 STATUS_TOLERANCE = 1e-9
@@ -56,16 +54,16 @@ class TrescaState(Sealed):
 
     problem: Problem = field(repr=False)
     alpha: Alpha
-    slip_bound: Vector
-    coefficients: Vector
-    lambda_n: Vector
-    lambda_t: Vector
-    u_n: Vector
-    u_t: Vector
-    rigid_coordinates: Vector | None = field(default=None, kw_only=True)
+    slip_bound: Floats
+    coefficients: Floats
+    lambda_n: Floats
+    lambda_t: Floats
+    u_n: Floats
+    u_t: Floats
+    rigid_coordinates: Floats | None = field(default=None, kw_only=True)
 
     @classmethod
-    def of(cls, data: TrescaData, x: Vector, **more: Any) -> Self:
+    def of(cls, data: TrescaData, x: Floats, **more: Any) -> Self:
         """The state of an x that solves a Tresca problem."""
         system = data.system
         (normal, tangential), (w_n, w_t) = system.split(x), system.split(system.moves(x))
@@ -86,18 +84,18 @@ class TrescaState(Sealed):
         )
 
     @property
-    def forces(self) -> Vector:
+    def forces(self) -> Floats:
         """lambda_n and lambda_t as one vector over the rows of ``problem.contact_rows`` [force]."""
         return np.concatenate([self.lambda_n, self.lambda_t.ravel(order="F")])
 
     @cached_property
-    def u(self) -> Vector:
+    def u(self) -> Floats:
         """Displacement of all degrees of freedom, shape (n,) [length]."""
         u, rigid = condensation_of(self.problem).displacement(self.alpha, self.forces), self.rigid_displacement
         return sealed(u if rigid is None else u + rigid)
 
     @property
-    def rigid_displacement(self) -> Vector | None:
+    def rigid_displacement(self) -> Floats | None:
         """Of a body that nothing holds: how it moves as a whole, N q, shape (n,) [length]; None of others."""
         N, q = self.problem.rigid_modes, self.rigid_coordinates
         return None if N is None or q is None else np.asarray(N @ q)
@@ -123,7 +121,7 @@ class TrescaState(Sealed):
                 found.append(self._slip(work[i]))
         return tuple(found)
 
-    def _slip(self, u_t: Vector) -> ContactStatus:
+    def _slip(self, u_t: Floats) -> ContactStatus:
         if not np.any(u_t):
             return ContactStatus.STICK
         if len(u_t) == 2:
@@ -165,7 +163,7 @@ class TrescaState(Sealed):
             values["coefficients"] = np.max(np.abs(self._coefficients_at_slips() - F))
         return MappingProxyType({name: float(value) + 0.0 for name, value in values.items()})
 
-    def _coefficients_at_slips(self) -> Vector:
+    def _coefficients_at_slips(self) -> Floats:
         problem: Any = self.problem
         slip = np.linalg.norm(self.u_t, axis=1) if problem.slip_mean is None else problem.slip_mean(self.u)
         return np.asarray(problem.coefficients(self.alpha, slip))
@@ -192,7 +190,7 @@ class TrescaState(Sealed):
         return pd.DataFrame(columns)
 
 
-def scaled_unknowns(system: ContactSystem, state: Any, name: str = "start") -> Vector:
+def scaled_unknowns(system: ContactSystem, state: Any, name: str = "start") -> Floats:
     """The x of a state or root: its scaled forces and rigid displacement, which is zero if it has none.
 
     Raises
@@ -229,7 +227,7 @@ def scaled_unknowns(system: ContactSystem, state: Any, name: str = "start") -> V
     return np.append(forces, rigid)
 
 
-def slips_of(state: Any, p: int, name: str) -> Vector:
+def slips_of(state: Any, p: int, name: str) -> Floats:
     """The slips that a state or root has: its ``slip``, or |u_t|, shape (p,) [length].
 
     Raises

@@ -26,12 +26,9 @@ from enumsol.support.array_arguments import real_array
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
     from enumsol.fixed_points.system import Problem
-    from enumsol.support.arguments import AlphaLike
+    from enumsol.support.array_types import AlphaLike, Floats
 
-    Vector = NDArray[np.float64]
 
 #: Differences of residuals that depend on each other to this degree are dropped.
 _RANK_TOLERANCE = 1e-10
@@ -49,11 +46,11 @@ class AndersonMixing:
     """
 
     def __init__(self, depth: int) -> None:
-        self._residuals: deque[Vector] = deque(maxlen=depth + 1)
-        self._images: deque[Vector] = deque(maxlen=depth + 1)
+        self._residuals: deque[Floats] = deque(maxlen=depth + 1)
+        self._images: deque[Floats] = deque(maxlen=depth + 1)
         self._least = np.inf
 
-    def next(self, x: Vector, image: Vector) -> Vector:
+    def next(self, x: Floats, image: Floats) -> Floats:
         """The next iterate after x with Psi(x) = image; its entries are not negative."""
         residual = image - x
         size = float(np.linalg.norm(residual))
@@ -200,12 +197,12 @@ class _Iteration:
         # sqrt(work) of the scaled system: the product of the force and the length factor is the same at every node
         self.work = float(np.sqrt(system.force[0] * system.length[0]))
         self.depth, self.mixing = depth, AndersonMixing(depth) if depth else None
-        self.recent: deque[Vector] = deque(maxlen=LONGEST_CYCLE + 1)
+        self.recent: deque[Floats] = deque(maxlen=LONGEST_CYCLE + 1)
         self.increments: list[tuple[float, float]] = []
         self.sizes: list[float] = []
         self.largest_slip = 0.0
         self.rounding = float("nan")
-        self.motion: Vector | None = None
+        self.motion: Floats | None = None
         self.started = time.perf_counter()
 
     def run(self, start: Any, limit: int) -> FixedPoint:
@@ -269,7 +266,7 @@ class _Iteration:
             self.rounding = max(self.rounding, *self.sizes[-_PATIENCE:])
         return better
 
-    def _start(self, start: Any) -> tuple[Vector, Vector]:
+    def _start(self, start: Any) -> tuple[Floats, Floats]:
         """Scaled slip bounds and slips to begin with."""
         system, p = self.system, self.system.p
         slip: Any = 0.0
@@ -287,11 +284,11 @@ class _Iteration:
             system.scaled(node_values(slip, "slips of start", p), system.length, "slips of start"),
         )
 
-    def _image(self) -> tuple[Vector, Vector]:
+    def _image(self) -> tuple[Floats, Floats]:
         """Psi of the iterate: scaled normal forces and slips."""
         return np.maximum(self.system.split(self.x)[0], 0.0), self.system.slip(self.x)
 
-    def _increment(self, data: TrescaData, slip: Vector, image: Vector, image_slip: Vector) -> float:
+    def _increment(self, data: TrescaData, slip: Floats, image: Floats, image_slip: Floats) -> float:
         """How far the limit may be, relative to the tolerance: at most 1 has converged."""
         system = self.system
         force = system.force_norm(image - data.bound)
@@ -328,13 +325,13 @@ class _Iteration:
         last, before = self.sizes[-_PATIENCE:], self.sizes[:-_PATIENCE]
         return bool(before) and min(before) <= min(_SMALL, *last)
 
-    def _look_for_jumps(self, slip: Vector) -> None:
+    def _look_for_jumps(self, slip: Floats) -> None:
         body = self.system.problem
         reach = 2.0 * float(np.max(slip * self.system.length))
         if isinstance(body, ContactProblem3D) and reach > 0:
             warn_of_jumps(body.law, np.full(body.p, reach), body.node_ids)
 
-    def _period(self, image: Vector) -> int | None:
+    def _period(self, image: Floats) -> int | None:
         """Length of the cycle that the iterates run through, if they do."""
         if self.mixing is not None:
             return None
@@ -346,7 +343,7 @@ class _Iteration:
         same = np.flatnonzero(distances[1:] <= _SAME * distances[0])
         return int(same[0]) + 2 if len(same) else None
 
-    def _next(self, bound: Vector, slip: Vector, image: Vector, image_slip: Vector) -> tuple[Vector, Vector]:
+    def _next(self, bound: Floats, slip: Floats, image: Floats, image_slip: Floats) -> tuple[Floats, Floats]:
         if self.mixing is None:
             return image, image_slip
         if not self.depends:

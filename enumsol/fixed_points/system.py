@@ -26,13 +26,11 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import ContactProblem
 from enumsol.model.problem3d import ContactProblem3D
 from enumsol.model.rigid_modes import modes_of
-from enumsol.support.arguments import Alpha, alpha_value
+from enumsol.support.arguments import alpha_value
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
+    from enumsol.support.array_types import Alpha, Floats
 
-    Vector = NDArray[np.float64]
-    Matrix = NDArray[np.float64]
     Problem = ContactProblem | ContactProblem3D
 
 #: Forces of a body that nothing holds that are so many times the load are taken for none.
@@ -84,14 +82,14 @@ class ContactSystem:
     problem: Problem
     alpha: Alpha
     condensed: Condensation = field(repr=False)
-    S: Matrix = field(repr=False)
-    g: Vector = field(repr=False)
-    G: Matrix = field(repr=False)
-    h: Vector = field(repr=False)
-    force: Vector = field(repr=False)
-    length: Vector = field(repr=False)
-    rigid: Matrix = field(repr=False)
-    cholesky: Matrix = field(repr=False)
+    S: Floats = field(repr=False)
+    g: Floats = field(repr=False)
+    G: Floats = field(repr=False)
+    h: Floats = field(repr=False)
+    force: Floats = field(repr=False)
+    length: Floats = field(repr=False)
+    rigid: Floats = field(repr=False)
+    cholesky: Floats = field(repr=False)
     compliance: float = 0.0
 
     @classmethod
@@ -116,9 +114,9 @@ class ContactSystem:
         g = condensed.free_displacements(value) * everywhere
         cholesky = cholesky_factor(S)
         r = 0 if problem.modes is None else problem.modes.r
-        G: Matrix = np.zeros((r, len(S)))
-        h: Vector = np.zeros(r)
-        rigid: Matrix = np.zeros((r, r))
+        G: Floats = np.zeros((r, len(S)))
+        h: Floats = np.zeros(r)
+        rigid: Floats = np.zeros((r, r))
         if isinstance(condensed, FloatingCondensation):
             still, slope = condensed.h
             G = solve_triangular(condensed.mixing, condensed.G * everywhere, lower=True, check_finite=False)
@@ -153,12 +151,12 @@ class ContactSystem:
         """Whether g or h is other than zero."""
         return bool(np.any(self.g) or np.any(self.h))
 
-    def moves(self, x: Vector) -> Vector:
+    def moves(self, x: Floats) -> Floats:
         """Scaled displacements w of all rows, shape (m,)."""
         w = np.asarray(self.g - self.S @ x[: self.m])
         return w + self.G.T @ x[self.m :] if self.modes else w
 
-    def imbalance(self, x: Vector) -> Vector:
+    def imbalance(self, x: Floats) -> Floats:
         """What contact forces, and springs if there are any, leave of the load on the body as a whole, shape (r,)."""
         return np.asarray(self.h - self.G @ x[: self.m] - self.compliance * x[self.m :]) if self.modes else self.h
 
@@ -172,7 +170,7 @@ class ContactSystem:
         return float(np.linalg.norm(np.append(elastic, self.h)))
 
     @cached_property
-    def largest_forces(self) -> Vector:
+    def largest_forces(self) -> Floats:
         """What no force of a solution exceeds, shape (m,): by the energy bound (theory, section 11.3).
 
         Of a body that nothing holds there is no such bound; forces so large are taken for none (theory, section 14.10).
@@ -183,17 +181,17 @@ class ContactSystem:
         return np.asarray(self.load_energy * np.linalg.norm(inverse, axis=0))
 
     @cached_property
-    def normal_stiffness(self) -> Matrix:
+    def normal_stiffness(self) -> Floats:
         """((S^-1)_nn)^-1, the matrix of the norm of normal forces (theory, (11.4)), shape (p, p)."""
         p = self.p
         coupling = self.S[:p, p:]
         return np.asarray(self.S[:p, :p] - coupling @ np.linalg.solve(self.S[p:, p:], coupling.T))
 
-    def force_norm(self, normal: Vector) -> float:
+    def force_norm(self, normal: Floats) -> float:
         """||normal||_D of scaled normal forces (theory, (11.4)): at most ``load_energy`` at solutions."""
         return float(np.sqrt(np.maximum(normal @ self.normal_stiffness @ normal, 0.0)))
 
-    def coefficients(self, slip: Vector) -> Matrix:
+    def coefficients(self, slip: Floats) -> Floats:
         """Friction coefficients for scaled slips of shape (p,), shape (p, d)."""
         if isinstance(self.problem, ContactProblem3D):
             F = self.problem.coefficients(self.alpha, slip * self.length)
@@ -203,7 +201,7 @@ class ContactSystem:
             raise InvalidArgumentError(f"friction is {np.max(F):g}; expected at most {_LARGEST:g} here")
         return F
 
-    def slip(self, x: Vector) -> Vector:
+    def slip(self, x: Floats) -> Floats:
         """The scaled slip that coefficients depend on, shape (p,)."""
         mean = self.problem.slip_mean if isinstance(self.problem, ContactProblem3D) else None
         if mean is None:
@@ -211,24 +209,24 @@ class ContactSystem:
         u, N = self._elastic(x), self.problem.rigid_modes
         return np.asarray(mean(u if N is None else u + N @ self.rigid_of(x)) / self.length)
 
-    def rigid_of(self, x: Vector) -> Vector:
+    def rigid_of(self, x: Floats) -> Floats:
         """Coordinates of the rigid displacement in the problem's units, shape (r,)."""
         return np.asarray(self.rigid @ x[self.m :])
 
-    def unit_motion(self, rigid: Vector) -> Vector:
+    def unit_motion(self, rigid: Floats) -> Floats:
         """Coordinates, in the problem's units, of a scaled rigid displacement, whose largest component becomes 1."""
         given, N = self.rigid @ rigid, self.problem.rigid_modes
         return given if N is None else np.asarray(given / np.max(np.abs(N @ given)))
 
-    def scaled_rigid(self, coordinates: Vector) -> Vector:
+    def scaled_rigid(self, coordinates: Floats) -> Floats:
         """Scaled coordinates of a rigid displacement, shape (r,)."""
         return np.asarray(np.linalg.solve(self.rigid, coordinates))
 
-    def _elastic(self, x: Vector) -> Vector:
+    def _elastic(self, x: Floats) -> Floats:
         """u less the rigid displacement in the problem's units, shape (n,)."""
         return self.condensed.displacement(self.alpha, x[: self.m] * np.tile(self.force, 1 + self.tangents))
 
-    def corrected(self, x: Vector) -> tuple[ContactSystem, Vector]:
+    def corrected(self, x: Floats) -> tuple[ContactSystem, Floats]:
         """The system with w as the body itself has it at scaled forces, and what that changes (theory, section 11.7).
 
         Returns
@@ -242,12 +240,12 @@ class ContactSystem:
         g = w + self.S @ x[: self.m]
         return replace(self, g=g), np.asarray(cho_solve((self.cholesky, True), g - self.g, check_finite=False))
 
-    def noise(self, x: Vector) -> Vector:
+    def noise(self, x: Floats) -> Floats:
         """What every scaled force changes by, in the mean, where S lambda is rounded (theory, (11.13))."""
         inverse = cho_solve((self.cholesky, True), np.eye(len(self.S)), check_finite=False)
         return np.asarray(UNIT * np.sqrt(inverse**2 @ (self.S**2 @ x[: self.m] ** 2)))
 
-    def scaled(self, values: Vector, unit: Vector, name: str) -> Vector:
+    def scaled(self, values: Floats, unit: Floats, name: str) -> Floats:
         """Forces or displacements of nodes or rows by the factors ``unit``, which are those of one tangent or of all.
 
         Raises
@@ -263,17 +261,17 @@ class ContactSystem:
             )
         return np.asarray(scaled)
 
-    def split(self, values: Vector) -> tuple[Vector, Matrix]:
+    def split(self, values: Floats) -> tuple[Floats, Floats]:
         """Normal part (p,) and tangential part (p, d) of a vector over all rows, or of x."""
         p = self.p
         return values[:p], values[p : self.m].reshape(-1, p).T
 
-    def joined(self, normal: Vector, tangential: Matrix, rigid: Vector) -> Vector:
+    def joined(self, normal: Floats, tangential: Floats, rigid: Floats) -> Floats:
         """The x with these parts."""
         return np.concatenate([normal, tangential.T.ravel(), rigid])
 
 
-def driven(problem: Any, alpha: Alpha, slip_bound: Vector, coefficients: Matrix, motion: Vector) -> str:
+def driven(problem: Any, alpha: Alpha, slip_bound: Floats, coefficients: Floats, motion: Floats) -> str:
     """In words: how the load drives the body along a rigid displacement, and how friction resists at given bounds."""
     moved = problem.rigid_modes @ motion
     slips = (problem.contact_rows @ moved)[problem.p :].reshape(-1, problem.p).T

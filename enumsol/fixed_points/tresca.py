@@ -16,12 +16,9 @@ from enumsol.support.array_arguments import real_array
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
     from enumsol.fixed_points.system import Problem
-    from enumsol.support.arguments import AlphaLike
+    from enumsol.support.array_types import AlphaLike, ArrayLike, Floats
 
-    Vector = NDArray[np.float64]
 
 Solver = Literal["newton", "clarabel", "cvxpy"]
 SOLVERS = ("newton", "clarabel", "cvxpy")
@@ -124,7 +121,7 @@ def solve_tresca(
     return TrescaSolution.of(data, x, residual=residual, solver=used)
 
 
-def node_values(value: ArrayLike, name: str, p: int) -> Vector:
+def node_values(value: ArrayLike, name: str, p: int) -> Floats:
     """Value as p numbers >= 0, one for each contact node.
 
     Raises
@@ -144,7 +141,7 @@ def node_values(value: ArrayLike, name: str, p: int) -> Vector:
     return array
 
 
-def solve_scaled(data: TrescaData, start: Vector, first: str = "newton") -> tuple[Vector, float, str]:
+def solve_scaled(data: TrescaData, start: Floats, first: str = "newton") -> tuple[Floats, float, str]:
     """The x that solves a Tresca problem, its residual, and what found it.
 
     Raises
@@ -158,7 +155,7 @@ def solve_scaled(data: TrescaData, start: Vector, first: str = "newton") -> tupl
 
     if not data.system.loaded:
         return np.zeros(len(start)), 0.0, first
-    found: list[tuple[float, str, Vector]] = []
+    found: list[tuple[float, str, Floats]] = []
     if first == "newton":
         x, residual = data.newton(start)
         if residual <= ACCEPTED:

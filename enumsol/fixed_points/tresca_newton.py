@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -11,17 +11,8 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve, eigh
 from scipy.optimize import linprog
 
 from enumsol.errors import EnumsolError
-from enumsol.fixed_points.system import driven
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from numpy.typing import NDArray
-
-    from enumsol.fixed_points.system import ContactSystem
-
-    Vector = NDArray[np.float64]
-    Matrix = NDArray[np.float64]
+from enumsol.fixed_points.system import ContactSystem, driven
+from enumsol.support.array_types import Floats, Mask
 
 #: Steps after which the method stops; from a near start it needs two to five.
 MOST_STEPS = 30
@@ -55,7 +46,7 @@ class TrescaNotFeasible(TrescaNotSolved):
         Coordinates of a rigid displacement, with 1 as its largest component, along which the load drives the body.
     """
 
-    def __init__(self, data: TrescaData, motion: Vector) -> None:
+    def __init__(self, data: TrescaData, motion: Floats) -> None:
         system = data.system
         self.motion = system.unit_motion(motion)
         words = driven(system.problem, system.alpha, data.bound * system.force, data.F, self.motion)
@@ -76,26 +67,26 @@ class TrescaData:
     """
 
     system: ContactSystem
-    bound: Vector
-    F: Matrix
+    bound: Floats
+    F: Floats
 
     @property
-    def occurs(self) -> NDArray[np.bool_]:
+    def occurs(self) -> Mask:
         """Which tau occur, shape (p, d)."""
         with np.errstate(over="ignore"):
             return np.asarray(self.F * self.bound[:, None] > _NEGLIGIBLE)
 
-    def steps(self) -> tuple[Vector, Vector]:
+    def steps(self) -> tuple[Floats, Floats]:
         """Factors r of (11.3), by node: for normals and for tangents, each (p,)."""
         normal, tangential = self.system.split(np.diagonal(self.system.S))
         largest = np.max(self.F**2 * tangential, axis=1)
         return 1.0 / normal, 1.0 / np.where(largest > 0, largest, 1.0)
 
-    def residual(self, x: Vector) -> float:
+    def residual(self, x: Floats) -> float:
         """The largest entry of (11.3) and of the equilibrium of the body as a whole, in forces."""
         return self._residual(x, self.system.moves(x))
 
-    def _residual(self, x: Vector, w: Vector) -> float:
+    def _residual(self, x: Floats, w: Floats) -> float:
         normal, tangential = self.system.split(x)
         w_n, v, tau = self._in_tau(x, w)
         r_n, r_t = self.steps()
@@ -107,7 +98,7 @@ class TrescaData:
         rest = np.max(np.abs(self.system.imbalance(x)), initial=0.0)
         return float(max(np.max(np.abs(gap_n)), np.max(np.abs(gap_t)), rest))
 
-    def newton(self, start: Vector) -> tuple[Vector, float]:
+    def newton(self, start: Floats) -> tuple[Floats, float]:
         """The best point of a Newton method from x, and its residual, which the caller judges."""
         system = self.system
         normal, tangential = system.split(start)
@@ -130,7 +121,7 @@ class TrescaData:
                 best, least = x, residual
         return best, least
 
-    def proximal(self, start: Vector) -> tuple[Vector, float]:
+    def proximal(self, start: Floats) -> tuple[Floats, float]:
         """The best point of a proximal point method from x, and its residual: slower than Newton's alone.
 
         The solutions for (S + rho, g + rho lambda), and with springs of the compliance rho that carry no force at q,
@@ -155,7 +146,7 @@ class TrescaData:
                 best, least = x, residual
         return best, least
 
-    def free_motion(self, x: Vector) -> Vector | None:
+    def free_motion(self, x: Floats) -> Floats | None:
         """A scaled rigid displacement by which a solution x may move a little and remain one; None if there is none.
 
         Normals with a force and nodes that stick do not move, and no slip turns. Of the others, nodes that touch must
@@ -187,7 +178,7 @@ class TrescaData:
                 return np.asarray(free.T @ found.x)
         return None
 
-    def unresisted(self, motion: Vector) -> Vector | None:
+    def unresisted(self, motion: Floats) -> Floats | None:
         """A scaled rigid displacement along which no forces within the bounds withstand the load, near a given one.
 
         It proves, within rounding, that there are none in balance but beyond `largest_forces` (theory, section 14.10).
@@ -211,13 +202,13 @@ class TrescaData:
                 return np.asarray(candidate)
         return None
 
-    def _in_tau(self, x: Vector, w: Vector) -> tuple[Vector, Matrix, Matrix]:
+    def _in_tau(self, x: Floats, w: Floats) -> tuple[Floats, Floats, Floats]:
         """w_n, v = F w_t and tau at a point; zero where tau does not occur."""
         (_, lambda_t), (w_n, w_t) = self.system.split(x), self.system.split(w)
         tau = np.divide(lambda_t, self.F, out=np.zeros_like(lambda_t), where=self.occurs)
         return w_n, np.where(self.occurs, self.F * w_t, 0.0), tau
 
-    def _step(self, x: Vector, w: Vector) -> Vector:
+    def _step(self, x: Floats, w: Floats) -> Floats:
         """One Newton step of (11.3).
 
         Some directions of lambda move by known steps: normals that open, and sliding pairs along z = tau + r v. In the
@@ -241,7 +232,7 @@ class TrescaData:
             step[:m] += Q @ solve(resisted @ step[m:])
         return step
 
-    def _solver(self, Q: sp.csc_array, shift: Vector) -> Callable[[Matrix], Matrix]:
+    def _solver(self, Q: sp.csc_array, shift: Floats) -> Callable[[Floats], Floats]:
         """Solves with Q' S Q + shift."""
         matrix = Q.T @ self.system.S @ Q
         if len(matrix) == 0:
@@ -250,7 +241,7 @@ class TrescaData:
         factor = cho_factor(matrix, lower=True, overwrite_a=True, check_finite=False)
         return lambda right: np.asarray(cho_solve(factor, right, check_finite=False))
 
-    def _directions(self, x: Vector, w: Vector) -> tuple[Vector, sp.csc_array, Vector, Vector]:
+    def _directions(self, x: Floats, w: Floats) -> tuple[Floats, sp.csc_array, Floats, Floats]:
         """Of a Newton step: the known part of dlambda, Q, and the shift and the weight of its equations."""
         p, d = self.system.p, self.system.tangents
         normal, _ = self.system.split(x)

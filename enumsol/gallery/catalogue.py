@@ -1,4 +1,4 @@
-"""The named problems, and finding one by its name."""
+"""The named problems, and how to find one by its name."""
 
 from __future__ import annotations
 
@@ -19,14 +19,12 @@ from enumsol.gallery.problems import (
 )
 from enumsol.gallery.solid_gallery import block3d, one_node_3d, wedge3d
 from enumsol.support import arguments
-from enumsol.support.arguments import entry_named
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
     from enumsol.gallery.problems import Pair
-    from enumsol.model.problem import ContactProblem
-    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import AnyProblem
 
 
 @dataclass(frozen=True)
@@ -38,13 +36,13 @@ class GalleryEntry:
     name : str
         Its name, as in ``gallery:NAME``.
     summary : str
-        What it shows, in a line.
+        What it shows, in one line.
     alpha : float
-        A parameter value at which it is worth a look.
+        A value of the parameter at which its solutions are worth a look.
     roots : int or None
-        Number of its roots at that alpha; None where they are not all isolated or the number is not known.
+        Number of its roots at that alpha; None if they are not all isolated or the number is not known.
     build : callable
-        Makes the problem.
+        Function without arguments that returns the problem.
     dimension : int
         2 or 3.
     """
@@ -53,7 +51,7 @@ class GalleryEntry:
     summary: str
     alpha: float
     roots: int | None
-    build: Callable[[], ContactProblem | ContactProblem3D] = field(repr=False)
+    build: Callable[[], AnyProblem] = field(repr=False)
     dimension: int = 2
 
 
@@ -63,7 +61,7 @@ def get(name: str) -> GalleryEntry:
     Raises
     ------
     InvalidArgumentError
-        There is no such entry; the message lists similar names, or all.
+        There is no such entry; the message lists similar names, or all of them.
 
     Examples
     --------
@@ -72,11 +70,11 @@ def get(name: str) -> GalleryEntry:
     >>> entry.roots == len(enumsol.enumerate_roots(entry.build(), entry.alpha))
     True
     """
-    return entry_named(name, GALLERY, "the gallery", "one-node-6.1")
+    return arguments.entry_named(name, GALLERY, "the gallery", "one-node-6.1")
 
 
 def close_names(name: str) -> list[str]:
-    """Up to five names in `GALLERY` similar to this one, the most similar first; only itself if it is one of them.
+    """Up to five names of `GALLERY` that resemble this one, the closest first; only this one if it is among them.
 
     Examples
     --------

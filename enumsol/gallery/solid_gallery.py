@@ -14,7 +14,7 @@ from enumsol.support.arguments import finite_number, nonnegative_number, positiv
 from enumsol.support.array_arguments import real_array, short_vector
 
 if TYPE_CHECKING:
-    from enumsol.fem.named_parts import SolidMesh
+    from enumsol.fem.meshes import SolidMesh
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.support.array_types import ArrayLike, Floats, Integers
 

@@ -53,7 +53,7 @@ from typing import TYPE_CHECKING, Any
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.io import fclib, matrix_market, npz
-from enumsol.model.problem import ContactProblem, check_is_problem
+from enumsol.model.problem import check_is_problem
 from enumsol.support.arguments import file_path
 from enumsol.support.files import writing
 
@@ -61,7 +61,7 @@ if TYPE_CHECKING:
     import os
     from pathlib import Path
 
-    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import AnyProblem
 
 __all__ = ["read_problem", "write_problem"]
 
@@ -72,7 +72,7 @@ _FORMATS = "a .npz file, a directory of MatrixMarket files, or an fclib file (.h
 _READABLE = f"{_FORMATS} (enumsol.fem makes problems of meshes and .toml files)"
 
 
-def read_problem(path: str | os.PathLike[str]) -> ContactProblem | ContactProblem3D:
+def read_problem(path: str | os.PathLike[str]) -> AnyProblem:
     """Contact problem in 2D or 3D from a file or directory; `enumsol.io` describes the formats.
 
     Parameters
@@ -107,7 +107,7 @@ def read_problem(path: str | os.PathLike[str]) -> ContactProblem | ContactProble
         raise InvalidProblemError(f"{place}: it cannot be read ({reason}); expected a readable place") from error
 
 
-def write_problem(problem: ContactProblem | ContactProblem3D, path: str | os.PathLike[str]) -> None:
+def write_problem(problem: AnyProblem, path: str | os.PathLike[str]) -> None:
     """Write a contact problem to a file or directory; `enumsol.io` describes the formats.
 
     An existing file is replaced. In an existing directory the MatrixMarket files of an earlier problem are replaced.
@@ -148,7 +148,7 @@ def write_problem(problem: ContactProblem | ContactProblem3D, path: str | os.Pat
             raise InvalidProblemError(f"{place}: {error}") from error
 
 
-def _read(place: Path) -> ContactProblem | ContactProblem3D:
+def _read(place: Path) -> AnyProblem:
     if place.is_dir():
         return matrix_market.read(place)
     if not place.exists():
@@ -167,7 +167,7 @@ def _read(place: Path) -> ContactProblem | ContactProblem3D:
     raise InvalidProblemError(f"{found}; expected {_READABLE}")
 
 
-def _write(problem: ContactProblem | ContactProblem3D, place: Path) -> None:
+def _write(problem: AnyProblem, place: Path) -> None:
     if place.is_dir() or not place.suffix:
         matrix_market.write(problem, place)
     elif place.suffix == ".npz":

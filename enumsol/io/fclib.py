@@ -21,7 +21,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidProblemError, MissingDependencyError
-from enumsol.io.layouts import refusing
+from enumsol.io.arrays import refusing
 from enumsol.model.problem import ContactProblem
 
 if TYPE_CHECKING:

@@ -11,17 +11,14 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidProblemError
-from enumsol.io.arrays import arrays_of, problem_from_arrays
-from enumsol.io.layouts import LAYOUT_2D, LAYOUT_3D, check_names, layout_of, refusing
+from enumsol.io.arrays import LAYOUT_2D, LAYOUT_3D, arrays_of, check_names, layout_of, problem_from_arrays, refusing
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
-    from enumsol.io.layouts import Layout
-    from enumsol.model.problem import ContactProblem
-    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.io.arrays import Layout
+    from enumsol.model.problem3d import AnyProblem
+    from enumsol.support.array_types import NDArray
 
 #: Most entries of a vector, or of a table that is stored densely.
 _LARGEST_VECTOR = 50_000_000
@@ -35,7 +32,7 @@ _LABELS = "node_ids.json"
 _DIGITS = 17
 
 
-def read(path: Path) -> ContactProblem | ContactProblem3D:
+def read(path: Path) -> AnyProblem:
     """The problem in a directory of .mtx files."""
     files = {file.stem: file for file in sorted(path.glob("*.mtx")) if not file.name.startswith("_")}
     if not files:
@@ -48,7 +45,7 @@ def read(path: Path) -> ContactProblem | ContactProblem3D:
     return problem_from_arrays(arrays, layout)
 
 
-def write(problem: ContactProblem | ContactProblem3D, path: Path) -> None:
+def write(problem: AnyProblem, path: Path) -> None:
     """Write a problem into a directory, which is made if need be; an earlier problem there is replaced."""
     from scipy.io import mmwrite  # slow to import
 

@@ -10,16 +10,13 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidProblemError
-from enumsol.io.arrays import arrays_of, problem_from_arrays
-from enumsol.io.layouts import FORMAT_VERSION, check_names, layout_of, refusing
+from enumsol.io.arrays import FORMAT_VERSION, arrays_of, check_names, layout_of, problem_from_arrays, refusing
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
-    from enumsol.model.problem import ContactProblem
-    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import AnyProblem
+    from enumsol.support.array_types import NDArray
 
 _VERSION = "enumsol_format"
 _PARTS = ("data", "indices", "indptr", "shape", "format")
@@ -36,7 +33,7 @@ _DAMAGE = (
 )
 
 
-def read(path: Path) -> ContactProblem | ContactProblem3D:
+def read(path: Path) -> AnyProblem:
     """The problem in a .npz file."""
     arrays = _load(path)
     version = arrays.pop(_VERSION, np.array(FORMAT_VERSION))
@@ -58,7 +55,7 @@ def read(path: Path) -> ContactProblem | ContactProblem3D:
     return problem_from_arrays(named, layout)
 
 
-def write(problem: ContactProblem | ContactProblem3D, path: Path) -> None:
+def write(problem: AnyProblem, path: Path) -> None:
     """Write a problem with its matrices in sparse parts."""
     arrays: dict[str, NDArray[Any]] = {_VERSION: np.array(FORMAT_VERSION)}
     for name, value in arrays_of(problem).items():

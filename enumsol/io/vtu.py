@@ -23,11 +23,10 @@ if TYPE_CHECKING:
     import os
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
     from enumsol.model.mesh import BodyMesh
+    from enumsol.model.problem3d import AnyProblem
+    from enumsol.support.array_types import Floats, Integers
 
-    Floats = NDArray[np.float64]
 
 _PLANE_STATUS = {status.value: float(code) for code, status in enumerate(STATUSES)}
 _STATUS = {"open": 0.0, "stick": 1.0}
@@ -60,9 +59,7 @@ class State(Protocol):
         """Slips, shape (p, 2) [length]."""
 
 
-def write_vtu(
-    problem: ContactProblem | ContactProblem3D, state: State | Sequence[State], path: str | os.PathLike[str]
-) -> None:
+def write_vtu(problem: AnyProblem, state: State | Sequence[State], path: str | os.PathLike[str]) -> None:
     """Write displacements, contact forces and stresses to a VTU file for ParaView, by meshio.
 
     Of one state the file at ``path`` is written. Of several, such as a RootSet, one file each is written beside it
@@ -149,7 +146,7 @@ def _empty(states: Sequence[State]) -> str:
     return f"a RootSet without isolated roots, whose {counted(len(families), 'family', 'families')} no file shows"
 
 
-def _picture(meshio: Any, problem: ContactProblem | ContactProblem3D, state: State) -> Any:
+def _picture(meshio: Any, problem: AnyProblem, state: State) -> Any:
     return _plane(meshio, problem, state) if isinstance(problem, ContactProblem) else _space(meshio, problem, state)
 
 
@@ -163,11 +160,11 @@ def _write_collection(place: Path, names: list[str]) -> None:
         ElementTree.ElementTree(root).write(place, encoding="utf-8", xml_declaration=True)
 
 
-def _stresses(problem: ContactProblem | ContactProblem3D, u: Floats) -> dict[str, Floats]:
+def _stresses(problem: AnyProblem, u: Floats) -> dict[str, Floats]:
     """Cell data of the body: stresses, where the mesh knows its Lame coefficients."""
     if problem.mesh is None or problem.mesh.lame is None:
         return {}
-    from enumsol.fem.stresses import cell_stresses, von_mises  # scikit-fem comes with the first stresses
+    from enumsol.fem.bases import cell_stresses, von_mises  # scikit-fem comes with the first stresses
 
     stress = cell_stresses(problem, u)
     if stress.shape[1] == 3:
@@ -275,7 +272,7 @@ def _body(meshio: Any, problem: ContactProblem3D, mesh: BodyMesh, u: Floats, dat
     return meshio.Mesh(mesh.points, cells, point_data=point_data, cell_data=cell_data)
 
 
-def _nodes(problem: ContactProblem3D, mesh: BodyMesh) -> NDArray[np.int64]:
+def _nodes(problem: ContactProblem3D, mesh: BodyMesh) -> Integers:
     """The node that each contact row stands for."""
     rows = problem.contact_rows
     nodes = mesh.dofs[rows.indices] // 3
@@ -288,7 +285,7 @@ def _nodes(problem: ContactProblem3D, mesh: BodyMesh) -> NDArray[np.int64]:
     return np.asarray(by_direction[0])
 
 
-def _spread(values: Floats, places: NDArray[np.int64], count: int) -> Floats:
+def _spread(values: Floats, places: Integers, count: int) -> Floats:
     """Values at some of ``count`` places; elsewhere NaN for scalars and zero for vectors."""
     full = np.full((count, *values.shape[1:]), np.nan if values.ndim == 1 else 0.0)
     full[places] = values

@@ -2,8 +2,7 @@
 
 from .growing import HistoryProgress as HistoryProgress, histories as histories
 from .history import History as History
-from .history_data import HistoryData as HistoryData, Refinement as Refinement
+from .history_data import HistoryData as HistoryData, Refinement as Refinement, Stage as Stage
 from .maps import MultiplicityMap as MultiplicityMap, multiplicity_map as multiplicity_map
-from .stages import Stage as Stage
 from .steps import LoadStep as LoadStep
 from .strips import MapFold as MapFold, MapRow as MapRow, MapStrip as MapStrip

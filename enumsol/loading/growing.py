@@ -1,49 +1,111 @@
-"""histories: every history of solutions that a sequence of loads may leave behind (theory, section 13)."""
+"""histories: every history of solutions that a sequence of loads may leave behind (theory, section 13).
+
+Increments are halved until the statuses along all histories no longer change, if that is asked for.
+"""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
+import networkx as nx
 import numpy as np
 
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.errors import Interrupted, InvalidArgumentError, NotHeldError
 from enumsol.loading.history import History
-from enumsol.loading.history_data import HistoryData
-from enumsol.loading.refinement import refined
-from enumsol.loading.stages import Rounding, Stage, case_of, contact_displacements, start_after
+from enumsol.loading.history_data import (
+    HistoryData,
+    Refinement,
+    Rounding,
+    Stage,
+    case_of,
+    contact_displacements,
+    start_after,
+)
 from enumsol.loading.steps import LoadStep, steps_of, way_to
 from enumsol.model.problem import ContactProblem, check_is_problem
 from enumsol.model.restart import SlipStart, restarted
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.roots.root import Root
-from enumsol.support.arguments import (
-    exact_number,
-    instance_of,
-    nonnegative_number,
-    one_of,
-    optional_callable,
-    optional_count,
-    optional_executor,
-    optional_seconds,
-    shown,
-)
+from enumsol.support import arguments
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
     from concurrent.futures import Executor
 
-    from enumsol.loading.history_data import Node
-    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.loading.history_data import HistoryData, Node
+    from enumsol.model.problem3d import AnyProblem
     from enumsol.roots.root_set import RootSet
 
     #: Of a parent's root (None in the first step) and the roots of the next step, those that are followed.
     Choice = Callable[[Root | None, RootSet], Any]
+    #: The statuses of all nodes at the given steps along one history.
+    Shape = tuple[tuple[Any, ...], ...]
+
+
+#: Histories that are compared at most.
+_MOST = 20_000
+
+
+def refined(
+    grown: Callable[[Sequence[LoadStep]], HistoryData],
+    steps: Sequence[LoadStep],
+    way: tuple[LoadStep, LoadStep],
+    most: int,
+) -> HistoryData:
+    """The history with the finest increments that were tried: the first of which halving changed nothing, halved.
+
+    ``way``: from where to where the load goes in the first step.
+    """
+    history = grown(steps)
+    changes: list[int] = []
+    reason = _incomparable(history)
+    while reason is None and len(changes) < most and (not changes or changes[-1]):
+        parts = 2 ** (len(changes) + 1)
+        finer = grown(halved(steps, way, parts))
+        reason = _incomparable(finer)
+        if reason is None:
+            changes.append(_changed(shapes(history, parts // 2), shapes(finer, parts), len(steps)))
+            history = finer
+    settled = bool(changes) and changes[-1] == 0
+    return replace(history, refinement=Refinement(len(changes), settled, tuple(changes), reason))
+
+
+def halved(steps: Sequence[LoadStep], way: tuple[LoadStep, LoadStep], parts: int) -> list[LoadStep]:
+    """Every step in so many equal parts; ``way``: from where to where the load goes in the first one."""
+    found: list[LoadStep] = []
+    for (start, end), step in zip([way, *pairwise(steps)], steps, strict=True):
+        found += [start.between(end, Fraction(k, parts)) for k in range(1, parts)]
+        found.append(step)
+    return found
+
+
+def shapes(history: HistoryData, every: int) -> set[Shape]:
+    """The statuses along the histories, seen after every so many steps."""
+    statuses = nx.get_node_attributes(history.graph, "statuses")
+    return {tuple(statuses[node] for node in path if node[0] % every == 0) for path in history.paths()}
+
+
+def _changed(one: set[Shape], other: set[Shape], steps: int) -> int:
+    """The first step up to which two sets of histories have different statuses; 0 where they have the same."""
+    for number in range(1, steps + 1):
+        if {shape[:number] for shape in one} != {shape[:number] for shape in other}:
+            return number
+    return 0
+
+
+def _incomparable(history: HistoryData) -> str | None:
+    """Why comparing a history would tell nothing about its increments, or None."""
+    if history.counts[-1] > _MOST:
+        return f"there are {history.counts[-1]} histories, too many to compare (at most {_MOST})"
+    return history.reasons[0] if history.reasons else None
+
 
 #: Options of enumerate_roots that a history has for the whole of it, or cannot have.
 _OWN = ("stop_after", "proof_path", "resume", "alpha", "method")
@@ -81,7 +143,7 @@ class HistoryProgress:
 
 
 def histories(
-    problem: ContactProblem | ContactProblem3D,
+    problem: AnyProblem,
     steps: Any,
     *,
     arithmetic: str = "verified",
@@ -174,27 +236,27 @@ def histories(
     """
     given: Any = problem
     check_is_problem(given)
-    one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
+    arguments.one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
     if problem.modes is not None and (arithmetic != "exact" or not isinstance(given, ContactProblem)):
         raise NotHeldError(
             "histories cannot take a body that nothing holds (rigid_modes is given) but in 2D and in exact arithmetic; "
             'expected arithmetic="exact", or a body held by supports or springs'
         )
     if not callable(follow):
-        one_of(follow, "follow", ("all", "nearest"))
-    tolerance = None if merge is None else nonnegative_number(merge, "merge")
+        arguments.one_of(follow, "follow", ("all", "nearest"))
+    tolerance = None if merge is None else arguments.nonnegative_number(merge, "merge")
     if tolerance is not None and arithmetic == "exact":
         raise InvalidArgumentError('merge is given with arithmetic "exact", in which only equal ends are merged')
     for name in _OWN:
         if name in options:
             raise InvalidArgumentError(f"{name} is an option of enumerate_roots that histories does not take")
-    instance_of(refine, bool, "refine")
-    optional_executor(executor)
-    optional_callable(progress, "progress")
+    arguments.instance_of(refine, bool, "refine")
+    arguments.optional_executor(executor)
+    arguments.optional_callable(progress, "progress")
     limits = _Limits(
-        optional_count(max_branches, "max_branches"),
-        optional_count(max_nodes, "max_nodes"),
-        optional_seconds(time_limit),
+        arguments.optional_count(max_branches, "max_branches"),
+        arguments.optional_count(max_nodes, "max_nodes"),
+        arguments.optional_seconds(time_limit),
     )
     fitted = steps_of(problem, steps)
     search = {"arithmetic": arithmetic, "executor": executor, **options}
@@ -205,7 +267,7 @@ def histories(
     if not refine:
         return History(grown(fitted))
     return History(
-        refined(grown, fitted, way_to(problem, fitted[0]), optional_count(max_halvings, "max_halvings") or 0)
+        refined(grown, fitted, way_to(problem, fitted[0]), arguments.optional_count(max_halvings, "max_halvings") or 0)
     )
 
 
@@ -244,7 +306,7 @@ class _Growing:
 
     def __init__(
         self,
-        problem: ContactProblem | ContactProblem3D,
+        problem: AnyProblem,
         steps: Sequence[LoadStep],
         follow: str | Choice,
         merge: float | None,
@@ -441,14 +503,15 @@ def _numbers(answer: Any, roots: RootSet) -> set[int]:
     InvalidArgumentError
         It returned something else.
     """
-    items = [answer] if isinstance(answer, Root) or exact_number(answer) is not None else answer
+    items = [answer] if isinstance(answer, Root) or arguments.exact_number(answer) is not None else answer
     found = set()
     for item in items if isinstance(items, Iterable) else (items,):
         own = [k for k, root in enumerate(roots) if root is item]
-        number = exact_number(item) if not own else own[0]
+        number = arguments.exact_number(item) if not own else own[0]
         if number is None or number != int(number) or not 0 <= number < len(roots):
             raise InvalidArgumentError(
-                f"follow returned {shown(item)}; expected roots of the RootSet that it was given, or their numbers"
+                f"follow returned {arguments.shown(item)}; "
+                "expected roots of the RootSet that it was given, or their numbers"
             )
         found.add(int(number))
     return found

@@ -14,11 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.loading.history_data import START, HistoryData, Refinement, history_proof
-from enumsol.loading.history_text import history_html, history_text
-from enumsol.loading.stages import Stage
+from enumsol.loading import history_data
 from enumsol.loading.steps import LoadStep
-from enumsol.model.problem import ContactProblem, check_is_problem
+from enumsol.model.problem import check_is_problem
 from enumsol.model.restart import SlipStart, restarted
 from enumsol.model.statuses import ContactStatus
 from enumsol.proof.proof_file import Proof
@@ -35,14 +33,15 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-    from enumsol.loading.history_data import Node
-    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import AnyProblem
 
 FORMAT, VERSION = "enumsol-history", 1
 _ARRAYS = ("lambda_n", "lambda_t", "u_n", "u_t")
+#: What the file holds as it is: of a root, and of the roots of a stage.
+_OF_ROOT, _OF_ROOTS = ("index", "regular", "margin"), ("stopped", "at_least", "certified_data")
 
 
-def save_history(data: HistoryData, file: str | Path) -> None:
+def save_history(data: history_data.HistoryData, file: str | Path) -> None:
     """Write a history (see History.save)."""
     record = {
         "format": FORMAT,
@@ -63,7 +62,7 @@ def save_history(data: HistoryData, file: str | Path) -> None:
         place.write_text(text, encoding="utf-8")
 
 
-def load_history(file: str | Path, problem: Any) -> HistoryData:
+def load_history(file: str | Path, problem: Any) -> history_data.HistoryData:
     """Read what save_history wrote (see History.load).
 
     Raises
@@ -82,8 +81,8 @@ def load_history(file: str | Path, problem: Any) -> HistoryData:
         stages = tuple(_read_stage(k, item, problem, steps, record) for k, item in enumerate(record["stages"]))
         refinement = record["refinement"]
         if refinement is not None:
-            refinement = Refinement(**refinement | {"changed_at": tuple(refinement["changed_at"])})
-        return HistoryData(
+            refinement = history_data.Refinement(**refinement | {"changed_at": tuple(refinement["changed_at"])})
+        return history_data.HistoryData(
             problem,
             steps,
             record["arithmetic"],
@@ -107,7 +106,7 @@ def _read_step(record: dict[str, Any], problem: Any) -> LoadStep:
     return step.on(problem, 1)
 
 
-def _stage(stage: Stage) -> dict[str, Any]:
+def _stage(stage: history_data.Stage) -> dict[str, Any]:
     start, roots = stage.start, stage.roots
     return {
         "step": stage.step,
@@ -120,9 +119,7 @@ def _stage(stage: Stage) -> dict[str, Any]:
         "roots": [_root(root) for root in roots],
         "families": [_family(family) for family in roots.families],
         "undecided": [[_names(part.statuses), part.reason, part.hint, part.leaves] for part in roots.undecided],
-        "stopped": roots.stopped,
-        "at_least": roots.at_least,
-        "certified_data": roots.certified_data,
+        **{name: getattr(roots, name) for name in _OF_ROOTS},
         "stats": {"nodes": roots.stats.nodes, "closed": roots.stats.closed, "seconds": roots.stats.seconds},
         "proof": None if roots.proof is None else base64.b64encode(roots.proof.content()).decode(),
     }
@@ -130,7 +127,7 @@ def _stage(stage: Stage) -> dict[str, Any]:
 
 def _read_stage(
     number: int, record: dict[str, Any], problem: Any, steps: tuple[LoadStep, ...], whole: dict[str, Any]
-) -> Stage:
+) -> history_data.Stage:
     exact = None if record["exact"] is None else tuple(map(Fraction, record["exact"]))
     radius = None if record["radius"] is None else np.array(record["radius"])
     start = SlipStart(np.array(record["offset"]), radius, exact)
@@ -145,14 +142,12 @@ def _read_stage(
         undecided=[Undecided(_statuses(names), *rest) for names, *rest in record["undecided"]],
         arithmetic=whole["arithmetic"],
         method="tree",
-        stopped=record["stopped"],
+        **{name: record[name] for name in _OF_ROOTS},
         stats=SearchStats(**record["stats"]),
         node_ids=problem.node_ids,
-        at_least=record["at_least"],
-        certified_data=record["certified_data"],
         proof=proof,
     )
-    return Stage(number, record["step"], start, roots, body, tuple(record["reasons"]))
+    return history_data.Stage(number, record["step"], start, roots, body, tuple(record["reasons"]))
 
 
 def _root(root: Root) -> dict[str, Any]:
@@ -161,9 +156,7 @@ def _root(root: Root) -> dict[str, Any]:
         "statuses": _names(root.statuses),
         "active": [sorted(_names(held)) for held in root.active],
         **{name: getattr(root, name).tolist() for name in _ARRAYS},
-        "index": root.index,
-        "regular": root.regular,
-        "margin": root.margin,
+        **{name: getattr(root, name) for name in _OF_ROOT},
         "bounds": None if bounds is None else {name: getattr(bounds, name).tolist() for name in _ARRAYS},
         "slips": None if root.exact_slips is None else [str(value) for value in root.exact_slips],
         "angles": None if root.slip_angle is None else [[float(a).hex() for a in pair] for pair in root.slip_angle],
@@ -178,9 +171,7 @@ def _read_root(record: dict[str, Any], alpha: Any, problem: Any) -> Root:
         statuses=_statuses(record["statuses"]),
         active=tuple(frozenset(_statuses(names)) for names in record["active"]),
         **arrays,
-        index=record["index"],
-        regular=record["regular"],
-        margin=record["margin"],
+        **{name: record[name] for name in _OF_ROOT},
         enclosure=None if bounds is None else Enclosure(*(np.array(bounds[name]) for name in _ARRAYS)),
         slip_angle=None if angles is None else np.array([[float.fromhex(a) for a in pair] for pair in angles]),
         _condensed=problem.condensed,
@@ -238,7 +229,7 @@ class History(Immutable):
     (0, (3, 5), 5, True)
     """
 
-    def __init__(self, data: HistoryData) -> None:
+    def __init__(self, data: history_data.HistoryData) -> None:
         self.data = data
         self.problem = data.problem
         self.steps = data.steps
@@ -266,11 +257,11 @@ class History(Immutable):
 
         None in fast and exact arithmetic, and where there was no search at all.
         """
-        return history_proof(self.data)
+        return history_data.history_proof(self.data)
 
     # -- the graph -------------------------------------------------------------------------------------------------
 
-    def root(self, node: Node) -> Root:
+    def root(self, node: history_data.Node) -> Root:
         """The root of a node.
 
         Raises
@@ -278,7 +269,7 @@ class History(Immutable):
         InvalidArgumentError
             There is no such node.
         """
-        if not isinstance(node, tuple) or node not in self.graph or node == START:
+        if not isinstance(node, tuple) or node not in self.graph or node == history_data.START:
             raise InvalidArgumentError(f"node is {shown(node)}; expected a pair (step, root) of this history")
         found: Root = self.graph.nodes[node]["root"]
         return found
@@ -295,24 +286,24 @@ class History(Immutable):
         return tuple(self.graph.nodes[node]["root"] for node in self.nodes_of(number))
 
     @property
-    def branchings(self) -> tuple[Node, ...]:
+    def branchings(self) -> tuple[history_data.Node, ...]:
         """Nodes that more than one root may follow; (0, 0) if the first step has several."""
         return tuple(node for node, degree in self.graph.out_degree() if degree > 1)
 
     @property
-    def ends(self) -> tuple[Node, ...]:
+    def ends(self) -> tuple[history_data.Node, ...]:
         """Nodes that nothing follows: those of the last step, and those after which nothing was searched or found."""
-        return tuple(node for node, degree in self.graph.out_degree() if degree == 0 and node != START)
+        return tuple(node for node, degree in self.graph.out_degree() if degree == 0 and node != history_data.START)
 
-    def stages(self, step: int) -> tuple[Stage, ...]:
+    def stages(self, step: int) -> tuple[history_data.Stage, ...]:
         """The searches of one step, from 1, one for each start."""
         return self.data.stages_of(step)
 
-    def nodes_of(self, step: int) -> tuple[Node, ...]:
+    def nodes_of(self, step: int) -> tuple[history_data.Node, ...]:
         """The nodes of one step."""
         return self.data.nodes_of(step)
 
-    def paths(self) -> Iterator[tuple[Node, ...]]:
+    def paths(self) -> Iterator[tuple[history_data.Node, ...]]:
         """The histories one by one: the nodes from the first step to an end."""
         return self.data.paths()
 
@@ -322,7 +313,7 @@ class History(Immutable):
         return self.data.counts
 
     @property
-    def dissipated(self) -> Mapping[Node, tuple[float, float]]:
+    def dissipated(self) -> Mapping[history_data.Node, tuple[float, float]]:
         """The work of friction from the start to every node, least and most over the histories that lead there."""
         return self.data.dissipated
 
@@ -340,7 +331,7 @@ class History(Immutable):
 
         rows = []
         for node in self.graph:
-            if node == START:
+            if node == history_data.START:
                 continue
             given, root = self.graph.nodes[node], self.root(node)
             shear = np.sum(root.lambda_t, axis=0)
@@ -394,7 +385,7 @@ class History(Immutable):
         MissingDependencyError
             matplotlib is not installed.
         """
-        from enumsol.loading.history_plots import draw_history  # matplotlib comes with the first picture
+        from enumsol.loading.figures import draw_history  # matplotlib comes with the first picture
 
         return kept(draw_history(self.data, x, y, ax), file)
 
@@ -409,7 +400,7 @@ class History(Immutable):
         save_history(self.data, file)
 
     @classmethod
-    def load(cls, file: str | Path, problem: ContactProblem | ContactProblem3D) -> History:
+    def load(cls, file: str | Path, problem: AnyProblem) -> History:
         """Read a history that `save` wrote, of this problem.
 
         Raises
@@ -426,7 +417,7 @@ class History(Immutable):
         return self.data.completeness()
 
     def __repr__(self) -> str:
-        return history_text(self.data)
+        return history_data.history_text(self.data)
 
     def _repr_html_(self) -> str:
-        return history_html(self.data)
+        return history_data.history_html(self.data)

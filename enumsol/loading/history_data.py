@@ -1,28 +1,160 @@
-"""What a history found, as plain data: its graph, and what is proven of it.
+"""What a history found, as plain data and as text: its stages, their graph, and what is proven of it.
 
-Its proof is one file: the proofs of its searches, with their starts and what follows them.
+A stage holds the roots of one step from one start, and where each of them leaves the contact nodes. The proof of a
+history is one file: the proofs of its searches, with their starts and what follows them.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import networkx as nx
+import numpy as np
 
-from enumsol.loading.stages import dissipated
+from enumsol.arithmetic.balls import SAFE, UNIT, Ball
+from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.model.restart import SlipStart
+from enumsol.model.statuses import ContactStatus
 from enumsol.proof.reading import rational_text
 from enumsol.proof.writer import ProofWriter
-from enumsol.support.messages import counted
+from enumsol.roots.root import Root, summary
+from enumsol.support.messages import counted, html_lines, html_table
+from enumsol.trusted.positions import certain_statuses, tangential_positions
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
+    from collections.abc import Hashable, Iterator, Mapping
 
-    from enumsol.loading.stages import Stage
     from enumsol.loading.steps import LoadStep
     from enumsol.proof.proof_file import Proof
+    from enumsol.roots.root_set import RootSet
+    from enumsol.support.array_types import Floats
+
+
+#: A start is stated with a larger radius than was found, so that a checker on another processor, whose rounding is
+#: different, finds its own ball inside: by this share, and by this many times what rounding has left in the first step.
+_WIDER, _ROUNDINGS = 2.0**-5, 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """The roots of one step from one start.
+
+    Attributes
+    ----------
+    number : int
+        In the order in which the stages of a history were searched.
+    step : int
+        From 1.
+    start : SlipStart
+    roots : RootSet
+    problem : ContactProblem or ContactProblem3D
+        The step's own: its load, its friction and the start as slip offset.
+    reasons : tuple of str
+        Why it is not proven that nothing else solves this step, each one sentence.
+    """
+
+    number: int
+    step: int
+    start: SlipStart
+    roots: RootSet
+    problem: Any
+    reasons: tuple[str, ...]
+
+    @property
+    def largest_radius(self) -> float:
+        """How far the start may be from its midpoint, at most [length]."""
+        return 0.0 if self.start.radius is None else float(np.max(self.start.radius))
+
+
+@dataclass
+class Rounding:
+    """What rounding alone has left of the positions: the largest radius among those of the first step [length]."""
+
+    first: float = 0.0
+
+    def widened(self, found: Ball, before: SlipStart) -> SlipStart:
+        """A ball as a start, stated wider (see above); what was carried over unchanged stays as it was."""
+        kept = (found.mid == before.ball.mid) & (found.rad == before.ball.rad)
+        if before.radius is None:
+            self.first = max(self.first, float(np.max(found.rad, initial=0.0)))
+        more = found.rad * _WIDER + _ROUNDINGS * np.minimum(self.first, found.rad)
+        more += 8 * UNIT * np.abs(found.mid)
+        radius = np.where(kept, found.rad, (found.rad + more) * SAFE)
+        offset, radius = (values.reshape(before.offset.shape, order="F") for values in (found.mid, radius))
+        return SlipStart(offset, radius if np.any(radius) else None)
+
+
+def start_after(stage: Stage, root: Root, rounding: Rounding) -> SlipStart | None:
+    """The start of the next step after a root; None where it cannot be enclosed (theory, section 13.2)."""
+    arithmetic = stage.roots.arithmetic
+    if arithmetic == "fast":
+        return SlipStart(stage.start.offset + root.u_t)
+    if arithmetic == "exact":
+        if root.exact_slips is None:
+            return None
+        pairs = zip(stage.start.rationals, root.exact_slips, strict=True)
+        return SlipStart.of_rationals(tuple(before + slip for before, slip in pairs))
+    found = _enclosed_positions(stage, root)
+    return None if found is None else rounding.widened(found, stage.start)
+
+
+def case_of(stage: Stage, root: Root) -> Hashable | None:
+    """Equal for regular roots of one step whose ends are the same functions of the same balls; None: not known.
+
+    In 2D what a regular root of a selection is depends on the offsets of its sticking nodes only.
+    """
+    if stage.roots.arithmetic != "verified" or not root.regular or root.u_t.ndim > 1:
+        return None
+    ball = stage.start.ball
+    sticking = [k for k, status in enumerate(root.statuses) if status is ContactStatus.STICK]
+    return stage.step, root.statuses, tuple(ball.mid[sticking].tolist()), tuple(ball.rad[sticking].tolist())
+
+
+def _enclosed_positions(stage: Stage, root: Root) -> Ball | None:
+    if root.enclosure is None or stage.roots.certified_data != "problem":
+        return None
+    low, high = root.enclosure.u_t[..., 0].ravel(order="F"), root.enclosure.u_t[..., 1].ravel(order="F")
+    still = (low == 0) & (high == 0)
+    before = stage.start.ball
+    if np.all(still):
+        return before
+    try:
+        enclosure = stage.problem.enclosure
+        forces = _forces(root)
+        codes = certain_statuses(forces, _middle(low, high)) if root.u_t.ndim == 1 else None
+        moved = tangential_positions(enclosure, Fraction(root.alpha), forces, still, before, codes)
+    except NotEnclosedError:
+        return None
+    return moved if np.all(np.isfinite(moved.rad)) else None
+
+
+def _forces(root: Root) -> Ball:
+    """lambda as a ball: all normal components, then the tangential ones, direction by direction."""
+    assert root.enclosure is not None
+    bounds = [root.enclosure.lambda_n, root.enclosure.lambda_t]
+    low, high = (np.concatenate([b[..., k].ravel(order="F") for b in bounds]) for k in (0, 1))
+    return _middle(low, high)
+
+
+def _middle(low: Floats, high: Floats) -> Ball:
+    """Balls that hold what lies between bounds."""
+    mid = 0.5 * low + 0.5 * high
+    return Ball(mid, np.maximum(high - mid, mid - low) * SAFE)
+
+
+def dissipated(root: Root) -> float:
+    """The work of friction in a step, the sum of lambda_t . u_t over the nodes [force times length]."""
+    return float(np.sum(root.lambda_t * root.u_t))
+
+
+def contact_displacements(problem: Any, root: Root) -> Floats:
+    """Bn u and Bt u in one column, by which roots of one step are near each other [length]."""
+    return np.concatenate([root.u_n + problem.gap, (root.u_t + problem.slip_offset).ravel()])
+
 
 #: The number of a step, and of a root in it.
 Node = tuple[int, int]
@@ -221,3 +353,100 @@ def _following(data: HistoryData) -> list[list[int]]:
         for parent in parents:
             found[stage_of[parent]].add(stage.number)
     return [sorted(numbers) for numbers in found]
+
+
+#: Lines of the tree, steps of the table and reasons that are printed at most.
+_TREE, _STEPS, _REASONS = 40, 40, 8
+#: How the line of a node below a branching begins, and the lines below it; of the last one otherwise.
+_BRANCH = {True: ("└─ ", "   "), False: ("├─ ", "│  ")}
+_HEADS = ("step", "alpha", "roots", "from", "histories", "dissipated")
+
+
+def history_text(history: HistoryData) -> str:
+    """What print shows."""
+    rows = [_HEADS, *_rows(history)]
+    widths = (4, 10, 6, 5, 10, 11)
+    table = [" ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True)) for row in rows]
+    left = len(history.steps) - _STEPS
+    more = [f"   ... {counted(left, 'more step')}"] if left > 0 else []
+    return "\n".join([_heading(history), *table, *more, "tree", *tree_lines(history), *_notes(history)])
+
+
+def history_html(history: HistoryData) -> str:
+    """What a notebook shows."""
+    tree = html_lines(["tree", *tree_lines(history)])
+    return html_lines([_heading(history)]) + html_table(_HEADS, _rows(history)) + tree + html_lines(_notes(history))
+
+
+def steps_table(history: HistoryData) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Heads and rows of the table of the steps."""
+    return _HEADS, _rows(history)
+
+
+def tree_lines(history: HistoryData, most: int = _TREE) -> Iterator[str]:
+    """The tree, a line per node: only below a branching it is indented.
+
+    What follows a node that several lead to stands below the first of them.
+    """
+    graph, last, seen = history.graph, len(history.steps), set()
+    pending = [(node, "", "") for node in reversed(list(graph.successors((0, 0))))]
+    if len(pending) > 1:
+        pending = [(node, *_BRANCH[k == 0]) for k, (node, _, _) in enumerate(pending)]
+    written = 0
+    while pending:
+        node, first, rest = pending.pop()
+        written += 1
+        if written > most:
+            continue
+        left = "" if node[0] == last or node in history.followed else " (not followed)"
+        again = " (see above)" if node in seen else ""
+        yield f"{first}{node[0]}.{node[1]} {summary(graph.nodes[node]['statuses'])}{left}{again}"
+        if node in seen:
+            continue
+        seen.add(node)
+        following = list(reversed(list(graph.successors(node))))
+        for k, child in enumerate(following):
+            begin, go_on = _BRANCH[k == 0] if len(following) > 1 else ("", "")
+            pending.append((child, rest + begin, rest + go_on))
+    if written > most:
+        yield f"... {counted(written - most, 'more line')} at least"
+
+
+def _heading(history: HistoryData) -> str:
+    total = history.counts[-1]
+    found = counted(total, "history", "histories") if total else "none reaches the last step"
+    return f"History of {counted(len(history.steps), 'step')}: {found} ({history.arithmetic})"
+
+
+def _rows(history: HistoryData) -> list[tuple[str, ...]]:
+    rows: list[tuple[str, ...]] = []
+    for number in range(1, min(len(history.steps), _STEPS) + 1):
+        nodes = history.nodes_of(number)
+        work = [history.dissipated[node] for node in nodes]
+        span = "" if not work else _span(min(low for low, _ in work), max(high for _, high in work))
+        alpha = history.steps[number - 1].alpha
+        rows.append(
+            (
+                str(number),
+                "" if alpha is None else f"{float(alpha):.6g}",
+                str(len(nodes)),
+                str(len(history.stages_of(number))),
+                str(history.counts[number - 1]),
+                span,
+            )
+        )
+    return rows
+
+
+def _span(low: float, high: float) -> str:
+    a, b = (f"{value + 0.0:.4g}" for value in (low, high))
+    return a if a == b else f"{a} to {b}"
+
+
+def _notes(history: HistoryData) -> list[str]:
+    lines = [f"open: {reason}" for reason in history.reasons[:_REASONS]]
+    if len(history.reasons) > _REASONS:
+        lines.append(f"   ... {len(history.reasons) - _REASONS} more reasons")
+    if history.refinement is not None:
+        lines.append(f"increments: {history.refinement}")
+    return [*lines, history.completeness()]

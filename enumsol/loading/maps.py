@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -14,20 +14,9 @@ import numpy as np
 
 from enumsol.branches.construction import branch_graph
 from enumsol.errors import Interrupted, InvalidArgumentError
-from enumsol.loading.strips import MapFold, MapRow, map_strip, ranges_of_one
+from enumsol.loading.strips import MapFold, MapRow, MapStrip, map_strip, ranges_of_one
 from enumsol.model.problem import ContactProblem
-from enumsol.support.arguments import (
-    alpha_interval,
-    alpha_value,
-    exact_number,
-    finite_number,
-    instance_of,
-    nonnegative_integer,
-    optional_callable,
-    optional_executor,
-    optional_seconds,
-    shown,
-)
+from enumsol.support import arguments
 from enumsol.support.array_arguments import vector_of
 from enumsol.support.immutable import Immutable
 from enumsol.support.messages import counted
@@ -35,14 +24,12 @@ from enumsol.support.plotting import kept
 from enumsol.support.workers import spread
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
     from concurrent.futures import Executor
     from pathlib import Path
 
     import pandas as pd
 
-    from enumsol.loading.strips import MapStrip
-    from enumsol.support.arguments import Alpha, AlphaLike
+    from enumsol.support.array_types import Alpha, AlphaLike
     from enumsol.support.workers import Call
 
 _EXPECTED = (
@@ -113,16 +100,16 @@ def multiplicity_map(
          0.1  1 3 5            3.6087
     complete: yes (proven at these values; says nothing about those between, but for one solution over 36 % of alpha)
     """
-    interval = alpha_interval(alphas, "alphas")
+    interval = arguments.alpha_interval(alphas, "alphas")
     name, make, values = _parameter(problem, over)
-    optional_executor(executor)
-    optional_callable(progress, "progress")
+    arguments.optional_executor(executor)
+    arguments.optional_callable(progress, "progress")
     if "interval" in options or "progress" in options:
         raise InvalidArgumentError("interval and progress are not options here; expected those of branch_graph")
-    most = nonnegative_integer(max_boxes, "max_boxes")
+    most = arguments.nonnegative_integer(max_boxes, "max_boxes")
     if not isinstance(make, _Replaced) or make.problem.modes is not None or options.get("arithmetic") == "fast":
         most = 0
-    work = _Rows(name, interval, values, make, options, optional_seconds(time_limit), most)
+    work = _Rows(name, interval, values, make, options, arguments.optional_seconds(time_limit), most)
     try:
         work.run(executor, progress)
     except (KeyboardInterrupt, Interrupted) as interruption:
@@ -197,7 +184,7 @@ def map_row(
 ) -> MapRow:
     """One row of a map (a module-level function, so that other processes can import it)."""
     started = time.perf_counter()
-    problem = instance_of(make(value), ContactProblem, "the problem that over makes")
+    problem = arguments.instance_of(make(value), ContactProblem, "the problem that over makes")
     graph = branch_graph(problem, interval, **options)
     steps, uniqueness = graph.claims.steps(), graph.claims.uniqueness()
     arcs = {vertex.number: [] for vertex in graph.folds}  # type: dict[int, list[tuple[str, ...]]]
@@ -279,8 +266,8 @@ class MultiplicityMap(Immutable):
         """
         row = next((row for row in self.rows if row.value == value), None)
         if row is None:
-            raise InvalidArgumentError(f"value is {shown(value)}; expected one of the values of the map")
-        exact = alpha_value(alpha)
+            raise InvalidArgumentError(f"value is {arguments.shown(value)}; expected one of the values of the map")
+        exact = arguments.alpha_value(alpha)
         if not self.interval[0] <= exact <= self.interval[1]:
             raise InvalidArgumentError(f"alpha is {float(exact):g}; expected it in the interval {list(self.interval)}")
         return row.count_at(exact)
@@ -360,7 +347,7 @@ class MultiplicityMap(Immutable):
         MissingDependencyError
             matplotlib is not installed.
         """
-        from enumsol.loading.map_plots import draw_map  # matplotlib comes with the first picture
+        from enumsol.loading.figures import draw_map  # matplotlib comes with the first picture
 
         return kept(draw_map(self.name, self.rows, self.strips, self.curves, self.completeness(), ax), file)
 
@@ -455,22 +442,22 @@ def _parameter(problem: Any, over: Any) -> tuple[str, Callable[[float], ContactP
     if isinstance(over, tuple) and len(over) == 2 and callable(over[0]):
         return getattr(over[0], "__name__", "value"), over[0], _numbers(over[1])
     if not isinstance(over, Mapping) or len(over) != 1:
-        raise InvalidArgumentError(f"over is {shown(over)}; {_EXPECTED}")
+        raise InvalidArgumentError(f"over is {arguments.shown(over)}; {_EXPECTED}")
     ((name, given),) = over.items()
     if name not in ("friction", "gap", "load"):
-        raise InvalidArgumentError(f"over is {shown(over)}; {_EXPECTED}")
-    body = instance_of(problem, ContactProblem, "problem")
+        raise InvalidArgumentError(f"over is {arguments.shown(over)}; {_EXPECTED}")
+    body = arguments.instance_of(problem, ContactProblem, "problem")
     if name != "load":
         return name, _Replaced(body, name), _numbers(given)
     if not isinstance(given, tuple) or len(given) != 2:
-        raise InvalidArgumentError(f"over is {shown(over)}; {_EXPECTED}")
+        raise InvalidArgumentError(f"over is {arguments.shown(over)}; {_EXPECTED}")
     return name, _Replaced(body, name, vector_of(given[0], "direction", body.n)), _numbers(given[1])
 
 
 def _numbers(values: Any) -> list[float]:
-    if isinstance(values, (str, bytes)) or exact_number(values) is not None or not np.iterable(values):
-        raise InvalidArgumentError(f"the values of over are {shown(values)}; expected a sequence of numbers")
-    found = [finite_number(value, "a value of over") for value in values]
+    if isinstance(values, (str, bytes)) or arguments.exact_number(values) is not None or not np.iterable(values):
+        raise InvalidArgumentError(f"the values of over are {arguments.shown(values)}; expected a sequence of numbers")
+    found = [arguments.finite_number(value, "a value of over") for value in values]
     if not found or len(set(found)) < len(found):
         raise InvalidArgumentError("the values of over are none, or one occurs twice; expected different numbers")
     return found

@@ -19,10 +19,9 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import pandas as pd
-    from numpy.typing import ArrayLike, NDArray
 
     from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.support.arguments import Alpha, AlphaLike
+    from enumsol.support.array_types import Alpha, AlphaLike, ArrayLike, Floats
 
     Problem = ContactProblem | ContactProblem3D
 
@@ -232,7 +231,7 @@ def _array(value: Any, name: str) -> Any:
     return sealed(real_array(value, name, error=InvalidArgumentError))
 
 
-def _coefficients(friction: Any, problem: Problem, number: int) -> NDArray[np.float64]:
+def _coefficients(friction: Any, problem: Problem, number: int) -> Floats:
     wanted = problem.slip_offset.shape
     values = np.asarray(friction, dtype=np.float64)
     if values.shape == (problem.p,) and len(wanted) == 2:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
     from enumsol.model.problem import ContactProblem
-    from enumsol.support.arguments import Alpha
+    from enumsol.support.array_types import Alpha
 
 
 @dataclass(frozen=True)

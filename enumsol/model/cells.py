@@ -6,14 +6,11 @@ A new element begins with an entry of `KINDS`; docs/architecture.md lists the ot
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-
-if TYPE_CHECKING:
-    from enumsol.support.array_types import Floats, Integers
+from enumsol.support.array_types import Floats, Integers
 
 #: Cosine of the angle up to which the boundary of a solid counts as smooth across an edge.
 _SMOOTH = float(np.cos(np.radians(20.0)))

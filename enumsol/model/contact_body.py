@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     from enumsol.condensation.factorization import Factorization
     from enumsol.condensation.products import Products
     from enumsol.model.mesh import BodyMesh
-    from enumsol.support.arguments import AlphaLike
-    from enumsol.support.array_types import ArrayLike, Floats, NDArray
+    from enumsol.support.array_types import AlphaLike, ArrayLike, Floats, Indices
 
 #: An asymmetry of A up to this fraction of max|A| is rounding of the user's assembly and is averaged away.
 ASYMMETRY_TOLERANCE = 1e-12
@@ -440,7 +439,7 @@ def _check_row_rank(contact: Mapping[str, sp.csr_array]) -> None:
             )
 
 
-def _dependent_rows(unit: sp.csr_array, gram: Floats) -> NDArray[np.intp]:
+def _dependent_rows(unit: sp.csr_array, gram: Floats) -> Indices:
     """The rows (of length one) that take part in a linear dependence; empty where there is none."""
     values, vectors = np.linalg.eigh(gram)
     # the Gram matrix squares the singular values: below sqrt(eps) decide by the singular values themselves

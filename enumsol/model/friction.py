@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -13,12 +14,8 @@ from enumsol.errors import FrictionJumpWarning, InvalidProblemError
 from enumsol.model.contact_body import span, vector
 from enumsol.support.arguments import exact_number, shown
 from enumsol.support.array_arguments import plain_array, real_array
+from enumsol.support.array_types import ArrayLike, Floats
 from enumsol.support.immutable import Immutable, Sealed, sealed
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from enumsol.support.array_types import ArrayLike, Floats
 
 _EXPECTED = "expected a number, a pair (F1, F2) of numbers or (p,) arrays, a FrictionTable, or a callable F(node, slip)"
 #: Slips per node at which a function is sampled for jumps; bisections of the largest step; the share of the step

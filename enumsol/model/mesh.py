@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.model.cells import KINDS, numbers_of_nodes
 from enumsol.support.array_arguments import real_array, real_matrix, vector_of
+from enumsol.support.array_types import ArrayLike, Floats, Integers
 from enumsol.support.immutable import Immutable, SealedMatrix, sealed
-
-if TYPE_CHECKING:
-    from enumsol.support.array_types import ArrayLike, Floats, Integers
 
 #: How far products of the columns of a motion may be from those of orthonormal ones.
 _ORTHONORMAL = 1e-8

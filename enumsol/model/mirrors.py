@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -12,10 +12,8 @@ from enumsol.model.shapes import body_shape, row_frames
 from enumsol.model.statuses import ContactStatus
 from enumsol.support.arguments import one_of
 from enumsol.support.array_arguments import real_array, short_vector
+from enumsol.support.array_types import ArrayLike, Floats, Integers
 from enumsol.support.immutable import Sealed, sealed
-
-if TYPE_CHECKING:
-    from enumsol.support.array_types import ArrayLike, Floats, Integers
 
 #: How far a node may be from the image of another, relative to the extent of the contact nodes, and how far normals and
 #: tangents: meshes are symmetric within rounding, or not at all.

@@ -18,8 +18,7 @@ from enumsol.support.immutable import sealed
 
 if TYPE_CHECKING:
     from enumsol.condensation.condensed import CondensedProblem
-    from enumsol.support.arguments import AlphaLike
-    from enumsol.support.array_types import ArrayLike, Floats
+    from enumsol.support.array_types import AlphaLike, ArrayLike, Floats
 
 
 class ContactProblem(ContactBody):

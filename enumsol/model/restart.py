@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
 from enumsol.model.contact_body import ContactBody
+from enumsol.support.array_types import Floats
 from enumsol.support.immutable import Sealed, sealed
-
-if TYPE_CHECKING:
-    from enumsol.support.array_types import Floats
 
 _Body = TypeVar("_Body", bound=ContactBody)
 
@@ -84,12 +82,7 @@ class SlipStart(Sealed):
         return bool(np.all((far <= own.rad) | ((own.mid == other.mid) & (other.rad <= own.rad))))
 
 
-def restarted(
-    problem: _Body,
-    start: SlipStart,
-    load: Floats | None = None,
-    friction: Floats | None = None,
-) -> _Body:
+def restarted(problem: _Body, start: SlipStart, load: Floats | None = None, friction: Floats | None = None) -> _Body:
     """The problem with another slip offset, and where they are given with another load and other coefficients.
 
     Nothing that depends on the matrices alone is computed again, their enclosure if it is known.

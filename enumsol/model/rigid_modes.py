@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -12,11 +12,9 @@ import scipy.sparse as sp
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.support.arguments import positive_number
 from enumsol.support.array_arguments import real_array
+from enumsol.support.array_types import Floats
 from enumsol.support.immutable import Sealed, sealed
 from enumsol.support.messages import listed
-
-if TYPE_CHECKING:
-    from enumsol.support.array_types import Floats
 
 #: A N is rounding of the user's assembly up to this fraction of |A| |N|; theory, section 14.1, says what is then meant.
 MODE_TOLERANCE = 1e-9

@@ -11,12 +11,9 @@ quarter; its number is i + (count - 1) RUN.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from fractions import Fraction
 from functools import lru_cache
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 #: The status code of sector i is SECTORS + i.
 SECTORS = 8

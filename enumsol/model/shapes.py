@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.statuses import ContactStatus
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from enumsol.support.array_types import Floats, Integers
+from enumsol.support.array_types import Floats, Integers
 
 #: Displacements are drawn so that the largest takes this part of the body's size, and forces likewise.
 _MOVED, _LONGEST = 0.08, 0.16

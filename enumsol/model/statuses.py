@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import enum
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.arguments import shown
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from enumsol.support.array_types import Floats, Mask, NDArray
+from enumsol.support.array_types import Floats, Mask, NDArray
 
 
 class ContactStatus(enum.Enum):

@@ -8,16 +8,14 @@ from __future__ import annotations
 import contextlib
 import itertools
 import zlib
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.proof.proof_file import EXPANSION, MAGIC, SMALL, ProofFormatError, decoded, lines_of
 from enumsol.proof.reading import quoted, same
 from enumsol.proof.records import DeclaredForm, UndecidedRecord
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
 
 #: Bytes that are expanded at once: what is lost before a damaged place.
 _CHUNK = 512

@@ -21,20 +21,17 @@ import json
 import math
 import stat
 import zlib
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from enumsol.errors import EnumsolError, InvalidArgumentError
 from enumsol.support.arguments import file_path
+from enumsol.support.array_types import Floats, Indices
 from enumsol.support.files import writing
 from enumsol.support.messages import html_lines
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from numpy.typing import NDArray
 
 MAGIC = b"enumsol-proof 1\n"
 _DIGEST = 32
@@ -59,7 +56,7 @@ class ProofFormatError(EnumsolError, ValueError):
     """A proof file is damaged, truncated or of another version."""
 
 
-def packed(rows: NDArray[np.intp], values: NDArray[np.float64]) -> tuple[str, str]:
+def packed(rows: Indices, values: Floats) -> tuple[str, str]:
     """Multipliers as text."""
     return (
         base64.b64encode(rows.astype("<u4").tobytes()).decode(),
@@ -67,7 +64,7 @@ def packed(rows: NDArray[np.intp], values: NDArray[np.float64]) -> tuple[str, st
     )
 
 
-def coarse(values: NDArray[np.float64]) -> NDArray[np.float64]:
+def coarse(values: Floats) -> Floats:
     """The same to 21 binary digits: the lower half of their bits is zero, which compresses well."""
     return ((values.view(np.uint64) + _HALF) & _UPPER).view(np.float64)
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.condensation.data import exactly_at
+from enumsol.condensation.data import Data, exactly_at
 from enumsol.errors import InvalidArgumentError
 from enumsol.trusted.exclusion import Terms
 from enumsol.trusted.status_rows import UNDECIDED
@@ -22,12 +22,9 @@ from enumsol.trusted.status_rows import UNDECIDED
 if TYPE_CHECKING:
     from collections.abc import Collection
 
-    from numpy.typing import NDArray
-
-    from enumsol.condensation.data import Data
     from enumsol.model.problem import ContactProblem
+    from enumsol.support.array_types import Floats, NDArray
 
-    Array = NDArray[np.float64]
 
 #: Most digits of the numerator and of the denominator of a fraction.
 MOST_DIGITS = 4000
@@ -117,7 +114,7 @@ def rational_from(text: Any) -> Fraction:
     return value
 
 
-def units_from(header: dict[str, Any], p: int) -> tuple[Array, Array]:
+def units_from(header: dict[str, Any], p: int) -> tuple[Floats, Floats]:
     """Units of forces and displacements, (2p,) powers of two, whose binary exponents a record gives."""
     force, length = (exponents_from(header.get(key), 2 * p) for key in ("force", "length"))
     if len({a + b for a, b in zip(force, length, strict=True)}) != 1 or force[:p] != force[p:]:
@@ -162,7 +159,7 @@ def multipliers_from(texts: list[Any], most: int) -> Terms:
     return Terms(row, value)
 
 
-def numbers_from(values: Any, size: int) -> Array:
+def numbers_from(values: Any, size: int) -> Floats:
     """``size`` finite numbers."""
     if not isinstance(values, list) or len(values) != size or not all(type(x) in (int, float) for x in values):
         raise ValueError(f"expected {size} numbers")

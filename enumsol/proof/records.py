@@ -11,21 +11,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from enumsol.proof.proof_file import packed
 from enumsol.proof.reading import codes_from, multipliers_from, numbers_from, quoted
+from enumsol.support.array_types import Codes, Floats
 from enumsol.trusted.exclusion import Terms
 from enumsol.trusted.status_rows import BACKWARD, CONTACT, FORWARD, ROW_KINDS, UNDECIDED, final_codes, refines
 from enumsol.trusted.uniqueness import numbers_of
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Codes = tuple[int, ...]
-    Array = NDArray[np.float64]
 
 _SLIDING = FORWARD, BACKWARD
 #: Codes that are not final.
@@ -162,7 +157,7 @@ class DeclaredForm(Record):
     kind, sizes, unfit = "q", (7,), "a form has {} entries; expected {}"
 
     codes: Codes
-    multipliers: Array
+    multipliers: Floats
     weight: float
 
     def entries(self) -> Iterable[Any]:
@@ -238,7 +233,7 @@ class EnclosureRecord:
     rad: Any
     index: Any
 
-    def numbers(self, size: int) -> tuple[Array, Array]:
+    def numbers(self, size: int) -> tuple[Floats, Floats]:
         """Midpoint and radius; ValueError where they are no ``size`` numbers each."""
         return numbers_from(self.mid, size), numbers_from(self.rad, size)
 
@@ -320,7 +315,7 @@ class Unbalanced(Exclusion):
 
     kind, sizes = "i", (2,)
 
-    direction: Array
+    direction: Floats
 
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> Unbalanced:
@@ -376,7 +371,7 @@ class Closed(ClosingRecord):
     selection: Codes
     free: Codes
     weights: Any
-    force: Array
+    force: Floats
     enclosure: EnclosureRecord | None = None
 
     @classmethod
@@ -433,8 +428,8 @@ class Alone(Record):
     kind, sizes, unfit = "a", (9,), "its record cannot be followed (it has {} entries; expected {})"
 
     selection: Codes
-    weights: Array
-    strengths: Array
+    weights: Floats
+    strengths: Floats
     terms: Terms
     enclosure: EnclosureRecord
 
@@ -484,7 +479,7 @@ def _nodes(value: Any, p: int) -> Codes:
     return tuple(value)
 
 
-def _weights(value: Any, free: Codes, codes: Codes, friction: Sequence[bool]) -> Array:
+def _weights(value: Any, free: Codes, codes: Codes, friction: Sequence[bool]) -> Floats:
     """The numbers of the form: one for every free or sliding node, and four more where a free node has friction."""
     sliding = sum(code in _SLIDING for code in codes)
     return numbers_from(value, len(free) + sliding + 4 * sum(friction[i] for i in free))

@@ -32,11 +32,9 @@ from enumsol.trusted.space.sector_rows import FORCE, GAP, RIGHT, UNDECIDED
 if TYPE_CHECKING:
     from fractions import Fraction
 
-    from numpy.typing import NDArray
-
+    from enumsol.support.array_types import Floats
     from enumsol.trusted.space.sector_rows import Row
 
-    Array = NDArray[np.float64]
 
 #: Numbers of directions and sectors in rows are less; directions of tangents are less than RUN.
 _NUMBERS = RUN << DEEPEST
@@ -49,7 +47,7 @@ class ExcludedInSpace(Exclusion):
     kind, sizes = "x", (3,)
 
     rows: list[Row]
-    values: Array
+    values: Floats
 
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> ExcludedInSpace:
@@ -73,7 +71,7 @@ class DeclaredSlipForm(Record):
 
     kind, sizes, unfit = DeclaredForm.kind, (2,), "a form has {} entries; expected {}"
 
-    numbers: Array
+    numbers: Floats
 
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> DeclaredSlipForm:
@@ -99,8 +97,8 @@ class DeclaredProductForm(Record):
     kind, sizes, unfit = DeclaredForm.kind, (4,), "a form has {} entries; expected {}"
 
     codes: tuple[int, ...]
-    centre: Array
-    numbers: Array
+    centre: Floats
+    numbers: Floats
 
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> DeclaredProductForm:
@@ -143,9 +141,9 @@ class OnlyRoot(ClosingRecord):
 
     kind, sizes = "m", (6,)
 
-    numbers: Array
+    numbers: Floats
     leaf: tuple[int, ...]
-    force: Array
+    force: Floats
     enclosure: EnclosureRecord
 
     @classmethod
@@ -188,7 +186,7 @@ class BoxedRoot(Solved):
         mid, rad, rho, *enclosure = entries
         return cls(mid, rad, rho, EnclosureRecord(*enclosure))
 
-    def box(self, size: int) -> tuple[Array, Array, Array]:
+    def box(self, size: int) -> tuple[Floats, Floats, Floats]:
         """Centre, radius and rho of the box; ValueError where they are no ``size`` numbers each."""
         return numbers_from(self.mid, size), numbers_from(self.rad, size), numbers_from(self.rho, size)
 
@@ -221,11 +219,11 @@ class CurveBoxRecord(Record):
 
     kind, sizes = "w", (7,)
 
-    centre: Array
-    direction: Array
-    border: Array
-    radius: Array
-    rho: Array
+    centre: Floats
+    direction: Floats
+    border: Floats
+    radius: Floats
+    rho: Floats
     half: float
 
     @classmethod
@@ -299,7 +297,7 @@ class OnlyOnCurve(Record):
 
     kind, sizes = "m", (4,)
 
-    numbers: Array
+    numbers: Floats
     first: int
     last: int
 

@@ -1,18 +1,24 @@
-"""Proofs as they are written: streamed, and readable up to the last records should the program be killed."""
+"""Proofs as they are written: streamed, and readable up to the last records should the program be killed.
+
+Records are encoded to parts of the zlib stream of a proof, which are made anywhere and put together without a look
+inside.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
 import io
+import json
 import os
+import zlib
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO, Protocol
 
 import numpy as np
 
-from enumsol.proof.compressed_parts import BEGIN, Checksum, Part, encoded
 from enumsol.proof.proof_file import MAGIC, Proof
 from enumsol.proof.reading import rational_text
 from enumsol.support.files import writing
@@ -20,11 +26,108 @@ from enumsol.support.files import writing
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
+    from enumsol.model.problem3d import AnyProblem
+    from enumsol.support.array_types import Alpha, Floats
 
-    from enumsol.model.problem import ContactProblem
-    from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.support.arguments import Alpha
+
+# measured on multipliers: higher levels take longer for little (level 6 four times as long for a tenth of the size),
+# and no matches at all (Z_HUFFMAN_ONLY) cost half as much again in size
+_LEVEL = 1
+#: Window of 32 kB; negative: without header and checksum.
+_RAW = -zlib.MAX_WBITS
+_ENCODER = json.JSONEncoder(separators=(",", ":"), allow_nan=False)
+#: How a stream of this level and window begins, and the empty last block (RFC 1950, RFC 1951).
+BEGIN, _LAST = b"\x78\x01", b"\x03\x00"
+#: Modulus of Adler-32.
+_ADLER = 65521
+
+
+def encoded(record: Any) -> str:
+    """A record as a line of a proof, without the line feed; ValueError where a number is not finite."""
+    return _ENCODER.encode(record)
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Lines of a proof, compressed without reference to what comes before, and ended at a whole byte.
+
+    Attributes
+    ----------
+    data : bytes
+        Blocks of a deflate stream, none of them the last.
+    size, adler : int
+        Bytes and Adler-32 of the text.
+    """
+
+    data: bytes
+    size: int
+    adler: int
+
+    @classmethod
+    def of(cls, lines: list[str]) -> Part:
+        """A part of at least one line."""
+        text = ("\n".join(lines) + "\n").encode()
+        deflate = zlib.compressobj(_LEVEL, zlib.DEFLATED, _RAW)
+        data = deflate.compress(text) + deflate.flush(zlib.Z_SYNC_FLUSH)
+        return cls(data, len(text), zlib.adler32(text))
+
+
+class Checksum:
+    """Adler-32 of parts that follow on each other (RFC 1950)."""
+
+    def __init__(self) -> None:
+        self._low, self._high = 1, 0
+
+    def add(self, part: Part) -> None:
+        """Go on with a part."""
+        low, high = part.adler & 0xFFFF, part.adler >> 16
+        # the part's own sums began with low = 1
+        self._high = (self._high + high + part.size * (self._low - 1)) % _ADLER
+        self._low = (self._low + low - 1) % _ADLER
+
+    def end(self) -> bytes:
+        """How the stream ends."""
+        return _LAST + (self._high << 16 | self._low).to_bytes(4, "big")
+
+
+class Recorder(Protocol):
+    """Takes the records of a proof in order."""
+
+    def write(self, record: Any) -> None:
+        """Append one record."""
+
+    def add(self, part: Part) -> None:
+        """Append records that were encoded elsewhere."""
+
+
+class KeptRecords:
+    """Keeps records: of a search that may begin again, or of a task whose records are sent as one part."""
+
+    def __init__(self) -> None:
+        self._records: list[Any] = []
+
+    def write(self, record: Any) -> None:
+        """Keep a record."""
+        self._records.append(record)
+
+    def add(self, part: Part) -> None:
+        """Keep records that were encoded elsewhere."""
+        self._records.append(part)
+
+    def release(self, recorder: Recorder) -> None:
+        """Hand the records on."""
+        for record in self._records:
+            (recorder.add if isinstance(record, Part) else recorder.write)(record)
+        self._records.clear()
+
+    def drop(self) -> None:
+        """Forget the records."""
+        self._records.clear()
+
+    def part(self) -> Part | None:
+        """All records, none of which was encoded elsewhere, as one part; None if there are none."""
+        return Part.of([encoded(record) for record in self._records]) if self._records else None
+
 
 #: Records after which a file is readable to its end: what a killed program loses.
 FLUSH_EVERY = 64
@@ -149,7 +252,7 @@ class ProofWriter:
 
 
 def point_header(
-    problem: ContactProblem | ContactProblem3D, alpha: Alpha, data: str, units: dict[str, list[int]], **kind: str
+    problem: AnyProblem, alpha: Alpha, data: str, units: dict[str, list[int]], **kind: str
 ) -> dict[str, Any]:
     """The header of a proof at one alpha.
 
@@ -178,6 +281,6 @@ def point_header(
     }
 
 
-def unit_exponents(force: NDArray[np.float64], length: NDArray[np.float64]) -> dict[str, list[int]]:
+def unit_exponents(force: Floats, length: Floats) -> dict[str, list[int]]:
     """Binary exponents of the units of forces and displacements, powers of two."""
     return {name: (np.frexp(units)[1] - 1).tolist() for name, units in (("force", force), ("length", length))}

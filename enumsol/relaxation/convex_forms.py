@@ -16,7 +16,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve, qr, solve_triangular
 
 from enumsol.arithmetic.balls import factor_above
-from enumsol.relaxation.active_set import ActiveSetRelaxation, FormEngine
+from enumsol.relaxation.active_set import ActiveSetEngine, ActiveSetRelaxation, FormEngine
 from enumsol.relaxation.imposed_rows import row_normals
 from enumsol.support.deadlines import look
 from enumsol.trusted.quadratic_forms import EnclosedForm, Equations
@@ -25,14 +25,10 @@ from enumsol.trusted.status_rows import CONTACT, UNDECIDED
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.condensation.enclosure import EnclosedSystem
-    from enumsol.relaxation.active_set import ActiveSetEngine
-    from enumsol.selections.solution import Codes
+    from enumsol.support.array_types import Codes, Floats, Indices
 
-    Array = NDArray[np.float64]
     Rows = tuple[list[int], list[int]]
 
 #: Weights of the bound and of the logs of multipliers beside that of the determinant, for every unknown.
@@ -65,17 +61,17 @@ class _Subspace:
         Numbers of the multipliers (of all 4p) whose terms do not vanish there, and may be at most zero at a solution.
     """
 
-    across: Array
-    live: NDArray[np.intp]
+    across: Floats
+    live: Indices
 
 
 @dataclass(frozen=True)
 class _Candidate:
     """Multipliers at which the bound is known."""
 
-    multipliers: Array
+    multipliers: Floats
     form: EnclosedForm
-    factor: Array
+    factor: Floats
     relaxation: ActiveSetRelaxation
 
     @property
@@ -99,13 +95,13 @@ class FormAscent:
         self._scaled, self._enclosed, self._engine = scaled, enclosed, engine
 
     @property
-    def energy(self) -> Array:
+    def energy(self) -> Floats:
         """The multipliers with which the form is the energy."""
         p = self._scaled.p
         return np.stack([np.ones(p), np.zeros(p), np.full(p, 0.5), np.full(p, 0.5)])
 
     def improve(
-        self, codes: Codes, multipliers: Array, rows: Rows, steps: int
+        self, codes: Codes, multipliers: Floats, rows: Rows, steps: int
     ) -> tuple[EnclosedForm, ActiveSetRelaxation] | None:
         """A form for a partial assignment and its solved relaxation; None where nothing is found.
 
@@ -148,15 +144,15 @@ class FormAscent:
         live = np.flatnonzero(np.concatenate([normal, normal & tangential, tangential, tangential]))
         return _Subspace(across, live)
 
-    def _factor(self, form: EnclosedForm, space: _Subspace) -> Array | None:
+    def _factor(self, form: EnclosedForm, space: _Subspace) -> Floats | None:
         """The Cholesky factor of a form on the subspace; None where it is not convex there."""
         whole = space.across.shape[1] == len(form.h)
         return factor_above(form.H if whole else space.across.T @ form.H @ space.across)
 
-    def _plain(self, codes: Codes, multipliers: Array, weight: float = 0.0) -> EnclosedForm:
+    def _plain(self, codes: Codes, multipliers: Floats, weight: float = 0.0) -> EnclosedForm:
         return EnclosedForm.of(self._enclosed, codes, multipliers.reshape(4, -1), weight)
 
-    def _candidate(self, codes: Codes, space: _Subspace, multipliers: Array, rows: Rows) -> _Candidate | None:
+    def _candidate(self, codes: Codes, space: _Subspace, multipliers: Floats, rows: Rows) -> _Candidate | None:
         """The relaxation with these multipliers; None where their form is not convex."""
         proven = self._plain(codes, multipliers)
         factor = self._factor(proven, space)
@@ -188,7 +184,7 @@ class FormAscent:
             return None
         step, promised = newton
 
-        def moved(length: float) -> Array:
+        def moved(length: float) -> Floats:
             values, change = z.copy(), length * step
             grown = z[live] * np.exp(np.clip(change, -_FURTHEST, _FURTHEST))
             values[live] = np.where(signed, grown, z[live] + change)
@@ -212,7 +208,7 @@ class FormAscent:
             length *= 0.5
         return None
 
-    def _direction(self, space: _Subspace, found: _Candidate, scale: float) -> tuple[Array, float] | None:
+    def _direction(self, space: _Subspace, found: _Candidate, scale: float) -> tuple[Floats, float] | None:
         """Newton's step, in the logs of multipliers that have a sign, and what it promises; None where it fails."""
         scaled, live = self._scaled, space.live
         signed = live >= 2 * scaled.p
@@ -234,13 +230,13 @@ class FormAscent:
 
     # -- the terms of all 4p multipliers: products of a factor in lambda and one in S lambda - g -----------------------
 
-    def _left(self, rows: Array) -> Array:
+    def _left(self, rows: Floats) -> Floats:
         """Factors lambda_n, lambda_t, lambda_t - F lambda_n, lambda_t + F lambda_n, given rows for lambda."""
         normal, tangential = rows[: self._scaled.p], rows[self._scaled.p :]
         bound = self._scaled.F[:, None] * normal
         return np.concatenate([normal, tangential, tangential - bound, tangential + bound])
 
-    def _right(self, rows: Array) -> Array:
+    def _right(self, rows: Floats) -> Floats:
         """Factors w_n, w_n, w_t, w_t, given rows for w."""
         normal, tangential = rows[: self._scaled.p], rows[self._scaled.p :]
         return np.concatenate([normal, normal, tangential, tangential])
@@ -257,14 +253,14 @@ class Products:
         Rows of the factors of all products, given rows for y and for S y - g.
     """
 
-    S: Array
-    g: Array
-    left: Callable[[Array], Array]
-    right: Callable[[Array], Array]
+    S: Floats
+    g: Floats
+    left: Callable[[Floats], Floats]
+    right: Callable[[Floats], Floats]
 
     def derivatives(
-        self, H: Array, factor: Array, forces: Array, scale: float, normals: Array, across: Array
-    ) -> tuple[Array, Array]:
+        self, H: Floats, factor: Floats, forces: Floats, scale: float, normals: Floats, across: Floats
+    ) -> tuple[Floats, Floats]:
         """Gradient, and minus the second derivative, of scale times the bound plus the log of the determinant.
 
         Parameters
@@ -290,7 +286,7 @@ class Products:
         bending = scale * self._bending(H, left, right, normals, across)
         return gradient, 0.5 * (lefts * rights + mixed * mixed.T) + bending
 
-    def _bending(self, H: Array, left: Array, right: Array, normals: Array, across: Array) -> Array:
+    def _bending(self, H: Floats, left: Floats, right: Floats, normals: Floats, across: Floats) -> Floats:
         """Minus the second derivative of the bound: the minimiser moves on the face of the rows that are active."""
         free = across @ _complement(normals) if len(normals) else across
         factor = factor_above(free.T @ H @ free) if free.shape[1] else None
@@ -301,7 +297,7 @@ class Products:
         return np.asarray(0.5 * (moved.T @ moved))
 
 
-def newton_step(gradient: Array, hessian: Array) -> Array | None:
+def newton_step(gradient: Floats, hessian: Floats) -> Floats | None:
     """The step of Newton's method, given minus the second derivative; None where that is not definite."""
     hessian[np.diag_indices(len(hessian))] *= 1.0 + 1e-8
     if not (np.all(np.isfinite(hessian)) and np.all(np.isfinite(gradient))):
@@ -312,11 +308,11 @@ def newton_step(gradient: Array, hessian: Array) -> Array | None:
         return None
 
 
-def _is_convex(H: Array, mean: float) -> bool:
+def _is_convex(H: Floats, mean: float) -> bool:
     return factor_above(H, _CURVATURE * mean) is not None
 
 
-def _complement(rows: Array) -> Array:
+def _complement(rows: Floats) -> Floats:
     """Columns that span what is orthogonal to some rows."""
     Q, R, _ = qr(rows.T, pivoting=True)
     size = np.abs(np.diagonal(R))

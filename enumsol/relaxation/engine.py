@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from enumsol.model.statuses import CONTACT, UNDECIDED
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from enumsol.selections.solution import Codes
+from enumsol.support.array_types import Codes, Floats, Indices
 
 #: Largest violation of a row (rows of unit length in the norm of S^{-1}) that the QP ignores.
 FEASIBILITY_TOLERANCE = 1e-11
@@ -46,17 +42,17 @@ class Relaxation(Protocol):
         """The form that ``bound`` is about: an EnclosedForm, in 3D a SlipForm; None for the energy."""
 
     @property
-    def forces(self) -> NDArray[np.float64]:
+    def forces(self) -> Floats:
         """lambda at the minimiser, shape (2p,), scaled."""
 
     @property
-    def displacements(self) -> NDArray[np.float64]:
+    def displacements(self) -> Floats:
         """w at the minimiser, shape (2p,), scaled."""
 
     def at(self, i: int) -> tuple[float, float]:
         """Number i of the forces and of the displacements."""
 
-    def multipliers(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    def multipliers(self) -> tuple[Indices, Floats]:
         """Rows and their multipliers, which prove ``bound``."""
 
     def choose(self, codes: Codes) -> int:
@@ -69,7 +65,7 @@ class Relaxation(Protocol):
         """The relaxation with further rows switched on; ``last``: this object is not used again."""
 
 
-def largest_violation(codes: Codes, F: NDArray[np.float64], forces: NDArray[np.float64], w: NDArray[np.float64]) -> int:
+def largest_violation(codes: Codes, F: Floats, forces: Floats, w: Floats) -> int:
     """The undecided node at which complementarity is violated most, -1 when all are decided."""
     array, p = np.array(codes), len(F)
     open_nodes = np.flatnonzero((array == CONTACT) | (array == UNDECIDED))

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
 
 import numpy as np
 
 from enumsol.model.statuses import CONDITIONS, FRICTIONLESS, OPEN, UNDECIDED, RowKind
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from numpy.typing import NDArray
-
+from enumsol.support.array_types import Floats, Indices
 
 INEQUALITY, EQUALITY = 1, 2
 _R = RowKind
@@ -39,7 +34,7 @@ def _rows_of(code: int) -> tuple[tuple[RowKind, int], ...]:
 _STATUS_ROWS = {code: _rows_of(code) for code in CONDITIONS}
 
 
-def row_terms(p: int, F: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.float64]]:
+def row_terms(p: int, F: Floats) -> tuple[Indices, Indices, Floats]:
     """All rows as sparse combinations of y = (lambda, w), w of shape (2p,): start, index and value arrays."""
     nodes, one = np.arange(p), np.ones(p)
     cones = np.stack([nodes, p + nodes], axis=1).ravel()
@@ -52,9 +47,7 @@ def row_terms(p: int, F: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray
     return start.astype(np.intp), index.astype(np.intp), value
 
 
-def row_normals(
-    p: int, F: NDArray[np.float64], S: NDArray[np.float64], numbers: NDArray[np.intp]
-) -> NDArray[np.float64]:
+def row_normals(p: int, F: Floats, S: Floats, numbers: Indices) -> Floats:
     """Gradients by lambda of some rows, up to sign, one below the other; w = g - S lambda."""
     kind, node = np.divmod(numbers, p)
     normals = np.zeros((len(numbers), 2 * p))

@@ -12,10 +12,8 @@ from enumsol.relaxation.engine import PRUNE_MARGIN, Relaxation, largest_violatio
 from enumsol.relaxation.imposed_rows import EQUALITY, row_terms
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from enumsol.condensation.condensed import ScaledSystem
-    from enumsol.selections.solution import Codes
+    from enumsol.support.array_types import Codes, Floats, Indices
     from enumsol.trusted.quadratic_forms import EnclosedForm
 
 
@@ -35,11 +33,11 @@ class InteriorPointEngine:
         norms = np.sqrt(np.sum(self.lower(self.normals.T) ** 2, axis=0))
         self.norms = np.where(norms > 0, norms, 1.0)
 
-    def lower(self, rhs: NDArray[np.float64]) -> NDArray[np.float64]:
+    def lower(self, rhs: Floats) -> Floats:
         """L^{-1} rhs with S = L L'."""
         return np.asarray(solve_triangular(self.system.cholesky, rhs, lower=True))
 
-    def dual_bound(self, rows: NDArray[np.intp], values: NDArray[np.float64]) -> float:
+    def dual_bound(self, rows: Indices, values: Floats) -> float:
         """Lower bound on the energy that the multipliers prove (theory, (6.1), in floats)."""
         v = self.system.g + self.normals[rows].T @ values
         return float(values @ self.offsets[rows] - 0.25 * np.sum(self.lower(v) ** 2))
@@ -77,7 +75,7 @@ class InteriorPointEngine:
         bound = self.dual_bound(order, values) if usable else -np.inf
         return _InteriorPointRelaxation(self, on, order, values, bound, np.array(answer.x) if solved else None)
 
-    def _scaled_ray(self, rows: NDArray[np.intp], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _scaled_ray(self, rows: Indices, values: Floats) -> Floats:
         """An infeasibility certificate, stretched so that the bound it proves is as large as it can be."""
         direction = self.normals[rows].T @ values
         rate = float(values @ self.offsets[rows])
@@ -99,10 +97,10 @@ class _InteriorPointRelaxation:
         self,
         engine: InteriorPointEngine,
         on: dict[int, int],
-        rows: NDArray[np.intp],
-        values: NDArray[np.float64],
+        rows: Indices,
+        values: Floats,
         bound: float,
-        forces: NDArray[np.float64] | None,
+        forces: Floats | None,
     ) -> None:
         self._engine, self._on, self._rows, self._values = engine, on, rows, values
         self.bound = bound
@@ -111,7 +109,7 @@ class _InteriorPointRelaxation:
         self.forces = np.zeros(len(engine.system.g)) if forces is None else forces
         self.displacements = engine.system.g - engine.system.S @ self.forces
 
-    def multipliers(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    def multipliers(self) -> tuple[Indices, Floats]:
         """Rows and their multipliers, which prove ``bound``."""
         keep = self._values != 0
         return self._rows[keep], self._values[keep]

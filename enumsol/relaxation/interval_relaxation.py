@@ -14,23 +14,17 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enumsol.arithmetic.balls import factor_above
-from enumsol.condensation.condensed import CondensedSystem, ScaledSystem
+from enumsol.condensation.condensed import CondensedProblem, CondensedSystem, ScaledSystem
 from enumsol.errors import InvalidProblemError, MissingDependencyError
 from enumsol.model.statuses import CONDITIONS, SLIP_MINUS, SLIP_PLUS, RowKind
 from enumsol.relaxation.active_set import CompiledEngine
 from enumsol.relaxation.engine import BRANCHING_CANDIDATES, not_compiled
 from enumsol.relaxation.imposed_rows import EQUALITY, INEQUALITY, row_terms, status_rows
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from enumsol.condensation.condensed import CondensedProblem
-    from enumsol.support.arguments import Alpha
+from enumsol.support.array_types import Alpha, NDArray
 
 #: Part of the secant's slope that makes the form in (lambda, tau) definite: what it costs vanishes with the interval.
 RIDGE = 1e-2

@@ -18,12 +18,10 @@ from enumsol.trusted.space.sector_rows import sector_row_terms
 from enumsol.trusted.space.slip_forms import SlipForm
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from enumsol.condensation.space_condensed import EnclosedSpace
     from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
+    from enumsol.support.array_types import Floats
 
-    Array = NDArray[np.float64]
     Rows = tuple[list[int], list[int]]
 
 #: Weights of the bound and of the barrier beside that of the determinant.
@@ -40,9 +38,9 @@ _WITHIN = 1.0 - 1e-9
 class _Candidate:
     """Multipliers at which the bound is known."""
 
-    numbers: Array
+    numbers: Floats
     form: SlipForm
-    factor: Array
+    factor: Floats
     relaxation: SpaceRelaxation
 
 
@@ -94,23 +92,23 @@ class SpaceFormAscent:
             found = self._candidate(found.numbers / self._curvature(found.numbers), rows)
         return None if found is None else (found.form, found.relaxation)
 
-    def _curvature(self, numbers: Array) -> float:
+    def _curvature(self, numbers: Floats) -> float:
         """The mean eigenvalue of H relative to S: c has no part in it."""
         return float(np.sum(self._shares[:, : len(self._system.g)].T @ numbers[self._live])) / len(self._system.g)
 
-    def _lengths(self, numbers: Array) -> tuple[Array, Array]:
+    def _lengths(self, numbers: Floats) -> tuple[Floats, Floats]:
         """kappa and c of the nodes with friction."""
         cones = np.append(numbers, 0.0)[self._cones]
         return cones[:, 0], cones[:, 1:]
 
-    def _form(self, numbers: Array) -> SlipForm | None:
+    def _form(self, numbers: Floats) -> SlipForm | None:
         """Their form, if they are allowed."""
         kappa, c = self._lengths(numbers)
         if not np.all(np.linalg.norm(c, axis=1) <= _WITHIN * kappa):
             return None
         return SlipForm.of(self._enclosed, numbers)
 
-    def _candidate(self, numbers: Array, rows: Rows) -> _Candidate | None:
+    def _candidate(self, numbers: Floats, rows: Rows) -> _Candidate | None:
         """The relaxation with these multipliers; None where their form is not convex."""
         form = self._form(numbers)
         factor = None if form is None else factor_above(form.H)
@@ -126,7 +124,7 @@ class SpaceFormAscent:
         if step is None:
             return None
 
-        def moved(length: float) -> Array:
+        def moved(length: float) -> Floats:
             numbers = found.numbers.copy()
             numbers[self._live] += length * step
             return numbers
@@ -151,7 +149,7 @@ class SpaceFormAscent:
             length *= 0.5
         return None
 
-    def _direction(self, found: _Candidate, scale: float) -> Array | None:
+    def _direction(self, found: _Candidate, scale: float) -> Floats | None:
         """Newton's step; None where it fails."""
         numbers, relaxation = found.numbers, found.relaxation
         whole, normals = np.eye(len(found.form.h)), self._normals(relaxation)
@@ -169,7 +167,7 @@ class SpaceFormAscent:
             curved[np.ix_(cone, cone)] += _BARRIER * (np.outer(own, own) - 2.0 * np.diag([1.0, -1.0, -1.0]) / square)
         return newton_step(slope[self._live], curved[np.ix_(self._live, self._live)])
 
-    def _normals(self, relaxation: SpaceRelaxation) -> Array:
+    def _normals(self, relaxation: SpaceRelaxation) -> Floats:
         """Normals of the rows that have multipliers, of length one."""
         system, size = self._system, len(self._system.g)
         numbers = relaxation.multipliers()[0].tolist()

@@ -3,45 +3,90 @@
 from __future__ import annotations
 
 import copy
-from typing import TYPE_CHECKING
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Self
 from weakref import WeakSet
 
 import numpy as np
 
-from enumsol.model.sectors import SECTORS, cut, end_number, middle_number, nearest, start_number, width_level
+from enumsol.model.sectors import SECTORS, cut, end_number, middle_number, nearest, start_number, width_level, width_of
 from enumsol.model.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.relaxation.engine import FEASIBILITY_TOLERANCE, PRUNE_MARGIN
 from enumsol.relaxation.imposed_rows import EQUALITY, INEQUALITY
-from enumsol.relaxation.shaving import Shaving
-from enumsol.trusted.space.sector_rows import (
-    ALONG,
-    CHORD,
-    END,
-    FORCE,
-    GAP,
-    LEFT,
-    RIGHT,
-    SLIP,
-    TANGENT,
-    TAU,
-    sector_children,
-    sector_row_terms,
-)
+from enumsol.trusted.space import sector_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-    from typing import Self
-
-    from numpy.typing import NDArray
+    from collections.abc import Iterable, Iterator, Sequence
 
     from enumsol.condensation.space_condensed import SpaceSystem
     from enumsol.relaxation._active_set import QPData, QPState
-    from enumsol.selections.solution import Codes
-    from enumsol.trusted.space.sector_rows import Row
+    from enumsol.support.array_types import Codes, Floats, Indices
     from enumsol.trusted.space.slip_forms import SlipForm
 
-    Array = NDArray[np.float64]
     Children = dict[tuple[int, ...], "SpaceRelaxation"]
+
+
+#: A slice is this power of 1/2 of its sector: at first, and at least.
+FIRST, THINNEST = 1, 2
+#: An end that kept the thinnest slice is tried again when the product of all widths is less than half of what it was.
+_AGAIN = 1.0
+#: A leaf whose sectors all have this level or a deeper one is tested before anything is cut off. A sector in which
+#: nothing is violated is not cut from this level on: near a degenerate root that would go on for many levels.
+NARROW = 8
+#: The next test is made when the sectors have become narrower by this power of 1/2 on average.
+_NARROWER = 0.5
+
+
+@dataclass
+class Shaving:
+    """What is known at a node of the tree about its sectors, from it and from those above it.
+
+    Attributes
+    ----------
+    tried : by contact node and end (0, 1), what the next slice is and log2 of the product of all widths before it
+    tested : log2 of the product of all widths when the leaf was tested last
+    """
+
+    tried: dict[tuple[int, int], tuple[int, float]] = field(default_factory=dict)
+    tested: float = math.inf
+
+    def copy(self) -> Shaving:
+        """What a child begins with."""
+        return Shaving(dict(self.tried), self.tested)
+
+    def sectors(self, codes: Codes, violated: Sequence[bool]) -> list[int]:
+        """Nodes whose sectors may be cut, the widest first; ``violated``, by node, where maximum dissipation is."""
+        there = [i for i, code in enumerate(codes) if code > SECTORS]
+        nodes = [i for i in there if violated[i] or width_level(codes[i] - SECTORS) < NARROW]
+        return sorted(nodes, key=lambda i: -width_of(codes[i] - SECTORS))
+
+    def shares(self, codes: Codes, node: int, end: int) -> Iterator[int]:
+        """The slices to be tried at an end of a sector, as numbers of halvings, one after the other."""
+        halvings, before = self.tried.get((node, end), (FIRST, math.inf))
+        if halvings > THINNEST:
+            if before - _size(codes) < _AGAIN:
+                return
+            halvings = THINNEST
+        yield from range(halvings, THINNEST + 1)
+
+    def note(self, codes: Codes, node: int, end: int, halvings: int, *, excluded: bool) -> None:
+        """Take note of what came of a slice: after one that is excluded a wider one is tried, else a thinner one."""
+        self.tried[node, end] = (max(halvings - 1, FIRST) if excluded else halvings + 1), _size(codes)
+
+    def leaf_is_due(self, codes: Codes) -> bool:
+        """Whether a leaf is to be tested now; if so, that is noted."""
+        levels = [width_level(code - SECTORS) for code in codes if code > SECTORS]
+        if not levels or min(levels) < NARROW or self.tested - _size(codes) < _NARROWER * len(levels):
+            return False
+        self.tested = _size(codes)
+        return True
+
+
+def _size(codes: Codes) -> float:
+    """Log2 of the product of the widths of all sectors."""
+    return math.fsum(math.log2(width_of(code - SECTORS)) for code in codes if code > SECTORS)
+
 
 #: Level of the directions on which tangents are put where the minimiser leaves the disc, and of those put anyway.
 _FINE, COARSE = 10, 3
@@ -101,12 +146,12 @@ class SpaceEngine:
         #: Of the nodes with both tangents: number, places of tau in y, and factors of tau and of the disc's radius.
         self._discs = nodes, system.tau[nodes].T, system.tau_scale[nodes].T, system.disc_scale[nodes] * (1.0 + _OUTSIDE)
         #: Row by number, for multipliers, and what the program's row is of it.
-        self.rows: dict[int, Row] = {}
+        self.rows: dict[int, sector_rows.Row] = {}
         self.scale, self._unit = np.ones(self.slots * p), system.row_unit.tolist()
         self.limit = 400 + 20 * len(system.g)
         self.full = False
 
-    def slot(self, row: Row) -> int | None:
+    def slot(self, row: sector_rows.Row) -> int | None:
         """The slot of a row among those of its node; None when there is no room for it."""
         kind, node, number = row
         known = self._known[node]
@@ -119,7 +164,7 @@ class SpaceEngine:
             self._put(slot * self.system.p + node, row)
         return known[kind, number]
 
-    def _bounded(self, H: Array, h: Array) -> QPData:
+    def _bounded(self, H: Floats, h: Floats) -> QPData:
         """Programs that bound y'H y - h'y, without rows."""
         system, rows = self.system, self.slots * self.system.p
         start, zeros = np.arange(rows + 1, dtype=np.intp) * _ENTRIES, np.zeros(rows * _ENTRIES)
@@ -134,15 +179,15 @@ class SpaceEngine:
         self._sharing.add(other)
         return other
 
-    def _put(self, place: int, row: Row) -> None:
+    def _put(self, place: int, row: sector_rows.Row) -> None:
         """Store a row."""
         indices, values = self._stored(place, row)
         for engine in self._sharing:
             engine.data.put_row(place, indices, values)
 
-    def _stored(self, place: int, row: Row) -> tuple[tuple[int, ...], list[float]]:
+    def _stored(self, place: int, row: sector_rows.Row) -> tuple[tuple[int, ...], list[float]]:
         """A row in the units of y and w, scaled so that its largest coefficient stays of size one."""
-        indices, coefficients = sector_row_terms(row, self.system.tau, len(self.system.g))
+        indices, coefficients = sector_rows.sector_row_terms(row, self.system.tau, len(self.system.g))
         units = [self._unit[i] for i in indices]
         scale = self.scale[place] = 1.0 / max(units)
         return indices, [value * (unit * scale) for value, unit in zip(coefficients, units, strict=True)]
@@ -158,9 +203,9 @@ class SpaceEngine:
 
     def children(self, node: int, code: int) -> tuple[int, ...]:
         """Codes that together cover a partial status of a node."""
-        return sector_children(code, self.tangents[node])
+        return sector_rows.sector_children(code, self.tangents[node])
 
-    def outside(self, y: Array) -> list[tuple[int, float, float]]:
+    def outside(self, y: Floats) -> list[tuple[int, float, float]]:
         """Nodes whose tau is outside the disc of radius lambda_n, with its direction."""
         nodes, places, factors, radii = self._discs
         first, second = y[places] * factors
@@ -172,35 +217,37 @@ class SpaceEngine:
         return SpaceRelaxation(self, self._state(self.data), rows, modes)
 
 
-def imposed(tau: NDArray[np.intp], node: int, code: int) -> list[tuple[Row, int]]:
+def imposed(tau: Indices, node: int, code: int) -> list[tuple[sector_rows.Row, int]]:
     """Rows that a (partial) status of a node imposes, and their modes; those of a child extend its parent's."""
     axes = [k for k in range(2) if tau[node, k] >= 0]
-    inequalities: list[Row] = [(FORCE, node, 0)]
-    equations: list[Row] = []
-    (inequalities if code in (OPEN, UNDECIDED) else equations).append((GAP, node, 0))
+    inequalities: list[sector_rows.Row] = [(sector_rows.FORCE, node, 0)]
+    equations: list[sector_rows.Row] = []
+    (inequalities if code in (OPEN, UNDECIDED) else equations).append((sector_rows.GAP, node, 0))
     if code == OPEN:
         return [
             *_with(inequalities[1:], INEQUALITY),
-            *_with([(FORCE, node, 0), *((TAU, node, k) for k in axes)], EQUALITY),
+            *_with([(sector_rows.FORCE, node, 0), *((sector_rows.TAU, node, k) for k in axes)], EQUALITY),
         ]
     if len(axes) == 2:
-        inequalities += [(TANGENT, node, (1 << COARSE) + k) for k in range(1 << COARSE)]
+        inequalities += [(sector_rows.TANGENT, node, (1 << COARSE) + k) for k in range(1 << COARSE)]
     elif axes:
         forward = 1 if code == SLIP_PLUS else -1 if code == SLIP_MINUS else 0
-        inequalities += [(END, node, sign) for sign in (1, -1) if sign != forward]
+        inequalities += [(sector_rows.END, node, sign) for sign in (1, -1) if sign != forward]
         if forward:
-            equations.append((END, node, forward))
-            inequalities.append((ALONG, node, forward))
+            equations.append((sector_rows.END, node, forward))
+            inequalities.append((sector_rows.ALONG, node, forward))
     if code == STICK:
-        equations += [(SLIP, node, k) for k in axes]
+        equations += [(sector_rows.SLIP, node, k) for k in axes]
     if code > SECTORS:
         number = code - SECTORS
-        inequalities += [(TANGENT, node, n) for n in (start_number(number), middle_number(number), end_number(number))]
-        inequalities += [(kind, node, number) for kind in (CHORD, LEFT, RIGHT)]
+        inequalities += [
+            (sector_rows.TANGENT, node, n) for n in (start_number(number), middle_number(number), end_number(number))
+        ]
+        inequalities += [(kind, node, number) for kind in (sector_rows.CHORD, sector_rows.LEFT, sector_rows.RIGHT)]
     return [*_with(inequalities, INEQUALITY), *_with(equations, EQUALITY)]
 
 
-def _with(rows: Iterable[Row], mode: int) -> list[tuple[Row, int]]:
+def _with(rows: Iterable[sector_rows.Row], mode: int) -> list[tuple[sector_rows.Row, int]]:
     return [(row, mode) for row in rows]
 
 
@@ -218,7 +265,7 @@ class SpaceRelaxation:
         self._shaving = Shaving()
         #: The node whose sector is not halved but cut into these parts, if there is one.
         self.cut: tuple[int, tuple[int, ...]] | None = None
-        self._kept: tuple[Array, Array, tuple[NDArray[np.intp], Array]] | None = None
+        self._kept: tuple[Floats, Floats, tuple[Indices, Floats]] | None = None
         self._solve(rows, modes)
         for _ in range(ROUNDS):
             if self.pruned or self.stalled:
@@ -239,7 +286,7 @@ class SpaceRelaxation:
         """Rows of tangents at nodes whose tau is outside the disc of radius lambda_n."""
         engine, rows = self._engine, []
         for node, x, y in engine.outside(self.forces):
-            slot = engine.slot((TANGENT, node, nearest(x, y, _FINE)))
+            slot = engine.slot((sector_rows.TANGENT, node, nearest(x, y, _FINE)))
             if slot is not None and not self._state.mode_of(slot * engine.system.p + node):
                 rows.append(slot * engine.system.p + node)
         return rows
@@ -250,12 +297,12 @@ class SpaceRelaxation:
         return self._engine.form
 
     @property
-    def forces(self) -> Array:
+    def forces(self) -> Floats:
         """y at the minimiser, shape (m,), scaled."""
         return self._state.x_array if self._kept is None else self._kept[0]
 
     @property
-    def displacements(self) -> Array:
+    def displacements(self) -> Floats:
         """w at the minimiser, shape (m,), scaled."""
         return self._state.w_array if self._kept is None else self._kept[1]
 
@@ -263,7 +310,7 @@ class SpaceRelaxation:
         """Number i of the forces and of the displacements."""
         return float(self.forces[i]), float(self.displacements[i])
 
-    def multipliers(self) -> tuple[NDArray[np.intp], Array]:
+    def multipliers(self) -> tuple[Indices, Floats]:
         """Rows and their multipliers, which prove ``bound``."""
         if self._kept is not None:
             return self._kept[2]
@@ -291,7 +338,7 @@ class SpaceRelaxation:
                 return node
         return self.most_promising(codes, score)
 
-    def most_promising(self, codes: Codes, score: Array) -> int:
+    def most_promising(self, codes: Codes, score: Floats) -> int:
         """The node with the best children, given its violation of complementarity; -1 where nothing is violated.
 
         All children of a candidate are solved, where complementarity is violated most first. The first candidate with
@@ -355,7 +402,7 @@ class SpaceRelaxation:
             self._excluded = {**self._excluded, **{rows: child._released() for rows, child in new.items()}}
         return children
 
-    def violations(self, codes: Codes) -> Array:
+    def violations(self, codes: Codes) -> Floats:
         """How much complementarity is violated at every node that can be branched on; -inf at the others."""
         system, y, w = self._engine.system, self.forces, self.displacements
         array, p = np.array(codes), system.p
@@ -367,7 +414,7 @@ class SpaceRelaxation:
         undecided = (array == CONTACT) | (array == UNDECIDED)
         return np.where(undecided, np.maximum(score, _DISSIPATION * _DISSIPATION), np.where(wide, score, -np.inf))
 
-    def _dissipation(self) -> Array:
+    def _dissipation(self) -> Floats:
         """By how much maximum dissipation is violated at every node: lambda_n |v| - tau . v."""
         system, y = self._engine.system, self.forces
         w = self.displacements

@@ -11,14 +11,9 @@ from enumsol.model.cells import KINDS, boundary_facets, facet_outlines, outline_
 from enumsol.model.shapes import BodyShape, body_shape, row_tangents
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from enumsol.fem import Scene
-    from enumsol.model.problem import ContactProblem
-    from enumsol.model.problem3d import ContactProblem3D
-
-    Floats = NDArray[np.float64]
-    Integers = NDArray[np.int64]
+    from enumsol.model.problem3d import AnyProblem
+    from enumsol.support.array_types import Floats, Integers
 
 #: Most numbers of displacements, about ten characters each; a mesh with more is drawn by its boundary, or not at all.
 _MOST_NUMBERS = 150_000
@@ -31,9 +26,7 @@ _DIGITS = 7
 _ROUNDING = 1e-9
 
 
-def body_record(
-    problem: ContactProblem | ContactProblem3D, scene: Scene | None = None
-) -> tuple[dict[str, Any] | None, str]:
+def body_record(problem: AnyProblem, scene: Scene | None = None) -> tuple[dict[str, Any] | None, str]:
     """What is drawn of a body of d dimensions and what moves it; and why it is not all of it, empty if it is.
 
     Displacements of the nodes, d components in turn, are ``u0 + alpha u1 - sum_k f_k c[k]`` over the d p contact
@@ -75,7 +68,7 @@ def most_fields(nodes: int, d: int) -> int:
 
 
 def drawn_body(
-    problem: ContactProblem | ContactProblem3D, shape: BodyShape, columns: int, scene: Scene | None = None
+    problem: AnyProblem, shape: BodyShape, columns: int, scene: Scene | None = None
 ) -> tuple[dict[str, Any], Integers]:
     """What is drawn of a body whatever its solution, and which nodes of its mesh the drawn ones are.
 
@@ -120,7 +113,7 @@ def _surface(shape: BodyShape, faces: Integers, new: Integers) -> dict[str, Any]
     }
 
 
-def bare_nodes(problem: ContactProblem | ContactProblem3D) -> tuple[dict[str, Any] | None, str]:
+def bare_nodes(problem: AnyProblem) -> tuple[dict[str, Any] | None, str]:
     """Of a problem without a mesh: in 3D the contact nodes at their coordinates, and what is not drawn."""
     places = problem.coordinates
     if not hasattr(problem, "Bt2"):
@@ -135,9 +128,7 @@ def bare_nodes(problem: ContactProblem | ContactProblem3D) -> tuple[dict[str, An
     return body, "The problem has no mesh: its contact nodes are drawn at their coordinates, without forces"
 
 
-def surroundings(
-    problem: ContactProblem | ContactProblem3D, shape: BodyShape, new: NDArray[np.int64], scene: Scene | None = None
-) -> dict[str, Any]:
+def surroundings(problem: AnyProblem, shape: BodyShape, new: Integers, scene: Scene | None = None) -> dict[str, Any]:
     """Load, supports, springs, foundation and material of a plane body, for the page.
 
     ``new`` is the number of every node among those that are drawn, -1 for others. ``load`` has (x, y) of a place,
@@ -181,7 +172,7 @@ def surroundings(
     }
 
 
-def _loads(problem: ContactProblem | ContactProblem3D) -> list[Floats]:
+def _loads(problem: AnyProblem) -> list[Floats]:
     slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
     return [problem.f, slope, *problem.contact_rows.toarray()]
 
@@ -204,7 +195,7 @@ def vectors(forces: Floats, nodes: Integers) -> list[list[float]]:
     return [[int(k), *short_list(forces[nodes[k]])] for k in np.flatnonzero(np.any(forces[nodes] != 0, axis=1))]
 
 
-def boundary_edges(outlines: NDArray[np.int64]) -> NDArray[np.int64]:
+def boundary_edges(outlines: Integers) -> Integers:
     """Edges that belong to one cell only, (k, 2)."""
     edges = np.concatenate([outlines[:, [k, (k + 1) % outlines.shape[1]]] for k in range(outlines.shape[1])])
     edges = edges[edges[:, 0] != edges[:, 1]]  # triangles among quadrilaterals name a corner twice

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.branches.elements import VertexKind
+from enumsol.branches.elements import Arc, Vertex, VertexKind
 from enumsol.branches.figures.curves import QUANTITIES, Curve, curves, side_by_side
 from enumsol.branches.figures.marks import colour_of
 from enumsol.branches.figures.panels import family_states
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from enumsol.branches import BranchGraph
-    from enumsol.branches.elements import Arc, Vertex
     from enumsol.fem import Scene
 
 #: Distance of drawn curves from the arcs, relative to the picture; coarser until the page is small enough.

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.loading.history_text import steps_table, tree_lines
+from enumsol.loading.history_data import steps_table, tree_lines
 from enumsol.report.given import given_section
 from enumsol.report.parts import fact_list, filled_page, proof_facts, scrolling, warning_list
 from enumsol.support.messages import counted, html_table

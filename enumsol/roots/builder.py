@@ -19,22 +19,19 @@ from enumsol.model.statuses import (
     ContactStatus,
     contact_status,
 )
-from enumsol.roots.linearisation import SelectionTangent
+from enumsol.roots.linearisation import SelectionTangent, SlipSigns, named_statuses, sign_over
 from enumsol.roots.root import Enclosure, Polytope, Root, RootFamily
 from enumsol.roots.root_set import Undecided
-from enumsol.roots.slip_signs import SlipSigns, named_statuses, sign_over
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
-
-    from numpy.typing import NDArray
 
     from enumsol.model.problem import ContactProblem
     from enumsol.roots.components import RootComponent
     from enumsol.search.certifiers.protocol import UndecidedPart
     from enumsol.selections.float_selections import FloatSelections
-    from enumsol.selections.solution import Codes, PointValues, SelectionSolution, SelectionSolver
-    from enumsol.support.arguments import Alpha
+    from enumsol.selections.solution import PointValues, SelectionSolution, SelectionSolver
+    from enumsol.support.array_types import Alpha, Codes, Floats
     from enumsol.trusted.at_alpha import VerifiedSelection
 
 
@@ -57,7 +54,7 @@ class RootBuilder:
     points: PointValues
     floats: FloatSelections
     verified: Mapping[Codes, VerifiedSelection]
-    rigid_unit: NDArray[np.float64] | None = None
+    rigid_unit: Floats | None = None
 
     def root(self, component: RootComponent) -> Root:
         """The isolated root of a component."""
@@ -89,10 +86,10 @@ class RootBuilder:
             _exact_slips=self.points.exact_slips(solution.vertices[0]),
         )
 
-    def _tangent(self, codes: Codes, force: NDArray[np.float64], w: NDArray[np.float64]) -> SelectionTangent:
+    def _tangent(self, codes: Codes, force: Floats, w: Floats) -> SelectionTangent:
         return SelectionTangent(self.floats, condensation_of(self.problem), self.problem.friction[1], codes, force, w)
 
-    def _rigid(self, solution: SelectionSolution) -> NDArray[np.float64] | None:
+    def _rigid(self, solution: SelectionSolution) -> Floats | None:
         """Coordinates of the rigid displacement of a body that nothing holds."""
         if self.rigid_unit is None:
             return None
@@ -129,7 +126,7 @@ class RootBuilder:
         bounds = np.stack([low, high], axis=1)
         return Enclosure(bounds[:p], bounds[p : 2 * p], bounds[2 * p : 3 * p], bounds[3 * p :])
 
-    def _values(self, codes: Codes, solution: SelectionSolution) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _values(self, codes: Codes, solution: SelectionSolution) -> tuple[Floats, Floats]:
         """Forces and displacements with the zeros that the statuses impose set exactly."""
         p, point, ball = self.problem.p, solution.vertices[0], self.verified.get(solution.codes)
         if ball is None:
@@ -180,7 +177,7 @@ def modes_of(solver: PointValues) -> int:
     return getattr(solver, "modes", 0)
 
 
-def rigid_of(solver: Any, point: Any) -> NDArray[np.float64]:
+def rigid_of(solver: Any, point: Any) -> Floats:
     """Coordinates of the rigid displacement at a point."""
     return np.asarray(solver.rigid(point) + 0.0)
 

@@ -10,25 +10,21 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from itertools import product
 from math import prod
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.selections.solution import VertexLimitError
+from enumsol.selections.solution import ActiveSets, SelectionSolution, SelectionSolver, VertexLimitError
 from enumsol.support.deadlines import look
 from enumsol.trusted.uniqueness import same_solution
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
-    from typing import Any
 
-    from numpy.typing import NDArray
+    from enumsol.support.array_types import Codes, Floats
 
-    from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution, SelectionSolver
-
-    Array = NDArray[np.float64]
     #: Local degree from the active sets, and lambda and w of an isolated root.
-    LocalDegree = Callable[[ActiveSets, tuple[Array, Array] | None], int | None]
+    LocalDegree = Callable[[ActiveSets, tuple[Floats, Floats] | None], int | None]
     Apart = tuple[list[SelectionSolution], list[SelectionSolution], list[Codes]]
 
 #: Selections examined around one degenerate root or family to find all that hold there; beyond, a search on the
@@ -73,9 +69,7 @@ class RootComponent:
 
 
 def connected_components(
-    solutions: Iterable[SelectionSolution],
-    solver: SelectionSolver,
-    degree: LocalDegree | None = None,
+    solutions: Iterable[SelectionSolution], solver: SelectionSolver, degree: LocalDegree | None = None
 ) -> list[RootComponent]:
     """Roots and families that the given solutions of selections form, every root once.
 
@@ -191,10 +185,7 @@ def _holds(codes: Codes, point: Any, solver: SelectionSolver) -> bool:
 
 
 def _component(
-    group: list[SelectionSolution],
-    whole: bool,
-    solver: SelectionSolver,
-    degree: LocalDegree | None,
+    group: list[SelectionSolution], whole: bool, solver: SelectionSolver, degree: LocalDegree | None
 ) -> RootComponent:
     group = sorted(group, key=lambda s: (-s.dimension, s.codes))
     dimension = group[0].dimension

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 import time
+from fractions import Fraction
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.contact_body import ContactBody
 from enumsol.model.problem import ContactProblem
-from enumsol.roots.at_rest import AtRest
+from enumsol.model.statuses import FINAL, OPEN
 from enumsol.roots.builder import RootBuilder, in_order, named, root_family
 from enumsol.roots.components import RootComponent, apart, closed_component, connected_components
 from enumsol.roots.enumeration import Enumeration, not_begun
@@ -21,17 +24,8 @@ from enumsol.search.exhaustive import BLOCK, exhaustive_exact, exhaustive_float
 from enumsol.search.outcome import SearchLimits, SearchProgress, Stop, StopReason
 from enumsol.search.solvers import Arithmetic, Solvers
 from enumsol.selections.float_selections import SIGN_TOLERANCE
-from enumsol.support.arguments import (
-    alpha_value,
-    file_path,
-    instance_of,
-    one_of,
-    optional_callable,
-    optional_count,
-    optional_executor,
-    optional_seconds,
-    share,
-)
+from enumsol.selections.solution import PointValues, SelectionSolution, SelectionSolver
+from enumsol.support import arguments
 from enumsol.support.deadlines import Deadline, TimeOverError, within
 
 if TYPE_CHECKING:
@@ -41,10 +35,55 @@ if TYPE_CHECKING:
 
     from typing_extensions import TypeIs
 
-    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import AnyProblem, ContactProblem3D
     from enumsol.roots.root import Root, RootFamily
-    from enumsol.selections.solution import Codes, PointValues, SelectionSolution, SelectionSolver
-    from enumsol.support.arguments import Alpha, AlphaLike
+    from enumsol.support.array_types import Alpha, AlphaLike, Codes, Floats
+
+
+class AtRest:
+    """The one root of a body with g = 0, at which every selection holds, and its values (PointValues).
+
+    The energy bound is lambda' S lambda <= 0 there, so that lambda = 0; its degree is that of all roots, +1.
+
+    Parameters
+    ----------
+    F_positive : tuple of p bool
+    proven : bool
+        g = 0 holds in the data and not only as computed in floats.
+    """
+
+    def __init__(self, F_positive: tuple[bool, ...], *, proven: bool) -> None:
+        self._F_positive, self._p, self._proven = F_positive, len(F_positive), proven
+
+    @property
+    def component(self) -> RootComponent:
+        """The root."""
+        solution = SelectionSolution((OPEN,) * self._p, (np.zeros(2 * self._p),), 0, 0, strict=False)
+        active = tuple(frozenset(FINAL[positive]) for positive in self._F_positive)
+        return RootComponent((solution,), active, 0, 1, whole=True)
+
+    def forces(self, point: Any) -> Floats:
+        """Zeros."""
+        del point
+        return np.zeros(2 * self._p)
+
+    displacements = forces
+
+    def slip_signs(self, point: Any) -> tuple[int, ...]:
+        """Zeros."""
+        del point
+        return (0,) * self._p
+
+    def exact_slips(self, point: Any) -> tuple[Fraction, ...]:
+        """Zeros."""
+        del point
+        return (Fraction(0),) * self._p
+
+    def bounds(self, point: Any) -> tuple[Floats, Floats] | None:
+        """Zeros where they are proven."""
+        del point
+        return (np.zeros(4 * self._p), np.zeros(4 * self._p)) if self._proven else None
+
 
 Method = Literal["tree", "exhaustive"]
 #: The exhaustive method reports progress this often [seconds].
@@ -52,7 +91,7 @@ _REPORT_SECONDS = 0.1
 
 
 def enumerate_roots(
-    problem: ContactProblem | ContactProblem3D,
+    problem: AnyProblem,
     alpha: AlphaLike,
     arithmetic: Arithmetic = "verified",
     method: Method = "tree",
@@ -134,15 +173,15 @@ def enumerate_roots(
     complete: yes (proven)
     """
     if not _is_in_space(problem):
-        instance_of(problem, ContactProblem, "problem")
-    started, value = time.perf_counter(), alpha_value(alpha)
-    one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
-    one_of(method, "method", ("tree", "exhaustive"))
-    one_of(engine, "engine", (None, "active-set", "clarabel"))
-    optional_executor(executor)
-    optional_callable(progress, "progress")
-    counts = optional_count(stop_after, "stop_after"), optional_count(max_nodes, "max_nodes")
-    seconds, tolerance = optional_seconds(time_limit), share(tolerance)
+        arguments.instance_of(problem, ContactProblem, "problem")
+    started, value = time.perf_counter(), arguments.alpha_value(alpha)
+    arguments.one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
+    arguments.one_of(method, "method", ("tree", "exhaustive"))
+    arguments.one_of(engine, "engine", (None, "active-set", "clarabel"))
+    arguments.optional_executor(executor)
+    arguments.optional_callable(progress, "progress")
+    counts = arguments.optional_count(stop_after, "stop_after"), arguments.optional_count(max_nodes, "max_nodes")
+    seconds, tolerance = arguments.optional_seconds(time_limit), arguments.share(tolerance)
     if _is_in_space(problem):
         # not for problems in 2D
         from enumsol.roots.space_roots import SpaceEnumeration, check_supported, solvers_in_space
@@ -166,7 +205,7 @@ def enumerate_roots(
     return search.run(executor, *counts, seconds)
 
 
-def is_unique(problem: ContactProblem | ContactProblem3D, alpha: AlphaLike, **options: Any) -> bool | None:
+def is_unique(problem: AnyProblem, alpha: AlphaLike, **options: Any) -> bool | None:
     """Whether the problem has one solution at one alpha, proven either way; None when that stayed open.
 
     True if all selections are accounted for and one solution is left: by one certificate where that serves (theory,
@@ -259,7 +298,7 @@ class _Enumeration(Enumeration[Solvers]):
 
     def _exhaustive(self, limits: SearchLimits) -> None:
         outcome, reported = self.outcome, self.started
-        floats, exact = self.solvers.floats, self.solvers.exact if self.solvers.arithmetic == "exact" else None
+        floats, exact = self.solvers.floats, self.solvers.exact if self.arithmetic == "exact" else None
         stream = exhaustive_float(self.solvers.scaled, floats) if exact is None else exhaustive_exact(exact)
         total = math.prod(4 if positive else 2 for positive in (exact or floats).F_positive)
         for outcome.selections, solution in stream:
@@ -296,7 +335,7 @@ class _Enumeration(Enumeration[Solvers]):
         """Components of the root set with the solver whose points they hold."""
         solutions, closed, self.doubtful = apart(self.outcome.solutions)
         exact, floats = [s for s in solutions if s.exact], [s for s in solutions if not s.exact]
-        degree = None if self.solvers.problem.modes is not None else partial(local_degree, self.solvers.floats)
+        degree = None if self.problem.modes is not None else partial(local_degree, self.solvers.floats)
         parts: list[tuple[list[RootComponent], SelectionSolver]] = []
         if floats or closed:
             components = connected_components(floats, self.solvers.floats, degree)
@@ -307,7 +346,7 @@ class _Enumeration(Enumeration[Solvers]):
 
     def _root(self, component: RootComponent, values: PointValues) -> Root:
         solvers, verified = self.solvers, self.certifier.certified.verified
-        about = solvers.problem, solvers.alpha, values, solvers.floats, verified, solvers.rigid_unit
+        about = self.problem, self.alpha, values, solvers.floats, verified, solvers.rigid_unit
         return RootBuilder(*about).root(component)
 
     def _result(self) -> RootSet:
@@ -316,7 +355,7 @@ class _Enumeration(Enumeration[Solvers]):
         families: list[RootFamily] = []
         separate, joinable = 0, False
         if self.unloaded:
-            at_rest = AtRest(solvers.floats.F_positive, proven=solvers.arithmetic != "fast")
+            at_rest = AtRest(solvers.floats.F_positive, proven=self.arithmetic != "fast")
             roots, separate = [self._root(at_rest.component, at_rest)], 1
         for components, solver in self._joined():
             # what joins a component that was not examined whole is not known
@@ -324,25 +363,13 @@ class _Enumeration(Enumeration[Solvers]):
             joinable = joinable or not all(c.whole for c in components)
             roots += [self._root(c, solver) for c in components if c.dimension == 0]
             proven = solver is not solvers.floats
-            families += [root_family(solvers.alpha, c, solver, proven=proven) for c in components if c.dimension > 0]
+            families += [root_family(self.alpha, c, solver, proven=proven) for c in components if c.dimension > 0]
         roots, families = in_order(roots, families)
         whole = outcome.stopped is None and not outcome.undecided and not self.doubtful
         separate -= len(self.doubtful)
-        return RootSet(
-            alpha=solvers.alpha,
-            roots=roots,
-            families=families,
-            undecided=[named(part) for part in [*outcome.undecided, *map(_in_doubt, self.doubtful)]],
-            arithmetic=solvers.arithmetic,
-            method=self.method,
-            stopped=None if outcome.stopped is None else str(outcome.stopped),
-            stats=self._stats(),
-            node_ids=solvers.problem.node_ids,
-            at_least=None if whole else self._at_least(separate + int(joinable)),
-            certified_data=solvers.data,
-            proof=self._proof(roots=len(roots), families=len(families)),
-            rigid_bound=self._rigid_bound(solvers.problem),
-        )
+        undecided = [named(part) for part in [*outcome.undecided, *map(_in_doubt, self.doubtful)]]
+        at_least = None if whole else self._at_least(separate + int(joinable))
+        return self._root_set(roots, undecided, at_least, solvers.data, families)
 
 
 def roots_of_selections(problem: ContactProblem, alpha: Alpha, selections: Sequence[Codes], *, whole: bool) -> RootSet:
@@ -383,7 +410,7 @@ class _Selected(_Enumeration):
 
 
 def _check_proof(arithmetic: str, method: str, proof_path: str | Path | None, resume: bool) -> None:
-    instance_of(resume, bool, "resume")
+    arguments.instance_of(resume, bool, "resume")
     if resume and proof_path is None:
         raise InvalidArgumentError("resume is True without proof_path; expected the file of the proof to resume from")
     if method == "exhaustive" and arithmetic == "verified":
@@ -395,4 +422,4 @@ def _check_proof(arithmetic: str, method: str, proof_path: str | Path | None, re
             f'proof_path is given with arithmetic {arithmetic!r}; expected "verified", which alone writes proofs'
         )
     if proof_path is not None:
-        file_path(proof_path, "proof_path")
+        arguments.file_path(proof_path, "proof_path")

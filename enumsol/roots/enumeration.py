@@ -9,25 +9,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from enumsol.errors import Interrupted, OutputError
-from enumsol.proof.begun import begun_proof
+from enumsol.proof.begun import BegunProof, begun_proof
 from enumsol.proof.writer import ProofWriter
 from enumsol.roots.root_set import RigidBound, RootSet, SearchStats, Undecided
 from enumsol.search.certifiers.protocol import UndecidedPart
-from enumsol.search.outcome import SearchLimits, SearchOutcome, Stop, StopReason
+from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
 from enumsol.search.parallel import Searchable, Spread
 from enumsol.search.resume import resume
 from enumsol.support.deadlines import Deadline, within
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from concurrent.futures import Executor
 
     from enumsol.model.contact_body import ContactBody
-    from enumsol.proof.begun import BegunProof
     from enumsol.proof.proof_file import Proof
-    from enumsol.search.outcome import SearchProgress
-    from enumsol.support.arguments import Alpha
+    from enumsol.roots.root import Root, RootFamily
+    from enumsol.support.array_types import Alpha
 
 _Solvers = TypeVar("_Solvers", bound=Searchable)
 
@@ -65,6 +64,7 @@ class Enumeration(ABC, Generic[_Solvers]):
         started: float | None = None,
     ) -> None:
         self.solvers, self.progress, self.method = solvers, progress, method
+        self.problem, self.alpha, self.arithmetic = solvers.problem, solvers.alpha, solvers.arithmetic
         self.started = time.perf_counter() if started is None else started
         #: The time was over before it was known which roots the solutions form.
         self.late = False
@@ -72,7 +72,7 @@ class Enumeration(ABC, Generic[_Solvers]):
         self.unloaded = False
         self.writer: ProofWriter | None = None
         self._begun: BegunProof | None = None
-        if solvers.arithmetic == "verified":
+        if self.arithmetic == "verified":
             header = solvers.proof_header()
             if resumed and proof_path is not None:
                 self._begun = begun_proof(Path(proof_path), header)
@@ -145,11 +145,33 @@ class Enumeration(ABC, Generic[_Solvers]):
     def _result(self) -> RootSet:
         """What was found, in the user's terms."""
 
-    def _rigid_bound(self, problem: ContactBody) -> RigidBound | None:
-        """Of a body that nothing holds: the bound of the rigid displacement within which all solutions are listed."""
-        if problem.modes is None:
-            return None
-        return RigidBound(problem.rigid_reach, self.certifier.certified.bounded or self.method != "tree")
+    def _root_set(
+        self,
+        roots: list[Root],
+        undecided: list[Undecided],
+        at_least: int | None,
+        certified_data: str = "problem",
+        families: Sequence[RootFamily] | None = None,
+    ) -> RootSet:
+        """The result; ``at_least`` is None where nothing is known to be missing, ``families`` in 3D, which has none."""
+        modes, stopped = self.problem.modes, self.outcome.stopped
+        needed = self.certifier.certified.bounded or self.method != "tree"
+        counts = {"roots": len(roots)} | ({} if families is None else {"families": len(families)})
+        return RootSet(
+            alpha=self.alpha,
+            roots=roots,
+            families=families or (),
+            undecided=undecided,
+            arithmetic=self.arithmetic,
+            method=self.method,
+            stopped=None if stopped is None else str(stopped),
+            stats=self._stats(),
+            node_ids=self.problem.node_ids,
+            at_least=at_least,
+            certified_data=certified_data,
+            proof=self._proof(**counts),
+            rigid_bound=None if modes is None else RigidBound(self.problem.rigid_reach, needed),
+        )
 
     def _stats(self) -> SearchStats:
         own: dict[str, Any] = {

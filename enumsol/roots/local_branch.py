@@ -2,28 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from itertools import product
 from math import prod
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from enumsol.condensation.condensed import condensation_of
 from enumsol.errors import InvalidArgumentError, TooLargeError
 from enumsol.model.problem import ContactProblem
-from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, STATUSES, STICK, contact_status
+from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, STATUSES, STICK, ContactStatus, contact_status
 from enumsol.support.arguments import instance_of
+from enumsol.support.array_types import Alpha, Codes, Floats
 from enumsol.support.messages import counted
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence, Set
-
-    from numpy.typing import NDArray
-
-    from enumsol.model.statuses import ContactStatus
-    from enumsol.selections.solution import Codes
-    from enumsol.support.arguments import Alpha
 
 #: Selections examined at one point (paper, Remark 5.1); six nodes in a corner of three statuses have 729.
 MAX_SELECTIONS = 4096
@@ -45,7 +38,7 @@ class SolutionPoint(Protocol):
         """All statuses that hold, node by node."""
 
     @property
-    def u_t(self) -> NDArray[np.float64]:
+    def u_t(self) -> Floats:
         """Tangential displacements, shape (p,)."""
 
 
@@ -144,10 +137,10 @@ def branch_test(condensed: Any, root: SolutionPoint) -> LocalBranchTest:
 
 
 def coherent_orientation(
-    S: NDArray[np.float64],
-    F: NDArray[np.float64],
+    S: Floats,
+    F: Floats,
     active: Sequence[Set[int]],
-    slip: NDArray[np.float64],
+    slip: Floats,
     alpha: float,
     singular: float = LOCATED_SINGULAR_TOLERANCE,
 ) -> LocalBranchTest:
@@ -177,9 +170,7 @@ def coherent_orientation(
     return LocalBranchTest.from_signs(signs, premise=bool(np.all(F > 0)))
 
 
-def normal_map_sign(
-    S: NDArray[np.float64], F: NDArray[np.float64], codes: Codes, singular: float = SINGULAR_TOLERANCE
-) -> int:
+def normal_map_sign(S: Floats, F: Floats, codes: Codes, singular: float = SINGULAR_TOLERANCE) -> int:
     """Sign of det DG in the cell of these statuses, 0 when it is singular; columns scaled to length one."""
     p = len(codes)
     DG = np.eye(len(S))

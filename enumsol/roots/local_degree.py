@@ -16,11 +16,9 @@ from enumsol.selections.float_selections import FloatSelections
 from enumsol.support.deadlines import current
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from enumsol.selections.solution import ActiveSets
+    from enumsol.support.array_types import Floats
 
-    Array = NDArray[np.float64]
 
 #: Sizes of the perturbation of g relative to the load's energy norm (to one for an unloaded body), and of which two
 #: the roots must lie in the same selections: statuses that hold strictly must not be lost on the way.
@@ -28,7 +26,7 @@ _STEPS, _DIRECTIONS = (1e-5, 1e-6), 2
 _MAX_NODES = 100_000
 
 
-def local_degree(solver: FloatSelections, active: ActiveSets, point: tuple[Array, Array] | None) -> int | None:
+def local_degree(solver: FloatSelections, active: ActiveSets, point: tuple[Floats, Floats] | None) -> int | None:
     """Local degree of a degenerate root, or of a family; None where it is not found.
 
     Parameters
@@ -41,7 +39,7 @@ def local_degree(solver: FloatSelections, active: ActiveSets, point: tuple[Array
     return perturbed_degree(solver, active) if index is None else index
 
 
-def _reduced_degree(solver: FloatSelections, active: ActiveSets, force: Array, w: Array) -> int | None:
+def _reduced_degree(solver: FloatSelections, active: ActiveSets, force: Floats, w: Floats) -> int | None:
     """The sign of the determinant of the strict nodes' equations, if the others have one solution.
 
     See theory, section 6.11.
@@ -74,7 +72,7 @@ def perturbed_degree(solver: FloatSelections, active: ActiveSets) -> int | None:
     return found[0] if found[0] == found[1] else None
 
 
-def _perturbed(solver: FloatSelections, active: ActiveSets, push: Array) -> dict[tuple[int, ...], int] | None:
+def _perturbed(solver: FloatSelections, active: ActiveSets, push: Floats) -> dict[tuple[int, ...], int] | None:
     """Selections of the roots of a perturbed problem, with sign det; None where it is not found."""
     loaded = bool(np.any(solver.system.g))
     system = replace(solver.system, g=solver.system.g + push if loaded else push / _STEPS[-1])

@@ -20,13 +20,10 @@ from enumsol.support.messages import counted
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from enumsol.model.statuses import ContactStatus
     from enumsol.roots.root import Root
-    from enumsol.support.arguments import Alpha
+    from enumsol.support.array_types import Alpha, Floats
 
-    Floats = NDArray[np.float64]
 
 #: By how much S, g and F may change under a mirror, relative to their size. Meshes and stiffness matrices are symmetric
 #: within rounding, which weak springs of a body make larger, or not at all.

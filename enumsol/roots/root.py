@@ -10,7 +10,7 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.statuses import ContactStatus, sign_array
-from enumsol.roots.local_branch import branch_test
+from enumsol.roots.local_branch import LocalBranchTest, branch_test
 from enumsol.support.immutable import Sealed, sealed
 from enumsol.support.messages import html_lines, html_table
 
@@ -18,13 +18,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from fractions import Fraction
 
-    from numpy.typing import NDArray
-
     from enumsol.condensation.condensed import Condensation, CondensedProblem
-    from enumsol.roots.linearisation import SelectionTangent
-    from enumsol.roots.local_branch import LocalBranchTest
-    from enumsol.roots.slip_signs import SlipSigns
-    from enumsol.support.arguments import Alpha
+    from enumsol.roots.linearisation import SelectionTangent, SlipSigns
+    from enumsol.support.array_types import Alpha, Floats, NDArray
 
 #: Contact nodes of a printed root; of larger ones the first are shown.
 _PRINTED_NODES = 20
@@ -50,10 +46,10 @@ class Enclosure(Sealed):
     True
     """
 
-    lambda_n: NDArray[np.float64]
-    lambda_t: NDArray[np.float64]
-    u_n: NDArray[np.float64]
-    u_t: NDArray[np.float64]
+    lambda_n: Floats
+    lambda_t: Floats
+    u_n: Floats
+    u_t: Floats
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -76,10 +72,10 @@ class ContactState(Sealed):
     alpha: Alpha
     statuses: tuple[ContactStatus, ...]
     active: tuple[frozenset[ContactStatus], ...]
-    lambda_n: NDArray[np.float64]
-    lambda_t: NDArray[np.float64]
-    u_n: NDArray[np.float64]
-    u_t: NDArray[np.float64]
+    lambda_n: Floats
+    lambda_t: Floats
+    u_n: Floats
+    u_t: Floats
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,11 +128,11 @@ class Root(ContactState):
     margin: float
     enclosure: Enclosure | None = field(repr=False, compare=False)
     _condensed: CondensedProblem | Condensation = field(repr=False, compare=False)
-    slip_angle: NDArray[np.float64] | None = field(default=None, compare=False)
+    slip_angle: Floats | None = field(default=None, compare=False)
     _tangent: SelectionTangent | None = field(repr=False, compare=False, default=None)
     _slips: SlipSigns | None = field(repr=False, compare=False, default=None)
     _exact_slips: tuple[Fraction, ...] | None = field(repr=False, compare=False, default=None)
-    _rigid: NDArray[np.float64] | None = field(repr=False, compare=False, default=None)
+    _rigid: Floats | None = field(repr=False, compare=False, default=None)
 
     @cached_property
     def condition(self) -> float:
@@ -151,7 +147,7 @@ class Root(ContactState):
         return np.inf if self._tangent is None else self._tangent.condition()
 
     @cached_property
-    def dlambda_dalpha(self) -> NDArray[np.float64] | None:
+    def dlambda_dalpha(self) -> Floats | None:
         """In 2D, derivatives of (lambda_n, lambda_t) along the branch, shape (p, 2); None unless the root is regular.
 
         Raises
@@ -162,7 +158,7 @@ class Root(ContactState):
         return self._rates("dlambda_dalpha")[0]
 
     @cached_property
-    def du_dalpha(self) -> NDArray[np.float64] | None:
+    def du_dalpha(self) -> Floats | None:
         """In 2D, derivatives of (u_n, u_t) along the branch, shape (p, 2) [length]; None unless the root is regular.
 
         Raises
@@ -173,19 +169,19 @@ class Root(ContactState):
         return self._rates("du_dalpha")[1]
 
     @property
-    def u(self) -> NDArray[np.float64]:
+    def u(self) -> Floats:
         """Displacement of all degrees of freedom, shape (n,) [length]; computed at every access."""
         forces = np.concatenate([self.lambda_n, self.lambda_t.ravel(order="F")])
         u, rigid = self._condensed.displacement(self.alpha, forces), self.rigid_displacement
         return u if rigid is None else u + rigid
 
     @property
-    def rigid_coordinates(self) -> NDArray[np.float64] | None:
+    def rigid_coordinates(self) -> Floats | None:
         """Of a body that nothing holds: q of the rigid displacement N q, shape (r,); None of others."""
         return self._rigid
 
     @property
-    def rigid_displacement(self) -> NDArray[np.float64] | None:
+    def rigid_displacement(self) -> Floats | None:
         """Of a body that nothing holds: how it moves as a whole, N q, shape (n,) [length]; None of others.
 
         It is the rigid displacement that equals u at r degrees of freedom, where theory, section 14.1, has the body on
@@ -244,7 +240,7 @@ class Root(ContactState):
         """
         if self.lambda_t.ndim == 1:
             return self.plot_body(ax)
-        from enumsol.roots.space_plots import draw_root  # matplotlib comes with the first picture
+        from enumsol.roots.body_plots import draw_root  # matplotlib comes with the first picture
 
         return draw_root(self, self.problem, ax)
 
@@ -280,7 +276,7 @@ class Root(ContactState):
             raise InvalidArgumentError(f"{name} is asked of a root in 3D; expected one in 2D")
         return cast("CondensedProblem", self._condensed)
 
-    def _rates(self, name: str) -> tuple[NDArray[np.float64], ...] | tuple[None, None]:
+    def _rates(self, name: str) -> tuple[Floats, ...] | tuple[None, None]:
         """Derivatives of forces and of displacements with respect to alpha."""
         self._in_2d(name)
         rates = None if self._tangent is None else self._tangent.rates
@@ -345,12 +341,12 @@ class Polytope(Sealed):
     """
 
     statuses: tuple[ContactStatus, ...]
-    vertices: NDArray[np.float64]
+    vertices: Floats
     dimension: int
-    rigid_coordinates: NDArray[np.float64] | None = None
+    rigid_coordinates: Floats | None = None
 
     @property
-    def coordinates(self) -> NDArray[np.float64]:
+    def coordinates(self) -> Floats:
         """Every vertex in a row, (k, 2p + r): lambda_n and lambda_t node by node, then the rigid displacement."""
         forces = self.vertices.reshape(len(self.vertices), -1)
         return forces if self.rigid_coordinates is None else np.hstack([forces, self.rigid_coordinates])
@@ -397,7 +393,7 @@ class RootFamily:
         return tuple(np.flatnonzero(np.ptp(np.concatenate(parts), axis=0) > 0).tolist())
 
     @cached_property
-    def vertices(self) -> NDArray[np.float64]:
+    def vertices(self) -> Floats:
         """All vertices, shape (k, p, 2), without repetition, in lexical order."""
         return sealed(np.unique(np.concatenate([part.vertices for part in self.polytopes]), axis=0))
 

@@ -10,21 +10,19 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.roots.root import Root, summary
+from enumsol.roots.root import Enclosure, Root, RootFamily, summary
 from enumsol.support.arguments import positive_number
 from enumsol.support.immutable import Immutable, Sealed
 from enumsol.support.messages import counted, html_lines, html_table
 
 if TYPE_CHECKING:
     import pandas as pd
-    from numpy.typing import NDArray
 
     from enumsol.model.statuses import ContactStatus
     from enumsol.proof.proof_file import Proof
     from enumsol.roots.mirrored import MirrorImages
-    from enumsol.roots.root import Enclosure, RootFamily
     from enumsol.search.certifiers.protocol import Escalations
-    from enumsol.support.arguments import Alpha
+    from enumsol.support.array_types import Alpha, Floats
 
 _PRINTED_ROOTS, _PRINTED_REGIONS = 20, 5
 _HEADS = ("", "index", "regular", "margin", "max lambda_n", "contact")
@@ -73,7 +71,7 @@ class Undecided(Sealed):
     reason: str
     hint: str
     leaves: int = 1
-    slip_angle: NDArray[np.float64] | None = field(default=None, compare=False)
+    slip_angle: Floats | None = field(default=None, compare=False)
     bounds: Enclosure | None = field(default=None, repr=False, compare=False)
 
 
@@ -491,12 +489,12 @@ def _region(item: Undecided) -> str:
     return f"{text}; a root in it has max lambda_n from {low:.5g} to {high:.5g}"
 
 
-def _columns(name: str, arrays: list[NDArray[np.float64]]) -> list[tuple[str, NDArray[np.float64]]]:
+def _columns(name: str, arrays: list[Floats]) -> list[tuple[str, Floats]]:
     """A quantity of all roots as columns of a frame: one, or in 3D one an axis."""
     return by_axis(name, np.concatenate(arrays) if arrays else np.zeros(0))
 
 
-def by_axis(name: str, values: NDArray[np.float64]) -> list[tuple[str, NDArray[np.float64]]]:
+def by_axis(name: str, values: Floats) -> list[tuple[str, Floats]]:
     """Values of nodes as columns with their names: one, or in 3D one an axis."""
     return [(name, values)] if values.ndim == 1 else [(f"{name}{k + 1}", values[:, k]) for k in range(values.shape[1])]
 

@@ -11,19 +11,14 @@ from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, smaller, solution, 
 from enumsol.model.sectors import SECTORS
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.support.deadlines import over, tell
-from enumsol.trusted.space.leaves import settle, unsettled
+from enumsol.trusted.space.leaves import Open, SpaceRoot, settle, unsettled
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from enumsol.condensation.space_condensed import EnclosedSpace
-    from enumsol.selections.solution import Codes
-    from enumsol.trusted.space.leaves import Open, SpaceRoot
+    from enumsol.support.array_types import Codes, Floats, Indices, Mask
     from enumsol.trusted.space.space_uniqueness import LooseSolution
-
-    Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -42,20 +37,20 @@ class Region:
     codes: tuple[Codes, ...]
     y: Ball
     w: Ball
-    slip_angle: Array
+    slip_angle: Floats
 
 
 @dataclass(frozen=True)
 class _Boxes:
     """Bounds of the roots of N leaves: of (y, w), (N, 2 m), and of angles, (N, p), nan where a node does not slip."""
 
-    low: Array
-    high: Array
-    angle: Array
-    radius: Array
-    in_sector: NDArray[np.bool_]
+    low: Floats
+    high: Floats
+    angle: Floats
+    radius: Floats
+    in_sector: Mask
 
-    def touching(self, one: int, others: NDArray[np.intp]) -> NDArray[np.bool_]:
+    def touching(self, one: int, others: Indices) -> Mask:
         """Which of the others may have a root in common with one, or roots that are connected."""
         meet = np.all((self.low[others] <= self.high[one]) & (self.high[others] >= self.low[one]), axis=1)
         turn = np.abs(np.remainder(self.angle[others] - self.angle[one] + np.pi, 2 * np.pi) - np.pi)
@@ -104,7 +99,7 @@ def with_zeros(system: EnclosedSpace, codes: Codes, y: Ball, w: Ball) -> tuple[B
     return done[0], done[1]
 
 
-def slip_angles(system: EnclosedSpace, codes: Codes, leaf: SpaceRoot | Open | None) -> tuple[Array, Array]:
+def slip_angles(system: EnclosedSpace, codes: Codes, leaf: SpaceRoot | Open | None) -> tuple[Floats, Floats]:
     """Directions of v as angles and radii, (p,) each; nan where a node does not slip against friction."""
     angle, radius = np.full((2, len(codes)), np.nan)
     for i, code in enumerate(codes):
@@ -118,7 +113,7 @@ def slip_angles(system: EnclosedSpace, codes: Codes, leaf: SpaceRoot | Open | No
     return angle, radius
 
 
-def loose_angles(system: EnclosedSpace, found: LooseSolution) -> tuple[Array, Array]:
+def loose_angles(system: EnclosedSpace, found: LooseSolution) -> tuple[Floats, Floats]:
     """Directions of v as angles and radii, (p,) each; nan where a node does not slip against friction for certain."""
     angle, radius = np.full((2, len(found.slip)), np.nan)
     for i in np.flatnonzero(found.slip):
@@ -172,13 +167,13 @@ def _energy_bounds(system: EnclosedSpace) -> Ball:
     return Ball(middle.mid, (middle.rad + reach) * SAFE + TINY)
 
 
-def _ball(low: Array, high: Array) -> Ball:
+def _ball(low: Floats, high: Floats) -> Ball:
     """The ball between bounds."""
     mid = low + 0.5 * (high - low)
     return Ball(mid, np.maximum(high - mid, mid - low) * SAFE)
 
 
-def _hull(angle: Array, radius: Array) -> Array:
+def _hull(angle: Floats, radius: Floats) -> Floats:
     """The shortest arc that holds some arcs, the nan left out; nan where there is none."""
     known = np.isfinite(radius)
     if not np.any(known):

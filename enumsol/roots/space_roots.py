@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, UNIT, Ball
-from enumsol.condensation.condensed import condensation_of
+from enumsol.condensation.condensed import Condensation, condensation_of
 from enumsol.condensation.floating import RigidRows
 from enumsol.condensation.space_condensed import FloatingSpace
 from enumsol.errors import InvalidArgumentError
@@ -22,41 +23,23 @@ from enumsol.roots.space_regions import loose_angles, regions_of, slip_angles, w
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.support.immutable import sealed
 from enumsol.trusted.space.boxed_solution import BoxedSolution, apart_in_boxes
-from enumsol.trusted.space.leaves import Cause, distinct_roots
+from enumsol.trusted.space.leaves import Cause, SpaceRoot, distinct_roots
 from enumsol.trusted.space.space_uniqueness import LooseSolution, OnlySolution
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from pathlib import Path
 
-    from numpy.typing import NDArray
-
-    from enumsol.condensation.condensed import Condensation
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.search.certifiers.protocol import UndecidedPart
-    from enumsol.search.outcome import SearchProgress
-    from enumsol.selections.solution import Codes
-    from enumsol.support.arguments import Alpha
-    from enumsol.trusted.space.leaves import SpaceRoot
+    from enumsol.support.array_types import Alpha, Codes, Floats
 
-    Array = NDArray[np.float64]
+
+#: The first of these that may hold is the status of a root of which several may.
+_STATUSES = (ContactStatus.OPEN, ContactStatus.STICK, ContactStatus.SLIP)
 
 
 class SpaceEnumeration(Enumeration[SpaceSolvers]):
     """One call of enumerate_roots in 3D."""
-
-    def __init__(
-        self,
-        solvers: SpaceSolvers,
-        progress: Callable[[SearchProgress], object] | None,
-        proof_path: str | Path | None,
-        *,
-        resumed: bool = False,
-        started: float | None = None,
-    ) -> None:
-        super().__init__(solvers, progress, proof_path, resumed=resumed, started=started)
-        self.problem, self.alpha, self.arithmetic = solvers.problem, solvers.alpha, solvers.arithmetic
-        self.system, self.enclosed = solvers.system, solvers.enclosed
 
     def _distinct(self) -> tuple[list[tuple[Codes, Any]], list[Codes]]:
         verified = self.certifier.certified.verified
@@ -82,82 +65,70 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         roots.sort(key=lambda root: (-float(np.sum(root.lambda_n)), root.lambda_n.tolist(), root.lambda_t.tolist()))
         undecided = [*self._undecided(outcome.undecided), *(self._doubtful(codes) for codes in doubtful)]
         whole = outcome.stopped is None and not undecided
-        return RootSet(
-            alpha=self.alpha,
-            roots=roots,
-            families=(),
-            undecided=undecided,
-            arithmetic=self.arithmetic,
-            method="tree",
-            stopped=None if outcome.stopped is None else str(outcome.stopped),
-            stats=self._stats(),
-            node_ids=self.problem.node_ids,
-            at_least=None if whole else self._at_least(len(roots) - len(doubtful)),
-            proof=self._proof(roots=len(roots)),
-            rigid_bound=self._rigid_bound(self.problem),
-        )
+        return self._root_set(roots, undecided, None if whole else self._at_least(len(roots) - len(doubtful)))
 
     # -- in the user's terms ---------------------------------------------------------------------------------------
 
     def root(self, codes: Codes, found: SpaceRoot) -> Root:
         """The root that a leaf holds."""
-        system, p = self.system, self.system.p
-        forces, F = found.y.mid, system.F
-        lambda_n = forces[:p] * system.force
-        lambda_t = system.tangential(forces) * F * system.force[:, None]
+        forces, F = self._forces(found.y.mid), self.solvers.system.F
         rigid = None if found.rigid is None else self._in_units(found.rigid)
-        u_n, u_t = self._displacements(lambda_n, lambda_t, rigid)
+        u_n, u_t = self._displacements(*forces, rigid)
         closed = np.array([code != OPEN for code in codes])
         u_n = np.where(closed, 0.0, np.minimum(u_n, 0.0))
         u_t = np.where((np.array(codes) == STICK)[:, None] & (F > 0), 0.0, u_t)
-        return Root(
-            alpha=self.alpha,
-            statuses=tuple(space_status(code, u_t[i]) for i, code in enumerate(codes)),
-            active=tuple(frozenset((space_status(code, u_t[i]),)) for i, code in enumerate(codes)),
-            lambda_n=lambda_n,
-            lambda_t=lambda_t,
-            u_n=u_n,
-            u_t=u_t,
-            slip_angle=self._angles(codes, found),
-            index=found.index,
-            regular=True,
-            margin=found.slack,
-            enclosure=self._root_enclosure(codes, found),
-            _condensed=self._condensed,
-            _rigid=None if rigid is None else rigid.mid + 0.0,
-        )
+        statuses = tuple(space_status(code, u_t[i]) for i, code in enumerate(codes))
+        active, bounds = [frozenset((status,)) for status in statuses], self._root_enclosure(codes, found)
+        root = self._root(statuses, active, forces, (u_n, u_t), self._angles(codes, found), found.index, bounds)
+        return replace(root, regular=True, margin=found.slack, _rigid=None if rigid is None else rigid.mid + 0.0)
 
     def _loose(self, found: LooseSolution) -> Root:
         """A solution whose statuses need not be known."""
-        system, p = self.system, self.system.p
-        bounds = self._loose_bounds(found)
-        lambda_n = found.y.mid[:p] * system.force
-        lambda_t = system.tangential(found.y.mid) * system.F * system.force[:, None]
-        u_n, u_t = self._displacements(lambda_n, lambda_t)
+        tau, bounds, forces = self.solvers.system.tau, self._loose_bounds(found), self._forces(found.y.mid)
+        u_n, u_t = self._displacements(*forces)
         u_n, u_t = (np.clip(u, b[..., 0], b[..., 1]) for u, b in ((u_n, bounds.u_n), (u_t, bounds.u_t)))
-        active = tuple(frozenset(_possible(found, i, u_t[i], rubs=bool(np.any(system.tau[i] >= 0)))) for i in range(p))
-        order = (ContactStatus.OPEN, ContactStatus.STICK, ContactStatus.SLIP)
+        active = [frozenset(_possible(found, i, u_t[i], rubs=bool(np.any(tau[i] >= 0)))) for i in range(len(tau))]
+        statuses = [next(status for status in _STATUSES if status in held) for held in active]
+        return self._root(statuses, active, forces, (u_n, u_t), self._loose_angles(found), found.index, bounds)
+
+    def _root(
+        self,
+        statuses: Sequence[ContactStatus],
+        active: Sequence[frozenset[ContactStatus]],
+        forces: tuple[Floats, Floats],
+        moved: tuple[Floats, Floats],
+        slip_angle: Floats,
+        index: int,
+        bounds: Enclosure | None,
+    ) -> Root:
+        """A root that is not known to be regular, with its bounds in verified arithmetic."""
         return Root(
             alpha=self.alpha,
-            statuses=tuple(next(status for status in order if status in held) for held in active),
-            active=active,
-            lambda_n=lambda_n,
-            lambda_t=lambda_t,
-            u_n=u_n,
-            u_t=u_t,
-            slip_angle=self._loose_angles(found),
-            index=found.index,
+            statuses=tuple(statuses),
+            active=tuple(active),
+            lambda_n=forces[0],
+            lambda_t=forces[1],
+            u_n=moved[0],
+            u_t=moved[1],
+            slip_angle=slip_angle,
+            index=index,
             regular=False,
             margin=0.0,
             enclosure=bounds if self.arithmetic == "verified" else None,
             _condensed=self._condensed,
         )
 
+    def _forces(self, scaled: Floats) -> tuple[Floats, Floats]:
+        """lambda_n and lambda_t."""
+        system = self.solvers.system
+        unit = system.force
+        return scaled[: system.p] * unit, system.tangential(scaled) * system.F * unit[:, None]
+
     def _loose_bounds(self, found: LooseSolution) -> Enclosure:
         return self._enclosure(found.y, Ball(found.w.mid, np.where(found.w.rad > 0, np.inf, 0.0)))
 
-    def _loose_angles(self, found: LooseSolution) -> Array:
-        return np.array([_around(*pair) for pair in zip(*loose_angles(self.enclosed, found), strict=True)])
+    def _loose_angles(self, found: LooseSolution) -> Floats:
+        return np.array([_around(*pair) for pair in zip(*loose_angles(self.solvers.enclosed, found), strict=True)])
 
     @cached_property
     def _condensed(self) -> Condensation:
@@ -171,8 +142,8 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         return Ball(rigid.mid * unit, rigid.rad * unit)
 
     @property
-    def _rigid_unit(self) -> Array:
-        return self.enclosed.rows.unit if isinstance(self.enclosed, FloatingSpace) else np.ones(0)
+    def _rigid_unit(self) -> Floats:
+        return self.solvers.enclosed.rows.unit if isinstance(self.solvers.enclosed, FloatingSpace) else np.ones(0)
 
     @cached_property
     def _moved(self) -> Ball:
@@ -191,7 +162,7 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         S, S_rad, g, g_rad = problem.enclosure.in_units(Fraction(self.alpha), ones, ones)
         return Ball(S, S_rad), Ball(g, g_rad)
 
-    def _displacements(self, lambda_n: Array, lambda_t: Array, rigid: Ball | None = None) -> tuple[Array, Array]:
+    def _displacements(self, lambda_n: Floats, lambda_t: Floats, rigid: Ball | None = None) -> tuple[Floats, Floats]:
         """u_n and u_t; floats may have S and g off by more than the root's enclosure is wide."""
         S, g = self._in_balls
         w = g.mid - S.mid @ np.concatenate([lambda_n, lambda_t.ravel(order="F")])
@@ -199,9 +170,9 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
             w += self._moved.mid @ rigid.mid
         return w[: self.problem.p], w[self.problem.p :].reshape(2, -1).T
 
-    def _angles(self, codes: Codes, found: SpaceRoot) -> Array:
+    def _angles(self, codes: Codes, found: SpaceRoot) -> Floats:
         """Bounds of the directions of v."""
-        pairs = zip(*slip_angles(self.enclosed, codes, found), strict=True)
+        pairs = zip(*slip_angles(self.solvers.enclosed, codes, found), strict=True)
         return np.array([_around(middle, radius) for middle, radius in pairs])
 
     def _enclosure(self, y: Ball, w: Ball, rigid: Ball | None = None) -> Enclosure:
@@ -209,7 +180,7 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
 
         ``rigid``: of a body that nothing holds, coordinates of its rigid displacement, by default all in question.
         """
-        system, exact, p = self.system, self.enclosed, self.problem.p
+        system, exact, p = self.solvers.system, self.solvers.enclosed, self.problem.p
         S, g = self._in_balls
         forces, known = (Ball(np.zeros(3 * p), np.full(3 * p, radius)) for radius in (0.0, np.inf))
         for k in range(3):
@@ -236,31 +207,16 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
     def _root_enclosure(self, codes: Codes, found: SpaceRoot) -> Enclosure | None:
         if self.arithmetic != "verified":
             return None
-        y, w = with_zeros(self.enclosed, codes, found.y, found.w)
+        y, w = with_zeros(self.solvers.enclosed, codes, found.y, found.w)
         # displacements are those of the forces
         return self._enclosure(y, Ball(w.mid, np.where(w.rad > 0, np.inf, 0.0)), found.rigid)
 
     def _rest(self) -> Root:
         """The unloaded body: nothing moves, and every status holds."""
         p = self.problem.p
-        zero, plane = np.zeros(p), np.zeros((p, 2))
-        every = frozenset((ContactStatus.OPEN, ContactStatus.STICK, ContactStatus.SLIP))
-        bounds = Enclosure(*(np.zeros(shape) for shape in ((p, 2), (p, 2, 2)) * 2))
-        return Root(
-            alpha=self.alpha,
-            statuses=(ContactStatus.OPEN,) * p,
-            active=(every,) * p,
-            lambda_n=zero,
-            lambda_t=plane,
-            u_n=zero,
-            u_t=plane,
-            slip_angle=np.full((p, 2), np.nan),
-            index=1,
-            regular=False,
-            margin=0.0,
-            enclosure=bounds if self.arithmetic == "verified" else None,
-            _condensed=self._condensed,
-        )
+        still, bounds = (np.zeros(p), np.zeros((p, 2))), [np.zeros(shape) for shape in ((p, 2), (p, 2, 2)) * 2]
+        every = [frozenset(_STATUSES)] * p
+        return self._root([ContactStatus.OPEN] * p, every, still, still, np.full((p, 2), np.nan), 1, Enclosure(*bounds))
 
     # -- what stayed undecided -------------------------------------------------------------------------------------
 
@@ -268,7 +224,7 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         """Leaves as regions, with a reason that leaves of them have, then the parts that were not searched."""
         leaves = {part.codes: part for part in parts if part.examined}
         found = []
-        for region in regions_of(self.enclosed, list(leaves)) if leaves else ():
+        for region in regions_of(self.solvers.enclosed, list(leaves)) if leaves else ():
             reasons = [(leaves[codes].reason, leaves[codes].hint) for codes in region.codes]
             # at the borders of what is singular conditions hold with equality as well
             telling = [each for each in reasons if each[0] != Cause.EQUALITY.value]
@@ -311,7 +267,7 @@ def _common(leaves: Sequence[tuple[ContactStatus | str | None, ...]]) -> tuple[C
 _DOUBTFUL = "two leaves hold roots that could not be told apart"
 
 
-def _possible(found: LooseSolution, i: int, u_t: Array, *, rubs: bool) -> list[ContactStatus]:
+def _possible(found: LooseSolution, i: int, u_t: Floats, *, rubs: bool) -> list[ContactStatus]:
     """The statuses that a node may have."""
     touching = [space_status(FRICTIONLESS, u_t)] if found.stick[i] else []
     if rubs:
@@ -319,7 +275,7 @@ def _possible(found: LooseSolution, i: int, u_t: Array, *, rubs: bool) -> list[C
     return [ContactStatus.OPEN] * bool(found.open[i]) + touching
 
 
-def _around(middle: float, radius: float) -> Array:
+def _around(middle: float, radius: float) -> Floats:
     """Bounds of an angle, the lower one in [-pi, pi)."""
     low = middle - radius
     turns = np.floor((low + np.pi) / (2.0 * np.pi))

@@ -19,12 +19,9 @@ from enumsol.trusted.selection import (
 )
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from enumsol.condensation.condensed import CondensedProblem, ScaledSystem
-    from enumsol.selections.solution import Codes
+    from enumsol.support.array_types import Codes, Floats
 
-    Array = NDArray[np.float64]
 
 #: Where a chain begins, beside the end of its interval, by its length; steps to an event, and how close is near enough.
 _BESIDE, _STEPS, _CLOSE = 1e-7, 40, 1e-12
@@ -81,7 +78,7 @@ class SelectionCurve:
         self._system, self.rows = system, Selection(codes)
         self._slope = self.rows.columns(system.S, system.F1, 0)
 
-    def at(self, alpha: float) -> tuple[Array, Array, Array, Array, Array, Array]:
+    def at(self, alpha: float) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
         """lambda, w and the conditions, then their slopes.
 
         Raises

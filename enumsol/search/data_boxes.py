@@ -16,22 +16,17 @@ from enumsol.condensation.condensed import CondensedSystem, ScaledSystem
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.errors import InvalidProblemError
 from enumsol.model.statuses import UNDECIDED
-from enumsol.search.fathoming import propose
+from enumsol.search.fathoming import Proposal, propose
 from enumsol.search.reduction import Reduction, WeightSource
 from enumsol.support.deadlines import look
-from enumsol.trusted.data_box import DataBox, only_throughout, solution_throughout
-from enumsol.trusted.piece_form import PieceNumbers
+from enumsol.trusted.data_box import DataBox, Throughout, only_throughout, solution_throughout
+from enumsol.trusted.over_interval import PieceNumbers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from enumsol.model.problem import ContactProblem
-    from enumsol.search.fathoming import Proposal
-    from enumsol.trusted.data_box import Throughout
 
-    Array = NDArray[np.float64]
 
 #: Rounds in which nodes are freed, and how many may be free: so many, or one for so many nodes.
 _ROUNDS, _FEW_LOOSE, _NODES_FOR_ONE = 4, 6, 8

@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.support.array_types import Floats, Indices, Mask
 from enumsol.support.deadlines import look
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
 
 #: Smallest eigenvalue below which a form counts as not definite.
 DEFINITE = 1e-10
@@ -54,21 +49,21 @@ class Nodes:
     """
 
     count: int
-    normal: NDArray[np.intp]
-    tangential: NDArray[np.intp]
-    F: Array
-    share: Array
-    wide: NDArray[np.bool_]
-    gap: Array
-    slip: Array
+    normal: Indices
+    tangential: Indices
+    F: Floats
+    share: Floats
+    wide: Mask
+    gap: Floats
+    slip: Floats
 
     @property
-    def chosen(self) -> NDArray[np.intp]:
+    def chosen(self) -> Indices:
         """Nodes with friction where theta may be chosen."""
         return np.flatnonzero(~np.isfinite(self.share) & ~self.wide)
 
     @property
-    def first(self) -> Array:
+    def first(self) -> Floats:
         """A share for every node with friction; where it may be chosen, the least in size that is clearly allowed."""
         size = self.F * np.abs(self.slip)
         least = 1.0 - np.minimum(_SHARED * self.gap, size) / np.where(size > 0, size, np.inf)
@@ -85,7 +80,7 @@ class AnalyticCentres:
     >= 0 says what else is asked of them.
     """
 
-    def __init__(self, R: Array, nodes: Nodes) -> None:
+    def __init__(self, R: Floats, nodes: Nodes) -> None:
         self._nodes, m, b = nodes, nodes.count, len(nodes.F)
         n, t, F, c, wide = nodes.normal, nodes.tangential, nodes.F, nodes.chosen, np.flatnonzero(nodes.wide)
         ends = np.cumsum([0, m, b, b, len(c), len(wide)])
@@ -102,7 +97,7 @@ class AnalyticCentres:
         self._C = self._conditions()
         self._scale = float(np.mean(np.abs(np.diag(R))))
 
-    def _conditions(self) -> Array:
+    def _conditions(self) -> Floats:
         nodes, c = self._nodes, self._nodes.chosen
         z, F = np.eye(self._size), nodes.F[:, None]
         mu, kappa, nu, rho = z[nodes.normal], z[self._kappa], z[self._nu], z[self._rho]
@@ -115,7 +110,7 @@ class AnalyticCentres:
         rows += [(mu[c] + side * F[c] * nu[c] - share * (F[c] * kappa[c] - side * rho))[apart], z[self._tau]]
         return np.concatenate(rows)
 
-    def _start(self) -> Array:
+    def _start(self) -> Floats:
         nodes, z = self._nodes, np.zeros(self._size + 1)
         z[self._mu], z[self._kappa], z[self._tau] = 1.0, 1.0, self._scale
         # a share of one is on the border
@@ -123,13 +118,13 @@ class AnalyticCentres:
         z[-1] = np.linalg.eigvalsh(self._matrix(z))[0] - 0.5 * self._scale
         return z
 
-    def _matrix(self, z: Array) -> Array:
+    def _matrix(self, z: Floats) -> Floats:
         M = (self._U * z[self._of]) @ self._V.T
         M = 0.5 * (M + M.T)
         M[np.diag_indices_from(M)] -= z[-1]
         return np.asarray(M)
 
-    def numbers(self) -> Array | None:
+    def numbers(self) -> Floats | None:
         """mu, kappa, nu and theta / F, or None."""
         if self._k > _LARGEST or not 0 < self._scale < np.inf:
             return None
@@ -153,14 +148,14 @@ class AnalyticCentres:
                 weight *= _GROWTH
         return self._found(z) if z[-1] > DEFINITE else None
 
-    def _found(self, z: Array) -> Array:
+    def _found(self, z: Floats) -> Floats:
         nodes, tau = self._nodes, np.zeros(len(self._nodes.F))
         share = np.where(np.isfinite(nodes.share), nodes.share, 0.0)
         share[nodes.chosen] = np.clip(z[self._rho] / (nodes.F * z[self._kappa])[nodes.chosen], -1.0, 1.0)
         tau[nodes.wide] = z[self._tau]
         return np.concatenate([z[self._mu], z[self._kappa], z[self._nu], share, tau])
 
-    def _moved(self, z: Array, weight: float) -> tuple[Array, float]:
+    def _moved(self, z: Floats, weight: float) -> tuple[Floats, float]:
         """A Newton step for -weight t - log det(M - t I) - sum log(C z), as long as serves, and its decrement."""
         gradient, hessian = self._derivatives(z, weight)
         step = np.asarray(-np.linalg.solve(hessian, gradient)[:-1], dtype=np.float64)
@@ -171,7 +166,7 @@ class AnalyticCentres:
         rates = np.concatenate([rates, (self._C @ step[:-1]) / (self._C @ z[:-1])])
         return z + _share(rates, weight * step[-1]) * step, decrement
 
-    def _derivatives(self, z: Array, weight: float) -> tuple[Array, Array]:
+    def _derivatives(self, z: Floats, weight: float) -> tuple[Floats, Floats]:
         """Gradient and second derivatives, with a row for the sum of mu and kappa."""
         P = np.linalg.inv(self._matrix(z))
         PU, PV = P @ self._U, P @ self._V
@@ -187,7 +182,7 @@ class AnalyticCentres:
         return gradient, hessian
 
 
-def _share(rates: Array, gain: float) -> float:
+def _share(rates: Floats, gain: float) -> float:
     """s > 0 at which -gain s - sum log(1 + s rates) is least, nearly."""
     low, high = 0.0, min(-1.0 / min(float(np.min(rates)), -1e-9), 1e3)
     s = min(1.0, _INSIDE * high)

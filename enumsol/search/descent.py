@@ -10,11 +10,9 @@ from enumsol.arithmetic.balls import factor_above
 from enumsol.support.deadlines import look
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from enumsol.search.definite import Nodes
+    from enumsol.support.array_types import Floats
 
-    Array = NDArray[np.float64]
 
 #: Smallest eigenvalue, relative to H and the mean of the numbers, at which descent may end; and that is any use.
 _CLEARLY, _JUST = 2e-3, 1e-6
@@ -53,7 +51,7 @@ class Descent:
         The symmetric part of R is not positive definite.
     """
 
-    def __init__(self, R: Array, nodes: Nodes, spare: Array | None = None) -> None:
+    def __init__(self, R: Floats, nodes: Nodes, spare: Floats | None = None) -> None:
         self._R, self._nodes = R, nodes
         self._spare = None if spare is None else (spare[0], spare[1, nodes.normal])
         m, b, chosen = nodes.count, len(nodes.F), ~np.isfinite(nodes.share)
@@ -64,7 +62,7 @@ class Descent:
         self._H = 0.5 * (R + R.T)
         self._L = np.linalg.cholesky(self._H)
 
-    def numbers(self) -> Array | None:
+    def numbers(self) -> Floats | None:
         """mu, kappa, nu, theta / F and tau as a proof has them, or None."""
         z = np.zeros(self._nu.stop)
         if self._spare is not None:
@@ -78,14 +76,14 @@ class Descent:
             least, lowest = self._least(z), max(_SLOW * least, far) if least < 0 else 0.0
         return self._as_written(z) if least > _JUST else None
 
-    def _lowered(self, z: Array, weight: float) -> Array:
+    def _lowered(self, z: Floats, weight: float) -> Floats:
         from scipy.optimize import minimize  # not for problems that need no numbers
 
         options = {"maxiter": _STEPS, "maxfun": _STEPS, "maxcor": _STEPS}
         found = minimize(self._objective, z, args=(weight,), jac=True, method="L-BFGS-B", options=options)
         return np.asarray(found.x)
 
-    def _split(self, z: Array) -> tuple[Array, Array, Array, Array, Array]:
+    def _split(self, z: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats]:
         """mu, kappa, nu, kappa theta, and the side of theta where it is chosen and not zero."""
         nodes = self._nodes
         mu, kappa = np.exp(z[self._mu]), np.exp(z[self._kappa])
@@ -95,7 +93,7 @@ class Descent:
         side = np.where(size > 0, self._side, 0.0)
         return mu, kappa, nu, np.where(side != 0, side * size, kappa * self._fixed), side
 
-    def _form(self, mu: Array, kappa: Array, nu: Array, rho: Array) -> Array:
+    def _form(self, mu: Floats, kappa: Floats, nu: Floats, rho: Floats) -> Floats:
         R, n, t = self._R, self._nodes.normal, self._nodes.tangential
         form = np.zeros_like(R)
         form[: len(mu)] = mu[:, None] * R[: len(mu)]
@@ -107,14 +105,14 @@ class Descent:
             form += R[: len(mu)].T @ (strength[:, None] * R[: len(mu)])
         return 0.5 * (form + form.T)
 
-    def _least(self, z: Array) -> float:
+    def _least(self, z: Floats) -> float:
         """The smallest eigenvalue relative to H, and to the mean of mu and kappa."""
         mu, kappa, nu, rho, _ = self._split(z)
         half = np.linalg.solve(self._L, self._form(mu, kappa, nu, rho))
         relative = np.linalg.solve(self._L, half.T)
         return float(np.linalg.eigvalsh(0.5 * (relative + relative.T))[0] / np.mean(np.concatenate([mu, kappa])))
 
-    def _objective(self, z: Array, weight: float) -> tuple[float, Array]:
+    def _objective(self, z: Floats, weight: float) -> tuple[float, Floats]:
         look()
         R, H, n, t, F = self._R, self._H, self._nodes.normal, self._nodes.tangential, self._nodes.F
         mu, kappa, nu, rho, side = self._split(z)
@@ -139,7 +137,7 @@ class Descent:
         slope[self._nu] *= 1.0 - np.tanh(z[self._nu]) ** 2
         return float(len(R) * np.log(mean) - 2.0 * np.sum(np.log(np.diag(L)))), slope
 
-    def _as_written(self, z: Array) -> Array:
+    def _as_written(self, z: Floats) -> Floats:
         mu, kappa, nu, rho, _ = self._split(z)
         share = np.clip(rho / (kappa * self._nodes.F), -1.0, 1.0)
         mean = np.mean(np.concatenate([mu, kappa]))

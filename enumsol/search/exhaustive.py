@@ -15,10 +15,9 @@ from enumsol.support.deadlines import look
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
-
     from enumsol.condensation.condensed import ScaledSystem
-    from enumsol.selections.solution import Codes, SelectionSolution, SelectionSolver
+    from enumsol.selections.solution import SelectionSolution, SelectionSolver
+    from enumsol.support.array_types import Codes, Floats, Mask, NDArray
 
 #: Most selections that the exhaustive method examines, in floats and in rationals.
 FLOAT_LIMIT = 4**11
@@ -74,7 +73,7 @@ def exhaustive_float(system: ScaledSystem, solver: SelectionSolver) -> Iterator[
         yield done, None
 
 
-def _candidates(system: ScaledSystem, block: NDArray[np.int8]) -> NDArray[np.bool_]:
+def _candidates(system: ScaledSystem, block: NDArray[np.int8]) -> Mask:
     """Mask of the selections of a block that may hold a root."""
     p, F, S, g = system.p, system.F, system.S, system.g
     M, b = selection_systems(S, g, F, block)
@@ -101,9 +100,7 @@ def exhaustive_exact(solver: SelectionSolver) -> Iterator[tuple[int, SelectionSo
         yield done, solver.solve(codes)
 
 
-def selection_systems(
-    S: NDArray[np.float64], g: NDArray[np.float64], F: NDArray[np.float64], codes: NDArray[np.int8]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def selection_systems(S: Floats, g: Floats, F: Floats, codes: NDArray[np.int8]) -> tuple[Floats, Floats]:
     """Linear systems M lambda = b of condensed selections (theory, section 2.3).
 
     Parameters

@@ -22,24 +22,20 @@ from enumsol.model.statuses import (
     STICK,
     UNDECIDED,
 )
-from enumsol.search.fathoming_in_contact import KnownRoot, Lone
+from enumsol.search.fathoming_in_contact import KnownRoot, Lone, LoneProposal
 from enumsol.search.reduction import NEAR, Reduction, WeightSource
-from enumsol.selections.solution import SelectionSolution
+from enumsol.selections.solution import ActiveSets, SelectionSolution
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.relaxation.engine import Relaxation
     from enumsol.search.certifiers.protocol import Bound
-    from enumsol.search.fathoming_in_contact import LoneProposal
-    from enumsol.selections.solution import ActiveSets, Codes
+    from enumsol.support.array_types import Codes, Floats
 
-    Array = NDArray[np.float64]
     #: lambda and w, (2p,) arrays each.
-    Point = tuple[Array, Array]
+    Point = tuple[Floats, Floats]
 
 #: So many nodes that slide without load make a search begin again.
 _MANY = 3
@@ -74,8 +70,8 @@ class Proposal:
     selection: Codes
     sliding: dict[int, int]
     free: tuple[int, ...]
-    force: Array
-    weights: Array | None
+    force: Floats
+    weights: Floats | None
     hopeless: bool
     strict: bool
     least: float
@@ -351,7 +347,7 @@ def propose(
     return Proposal(tuple(selection), sliding, free, force, weights, hopeless, strict, least, reduction)
 
 
-def without_load(system: ScaledSystem, force: Array, w: Array) -> dict[int, int]:
+def without_load(system: ScaledSystem, force: Floats, w: Floats) -> dict[int, int]:
     """FORWARD or BACKWARD for the nodes with friction that touch without load and slide."""
     p = system.p
     rests = (np.abs(force[:p]) <= NEAR) & (np.abs(w[:p]) <= NEAR) & (np.abs(w[p:]) > NEAR) & (system.F > 0)
@@ -361,7 +357,7 @@ def without_load(system: ScaledSystem, force: Array, w: Array) -> dict[int, int]
 _FINAL = (OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS)
 
 
-def _slack(system: ScaledSystem, selection: list[int], force: Array, w: Array) -> Array:
+def _slack(system: ScaledSystem, selection: list[int], force: Floats, w: Floats) -> Floats:
     """Every node's least slack of the conditions of its status."""
     p = system.p
     n, t, u, v = force[:p], force[p:], -w[:p], w[p:]

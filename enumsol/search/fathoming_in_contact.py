@@ -16,13 +16,10 @@ from enumsol.trusted.status_rows import refines, slip_directions
 from enumsol.trusted.uniqueness import numbers_of
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.relaxation.engine import Relaxation
-    from enumsol.selections.solution import Codes
+    from enumsol.support.array_types import Codes, Floats, Indices
 
-    Array = NDArray[np.float64]
 
 #: mu for all nodes, if kappa is one: what loaded nodes lose by a gap grows with it, the share of the slip falls.
 _FACTORS = (1.0, 3.0, 10.0)
@@ -38,8 +35,8 @@ class KnownRoot:
     """A root whose conditions hold strictly, as far as floats tell: its selection, lambda and w."""
 
     selection: Codes
-    force: Array
-    w: Array
+    force: Floats
+    w: Floats
 
     def below(self, codes: Codes) -> bool:
         """Whether it lies below an assignment."""
@@ -51,8 +48,8 @@ class LoneProposal:
     """The selection of a known root, and the numbers and strengths that may prove it alone."""
 
     selection: Codes
-    weights: Array
-    strengths: Array
+    weights: Floats
+    strengths: Floats
 
 
 class Lone:
@@ -80,7 +77,7 @@ class Lone:
         self.nodes = self._at_root(nodes, at.normal)
         self.spare = self._spare(relaxation)
 
-    def _at_root(self, nodes: NDArray[np.intp], normal: NDArray[np.intp]) -> Nodes:
+    def _at_root(self, nodes: Indices, normal: Indices) -> Nodes:
         known, chosen = self._known, nodes[normal]
         (n, t), (w_n, slip) = (a.reshape(2, -1)[:, chosen] for a in (known.force, known.w))
         F, codes = self._system.F[chosen], np.array(known.selection)[chosen]
@@ -91,7 +88,7 @@ class Lone:
         wide = np.zeros(len(normal), dtype=bool)
         return Nodes(len(nodes), normal, tangential, F, share, wide, np.where(codes == OPEN, -w_n, 0.0), slip)
 
-    def _spare(self, relaxation: Relaxation) -> Array:
+    def _spare(self, relaxation: Relaxation) -> Floats:
         """What mu and nu of each node allow its square at most; where that vanishes they need not allow any."""
         nodes, p, system, spare = self._nodes, self._system.p, self._system, np.zeros((2, len(self._nodes)))
         if relaxation.form is not None:
@@ -103,7 +100,7 @@ class Lone:
         spare[1, self.nodes.normal] = np.where(loaded, self._known.force[p + nodes] / gaps, 0.0)[self.nodes.normal]
         return spare * _MOST
 
-    def numbers(self, *, descent: bool) -> Array | None:
+    def numbers(self, *, descent: bool) -> Floats | None:
         """mu, kappa, nu, theta / F and tau with which the form is definite, or None."""
         b, count = len(self.nodes.F), self.nodes.count
         share = self.nodes.first

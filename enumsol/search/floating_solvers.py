@@ -16,10 +16,10 @@ from enumsol.condensation.condensed import ScaledSystem
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.floating import FloatingSystem, RigidRows
 from enumsol.proof import records
-from enumsol.search.certifiers.protocol import UndecidedPart
+from enumsol.search.certifiers.protocol import Bound, Certifier, UndecidedPart
 from enumsol.search.certifiers.rational_certifier import ExactCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier, proven
-from enumsol.search.resume import PlaneReader, RecordedBound
+from enumsol.search.resume import PlaneReader, Reader, RecordedBound
 from enumsol.search.setup import HeldByNothing
 from enumsol.search.solvers import Solvers
 from enumsol.search.splitting import PlaneSplitting
@@ -32,14 +32,11 @@ from enumsol.trusted.status_rows import CONDITIONS
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
-    from enumsol.proof.compressed_parts import Recorder
-    from enumsol.search.certifiers.margins import Margin
-    from enumsol.search.certifiers.protocol import Bound, Certifier
-    from enumsol.search.resume import Reader
+    from enumsol.proof.writer import Recorder
+    from enumsol.search.certifiers.protocol import Margin
     from enumsol.selections.rational_selections import ExactSelections
-    from enumsol.selections.solution import Codes, SelectionSolution
+    from enumsol.selections.solution import SelectionSolution
+    from enumsol.support.array_types import Codes, Floats
 
 #: Stiffness of the springs of the relaxations, relative to that of the body (theory, section 14.5).
 WEAK = 2.0**-20
@@ -54,7 +51,7 @@ class FloatingSolvers(HeldByNothing, Solvers):
         return RigidRows.of(self.problem, Fraction(self.alpha), self.scaled.force, self.scaled.length)
 
     @property
-    def rigid_unit(self) -> NDArray[np.float64]:  # type: ignore[override]
+    def rigid_unit(self) -> Floats:  # type: ignore[override]
         """Units of the coordinates of the rigid displacement, (r,)."""
         return self.rows.unit
 
@@ -157,7 +154,7 @@ def on_weak_springs(scaled: ScaledSystem, rows: RigidRows) -> ScaledSystem:
     return ScaledSystem(S, g, scaled.F, scaled.force, scaled.length, cholesky)
 
 
-def weakly_held(S: NDArray[np.float64], g: NDArray[np.float64], rows: RigidRows) -> tuple[NDArray[np.float64], ...]:
+def weakly_held(S: Floats, g: Floats, rows: RigidRows) -> tuple[Floats, ...]:
     """S and g with weak springs in place of those that they have."""
     G, h = rows.G.mid, rows.h.mid
     soft = G.T / WEAK

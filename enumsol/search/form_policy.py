@@ -18,12 +18,10 @@ from enumsol.relaxation.active_set import ActiveSetEngine, ActiveSetRelaxation, 
 from enumsol.search.splitting import ImposedRows, PlaneSplitting
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.relaxation.engine import Engine
     from enumsol.relaxation.interval_relaxation import IntervalSystem
-    from enumsol.selections.solution import Codes
+    from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.quadratic_forms import EnclosedForm
 
     Rows = tuple[list[int], list[int]]
@@ -124,15 +122,15 @@ class PairedTerms:
         mu, nu, delta and s of every node.
     """
 
-    terms: NDArray[np.float64]
+    terms: Floats
 
     @classmethod
-    def of(cls, multipliers: NDArray[np.float64], F: NDArray[np.float64]) -> PairedTerms:
+    def of(cls, multipliers: Floats, F: Floats) -> PairedTerms:
         """The form of multipliers mu, nu, alpha and beta (theory, section 5.8) with coefficients F."""
         mu, nu, alpha, beta = multipliers
         return cls(np.stack([mu, nu, F * (beta - alpha), alpha + beta]))
 
-    def multipliers(self, F: NDArray[np.float64]) -> NDArray[np.float64]:
+    def multipliers(self, F: Floats) -> Floats:
         """mu, nu, alpha and beta with other coefficients, which are at least as large."""
         mu, nu, delta, s = self.terms
         return np.stack([mu, nu, np.maximum(0.5 * (s - delta / F), 0.0), np.maximum(0.5 * (s + delta / F), 0.0)])

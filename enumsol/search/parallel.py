@@ -15,21 +15,18 @@ import time
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
-from enumsol.proof.compressed_parts import KeptRecords
-from enumsol.search.outcome import Stop, StopReason
-from enumsol.search.tree import TreeNode
-from enumsol.support.workers import Crew
+from enumsol.proof.writer import KeptRecords, Part, Recorder
+from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
+from enumsol.search.tree import TreeNode, TreeSearch
+from enumsol.support.workers import Crew, Job
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
     from concurrent.futures import Executor
 
-    from enumsol.proof.compressed_parts import Part, Recorder
     from enumsol.search.certifiers.protocol import Certified, Certifier
-    from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress
     from enumsol.search.resume import Reader
-    from enumsol.search.tree import TreeSearch
-    from enumsol.support.workers import Job
+    from enumsol.support.array_types import Alpha
 
 #: Nodes of a task, and those that are examined here before there are any.
 NODES, FIRST = 512, 64
@@ -39,6 +36,9 @@ ALONE = 4
 
 class Searchable(Protocol):
     """A problem in 2D or 3D at one alpha in one arithmetic: all that a search of its tree is made from."""
+
+    problem: Any
+    alpha: Alpha
 
     @property
     def arithmetic(self) -> str:

@@ -16,12 +16,9 @@ from enumsol.trusted.selection import Selection, Unknowns
 from enumsol.trusted.status_rows import slip_directions
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from enumsol.condensation.condensed import ScaledSystem
-    from enumsol.selections.solution import Codes
+    from enumsol.support.array_types import Codes, Floats, Indices, Mask
 
-    Array = NDArray[np.float64]
 
 #: A condition of a scaled problem within this of zero may hold as an equation; only the choice of what to try rests on
 #: it.
@@ -80,13 +77,13 @@ class Reduction:
         """How much a fixed node's force changes at most with a component of w."""
         return float(np.max(np.abs(np.linalg.inv(self.M)), initial=0.0))
 
-    def forces(self, x: Array) -> Array:
+    def forces(self, x: Floats) -> Floats:
         """lambda for the forces of the nodes that are free or slide."""
         force = np.asarray(self.E @ (self.Z[:, 0] - self.Z[:, 1:] @ x))
         self._at.put(x, self.system.F, force)
         return force
 
-    def solution(self, near: tuple[Array, Array] | None) -> tuple[Array, list[int]] | None:
+    def solution(self, near: tuple[Floats, Floats] | None) -> tuple[Floats, list[int]] | None:
         """Forces and statuses that solve the reduced problem up to NEAR, or None.
 
         By Newton's method from lambda and w; ``near`` None: from far away, along F from frictionless contact.
@@ -94,7 +91,7 @@ class Reduction:
         x = self._along_friction() if near is None else self._newton(near[0][self.places], near[1][self.places], 1.0)
         return None if x is None else (x, self._named(x))
 
-    def _along_friction(self) -> Array | None:
+    def _along_friction(self) -> Floats | None:
         """A solution with share F of the friction, the share going from 0 to 1."""
         x, share, step = np.zeros(len(self.places)), 0.0, 0.0
         while True:
@@ -109,7 +106,7 @@ class Reduction:
                 if step < _LEAST_SHARE:
                     return None
 
-    def _newton(self, x: Array, v: Array, share: float) -> Array | None:
+    def _newton(self, x: Floats, v: Floats, share: float) -> Floats | None:
         """A solution with this share of the friction; steps are shortened once a set of statuses comes again."""
         seen, damped, residual = set[bytes](), False, np.inf
         for _ in range(min(_NEWTON_STEPS + len(self.free) // _NODES_A_STEP, _MOST_STEPS)):
@@ -130,7 +127,7 @@ class Reduction:
                 return x
         return None
 
-    def _shortened(self, x: Array, ahead: Array, residual: float, share: float) -> Array | None:
+    def _shortened(self, x: Floats, ahead: Floats, residual: float, share: float) -> Floats | None:
         """A point on the way at which the residual is less."""
         part = 1.0
         while part >= _LEAST_PART:
@@ -140,7 +137,7 @@ class Reduction:
             part *= 0.5
         return None
 
-    def _statuses(self, x: Array, v: Array, share: float) -> NDArray[np.intp]:
+    def _statuses(self, x: Floats, v: Floats, share: float) -> Indices:
         """The statuses whose test functions are active at a point (theory, (1.7))."""
         m, t = len(self.free), self.tangential[self.rubbing]
         codes = np.where(x[:m] + v[:m] > 0, FRICTIONLESS, OPEN)
@@ -150,7 +147,7 @@ class Reduction:
         codes[self.rubbing] = np.where(loaded, slips, OPEN)
         return codes
 
-    def _selected(self, codes: NDArray[np.intp], share: float) -> Array | None:
+    def _selected(self, codes: Indices, share: float) -> Floats | None:
         """The forces of the reduced problem's selection; None where its matrix is singular."""
         closed, stuck = np.flatnonzero(codes != OPEN), self.tangential[codes == STICK]
         x, rows = np.zeros(len(self.places)), np.concatenate([closed, stuck])
@@ -166,7 +163,7 @@ class Reduction:
         x[self.tangential[slips]] = turn[slips] * x[slips]
         return x
 
-    def _residual(self, x: Array, v: Array, share: float) -> float:
+    def _residual(self, x: Floats, v: Floats, share: float) -> float:
         """What the point is off at most: its conditions are min(lambda_n, -w_n) = 0, and of the slip likewise."""
         m, t = len(self.free), self.tangential[self.rubbing]
         bound = share * self._F * np.maximum(x[:m][self.rubbing], 0.0)
@@ -174,7 +171,7 @@ class Reduction:
         residual = float(max(np.max(part, initial=0.0) for part in apart))
         return residual if np.isfinite(residual) else np.inf
 
-    def _named(self, x: Array) -> list[int]:
+    def _named(self, x: Floats) -> list[int]:
         """The first status that holds up to NEAR: of those that do, one whose equations are regular with others'."""
         v, m, t = self.h - self.R @ x, len(self.free), self.tangential[self.rubbing]
         codes = np.full(m, FRICTIONLESS)
@@ -185,8 +182,8 @@ class Reduction:
     # -- the test of definiteness ----------------------------------------------------------------------------------
 
     def weights(
-        self, x: Array, v: Array, *, exactly: bool, sought: WeightSource = WeightSource.CENTRES
-    ) -> Array | None:
+        self, x: Floats, v: Floats, *, exactly: bool, sought: WeightSource = WeightSource.CENTRES
+    ) -> Floats | None:
         """Numbers for which the form of theory, (6.9), is definite at a solution, as a proof has them, or None.
 
         Parameters
@@ -207,13 +204,13 @@ class Reduction:
         nodes = Nodes(len(self.nodes), normal, tangential, F, share, wide, np.where(gap > NEAR, gap, 0.0), slip)
         return weights_of(self.R, nodes, sought)
 
-    def resting(self, x: Array, v: Array) -> NDArray[np.bool_]:
+    def resting(self, x: Floats, v: Floats) -> Mask:
         """Nodes with friction, and free, that touch without load at a solution and do not slide."""
         n, t = np.arange(len(self.nodes)), self.tangential
         return np.asarray(self.rubbing & (x[n] <= NEAR) & (np.abs(v[n]) <= NEAR) & (np.abs(v[t]) <= NEAR))
 
 
-def weights_of(R: Array, nodes: Nodes, sought: WeightSource = WeightSource.CENTRES) -> Array | None:
+def weights_of(R: Floats, nodes: Nodes, sought: WeightSource = WeightSource.CENTRES) -> Floats | None:
     """mu, kappa, nu, theta / F and tau for which (6.9) is definite, as a proof has them; None where none were found.
 
     Parameters

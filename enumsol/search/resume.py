@@ -15,19 +15,16 @@ import numpy as np
 from enumsol.model.statuses import CONTACT, SLIDING, UNDECIDED
 from enumsol.proof import records
 from enumsol.search.fathoming_in_contact import LoneProposal
-from enumsol.search.tree import TreeNode
+from enumsol.search.tree import TreeNode, TreeSearch
 from enumsol.trusted.quadratic_forms import EnclosedForm
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
-
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.proof.begun import BegunProof
     from enumsol.search.certifiers.protocol import Bound
-    from enumsol.search.tree import TreeSearch
-    from enumsol.selections.solution import Codes
+    from enumsol.support.array_types import Codes, Floats, Indices
 
 #: Progress is reported after so many nodes.
 _REPORT_EVERY = 64
@@ -37,12 +34,12 @@ _REPORT_EVERY = 64
 class RecordedBound:
     """Multipliers that are said to bound the energy, or a form, from below; in place of a relaxation's."""
 
-    rows: NDArray[np.intp]
-    values: NDArray[np.float64]
+    rows: Indices
+    values: Floats
     form: Any = None
     bound: float = np.inf
 
-    def multipliers(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    def multipliers(self) -> tuple[Indices, Floats]:
         """Rows and their multipliers."""
         return self.rows, self.values
 

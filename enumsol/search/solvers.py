@@ -11,12 +11,12 @@ import numpy as np
 from enumsol.condensation.data import EXACT_DOF_LIMIT, exactly_at
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.errors import InvalidArgumentError
-from enumsol.proof.writer import point_header, unit_exponents
+from enumsol.proof.writer import Recorder, point_header, unit_exponents
 from enumsol.search.certifiers.float_certifier import FastCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier
-from enumsol.search.fathoming import Closer
+from enumsol.search.fathoming import Closer, Closing
 from enumsol.search.form_policy import Forms
-from enumsol.search.resume import PlaneReader
+from enumsol.search.resume import PlaneReader, Reader
 from enumsol.search.setup import SearchSetup
 from enumsol.search.splitting import PlaneSplitting
 from enumsol.search.tree import make_engine
@@ -25,19 +25,13 @@ from enumsol.selections.float_selections import FloatSelections
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.model.problem import ContactProblem
-    from enumsol.proof.compressed_parts import Recorder
     from enumsol.relaxation.engine import Engine
     from enumsol.search.certifiers.protocol import Certifier
     from enumsol.search.certifiers.rational_certifier import ExactCertifier
-    from enumsol.search.fathoming import Closing
-    from enumsol.search.resume import Reader
     from enumsol.selections.rational_selections import ExactSelections
-    from enumsol.selections.solution import Codes
-    from enumsol.support.arguments import Alpha
+    from enumsol.support.array_types import Alpha, Codes, Floats
     from enumsol.trusted.at_alpha import VerifiedSelection
     from enumsol.trusted.precise_at_alpha import PreciseAtAlpha
 
@@ -66,15 +60,10 @@ class Solvers(SearchSetup):
     """
 
     #: Units of the rigid displacement of a body that nothing holds.
-    rigid_unit: NDArray[np.float64] | None = None
+    rigid_unit: Floats | None = None
 
     def __init__(
-        self,
-        problem: ContactProblem,
-        alpha: Alpha,
-        arithmetic: Arithmetic,
-        tolerance: float,
-        engine: str | None = None,
+        self, problem: ContactProblem, alpha: Alpha, arithmetic: Arithmetic, tolerance: float, engine: str | None = None
     ) -> None:
         self.problem, self.alpha, self.arithmetic, self.engine = problem, alpha, arithmetic, engine
         body = problem.on_springs

@@ -14,11 +14,8 @@ from enumsol.trusted.status_rows import is_covering, refines
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterable, Mapping, Sequence
 
-    import numpy as np
-    from numpy.typing import NDArray
-
     from enumsol.relaxation.engine import Relaxation
-    from enumsol.selections.solution import Codes
+    from enumsol.support.array_types import Codes, Floats
 
 
 class Splitting(Protocol):
@@ -113,10 +110,7 @@ class PlaneSplitting:
     """
 
     def __init__(
-        self,
-        F: NDArray[np.float64],
-        allowed: Sequence[frozenset[int]] | None = None,
-        sliding: Mapping[int, int] | None = None,
+        self, F: Floats, allowed: Sequence[frozenset[int]] | None = None, sliding: Mapping[int, int] | None = None
     ) -> None:
         self._F: list[float] = F.tolist()
         self._sliding = sliding if sliding is not None else {}

@@ -19,26 +19,25 @@ from typing import TYPE_CHECKING, Any
 from enumsol.condensation.condensed import ScaledSystem
 from enumsol.errors import MissingDependencyError
 from enumsol.model.statuses import UNDECIDED
-from enumsol.proof.compressed_parts import KeptRecords
+from enumsol.proof.writer import KeptRecords
 from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.relaxation.engine import Engine, Relaxation, not_compiled
 from enumsol.relaxation.interior_point import InteriorPointEngine
-from enumsol.search.certifiers.protocol import Refine, UndecidedPart
+from enumsol.search.certifiers.protocol import Bound, Certifier, Refine, UndecidedPart
 from enumsol.search.form_policy import Forms
 from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
 from enumsol.search.splitting import ImposedRows, PlaneSplitting, Splitting, branching_node
-from enumsol.selections.solution import Codes
 from enumsol.support.deadlines import Deadline, TimeOverError, over, tell, within
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from enumsol.condensation.space_condensed import SpaceSystem
-    from enumsol.search.certifiers.protocol import Bound, Certifier
     from enumsol.search.fathoming import Closer
     from enumsol.search.fathoming_in_contact import LoneProposal
     from enumsol.search.space.space_fathoming import SpaceCloser
     from enumsol.search.space.space_forms import SpaceForms
+    from enumsol.support.array_types import Codes
 
 #: Progress is reported and limits on time are looked at after this many nodes.
 _REPORT_EVERY = 64

@@ -10,13 +10,12 @@ import numpy as np
 from scipy.linalg import cho_solve
 
 from enumsol.model.statuses import CONDITIONS, FRICTIONLESS, SLIP_PLUS, RowKind, active_within
-from enumsol.selections.solution import MAX_BASES, ActiveSets, Codes, SelectionSolution, VertexLimitError
+from enumsol.selections.solution import MAX_BASES, ActiveSets, SelectionSolution, VertexLimitError
 from enumsol.trusted.selection import Selection, row_values
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from enumsol.condensation.condensed import ScaledSystem
+    from enumsol.support.array_types import Codes, Floats, Indices, Integers
 
 #: Default of arithmetic "fast": a condition within this of zero counts as zero. It is relative to the energy norm of
 #: the load: forces are measured by sqrt((S^-1)_ii) and displacements by sqrt(S_ii), the bounds that hold at roots.
@@ -57,20 +56,20 @@ class FloatSelections:
         # energy norm of the force direction (1, +F) or (1, -F) of a slipping node
         self._slip_scale = size * np.sqrt(np.maximum(one**2 * snn + f**2 * stt + 2 * f * one * snt * turn, 0.0))
 
-    def row_norms(self) -> NDArray[np.float64]:
+    def row_norms(self) -> Floats:
         """Norms by which the rows of relaxations are measured, in the order of their numbers kind * p + node."""
         return self._norms.ravel()
 
     # -- solving ---------------------------------------------------------------------------------------------------
 
-    def reduced(self, codes: Codes) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    def reduced(self, codes: Codes) -> tuple[Indices, Floats]:
         """Rows of S that vanish in the selection, and E with lambda = E y, columns of unit energy norm."""
         selection, size = Selection(codes), self._length_scale.copy()
         size[selection.slip] = self._slip_scale[np.where(selection.slip_signs > 0, 0, 1), selection.slip]
         rows = selection.unknown
         return rows, selection.forces(np.diag(1.0 / size[rows]), self.system.F)
 
-    def matrix(self, codes: Codes) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def matrix(self, codes: Codes) -> tuple[Floats, Floats, Floats]:
         """Scaled matrix and right-hand side of the reduced selection system, and E."""
         rows, E = self.reduced(codes)
         scale = 1.0 / self._length_scale[rows]
@@ -99,16 +98,14 @@ class FloatSelections:
             return None
         return self._polytope(codes, E @ y, E @ Vt[rank:].T)
 
-    def _accept(self, codes: Codes, point: NDArray[np.float64], sign: int) -> SelectionSolution | None:
+    def _accept(self, codes: Codes, point: Floats, sign: int) -> SelectionSolution | None:
         slack = self.slacks(codes, point, self._w(point))
         least = float(np.min(slack)) if len(slack) else np.inf
         if not least >= -self.tolerance:
             return None
         return SelectionSolution(codes, (point,), 0, sign, least > self.tolerance)
 
-    def _polytope(
-        self, codes: Codes, point: NDArray[np.float64], kernel: NDArray[np.float64]
-    ) -> SelectionSolution | None:
+    def _polytope(self, codes: Codes, point: Floats, kernel: Floats) -> SelectionSolution | None:
         d = self.slacks(codes, point, self._w(point))
         C = np.column_stack([self.slacks(codes, column, -self.system.S @ column) for column in kernel.T])
         steps = _vertices(C, d, self.tolerance)
@@ -123,10 +120,10 @@ class FloatSelections:
 
     # -- conditions ------------------------------------------------------------------------------------------------
 
-    def _w(self, point: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _w(self, point: Floats) -> Floats:
         return np.asarray(self.system.g - self.system.S @ point)
 
-    def slacks(self, codes: Codes, point: NDArray[np.float64], w: NDArray[np.float64]) -> NDArray[np.float64]:
+    def slacks(self, codes: Codes, point: Floats, w: Floats) -> Floats:
         """Scaled slacks of the selection's inequalities at forces ``point`` and displacements ``w``, in node order."""
         rows, out = row_values(point, w, self.system.F), []
         for i, code in enumerate(codes):
@@ -137,12 +134,12 @@ class FloatSelections:
                     out.append(rows[kind, i] / self._norms[kind, i])
         return np.array(out)
 
-    def active(self, point: NDArray[np.float64]) -> ActiveSets:
+    def active(self, point: Floats) -> ActiveSets:
         """Per node the codes whose conditions hold at the point within the tolerance."""
         rows = row_values(point, self._w(point), self.system.F) / np.where(self._norms > 0, self._norms, 1)
         return active_within(rows, self.F_positive, self.tolerance)
 
-    def equal(self, a: NDArray[np.float64], b: NDArray[np.float64]) -> bool:
+    def equal(self, a: Floats, b: Floats) -> bool:
         """Whether two points agree within ten tolerances in scaled forces."""
         return bool(np.max(np.abs(a - b) / self._force_scale) <= 10 * self.tolerance)
 
@@ -165,7 +162,7 @@ class FloatSelections:
         answer = linprog(cost, A_ub=upper, b_ub=np.zeros(2 * size), A_eq=equal, b_eq=np.ones(2))
         return bool(answer.status == 0 and answer.fun <= 10 * self.tolerance)
 
-    def departure(self, solution: SelectionSolution, direction: NDArray[np.int64]) -> int | None:
+    def departure(self, solution: SelectionSolution, direction: Integers) -> int | None:
         """See SelectionSolver.departure."""
         if solution.det_sign == 0:
             return 0
@@ -184,28 +181,28 @@ class FloatSelections:
 
     # -- values ----------------------------------------------------------------------------------------------------
 
-    def forces(self, point: NDArray[np.float64]) -> NDArray[np.float64]:
+    def forces(self, point: Floats) -> Floats:
         """Unscaled lambda."""
         return point * self.system.force
 
-    def displacements(self, point: NDArray[np.float64]) -> NDArray[np.float64]:
+    def displacements(self, point: Floats) -> Floats:
         """Unscaled w = g - S lambda."""
         return self._w(point) * self.system.length
 
-    def bounds(self, point: NDArray[np.float64]) -> None:
+    def bounds(self, point: Floats) -> None:
         """Floats prove no bounds."""
 
-    def exact_slips(self, point: NDArray[np.float64]) -> None:
+    def exact_slips(self, point: Floats) -> None:
         """Floats are not exact."""
         del point
 
-    def slip_signs(self, point: NDArray[np.float64]) -> tuple[int, ...]:
+    def slip_signs(self, point: Floats) -> tuple[int, ...]:
         """Signs of w_t; zero within the tolerance."""
         w = (self._w(point) / self._length_scale)[self.p :]
         return tuple(int(np.sign(v)) if abs(v) > self.tolerance else 0 for v in w)
 
 
-def _vertices(C: NDArray[np.float64], d: NDArray[np.float64], tolerance: float) -> NDArray[np.float64]:
+def _vertices(C: Floats, d: Floats, tolerance: float) -> Floats:
     """Vertices t of {C t + d >= 0}, shape (k, dim), by trying every basis; the set is known to be bounded."""
     size = C.shape[1]
     norms = np.linalg.norm(C, axis=1)
@@ -218,7 +215,7 @@ def _vertices(C: NDArray[np.float64], d: NDArray[np.float64], tolerance: float) 
             f"a family of roots has {comb(len(d), size)} candidate vertices; at most {MAX_BASES} are enumerated"
         )
     unit, offset = C / norms[~flat, None], d / norms[~flat]
-    found: list[NDArray[np.float64]] = []
+    found: list[Floats] = []
     bases = combinations(range(len(d)), size)
     while block := list(islice(bases, 4096)):
         index = np.array(block)

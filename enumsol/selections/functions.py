@@ -15,7 +15,7 @@ from enumsol.trusted.selection import Selection
 
 if TYPE_CHECKING:
     from enumsol.condensation.exact import ExactCondensed
-    from enumsol.selections.solution import Codes
+    from enumsol.support.array_types import Codes
 
 
 @lru_cache(maxsize=64)

@@ -11,21 +11,19 @@ import numpy as np
 from flint import fmpq, fmpq_mat
 
 from enumsol.arithmetic.rationals import as_objects, rational, to_fraction
-from enumsol.condensation.exact import ExactSystem, UncondensedSystem
+from enumsol.condensation.exact import ExactCondensed, ExactSystem, UncondensedSystem
 from enumsol.model.statuses import CONDITIONS, FINAL, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, RowKind
-from enumsol.selections.polytopes import dot, polytope_vertices, value
-from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution, VertexLimitError
+from enumsol.selections.polytopes import Form, Point, dot, polytope_vertices, value
+from enumsol.selections.solution import ActiveSets, SelectionSolution, VertexLimitError
 from enumsol.support.deadlines import look
 from enumsol.trusted.selection import Selection, row_values
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
-    from enumsol.condensation.exact import ExactCondensed
     from enumsol.model.statuses import Conditions
-    from enumsol.selections.polytopes import Form, Point, Table
+    from enumsol.selections.polytopes import Table
+    from enumsol.support.array_types import Codes, Floats, Integers, NDArray
 
 
 def _outward(number: Any) -> tuple[float, float]:
@@ -217,7 +215,7 @@ class ExactSelections:
             for rows, friction in zip(self._rows(point).T, self.F_positive, strict=True)
         )
 
-    def statuses_by_test_functions(self, point: Point, r: NDArray[np.float64]) -> tuple[int, ...]:
+    def statuses_by_test_functions(self, point: Point, r: Floats) -> tuple[int, ...]:
         """Per node the code that the signs of theory, (1.7), name at any point; ``r`` holds powers of two."""
         p, w = self.p, self.moved(point)
         codes = []
@@ -241,7 +239,7 @@ class ExactSelections:
         first, second = self.forms(a.codes), self.forms(b.codes)
         return bool(polytope_vertices(first[0] + second[0], first[1] + second[1], self.row_reduced))
 
-    def departure(self, solution: SelectionSolution, direction: NDArray[np.int64]) -> int | None:
+    def departure(self, solution: SelectionSolution, direction: Integers) -> int | None:
         """See SelectionSolver.departure."""
         if solution.det_sign == 0:
             return 0
@@ -264,15 +262,15 @@ class ExactSelections:
 
     # -- values ----------------------------------------------------------------------------------------------------
 
-    def forces(self, point: Point) -> NDArray[np.float64]:
+    def forces(self, point: Point) -> Floats:
         """lambda as floats."""
         return np.array([self.as_float(v) for v in point[: 2 * self.p]])
 
-    def rigid(self, point: Point) -> NDArray[np.float64]:
+    def rigid(self, point: Point) -> Floats:
         """Coordinates q of the rigid displacement as floats, shape (r,)."""
         return np.array([-self.as_float(v) for v in point[2 * self.p :]])
 
-    def displacements(self, point: Point) -> NDArray[np.float64]:
+    def displacements(self, point: Point) -> Floats:
         """w = g - S lambda as floats, rounded once."""
         return np.array([self.as_float(v) for v in self.moved(point)[: 2 * self.p]])
 
@@ -284,7 +282,7 @@ class ExactSelections:
         """w_t, exactly."""
         return tuple(map(to_fraction, self.moved(point)[self.p : 2 * self.p]))
 
-    def bounds(self, point: Point) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def bounds(self, point: Point) -> tuple[Floats, Floats]:
         """Floats below and above (lambda, w), two arrays of shape (4p,), equal where a value is a float."""
         forces = 2 * self.p
         pairs = [_outward(v) for v in (*point[:forces], *self.moved(point)[:forces])]

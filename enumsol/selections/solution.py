@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from fractions import Fraction
+from typing import Any, Protocol
 
 import numpy as np
 
 from enumsol.errors import TooLargeError
-
-if TYPE_CHECKING:
-    from fractions import Fraction
 
 Codes = tuple[int, ...]
 ActiveSets = tuple[frozenset[int], ...]

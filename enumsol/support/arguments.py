@@ -18,26 +18,18 @@ import numbers
 import operator
 import os
 import re
+from collections.abc import Callable, Collection, Mapping
 from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
 from reprlib import Repr
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
+from enumsol.support.array_types import Alpha, NDArray
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping
-
-    from numpy.typing import NDArray
-
-
-#: What a value of alpha is kept as.
-Alpha = float | Fraction
-#: What is accepted as alpha.
-AlphaLike = float | Fraction | Decimal | str | np.number[Any] | np.ndarray[Any, Any]
 #: Most binary digits of a numerator or denominator: four times those of any float64, which bounds the cost.
 MAX_BITS = 4096
 #: Most characters of a text: enough for every fraction within MAX_BITS.
@@ -51,7 +43,7 @@ _SHOWN = 60
 _MOST_NAMES = 40
 
 T = TypeVar("T")
-N = TypeVar("N", float, Alpha)
+N = TypeVar("N", float, "Alpha")
 
 
 # -- what was found ------------------------------------------------------------------------------------------------

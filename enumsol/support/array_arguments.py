@@ -9,17 +9,14 @@ single bool is no number.
 from __future__ import annotations
 
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.errors import EnumsolError, InvalidArgumentError, InvalidProblemError
 from enumsol.support.arguments import exact_number, shown
-
-if TYPE_CHECKING:
-    from enumsol.errors import EnumsolError
-    from enumsol.support.array_types import Floats, Mask, NDArray
+from enumsol.support.array_types import Floats, Mask, NDArray
 
 #: Integers up to this size are floats.
 _EXACT_INTEGERS = 2**53

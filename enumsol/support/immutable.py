@@ -6,16 +6,14 @@ holds is copied when it is made, and made immutable: writing to it raises, and i
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import scipy.sparse as sp
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from enumsol.support.array_types import Floats, NDArray
+from enumsol.support.array_types import Floats, NDArray
 
 
 def sealed(array: NDArray[Any]) -> NDArray[Any]:

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import enum
+from collections.abc import Iterable
 from html import escape
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 
 class TextEnum(enum.StrEnum):

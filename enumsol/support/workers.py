@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import warnings
 from collections import deque
-from concurrent.futures import BrokenExecutor, CancelledError
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator
-    from concurrent.futures import Executor, Future
 
     #: A key, a function that other processes can import, and its arguments.
     Call = tuple["Key", Callable[..., Any], tuple[Any, ...]]

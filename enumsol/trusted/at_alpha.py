@@ -30,8 +30,8 @@ from enumsol.trusted.status_rows import CONDITIONS
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.arithmetic.balls import Array
     from enumsol.condensation.enclosure import EnclosedSystem
+    from enumsol.support.array_types import Floats
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,9 @@ def _solve_selection(system: EnclosedSystem, codes: Sequence[int]) -> VerifiedSe
     return _conditions(system, codes, force, w, solved.sign)
 
 
-def _closer(system: EnclosedSystem, selection: Selection, solved: VerifiedSolution, scale: Array, force: Ball) -> Array:
+def _closer(
+    system: EnclosedSystem, selection: Selection, solved: VerifiedSolution, scale: Floats, force: Ball
+) -> Floats:
     """Radii of g - S lambda in which errors of lambda cancel: those of a solution of ill-conditioned equations do.
 
     With lambda = E (y + e), e = R rest + (I - R M) e: S E R is not large where S E and R are.

@@ -20,8 +20,8 @@ from enumsol.trusted.status_rows import BACKWARD, FORWARD, FRICTIONLESS, OPEN, S
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.arithmetic.balls import Array
     from enumsol.condensation.floating import FloatingSystem
+    from enumsol.support.array_types import Floats
 
 #: Cells that are looked at before it is left open, and how narrow they may become.
 _MOST_CELLS, _NARROW = 1000, 2.0**-10
@@ -56,7 +56,7 @@ def is_confined(system: FloatingSystem) -> bool:
         return False
 
 
-def motion_against(system: FloatingSystem, codes: Sequence[int]) -> Array:
+def motion_against(system: FloatingSystem, codes: Sequence[int]) -> Floats:
     """A rigid motion against which the load works, and no forces of an assignment do, nor any that are near these.
 
     What is left of the load after its projection onto the cone of resultants G lambda, which is made wider by a share.
@@ -65,7 +65,7 @@ def motion_against(system: FloatingSystem, codes: Sequence[int]) -> Array:
     return motion_beside(system, _rays(system, codes))
 
 
-def motion_beside(system: FloatingSystem, resultants: Sequence[Array]) -> Array:
+def motion_beside(system: FloatingSystem, resultants: Sequence[Floats]) -> Floats:
     """As ``motion_against``, for forces whose resultants are combinations of these with positive coefficients."""
     h = system.rows.h.mid
     size = float(np.linalg.norm(h))
@@ -86,7 +86,7 @@ def motion_beside(system: FloatingSystem, resultants: Sequence[Array]) -> Array:
     return rest / length if length > 0 else rest
 
 
-def _rays(system: FloatingSystem, codes: Sequence[int]) -> list[Array]:
+def _rays(system: FloatingSystem, codes: Sequence[int]) -> list[Floats]:
     """Resultants that span those of all forces of an assignment."""
     G, F, p = system.rows.G.mid, system.F, system.p
     return [
@@ -114,7 +114,7 @@ class _Cells:
         #: What w / s may be beside G'q / s.
         self._elastic = (self._largest_elastic() + self._reach @ G.rad + 4 * k * size) * (1 + k) * SAFE + TINY
 
-    def _largest_elastic(self) -> Array:
+    def _largest_elastic(self) -> Floats:
         """Bounds of |g - S lambda| / s, by the energy (theory, (14.5)) or, if it is better, by balance."""
         system, k = self._system, gamma(2 * len(self._system.g) + 8)
         S = np.abs(system.S) + system.S_rad
@@ -123,7 +123,7 @@ class _Cells:
             moved = np.minimum(moved, S @ np.concatenate([most, (system.F + system.F_rad) * most]) * (1 + k) * SAFE)
         return np.asarray((g + moved) * SAFE)
 
-    def _largest_forces(self) -> Array | None:
+    def _largest_forces(self) -> Floats | None:
         """Bounds of lambda_n, (p,), by a motion that all contact forces oppose; None without one."""
         system, p = self._system, self._p
         G, h, k = system.rows.G, system.rows.h, gamma(len(self._reach) + 8)
@@ -177,7 +177,7 @@ class _Cells:
             waiting += [(low, below), (above, high)]
         return not waiting
 
-    def _is_excluded(self, low: Array, high: Array) -> bool:
+    def _is_excluded(self, low: Floats, high: Floats) -> bool:
         """Whether a cell holds no solution."""
         p, middle, half = self._p, 0.5 * (low + high), 0.5 * (high - low)
         # the ends of cells are few binary digits: these sums round nothing

@@ -6,26 +6,19 @@ in them is kept as such, and only the rest is bounded.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, Inverse
-from enumsol.condensation.enclosure import EnclosedSystem
-from enumsol.trusted.piece_form import definite
+from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem
+from enumsol.support.array_types import Codes, Floats, Indices
+from enumsol.trusted.over_interval import PieceNumbers, definite
 from enumsol.trusted.selection import Selection, Unknowns
 from enumsol.trusted.status_rows import CONDITIONS, OPEN, final_codes
 from enumsol.trusted.uniqueness_weights import Components, Weights
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from enumsol.condensation.enclosure import CondensedEnclosure
-    from enumsol.trusted.piece_form import PieceNumbers
-
-    Array = np.ndarray[Any, np.dtype[np.float64]]
-    Codes = tuple[int, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +34,7 @@ class Expansion:
     value: Ball
     along: Ball
     across: Ball
-    rest: Array
+    rest: Floats
 
     @property
     def ball(self) -> Ball:
@@ -99,8 +92,8 @@ class DataBox:
         enclosures: tuple[CondensedEnclosure, CondensedEnclosure],
         alphas: tuple[float, float],
         shares: tuple[float, float],
-        force: Array,
-        length: Array,
+        force: Floats,
+        length: Floats,
     ) -> DataBox:
         """The problems between two with the same A, Bn and Bt, on which load, gap and friction depend affinely.
 
@@ -133,7 +126,7 @@ class DataBox:
         return cls(system, g, F)
 
     @property
-    def rubbing(self) -> np.ndarray[Any, np.dtype[np.intp]]:
+    def rubbing(self) -> Indices:
         """Nodes with friction."""
         return np.flatnonzero(self.system.F > 0)
 
@@ -154,7 +147,7 @@ class Throughout:
 
 
 def solution_throughout(
-    box: DataBox, selection: Codes, loose: Sequence[int], weights: Array, force: Array
+    box: DataBox, selection: Codes, loose: Sequence[int], weights: Floats, force: Floats
 ) -> Throughout | None:
     """A solution of the reduced problem of the loose nodes for all data of a box; None where that is not proven.
 
@@ -230,7 +223,7 @@ def only_throughout(box: DataBox, found: Throughout, numbers: PieceNumbers, marg
         return definite(form[np.ix_(kept, kept)], margin)
 
 
-def slopes(box: DataBox, found: Throughout, numbers: PieceNumbers) -> tuple[Array, Array]:
+def slopes(box: DataBox, found: Throughout, numbers: PieceNumbers) -> tuple[Floats, Floats]:
     """theta of every node, and how far from it one may be that serves the solution, whichever that is."""
     p, F = box.system.p, box.system.balls[2]
     n, t, w_n, w_t = found.force[:p], found.force[p:], found.w[:p].ball, found.w[p:].ball
@@ -284,7 +277,7 @@ def _expanded(
     if inverse is not None:
         coefficients, T = (box.F.value, box.F.along, box.F.across), S[rows]
 
-        def forces(y: Array, order: int) -> Ball:
+        def forces(y: Floats, order: int) -> Ball:
             found: Ball = fixed.forces(Ball.exact(y), coefficients[order], unit=int(order == 0))
             return found
 

@@ -14,16 +14,16 @@ import numpy as np
 from enumsol.arithmetic.balls import ROOT_TINY, SAFE, TINY, UNIT, gamma
 
 if TYPE_CHECKING:
-    from enumsol.arithmetic.balls import Array
     from enumsol.condensation.enclosure import EnclosedSystem
+    from enumsol.support.array_types import Floats
 
 #: Steps of refinement; forms may be hardly convex.
 _REFINEMENTS = 3
 
 
 def energy_bounds(
-    system: EnclosedSystem, y: Array, c: Array, c_rad: Array, errors: float = 1.0, enough: float = 0.0
-) -> Array:
+    system: EnclosedSystem, y: Floats, c: Floats, c_rad: Floats, errors: float = 1.0, enough: float = 0.0
+) -> Floats:
     """Lower bounds on the energy for multipliers y (m, 2p) on S lambda - g and c, a ball, on lambda.
 
     By theory, (6.2); where that proves nothing, by (6.1), which loses less to large multipliers: with v = g + c + S y
@@ -41,7 +41,7 @@ def energy_bounds(
     return bounds
 
 
-def _energy_bounds(system: EnclosedSystem, y: Array, c: Array, c_rad: Array, errors: float) -> Array:
+def _energy_bounds(system: EnclosedSystem, y: Floats, c: Floats, c_rad: Floats, errors: float) -> Floats:
     """The same by theory, (6.2) and (6.3)."""
     S, g = system.S, system.g
     # every inner product of up to 2p terms below is off by at most k times that of the absolute values
@@ -73,10 +73,10 @@ class EnergyForm:
     """The energy with the fields of an EnclosedForm: H = S, h = g, k = 0."""
 
     system: EnclosedSystem
-    H: Array
-    h: Array
-    h_rad: Array
-    inverse: Array
+    H: Floats
+    h: Floats
+    h_rad: Floats
+    inverse: Floats
     form_error: float
     smallest_eigenvalue: float
     k: float = 0.0
@@ -89,7 +89,7 @@ class EnergyForm:
         return cls(system, system.S, system.g, system.g_rad, *own)
 
 
-def form_bounds(form: Any, y: Array, c: Array, c_rad: Array, errors: float) -> Array:
+def form_bounds(form: Any, y: Floats, c: Floats, c_rad: Floats, errors: float) -> Floats:
     """Lower bounds on q for multipliers y (m, 2p) on S lambda - g and c, a ball, on lambda; as energy_bounds.
 
     ``form`` is an EnclosedForm, or what else has its fields.
@@ -118,6 +118,6 @@ def form_bounds(form: Any, y: Array, c: Array, c_rad: Array, errors: float) -> A
     return np.asarray(total - errors * error * (1 + k) * SAFE * SAFE - TINY)
 
 
-def dots(a: Array, b: Array) -> Array:
+def dots(a: Floats, b: Floats) -> Floats:
     """Inner products of the rows of two arrays."""
     return np.asarray(np.vecdot(a, b))

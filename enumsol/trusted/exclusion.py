@@ -15,7 +15,7 @@ in alpha (see ``trusted.over_interval``). ``trusted.energy_bounds`` has the boun
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import TYPE_CHECKING, NamedTuple, Self, cast
 
 import numpy as np
 
@@ -29,19 +29,16 @@ from enumsol.trusted.status_rows import FORBIDDEN, NONNEGATIVE, ROW_KINDS, row_s
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from typing import Self
 
-    from numpy.typing import NDArray
-
-    from enumsol.arithmetic.balls import Array
     from enumsol.condensation.enclosure import EnclosedSystem
+    from enumsol.support.array_types import Floats, Indices, NDArray
 
 
 class Terms(NamedTuple):
     """Row numbers, kind * p + node, and their multipliers."""
 
-    rows: NDArray[np.intp]
-    values: Array
+    rows: Indices
+    values: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,10 +53,10 @@ class Leaves:
         impose, or a multiplier of the wrong sign, makes that assignment's bound -inf.
     """
 
-    codes: NDArray[np.intp]
-    leaf: NDArray[np.intp]
-    rows: NDArray[np.intp]
-    values: Array
+    codes: Indices
+    leaf: Indices
+    rows: Indices
+    values: Floats
 
     @classmethod
     def of(cls, codes: Sequence[Sequence[int]] | NDArray[np.uint8], terms: Sequence[Terms]) -> Self:
@@ -68,7 +65,7 @@ class Leaves:
         leaf = np.repeat(np.arange(len(rows)), [len(r) for r in rows])
         return cls(np.array(codes, dtype=np.intp), leaf, np.concatenate(rows), np.concatenate(values))
 
-    def times(self, factors: Array | float) -> Self:
+    def times(self, factors: Floats | float) -> Self:
         """The same with multipliers times a factor, or each assignment's times its own."""
         return replace(self, values=self.values * (factors[self.leaf] if isinstance(factors, np.ndarray) else factors))
 
@@ -76,8 +73,8 @@ class Leaves:
 def exclusion_margin(
     within: EnclosedSystem | EnclosedForm | EnclosedPiece,
     codes: Sequence[int],
-    rows: NDArray[np.intp],
-    values: Array,
+    rows: Indices,
+    values: Floats,
     errors: float = 1.0,
 ) -> float:
     """Proven lower bound over one partial assignment (see exclusion_margins)."""
@@ -86,7 +83,7 @@ def exclusion_margin(
 
 def exclusion_margins(
     within: EnclosedSystem | EnclosedForm | EnclosedPiece, leaves: Leaves, errors: float = 1.0
-) -> Array:
+) -> Floats:
     """Proven lower bounds over partial assignments; positive means that one holds no solution.
 
     Parameters
@@ -116,11 +113,11 @@ def exclusion_margins(
 def _margins(
     ends: Sequence[EnclosedSystem | EnclosedForm],
     allowed: NDArray[np.int8],
-    low: Array,
-    high: Array,
+    low: Floats,
+    high: Floats,
     leaves: Leaves,
     errors: float,
-) -> Array:
+) -> Floats:
     """Bounds that hold at all ends, -inf where one is not finite.
 
     Parameters
@@ -168,7 +165,7 @@ def _margins(
     return np.where(refused | ~np.isfinite(least), -np.inf, least)
 
 
-def _bounds(end: EnclosedSystem | EnclosedForm, y: Array, c: Array, c_rad: Array, errors: float) -> Array:
+def _bounds(end: EnclosedSystem | EnclosedForm, y: Floats, c: Floats, c_rad: Floats, errors: float) -> Floats:
     if isinstance(end, EnclosedForm):
         return form_bounds(end, y, c, c_rad, errors)
     return energy_bounds(end, y, c, c_rad, errors)

@@ -14,20 +14,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, gamma
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma
 from enumsol.trusted.energy_bounds import dots, energy_bounds
 from enumsol.trusted.status_rows import BACKWARD, FORWARD, OPEN, SLIP_MINUS, SLIP_PLUS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
-    from enumsol.arithmetic.balls import Array, Ball
     from enumsol.condensation.floating import FloatingSystem
+    from enumsol.support.array_types import Floats, Mask
 
 
-def floating_bounds(ends: Sequence[FloatingSystem], y: Array, c: Array, c_rad: Array, errors: float = 1.0) -> Array:
+def floating_bounds(ends: Sequence[FloatingSystem], y: Floats, c: Floats, c_rad: Floats, errors: float = 1.0) -> Floats:
     """Lower bounds on e - h'q for multipliers y (m, 2p) and c, a ball; as energy_bounds.
 
     At one alpha, or for all between two, at which g and h are those of the ends (theory, section 14.8).
@@ -52,7 +50,7 @@ def floating_bounds(ends: Sequence[FloatingSystem], y: Array, c: Array, c_rad: A
     return np.asarray(np.fmax(first, np.where(sure & np.isfinite(second), second, -np.inf)))
 
 
-def _bend(found: Sequence[tuple[FloatingSystem, Array, Array, NDArray[np.bool_]]], z: Sequence[Array]) -> Array:
+def _bend(found: Sequence[tuple[FloatingSystem, Floats, Floats, Mask]], z: Sequence[Floats]) -> Floats:
     """How far the bound may sag between two ends, (m,), for multipliers that are affine in alpha."""
     (one, y0, change0, _), (other, y1, change1, _) = found
     k = gamma(len(one.g) + len(one.reach) + 8)
@@ -63,7 +61,7 @@ def _bend(found: Sequence[tuple[FloatingSystem, Array, Array, NDArray[np.bool_]]
     return np.asarray(0.25 * work * (1 + k) * SAFE * SAFE + TINY)
 
 
-def balancing(system: FloatingSystem, y: Array, c: Array) -> Array:
+def balancing(system: FloatingSystem, y: Floats, c: Floats) -> Floats:
     """Multipliers z of G lambda - h, (m, r), that are good for these y and c; any z is a choice."""
     G, h = system.rows.G.mid, system.rows.h.mid
     z = (2 * h - (system.g + c) @ system.inverse.T @ G.T - y @ G.T) @ system.mode_inverse
@@ -72,15 +70,15 @@ def balancing(system: FloatingSystem, y: Array, c: Array) -> Array:
 
 def bounds_within(
     system: FloatingSystem,
-    y: Array,
-    y_rad: Array,
-    c: Array,
-    c_rad: Array,
+    y: Floats,
+    y_rad: Floats,
+    c: Floats,
+    c_rad: Floats,
     errors: float,
-    z: Array | None = None,
+    z: Floats | None = None,
     *,
     at_balance: bool = False,
-) -> Array:
+) -> Floats:
     """Lower bounds on e - h'q for a y and a c, both balls, within the bounds of the rigid displacement.
 
     ``at_balance``: for the y of the ball with G y = h, which are known to exist, at any displacement.
@@ -109,7 +107,7 @@ def bounds_within(
     return np.where(np.isfinite(loss), bounds - errors * loss, -np.inf)
 
 
-def balanced(G: Ball, h: Ball, y: Array, errors: float = 1.0) -> tuple[Array, Array, NDArray[np.bool_]]:
+def balanced(G: Ball, h: Ball, y: Floats, errors: float = 1.0) -> tuple[Floats, Floats, Mask]:
     """Multipliers next to y (m, k) of the same signs that satisfy G y = h exactly, as midpoints and radii.
 
     They are y + |y| G's: every component keeps its sign as long as |G's| <= 1. A first step is taken in floats. What it
@@ -140,7 +138,7 @@ def balanced(G: Ball, h: Ball, y: Array, errors: float = 1.0) -> tuple[Array, Ar
     return y, y_abs * share * SAFE + TINY * (y_abs > 0), sure
 
 
-def is_unbalanced(system: FloatingSystem, codes: Sequence[int], z: Array) -> bool:
+def is_unbalanced(system: FloatingSystem, codes: Sequence[int], z: Floats) -> bool:
     """Whether no forces below a partial assignment are in balance with the load, by z (r,); see theory, (14.7).
 
     z'h > 0, and z'G lambda <= 0 for the forces that span those of every node: (1, F) or (1, -F), or (1, 0) where F = 0.
@@ -172,16 +170,16 @@ def is_unbalanced(system: FloatingSystem, codes: Sequence[int], z: Array) -> boo
     return load > 0 and bool(np.all(most[rays] <= 0))
 
 
-def _weighted(G: Array, weights: Array) -> Array:
+def _weighted(G: Floats, weights: Floats) -> Floats:
     """G diag(weights) G' for every row of weights."""
     return _product(G, weights, G)
 
 
-def _product(left: Array, weights: Array, right: Array) -> Array:
+def _product(left: Floats, weights: Floats, right: Floats) -> Floats:
     return np.asarray(np.einsum("ri,mi,si->mrs", left, weights, right))
 
 
-def _inverses(G: Array, weights: Array) -> Array:
+def _inverses(G: Floats, weights: Floats) -> Floats:
     """Approximate inverses of G diag(weights) G'; what is not finite proves nothing."""
     W = _weighted(G, weights)
     W = np.where(np.isfinite(W), W, 0.0)

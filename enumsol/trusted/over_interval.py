@@ -16,18 +16,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE
-from enumsol.condensation.enclosure import CondensedEnclosure
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, factor_above, gamma, upper_norm
+from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem
 from enumsol.condensation.floating import FloatingSystem, RigidRows
 from enumsol.trusted.quadratic_forms import EnclosedForm
 from enumsol.trusted.status_rows import BACKWARD, FORWARD, ROW_KINDS, STILL, UNDECIDED, row_table
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from enumsol.arithmetic.balls import Array
-    from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.model.problem import ContactProblem
+    from enumsol.support.array_types import Floats, Indices, NDArray
+
 
 KINDS = ROW_KINDS + 2
 #: Table of rows.row_table with kinds 7 and 8; then slip+ and slip- at a node whose friction varies.
@@ -54,8 +52,8 @@ class EnclosedPiece:
     """
 
     ends: tuple[EnclosedSystem, ...]
-    low: Array
-    high: Array
+    low: Floats
+    high: Floats
     forms: tuple[EnclosedForm, ...] = ()
 
     @classmethod
@@ -64,8 +62,8 @@ class EnclosedPiece:
         enclosure: CondensedEnclosure,
         a: Fraction,
         b: Fraction,
-        force: Array,
-        length: Array,
+        force: Floats,
+        length: Floats,
         origin: Fraction | None,
     ) -> EnclosedPiece:
         """A piece [a, b]; with ``origin`` (the alpha at one of its ends where g vanishes) for the load +-g1.
@@ -87,7 +85,9 @@ class EnclosedPiece:
         return cls(tuple(systems), low, high)
 
     @classmethod
-    def floating(cls, problem: ContactProblem, a: Fraction, b: Fraction, force: Array, length: Array) -> EnclosedPiece:
+    def floating(
+        cls, problem: ContactProblem, a: Fraction, b: Fraction, force: Floats, length: Floats
+    ) -> EnclosedPiece:
         """A piece [a, b] of a body that nothing holds (theory, section 14.8).
 
         Raises
@@ -102,7 +102,7 @@ class EnclosedPiece:
         )
         return replace(held, ends=ends)
 
-    def with_form(self, multipliers: Array) -> EnclosedPiece:
+    def with_form(self, multipliers: Floats) -> EnclosedPiece:
         """The same with a form for all alpha of the piece: with F_lo in place of F (theory, section 7.9).
 
         Parameters
@@ -118,7 +118,7 @@ class EnclosedPiece:
             forms = tuple(EnclosedForm.of(system, everything, multipliers, 0.0) for system in systems)
         return replace(self, forms=forms)
 
-    def row_signs(self, codes: NDArray[np.intp]) -> NDArray[np.int8]:
+    def row_signs(self, codes: Indices) -> NDArray[np.int8]:
         """What multipliers may be, (m, p, 9), for (partial) status codes (m, p)."""
         code = np.where((codes == UNDECIDED) & (self.high == 0), STILL, codes)
         return np.where((self.low == self.high)[:, None], _CONSTANT[code], _VARYING[code])
@@ -134,3 +134,67 @@ def as_computed(problem: ContactProblem) -> CondensedEnclosure:
 def interval_row_tables() -> NDArray[np.int8]:
     """What the multipliers may be, shape (2, 10, 9), by status code as in rows.row_table; second: friction varies."""
     return np.stack([_CONSTANT, _VARYING])
+
+
+@dataclass(frozen=True, eq=False)
+class PieceNumbers:
+    """The numbers of the form of theory, (6.9), for all data of a piece.
+
+    Attributes
+    ----------
+    mu, kappa, nu : (p,) arrays
+        mu and kappa positive; kappa and nu are read at nodes with friction only.
+    """
+
+    mu: Floats
+    kappa: Floats
+    nu: Floats
+
+    @property
+    def usable(self) -> bool:
+        """Whether they are numbers, and positive where they must be."""
+        finite = all(np.all(np.isfinite(part)) for part in (self.mu, self.kappa, self.nu))
+        return bool(finite and np.all(self.mu > 0) and np.all(self.kappa > 0))
+
+    def serve(self, largest: Floats) -> bool:
+        """Whether ``|nu| F <= mu`` for all coefficients up to these."""
+        return not np.any(np.abs(self.nu) * largest * SAFE + TINY > self.mu)
+
+    def form(self, S: Ball, theta: Ball) -> Ball:
+        """D'S, of which (6.9) is the symmetric part."""
+        p = len(self.mu)
+        along = S[:p] * Ball.exact(self.mu[:, None])
+        turned = (theta * Ball.exact(self.kappa))[:, None]
+        across = S[:p] * Ball.exact(self.nu[:, None]) + S[p:] * Ball.exact(self.kappa[:, None])
+        along = along - S[p:] * turned
+        return Ball.joined(along, across)
+
+    def taken(self, S: Ball, off: Floats) -> Ball:
+        """What a theta that is off by so much takes from the form at most (theory, (7.18))."""
+        p = len(self.mu)
+        nodes = np.flatnonzero(off > 0)
+        length = upper_norm(S[p + nodes].size, axis=1)
+        weight = self.kappa[nodes] * off[nodes] * SAFE
+        # weights at least kappa rho / |r|, for any rounding
+        T = S[p + nodes] * Ball.exact((np.sqrt(weight / length) * SAFE + TINY)[:, None])
+        square = T.T @ T
+        taken = Ball(0.5 * square.mid, 0.5 * square.rad)
+        taken.mid[nodes, nodes] += 0.5 * weight * length * SAFE
+        taken.rad[nodes, nodes] += 4 * UNIT * taken.mid[nodes, nodes]
+        return taken
+
+
+def definite(form: Ball, margin: float) -> bool:
+    """Whether the symmetric parts of all matrices in a ball are positive definite.
+
+    ``margin``: their smallest eigenvalue has to be larger than this, relative to the largest entry of the diagonal.
+    """
+    form = form.symmetric
+    if not form.finite:
+        return False
+    mid = form.mid
+    k, largest = gamma(len(mid) + 2), float(np.max(np.abs(np.diagonal(mid)), initial=0.0))
+    # a Cholesky factorization that runs to its end proves M >= -gamma trace (Rump 2006)
+    slack = k / (1 - k) * float(np.trace(np.abs(mid))) + float(upper_norm(form.rad)) + margin * largest
+    shift = (slack + 8 * UNIT * largest) * (1.0 + 8 * UNIT) * SAFE + TINY
+    return factor_above(mid, shift) is not None

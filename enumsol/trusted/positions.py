@@ -13,10 +13,9 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from fractions import Fraction
 
-    from numpy.typing import NDArray
-
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.model.problem import ContactProblem
+    from enumsol.support.array_types import Mask
 
 #: Positions known to within this share of the largest of them are known well enough.
 _WELL_KNOWN = 2.0**-30
@@ -52,7 +51,7 @@ def tangential_positions(
     enclosure: CondensedEnclosure,
     alpha: Fraction,
     forces: Ball,
-    still: NDArray[np.bool_],
+    still: Mask,
     before: Ball,
     codes: Sequence[int] | None = None,
     *,

@@ -23,10 +23,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from fractions import Fraction
 
-    from numpy.typing import NDArray
-
-    from enumsol.arithmetic.balls import Array
     from enumsol.model.problem import ContactProblem
+    from enumsol.support.array_types import Floats, NDArray
 
 #: Radii in double arithmetic, relative to the numbers: beyond their rounding, since another factorization of A leads to
 #: other last bits.
@@ -48,7 +46,7 @@ class PreciseAtAlpha:
     F: NDArray[Any]
 
     @classmethod
-    def of(cls, problem: ContactProblem, alpha: Fraction, force: Array, length: Array) -> PreciseAtAlpha | None:
+    def of(cls, problem: ContactProblem, alpha: Fraction, force: Floats, length: Floats) -> PreciseAtAlpha | None:
         """Condensed from the problem's own data, in units of every row given by powers of two.
 
         None where A is not proven positive definite or has too many entries, or where the slip offset is not the floats

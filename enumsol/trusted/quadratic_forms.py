@@ -23,8 +23,8 @@ from enumsol.trusted.status_rows import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, ST
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.arithmetic.balls import Array
     from enumsol.condensation.enclosure import EnclosedSystem
+    from enumsol.support.array_types import Floats
 
 
 @dataclass(frozen=True)
@@ -37,10 +37,10 @@ class Equations:
     b, b_rad : (m,) arrays
     """
 
-    a: Array
-    a_rad: Array
-    b: Array
-    b_rad: Array
+    a: Floats
+    a_rad: Floats
+    b: Floats
+    b_rad: Floats
 
     @classmethod
     def of(cls, system: EnclosedSystem, codes: Sequence[int]) -> Equations:
@@ -80,10 +80,10 @@ class QuadraticForm:
     """
 
     system: EnclosedSystem
-    H: Array
-    H_rad: Array
-    h: Array
-    h_rad: Array
+    H: Floats
+    H_rad: Floats
+    h: Floats
+    h_rad: Floats
     k: float
     k_rad: float
 
@@ -96,7 +96,7 @@ class QuadraticForm:
             return float((dense_eigenvalue_bound(self.H) - float(upper_norm(self.H_rad))) / SAFE)
 
     @cached_property
-    def inverse(self) -> Array:
+    def inverse(self) -> Floats:
         """Approximate inverse of H; no claim rests on its accuracy."""
         return np.asarray(np.linalg.inv(self.H))
 
@@ -123,12 +123,12 @@ class EnclosedForm(QuadraticForm):
     """
 
     codes: tuple[int, ...]
-    multipliers: Array
+    multipliers: Floats
     weight: float
-    F_rad: Array
+    F_rad: Floats
 
     @classmethod
-    def of(cls, system: EnclosedSystem, codes: Sequence[int], multipliers: Array, weight: float) -> EnclosedForm:
+    def of(cls, system: EnclosedSystem, codes: Sequence[int], multipliers: Floats, weight: float) -> EnclosedForm:
         """The form of a partial assignment.
 
         Parameters
@@ -149,7 +149,7 @@ class EnclosedForm(QuadraticForm):
         left = np.concatenate([mu, nu])
         right, right_rad = np.concatenate([tau, s]), np.concatenate([tau_rad, 2 * UNIT * s])
 
-        def combined(value: Array, radius: Array) -> tuple[Array, Array]:
+        def combined(value: Floats, radius: Floats) -> tuple[Floats, Floats]:
             """D' applied to what has a row for every component of w."""
             shape = (-1,) + (1,) * (value.ndim - 1)
             first, second = np.concatenate([value[:p], value[:p]]), np.concatenate([value[p:], value[p:]])

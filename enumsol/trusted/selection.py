@@ -7,17 +7,14 @@ with M the same rows of S E.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from enumsol.arithmetic.balls import Ball
+from enumsol.support.array_types import Indices, Mask
 from enumsol.trusted.status_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
 
 NORMAL_FORCE, TANGENTIAL_FORCE, CONE_PLUS, CONE_MINUS, PENETRATION, SLIP_FORWARD, SLIP_BACKWARD = range(7)
 
@@ -148,7 +145,7 @@ class Unknowns:
     side : int array, numbers among ``nodes`` of those whose lambda_t turns with lambda_n
     """
 
-    def __init__(self, p: int, nodes: NDArray[np.intp], own: NDArray[np.bool_], directions: NDArray[np.intp]) -> None:
+    def __init__(self, p: int, nodes: Indices, own: Mask, directions: Indices) -> None:
         self.nodes, self.normal = nodes, np.flatnonzero(own)
         self.places = np.concatenate([nodes, p + nodes[own]])
         self.tangential = np.where(own, len(nodes) + np.cumsum(own) - 1, -1)

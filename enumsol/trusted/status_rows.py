@@ -12,14 +12,11 @@ Rows of node i, row number kind * p + i, as expressions that are nonnegative (or
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
+from enumsol.support.array_types import Floats, Indices, NDArray
 
 #: Rows of a node at one alpha.
 ROW_KINDS = 7
@@ -62,7 +59,7 @@ def row_table() -> NDArray[np.int8]:
     return _ROWS.copy()
 
 
-def row_signs(codes: NDArray[np.intp], F: NDArray[np.float64]) -> NDArray[np.int8]:
+def row_signs(codes: Indices, F: Floats) -> NDArray[np.int8]:
     """What the multipliers of all rows may be, shape (..., p, 7), for (partial) status codes of shape (..., p)."""
     return np.asarray(_ROWS[np.where((codes == UNDECIDED) & (F == 0), STILL, codes)])
 
@@ -70,7 +67,7 @@ def row_signs(codes: NDArray[np.intp], F: NDArray[np.float64]) -> NDArray[np.int
 _DIRECTIONS = np.array([0, 0, 1, -1, 0, 0, 0, 1, -1])
 
 
-def slip_directions(codes: Sequence[int] | NDArray[np.intp]) -> NDArray[np.intp]:
+def slip_directions(codes: Sequence[int] | Indices) -> Indices:
     """1 or -1 where a (partial) status makes lambda_t F or -F times lambda_n, else 0."""
     return np.asarray(_DIRECTIONS[np.asarray(codes, dtype=np.intp)])
 

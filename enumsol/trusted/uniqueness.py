@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, Ball, determinant_sign, gamma, solution
-from enumsol.trusted.at_alpha import EnclosedSolution, solve_selection
+from enumsol.trusted.at_alpha import EnclosedSolution, VerifiedSelection, solve_selection
 from enumsol.trusted.exclusion import exclusion_margin
 from enumsol.trusted.selection import Selection, Unknowns, row_values
 from enumsol.trusted.status_rows import (
@@ -40,13 +40,9 @@ from enumsol.trusted.uniqueness_weights import SLIDES, Components, Weights
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
-    from enumsol.arithmetic.balls import Array
     from enumsol.condensation.enclosure import EnclosedSystem
-    from enumsol.trusted.at_alpha import VerifiedSelection
+    from enumsol.support.array_types import Codes, Floats, Indices, Mask
 
-    Codes = tuple[int, ...]
 
 #: Radii of forces by the largest force, beyond which a solution is hardly placed.
 _WIDE = 1e-3
@@ -86,7 +82,7 @@ class ClosedSolution(EnclosedSolution):
 
 
 def closed_solution(
-    system: EnclosedSystem, selection: Codes, free: Sequence[int], weights: Array, force: Array
+    system: EnclosedSystem, selection: Codes, free: Sequence[int], weights: Floats, force: Floats
 ) -> ClosedSolution | None:
     """The only solution of the reduced problem, or None where that is not proven.
 
@@ -109,7 +105,7 @@ def only_solution(
     system: EnclosedSystem,
     selection: Codes,
     free: Sequence[int],
-    weights: Array,
+    weights: Floats,
     point: Sequence[Any],
     w: Sequence[Any],
 ) -> int:
@@ -159,7 +155,7 @@ class Reduced(Components):
     h : Ball
     """
 
-    rows: NDArray[np.intp]
+    rows: Indices
     E: Ball
     Z: Ball
     h: Ball
@@ -192,7 +188,7 @@ class Reduced(Components):
         R, h = across[places] - moved[:, 1:], g[places] - moved[:, 0]
         return cls(system, selection, at, R, rows, forms, Z, h, sign)
 
-    def enclosed(self, numbers: Weights, force: Array) -> ClosedSolution | None:
+    def enclosed(self, numbers: Weights, force: Floats) -> ClosedSolution | None:
         """The solution as a ball, None where it is not proven to exist and to be the only one."""
         if len(self.at.nodes) == self.system.p and not any(code in SLIDES for code in self.selection):
             # all nodes are free: where its selection holds strictly, that is closer than (6.10) if Q is hardly definite
@@ -250,7 +246,7 @@ class Reduced(Components):
         return ClosedSolution(force, w, slack, core, possible, self.sign)
 
     @staticmethod
-    def _slides(code: int, values: Array, radii: Array) -> tuple[float, float]:
+    def _slides(code: int, values: Floats, radii: Floats) -> tuple[float, float]:
         """What tells that a sliding node slips in its direction or is open, with its radius."""
         forward = 5 if code == FORWARD else 6
         separate, slips = (values[4], radii[4]), (values[forward], radii[forward])
@@ -259,7 +255,7 @@ class Reduced(Components):
         loaded = values[0] > radii[0]
         return slips if loaded or slips[0] > slips[1] else (0.0, 0.0)
 
-    def _possible(self, node: int, values: Array, radii: Array) -> frozenset[int]:
+    def _possible(self, node: int, values: Floats, radii: Floats) -> frozenset[int]:
         """Final codes of a node that its balls do not exclude."""
         high, low = values + radii, values - radii
         return frozenset(
@@ -273,7 +269,7 @@ class Reduced(Components):
 _TOUCHING = (STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS, CONTACT)
 
 
-def numbers_of(codes: Sequence[int], friction: Sequence[bool]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+def numbers_of(codes: Sequence[int], friction: Sequence[bool]) -> tuple[Indices, Mask]:
     """The nodes that are not open in an assignment, and of these those that have a lambda_t of their own."""
     status = np.array(codes, dtype=np.intp)
     nodes = np.flatnonzero(status != OPEN)
@@ -284,10 +280,10 @@ def lone_root(
     system: EnclosedSystem,
     codes: Sequence[int],
     selection: Sequence[int],
-    weights: Array,
-    strengths: Array,
-    rows: NDArray[np.intp],
-    values: Array,
+    weights: Floats,
+    strengths: Floats,
+    rows: Indices,
+    values: Floats,
 ) -> VerifiedSelection | None:
     """The only root below an assignment, that of a selection and regular; None where that is not proven.
 
@@ -325,7 +321,7 @@ def _components(system: EnclosedSystem, codes: Sequence[int], selection: Sequenc
     return Components(system, tuple(selection), at, at.columns(S[at.places], F))
 
 
-def _squares(part: Components, strengths: Array) -> Ball | None:
+def _squares(part: Components, strengths: Floats) -> Ball | None:
     """Rows of (S d)_n and (S d)_t, each times the root of its strength."""
     factors = np.sqrt(strengths.ravel()[part.at.places])
     used = np.flatnonzero(factors)
@@ -336,10 +332,10 @@ def _allowed(
     part: Components,
     codes: Sequence[int],
     numbers: Weights,
-    strengths: Array,
+    strengths: Floats,
     root: VerifiedSelection,
-    rows: NDArray[np.intp],
-    values: Array,
+    rows: Indices,
+    values: Floats,
 ) -> bool:
     """Whether the squares that do not vanish below the assignment are no more than what the form leaves out."""
     system, p, status = part.system, part.system.p, np.array(codes)
@@ -359,7 +355,7 @@ def _allowed(
     return bool(np.all(np.array(part.selection)[loose] != OPEN) and np.all(needed <= left.low / SAFE))
 
 
-def gaps(system: EnclosedSystem, codes: Sequence[int], rows: NDArray[np.intp], values: Array) -> Array:
+def gaps(system: EnclosedSystem, codes: Sequence[int], rows: Indices, values: Floats) -> Floats:
     """Upper bounds of -w_n at all roots below an assignment; infinite where the multipliers are not allowed.
 
     With multipliers that combine to y on S lambda - g and to c on lambda, the energy less the rows times them is its

@@ -13,10 +13,8 @@ from enumsol.trusted.status_rows import BACKWARD, FORWARD, OPEN, SLIP_MINUS, SLI
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
-    from enumsol.arithmetic.balls import Array
     from enumsol.condensation.enclosure import EnclosedSystem
+    from enumsol.support.array_types import Floats, Indices
     from enumsol.trusted.selection import Unknowns
 
 #: Codes of nodes that are open or slip in one direction.
@@ -38,17 +36,17 @@ class Weights:
     normal : places of lambda_n of free nodes with friction
     """
 
-    mu: Array
-    kappa: Array
-    nu: Array
-    share: Array
-    tau: Array
+    mu: Floats
+    kappa: Floats
+    nu: Floats
+    share: Floats
+    tau: Floats
     slope: Ball
     friction: Ball
-    normal: NDArray[np.intp]
+    normal: Indices
 
     @classmethod
-    def of(cls, part: Components, numbers: Array) -> Weights | None:
+    def of(cls, part: Components, numbers: Floats) -> Weights | None:
         """From one array: mu of all nodes, then kappa, nu, theta / F and tau of the free ones with friction.
 
         mu and kappa are positive, |nu| F <= mu, |theta| <= F; theta = +-F at nodes that slip in the selection; tau is
@@ -85,7 +83,7 @@ class Weights:
                 return None
         return replace(self, slope=slope)
 
-    def beside(self, x: Ball, tangential: NDArray[np.intp]) -> Weights:
+    def beside(self, x: Ball, tangential: Indices) -> Weights:
         """With theta = lambda_t / lambda_n at the middle of a solution's ball where it is not F or -F, nor tau > 0."""
         n, t = x.mid[self.normal], x.mid[tangential]
         told = (self.tau == 0) & (np.abs(self.share) < 1) & (n > 0)
@@ -123,7 +121,7 @@ class Weights:
         apart = t - slope * n
         return float(apart.size / low * SAFE)
 
-    def moved(self, change: Array) -> float:
+    def moved(self, change: Floats) -> float:
         """Upper bound of ||D'delta||, |delta| <= change."""
         m, n = len(self.mu), self.normal
         along = self.mu * change[:m]
@@ -199,14 +197,14 @@ class Components:
         # at each of them Q is not smaller than this
         return bool(least > upper_norm(numbers.kappa * off * upper_norm(self.R[t].size, axis=1)) * SAFE)
 
-    def point(self, force: Array, numbers: Weights) -> Ball:
+    def point(self, force: Floats, numbers: Weights) -> Ball:
         """Forces in the cones, with the statuses of the selection, near the given ones."""
         mid = np.array([0.0 if self.selection[i] == OPEN else max(float(force[i]), 0.0) for i in self.at.nodes])
         turned = Ball.exact(mid[self.at.tangential >= 0]) * numbers.slope
         radii = np.where(mid[self.at.tangential >= 0] > 0, turned.rad, 0.0)
         return Ball(np.concatenate([mid, turned.mid]), np.concatenate([np.zeros(len(mid)), radii]))
 
-    def distance(self, point: Array, w: Ball, numbers: Weights) -> float:
+    def distance(self, point: Floats, w: Ball, numbers: Weights) -> float:
         """Bound of the numerator of theory, (6.10), for a point that is a solution with another h."""
         size, change = w.size, np.zeros(len(self.at.places))
         up, down = np.maximum(w.high, 0.0) * SAFE, np.maximum(w.rad - w.mid, 0.0) * SAFE

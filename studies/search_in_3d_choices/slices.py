@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from unittest.mock import patch
 
 from enumsol import gallery
-from enumsol.relaxation import shaving
+from enumsol.relaxation import space_relaxation
 from enumsol.relaxation.space_relaxation import SpaceRelaxation
 from enumsol.search.outcome import SearchLimits
 from enumsol.trusted.space.leaves import distinct_roots
@@ -85,7 +85,7 @@ def slices(run: Run, solvers, most: int) -> None:
         for name, (build, alpha) in cases.items():
             with ExitStack() as stack:
                 for constant, value in constants.items():
-                    stack.enter_context(patch.object(shaving, constant, value))
+                    stack.enter_context(patch.object(space_relaxation, constant, value))
                 problem = build()
                 problem.enclosure  # noqa: B018 (made once, not part of the search)
                 started = process_time()

@@ -7,8 +7,15 @@ import numpy as np
 import pytest
 from flint import fmpq, fmpz_poly
 
-from enumsol.arithmetic.algebraic import CriticalAlpha, merge, rational_between, real_roots, variations
-from enumsol.arithmetic.number_field import NumberFieldElement, exact_value
+from enumsol.arithmetic.algebraic import (
+    CriticalAlpha,
+    NumberFieldElement,
+    exact_value,
+    merge,
+    rational_between,
+    real_roots,
+    variations,
+)
 
 X = fmpz_poly([0, 1])
 

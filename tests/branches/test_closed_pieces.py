@@ -20,7 +20,7 @@ from enumsol.branches.enclosed.single_branches import ClosedPieces
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.unloaded import vanishing_alpha
 from enumsol.trusted.arcs.only_branch import only_roots
-from enumsol.trusted.piece_form import PieceNumbers
+from enumsol.trusted.over_interval import PieceNumbers
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -17,7 +17,7 @@ from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery
 from enumsol.arithmetic.rationals import rational
 from enumsol.branches import ways
 from enumsol.branches.enclosed import following, tracing
-from enumsol.branches.enclosed.arc_parts import AlphaBox, ArcPart, ArcPartKind, Trace
+from enumsol.branches.enclosed.cutting import AlphaBox, ArcPart, ArcPartKind, Trace
 from enumsol.branches.enclosed.joining import join
 from enumsol.branches.exact import known_selections
 from enumsol.branches.exact.gluing import glue

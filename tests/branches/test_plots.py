@@ -10,8 +10,7 @@ from refusals import bad_argument
 from enumsol import ContactProblem, branch_graph, gallery
 from enumsol.branches.claims import MultiplicitySteps
 from enumsol.branches.figures.curves import QUANTITIES, Curve, curves, side_by_side
-from enumsol.branches.figures.labels import narrow_changes
-from enumsol.branches.figures.marks import MARKERS, STATUS_STYLES
+from enumsol.branches.figures.marks import MARKERS, STATUS_STYLES, narrow_changes
 from enumsol.model.statuses import ContactStatus
 
 

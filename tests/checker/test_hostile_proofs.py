@@ -35,7 +35,7 @@ from enumsol import ContactProblem, EnumsolError, Proof, ProofFormatError, enume
 from enumsol.cli import main
 from enumsol.condensation.factorization import Factorization
 from enumsol.proof import proof_file as proof_module
-from enumsol.proof.compressed_parts import Part
+from enumsol.proof.writer import Part
 
 BEFORE = {item["name"]: item for item in json.loads(Path(__file__).with_name("proofs_written_before.json").read_text())}
 GRAPHS = [name for name in BEFORE if name.startswith("graph")]

@@ -25,7 +25,6 @@ CHECKERS = (
 )
 IN_SPACE = {
     "enumsol.checker.space_checker",
-    "enumsol.checker.space_floating",
     "enumsol.trusted.space.resultants",
     "enumsol.trusted.space.sector_rows",
     "enumsol.trusted.space.slip_forms",
@@ -41,7 +40,6 @@ IN_SPACE = {
 #: The search: its rooms, and what it alone uses of rooms that it shares with the checkers.
 SEARCH = (
     "enumsol.arithmetic.algebraic",
-    "enumsol.arithmetic.number_field",
     "enumsol.branches",
     "enumsol.condensation.exact",
     "enumsol.continuation",
@@ -65,14 +63,13 @@ SHARED = {
     "condensation.unloaded": {"CondensedData", "never_loaded", "vanishing_alpha"},
     "trusted.arcs.only_branch": {"only_roots"},
     "trusted.data_box": {"DataBox", "Throughout", "only_throughout", "solution_throughout"},
-    "trusted.piece_form": {"PieceNumbers"},
     "trusted.arcs.selection_balls": None,
     "trusted.exclusion": {"Terms", "exclusion_margin"},
     "trusted.floating_bounds": {"is_unbalanced"},
     "trusted.confinement": {"motion_against", "motion_beside", "without_bound"},
     "trusted.arcs.many_digits": {"affordable"},
     "trusted.arcs.over_parts": None,
-    "trusted.over_interval": {"EnclosedPiece", "as_computed"},
+    "trusted.over_interval": {"EnclosedPiece", "PieceNumbers", "as_computed"},
     "trusted.arcs.precise": None,
     "trusted.positions": {"certain_statuses", "tangential_positions"},
     "trusted.selection": None,
@@ -110,7 +107,6 @@ SHARED = {
         )
     },
     "proof.begun": None,
-    "proof.compressed_parts": None,
     "proof.proof_file": {"Proof", "fraction_text", "packed", "coarse"},
     "proof.reading": {"fits", "rational_text"},
     "proof.records": None,
@@ -181,7 +177,7 @@ def closure_of(modules):
 
 def test_no_module_of_the_search_is_imported_however_indirectly():
     closure = closure_of(CHECKERS)
-    assert closure >= {*CHECKERS, *IN_SPACE, "enumsol.checker.rational", "enumsol.checker.hull"}
+    assert closure >= {*CHECKERS, *IN_SPACE, "enumsol.checker.rational"}
     assert not {module for module in closure if is_search(module)}
     # the public names stand in a module that imports for types only
     assert all(what is None for module in closure for name, what in imports_of(module) if name == "enumsol")
@@ -242,7 +238,7 @@ def test_no_module_of_the_search_is_loaded_by_a_verification(tmp_path):
     )
     done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
     modules = set(json.loads(done.stdout.splitlines()[-1]))
-    assert modules >= {*CHECKERS, "enumsol.checker.hull"} - {"enumsol.checker.space_graph"}
+    assert modules >= {*CHECKERS, "enumsol.checker.rational"} - {"enumsol.checker.space_graph"}
     assert not {module for module in modules if is_search(module)}
     assert not modules & IN_SPACE
 

@@ -307,6 +307,6 @@ def test_rows_of_several_alphas_say_so(capsys):
 
 
 def test_an_empty_table_explains_nothing(capsys, monkeypatch):
-    monkeypatch.setattr("enumsol.branches.table.table_row", CtrlC())
+    monkeypatch.setattr("enumsol.branches.samples.table_row", CtrlC())
     out = printed(capsys, *SAMPLED, "--samples", 3, status=130)
     assert out == "\ncomplete: no (interrupted after 0 of 3 alphas)\n"

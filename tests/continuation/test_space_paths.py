@@ -9,8 +9,8 @@ from refusals import bad_argument
 
 import enumsol
 from enumsol.continuation import SmoothPath, follow, newton, start_tangents
-from enumsol.continuation.equations import equation_on
 from enumsol.continuation.space_equation import SLIP, SpaceEquation
+from enumsol.continuation.start import equation_on
 from enumsol.model.statuses import OPEN, STICK
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from enumsol.fem.named_parts import PartedMesh
+from enumsol.fem.meshes import PartedMesh
 
 #: Pairs of corners between which second-order cells have nodes, by corners of the cell.
 EDGES = {3: ((0, 1), (1, 2), (2, 0)), 4: ((0, 1), (1, 2), (2, 3), (3, 0))}

@@ -9,9 +9,8 @@ from proof_tools import bytes_of
 
 from enumsol import Proof, enumerate_roots, gallery
 from enumsol.proof.begun import BegunProof
-from enumsol.proof.compressed_parts import BEGIN, Checksum, Part, encoded
 from enumsol.proof.proof_file import MAGIC
-from enumsol.proof.writer import FLUSH_EVERY, ProofWriter
+from enumsol.proof.writer import BEGIN, FLUSH_EVERY, Checksum, Part, ProofWriter, encoded
 from enumsol.search import parallel
 
 

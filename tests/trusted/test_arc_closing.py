@@ -21,7 +21,7 @@ from enumsol import ContactProblem
 from enumsol.branches.enclosed.following import TracedProblem
 from enumsol.condensation.unloaded import vanishing_alpha
 from enumsol.trusted.arcs.only_branch import only_roots
-from enumsol.trusted.piece_form import PieceNumbers
+from enumsol.trusted.over_interval import PieceNumbers
 
 FAMILIES = (generic_problem, integer_problem, generic_problem, without_friction_somewhere)
 

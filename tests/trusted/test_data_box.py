@@ -13,7 +13,7 @@ from enumsol import ContactProblem
 from enumsol.arithmetic.balls import Ball
 from enumsol.search.data_boxes import Box, BoxSearch, _located, throughout
 from enumsol.trusted.data_box import DataBox, Expansion, Throughout, only_throughout, slopes, solution_throughout
-from enumsol.trusted.piece_form import PieceNumbers
+from enumsol.trusted.over_interval import PieceNumbers
 
 ALPHAS = (0.0, 2.0)
 

@@ -14,13 +14,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.branches.enclosed.arc_parts import OpenCause
-from enumsol.branches.enclosed.joining import Joined, join
+from enumsol.branches.enclosed.cutting import ArcPart, OpenCause, Trace
+from enumsol.branches.enclosed.joining import EventPlace, Joined, join
 from enumsol.branches.enclosed.tracing import trace
 from enumsol.branches.remedies import END_ELSEWHERE, SHORT_INTERVAL, TOLD_APART
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.search.outcome import Stop, StopReason
-from enumsol.support.deadlines import Deadline, TimeOverError, over, within
+from enumsol.support.deadlines import Deadline, Limited, TimeOverError, over, within
 from enumsol.support.messages import counted, listed
 from enumsol.trusted.arcs.many_digits import affordable
 from enumsol.trusted.arcs.precise import PreciseSelection, PreciseSystem
@@ -29,21 +29,13 @@ from enumsol.trusted.arcs.selection_balls import ArcSelection, ArcSystem
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
-
-    from enumsol.branches.enclosed.arc_parts import Trace
-    from enumsol.branches.enclosed.joining import EventPlace
     from enumsol.model.problem import ContactProblem
     from enumsol.search.interval.subintervals import SearchedPiece
-    from enumsol.selections.solution import Codes
-    from enumsol.support.deadlines import Limited
+    from enumsol.support.array_types import Codes, Floats
 
     Bounds = tuple[Fraction, Fraction]
     from collections.abc import Iterable, Mapping
 
-    from enumsol.branches.enclosed.arc_parts import ArcPart
-
-    Array = NDArray[np.float64]
 
 #: Events are not sharpened when their bounds are this narrow, relative to alpha.
 _NARROW = 2.0**-60
@@ -160,7 +152,7 @@ class TracedProblem:
 
     # -- values ----------------------------------------------------------------------------------------------------
 
-    def values(self, codes: Codes, alpha: Fraction, *, precisely: bool) -> tuple[Array, Array] | None:
+    def values(self, codes: Codes, alpha: Fraction, *, precisely: bool) -> tuple[Floats, Floats] | None:
         """lambda [force] and w [length] of a selection's solution, 2p each; None where it is not proven regular.
 
         ``precisely`` asks for many digits, to be rounded last, where they are affordable and make a difference.
@@ -193,7 +185,7 @@ class TracedProblem:
         return {i: int(w.mid[p + i] > 2 * w.rad[p + i]) - int(w.mid[p + i] < -2 * w.rad[p + i]) for i in nodes}
 
 
-def _is_close(middle: Array, radius: Array) -> bool:
+def _is_close(middle: Floats, radius: Floats) -> bool:
     return bool(np.max(radius) <= _CLOSE * np.max(np.abs(middle)))
 
 
@@ -226,8 +218,8 @@ class Followed:
     """
 
     problem: ContactProblem
-    force: NDArray[np.float64]
-    length: NDArray[np.float64]
+    force: Floats
+    length: Floats
     cut_short: bool = False
     traces: list[Trace] = field(default_factory=list)
     joined: Joined = field(default_factory=Joined)

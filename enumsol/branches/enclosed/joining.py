@@ -15,15 +15,14 @@ from typing import TYPE_CHECKING
 
 from networkx.utils import UnionFind
 
-from enumsol.branches.enclosed.arc_parts import ArcPartKind, OpenCause, parts_between
+from enumsol.branches.enclosed.cutting import ArcPart, ArcPartKind, OpenCause, Trace, parts_between
 from enumsol.branches.remedies import DEFECT, named
 from enumsol.model.statuses import ACROSS
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from enumsol.branches.enclosed.arc_parts import ArcPart, Trace
-    from enumsol.selections.solution import Codes
+    from enumsol.support.array_types import Codes
 
     Bounds = tuple[Fraction, Fraction]
 

@@ -9,19 +9,19 @@ import numpy as np
 
 from enumsol.arithmetic.algebraic import EnclosedAlpha
 from enumsol.arithmetic.rationals import rational
-from enumsol.branches.elements import Arc, ArcValues, make_vertex, sides_of, with_exact_zeros
-from enumsol.branches.enclosed.joining import EventPlaceKind
+from enumsol.branches.elements import Arc, ArcValues, Sides, Vertex, make_vertex, sides_of, with_exact_zeros
+from enumsol.branches.enclosed.joining import EventPlace, EventPlaceKind, Joined, JoinedArc
 from enumsol.model.statuses import FINAL, FRICTIONLESS, contact_status
-from enumsol.roots.slip_signs import named_statuses
+from enumsol.roots.linearisation import named_statuses
 
 if TYPE_CHECKING:
     from collections.abc import Sequence, Set
     from fractions import Fraction
 
-    from enumsol.branches.elements import Pair, Sides, Vertex
+    from enumsol.branches.elements import Pair
     from enumsol.branches.enclosed.following import TracedProblem
-    from enumsol.branches.enclosed.joining import EventPlace, Joined, JoinedArc
-    from enumsol.selections.solution import ActiveSets, Codes
+    from enumsol.selections.solution import ActiveSets
+    from enumsol.support.array_types import Codes
 
 
 @dataclass(frozen=True)

@@ -12,23 +12,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.branches.enclosed.joining import EventPlaceKind, join
-from enumsol.search.chains import Chains, LoadedSystem, SelectionCurve
+from enumsol.branches.enclosed.joining import EventPlaceKind, Joined, join
+from enumsol.search.chains import Chains, Link, LoadedSystem, SelectionCurve
 from enumsol.search.interval.subintervals import Piece, whole_pieces
 from enumsol.search.reduction import WeightSource
 from enumsol.support.deadlines import look
 from enumsol.trusted.arcs.only_branch import only_roots
-from enumsol.trusted.piece_form import PieceNumbers
+from enumsol.trusted.over_interval import PieceNumbers
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from fractions import Fraction
 
-    from enumsol.branches.enclosed.arc_parts import Trace
+    from enumsol.branches.enclosed.cutting import Trace
     from enumsol.branches.enclosed.following import TracedProblem
-    from enumsol.branches.enclosed.joining import Joined
-    from enumsol.search.chains import Link
-    from enumsol.selections.solution import Codes
+    from enumsol.support.array_types import Codes
     from enumsol.trusted.arcs.selection_balls import ArcSelection
 
     Spans = list[tuple[Codes, float, float]]

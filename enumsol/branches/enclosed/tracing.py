@@ -12,16 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.branches.enclosed.arc_parts import AlphaBox, ArcPart, ArcPartKind, OpenCause, Trace
-from enumsol.branches.enclosed.cutting import Cutting, between
+from enumsol.branches.enclosed.cutting import AlphaBox, ArcPart, ArcPartKind, Cutting, OpenCause, Trace, between
 from enumsol.support.deadlines import TimeOverError, look
 from enumsol.trusted.arcs.over_parts import Expansion, expansions, over_parts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Sequence
 
-    from enumsol.branches.enclosed.arc_parts import Interval, Number
-    from enumsol.branches.enclosed.cutting import AlphaExpansion
+    from enumsol.branches.enclosed.cutting import AlphaExpansion, Interval, Number
     from enumsol.trusted.arcs.precise import PreciseSelection
     from enumsol.trusted.arcs.selection_balls import ArcSelection
 
@@ -51,10 +49,7 @@ _FLAT_BOX = 2.0**-12
 
 
 def trace(
-    asked: Sequence[tuple[ArcSelection, float, float, Precise, float]],
-    found: list[Trace],
-    *,
-    sharpened: bool = False,
+    asked: Sequence[tuple[ArcSelection, float, float, Precise, float]], found: list[Trace], *, sharpened: bool = False
 ) -> None:
     """Cut intervals into boxes and parts, of every selection its own.
 

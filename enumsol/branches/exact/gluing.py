@@ -17,19 +17,18 @@ from enumsol.arithmetic.algebraic import CriticalAlpha, merge
 from enumsol.branches.exact.known_selections import KnownSelections
 from enumsol.branches.remedies import TOLD_APART, named
 from enumsol.model.statuses import FINAL, OPEN
-from enumsol.roots.components import connected_components
+from enumsol.roots.components import RootComponent, connected_components
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.selections.rational_selections import FiberSelections
-from enumsol.support.deadlines import Deadline, TimeOverError, look, tell, within
+from enumsol.support.deadlines import Deadline, Limited, TimeOverError, look, tell, within
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
     from enumsol.branches.exact.selection_arcs import SelectionArcs, SelectionEvent
     from enumsol.condensation.exact import ExactCondensed
-    from enumsol.roots.components import RootComponent
-    from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution
-    from enumsol.support.deadlines import Limited
+    from enumsol.selections.solution import ActiveSets, SelectionSolution
+    from enumsol.support.array_types import Codes
 
 
 @dataclass

@@ -10,11 +10,11 @@ import numpy as np
 from flint import fmpq
 
 from enumsol.arithmetic.rationals import rational, to_fraction
-from enumsol.branches.elements import Arc, ArcValues, degree_of, make_vertex, sides_of, with_exact_zeros
+from enumsol.branches.elements import Arc, ArcValues, Sides, Vertex, degree_of, make_vertex, sides_of, with_exact_zeros
 from enumsol.model.statuses import RowKind, contact_status
 from enumsol.roots.builder import polytope
-from enumsol.roots.root import RootFamily
-from enumsol.roots.slip_signs import named_statuses, sign_over
+from enumsol.roots.linearisation import named_statuses, sign_over
+from enumsol.roots.root import Polytope, RootFamily
 from enumsol.selections.functions import SelectionFunctions
 from enumsol.selections.polytopes import dot
 from enumsol.selections.rational_selections import FiberSelections, as_float
@@ -23,11 +23,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from fractions import Fraction
 
-    from enumsol.branches.elements import Pair, Sides, Vertex
+    from enumsol.branches.elements import Pair
     from enumsol.branches.exact.gluing import GluedArc, GluedVertex, Gluing
     from enumsol.condensation.exact import ExactCondensed
-    from enumsol.roots.root import Polytope
-    from enumsol.selections.solution import Codes
+    from enumsol.support.array_types import Codes
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.exact import ExactCondensed
     from enumsol.selections.rational_selections import FiberSelections
-    from enumsol.selections.solution import ActiveSets, Codes, SelectionSolution
+    from enumsol.selections.solution import ActiveSets, SelectionSolution
+    from enumsol.support.array_types import Codes
 
 #: What makes a critical point, apart from the numbers of rows: the determinant vanishes; an end of the interval.
 _DET, _END = -1, -2

@@ -11,11 +11,8 @@ from enumsol.support.arguments import one_of
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from numpy.typing import NDArray
-
     from enumsol.branches.elements import Arc
-
-    Floats = NDArray[np.float64]
+    from enumsol.support.array_types import Floats, Indices
 
 
 #: Initial number of points, which determine the range of every quantity, and the largest number of points of an arc.
@@ -117,7 +114,7 @@ class _Polygon:
             doubtful = np.zeros(len(self._angles) - 1, dtype=bool)
             doubtful[place[far]] = doubtful[place[far] + 1] = True
 
-    def _distance(self, k: NDArray[np.intp], new: Curve, width: float, height: Floats) -> Floats:
+    def _distance(self, k: Indices, new: Curve, width: float, height: Floats) -> Floats:
         """Largest distance, over the columns, of points from the chords k."""
         alphas, values = self.curve.alphas, self.curve.values
         run = (alphas[k + 1] - alphas[k])[:, None] / width

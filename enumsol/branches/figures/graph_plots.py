@@ -17,8 +17,7 @@ from enumsol.branches.figures.curves import (
     side_by_side,
     state_columns,
 )
-from enumsol.branches.figures.labels import narrow_changes
-from enumsol.branches.figures.marks import GREY, MARKERS, STATUS_STYLES, colour_of, handles, index_style
+from enumsol.branches.figures.marks import GREY, MARKERS, STATUS_STYLES, colour_of, handles, index_style, narrow_changes
 from enumsol.branches.figures.panels import draw_numbers, draw_steps, drawn_range, family_range, sheet_range
 from enumsol.branches.roots_at import roots_at
 from enumsol.errors import InvalidArgumentError
@@ -212,12 +211,7 @@ def _drawn(graph: GraphData, style: _Style, window: tuple[float, float] | None) 
 
 
 def _panel(
-    axis: Any,
-    graph: GraphData,
-    style: _Style,
-    row: int,
-    drawn: dict[int, Curve],
-    window: tuple[float, float],
+    axis: Any, graph: GraphData, style: _Style, row: int, drawn: dict[int, Curve], window: tuple[float, float]
 ) -> tuple[Any, dict[int, Curve], dict[int, CurvePlace], Mapping[int, int], int]:
     """Draw one panel; returns what numbers beside its curves need."""
     from matplotlib.transforms import ScaledTranslation

@@ -7,23 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.branches.figures.curves import columns, state_columns
-from enumsol.branches.figures.labels import Label, dense, place_labels
-from enumsol.branches.figures.marks import GREY, colour_of
+from enumsol.branches.figures.curves import Curve, CurvePlace, Quantity, columns, state_columns
+from enumsol.branches.figures.marks import GREY, Label, colour_of, dense, place_labels
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
     from enumsol.branches.claims import MultiplicitySteps
     from enumsol.branches.elements import Arc, Vertex
-    from enumsol.branches.figures.curves import Curve, CurvePlace, Quantity
     from enumsol.model.problem import ContactProblem
     from enumsol.roots.root import RootFamily
     from enumsol.roots.root_set import RootSet
+    from enumsol.support.array_types import Floats
 
-    Floats = NDArray[np.float64]
     #: Axes, curves, places, branches of arcs, column.
     Panel = tuple[Any, dict[int, Curve], dict[int, CurvePlace], Mapping[int, int], int]
 

@@ -14,21 +14,16 @@ from enumsol.arithmetic.rationals import rational
 from enumsol.branches.elements import Arc, ArcValues, VertexKind, make_vertex, sides_of, tangential, with_exact_zeros
 from enumsol.branches.remedies import END_ELSEWHERE, TOLD_APART
 from enumsol.branches.space.pieces import Run, Turn
-from enumsol.model.statuses import space_status
-from enumsol.trusted.space.solution_curve import curve_point
+from enumsol.model.statuses import ContactStatus, space_status
+from enumsol.trusted.space.solution_curve import AlphaProblem, curve_point
 
 if TYPE_CHECKING:
     from collections.abc import Sequence, Set
 
-    from numpy.typing import NDArray
-
     from enumsol.branches.elements import Pair, Sides, Vertex
     from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.model.statuses import ContactStatus
-    from enumsol.selections.solution import Codes
-    from enumsol.trusted.space.solution_curve import AlphaProblem
+    from enumsol.support.array_types import Codes, Floats
 
-    Array = NDArray[np.float64]
     Bounds = tuple[Fraction, Fraction]
 
 #: Steps to the parameter of an alpha, and how near that comes, relative to the larger of 1 and alpha.
@@ -53,10 +48,10 @@ class CurvedArcValues(ArcValues):
     given: AlphaProblem
     problem: ContactProblem3D
     codes: Codes
-    knots: Array
-    borders: Array
+    knots: Floats
+    borders: Floats
 
-    def point(self, alpha: float) -> Array:
+    def point(self, alpha: float) -> Floats:
         """Forces and alpha of the solution on the arc; beside its ends those of its first or last knot."""
         k = bisect_right(self.knots[:, -1].tolist(), alpha) - 1
         if not 0 <= k < len(self.borders):
@@ -64,7 +59,7 @@ class CurvedArcValues(ArcValues):
         start, end, border = self.knots[k], self.knots[k + 1], self.borders[k]
         row = self.given.border_of_zeta(border)
         low, high, share = 0.0, 1.0, float((alpha - start[-1]) / (end[-1] - start[-1]))
-        x: Array = start + share * (end - start)
+        x: Floats = start + share * (end - start)
         for _ in range(_STEPS):
             found = curve_point(self.given, self.given.placed(start + share * (end - start)), row)
             if found is None:
@@ -89,7 +84,7 @@ class CurvedArcValues(ArcValues):
         return {"knots": self.knots.tolist(), "borders": self.borders.tolist()}
 
 
-def state_of(problem: ContactProblem3D, x: Array, active: Sequence[Set[int]]) -> Pair:
+def state_of(problem: ContactProblem3D, x: Floats, active: Sequence[Set[int]]) -> Pair:
     """Forces and displacements of forces and alpha x, with the zeros of the statuses that hold at every node."""
     forces, condensed = x[:-1], problem.condensed
     w = condensed.free_displacements(float(x[-1])) - condensed.S @ forces
@@ -101,7 +96,7 @@ class _Place:
     """Where a vertex will be."""
 
     alphas: Bounds
-    x: Array
+    x: Floats
     selections: tuple[Codes, ...]
     border: bool
     settled: bool

@@ -18,15 +18,11 @@ from enumsol.trusted.space.leaves import SpaceRoot, distinct_roots, settle
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from numpy.typing import NDArray
-
     from enumsol.branches.elements import Arc, Vertex
     from enumsol.branches.graph_data import GraphData
     from enumsol.condensation.space_condensed import EnclosedSpace
-    from enumsol.selections.solution import Codes
-    from enumsol.support.arguments import Alpha
+    from enumsol.support.array_types import Alpha, Codes, Floats
 
-    Array = NDArray[np.float64]
 
 #: Levels of the sectors in which a root is looked for, the narrow ones first.
 _LEVELS = (22, 16, 11, 8, 6)
@@ -80,7 +76,7 @@ def roots_on_arcs(
     )
 
 
-def root_near(system: EnclosedSpace, codes: Codes, forces: Array) -> tuple[Codes, SpaceRoot] | None:
+def root_near(system: EnclosedSpace, codes: Codes, forces: Floats) -> tuple[Codes, SpaceRoot] | None:
     """The regular root with these statuses near given forces (in the problem's units), proven; None where it is not.
 
     ``codes`` as in a graph: slip in any direction.
@@ -93,7 +89,7 @@ def root_near(system: EnclosedSpace, codes: Codes, forces: Array) -> tuple[Codes
     return None
 
 
-def _leaves(system: EnclosedSpace, i: int, code: int, forces: Array, level: int) -> Iterable[int]:
+def _leaves(system: EnclosedSpace, i: int, code: int, forces: Floats, level: int) -> Iterable[int]:
     """Codes of a node in a leaf: of a node that slips, the sectors of a level around the direction of its friction."""
     if code == OPEN:
         return (OPEN,)

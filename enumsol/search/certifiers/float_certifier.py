@@ -8,18 +8,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.relaxation.engine import PRUNE_MARGIN
-from enumsol.search.certifiers.margins import margin_of_form
-from enumsol.search.certifiers.protocol import UndecidedPart, WithoutProof
-from enumsol.search.fathoming import holds_below, without_load
+from enumsol.search.certifiers.protocol import Bound, UndecidedPart, WithoutProof, margin_of_form
+from enumsol.search.fathoming import Proposal, holds_below, without_load
 from enumsol.search.reduction import NEAR
-from enumsol.selections.solution import SelectionSolution, VertexLimitError
+from enumsol.selections.solution import SelectionSolution, SelectionSolver, VertexLimitError
 
 if TYPE_CHECKING:
-    from enumsol.search.certifiers.margins import Margin
-    from enumsol.search.certifiers.protocol import Bound
-    from enumsol.search.fathoming import Point, Proposal
+    from enumsol.search.certifiers.protocol import Margin
+    from enumsol.search.fathoming import Point
     from enumsol.selections.float_selections import FloatSelections
-    from enumsol.selections.solution import Codes, SelectionSolver
+    from enumsol.support.array_types import Codes
     from enumsol.trusted.quadratic_forms import EnclosedForm
 
 

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 from enumsol.arithmetic.rationals import rational
 from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
-from enumsol.condensation.exact import ExactSystem
+from enumsol.condensation.exact import ExactCondensed, ExactSystem
 from enumsol.model.statuses import RowKind
 from enumsol.relaxation.imposed_rows import with_implied
-from enumsol.relaxation.interval_relaxation import IntervalRowKind, interval_rows
-from enumsol.search.certifiers.margins import FORM_ERRORS, energy_margin
+from enumsol.relaxation.interval_relaxation import IntervalRowKind, IntervalSystem, interval_rows
+from enumsol.search.certifiers.protocol import FORM_ERRORS, energy_margin
 from enumsol.search.certifiers.rational_certifier import accepted, energy_bound_positive
-from enumsol.search.interval.subintervals import IntervalCertifier
+from enumsol.search.interval.subintervals import IntervalCertifier, Piece
 from enumsol.selections.rational_selections import ExactSelections
 from enumsol.trusted.exclusion import exclusion_margin
 from enumsol.trusted.over_interval import EnclosedPiece, as_computed
@@ -20,15 +20,10 @@ from enumsol.trusted.over_interval import EnclosedPiece, as_computed
 if TYPE_CHECKING:
     from fractions import Fraction
 
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from enumsol.condensation.exact import ExactCondensed
     from enumsol.model.problem import ContactProblem
-    from enumsol.relaxation.interval_relaxation import IntervalSystem
-    from enumsol.search.certifiers.margins import Margin
+    from enumsol.search.certifiers.protocol import Margin
     from enumsol.search.interval.interval_tree import EmptyLeaf
-    from enumsol.search.interval.subintervals import Piece
+    from enumsol.support.array_types import Floats
 
 #: Bounds must be this large [energy unit of the piece], so that a checker that sums in another order agrees.
 _MARGIN = 1e-12
@@ -60,7 +55,7 @@ class VerifiedIntervalCertifier(IntervalCertifier):
         self._rationals = ExactIntervalCertifier(exact) if exact is not None and exactly else None
         self._zero = zero if exact is None else exact.zero
         self._piece: tuple[Piece, EnclosedPiece | None, Margin | None] | None = None
-        self._form: tuple[NDArray[np.float64], EnclosedPiece] | None = None
+        self._form: tuple[Floats, EnclosedPiece] | None = None
         #: Rationals decide where there are no balls; the checker repeats what balls accepted.
         self.forms, self.rational, self.checkable = True, self._rationals is not None, True
 
@@ -77,14 +72,14 @@ class VerifiedIntervalCertifier(IntervalCertifier):
         self.checkable = False
         return self._rationals.excluded(piece, system, leaf)
 
-    def convex(self, piece: Piece, system: IntervalSystem, form: NDArray[np.float64]) -> bool:
+    def convex(self, piece: Piece, system: IntervalSystem, form: Floats) -> bool:
         """Whether the form of these multipliers is proven convex on the piece, for all data in the balls."""
         enclosed = self._on(piece, system)[0]
         if enclosed is None:
             return False
         return all(one.smallest_eigenvalue > 0 for one in self._with_form(enclosed, form).forms)
 
-    def _with_form(self, enclosed: EnclosedPiece, form: NDArray[np.float64]) -> EnclosedPiece:
+    def _with_form(self, enclosed: EnclosedPiece, form: Floats) -> EnclosedPiece:
         if self._form is None or self._form[0] is not form or self._form[1].ends is not enclosed.ends:
             self._form = form, enclosed.with_form(form)
         return self._form[1]

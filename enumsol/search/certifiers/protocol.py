@@ -1,21 +1,28 @@
-"""What every certifier offers to the search, and what those have in common that write a proof or none."""
+"""What every certifier offers to the search, and what those have in common that write a proof or none.
+
+The exclusion inequalities are compiled here, if that module is installed, else those of the trusted core.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
+from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
 
-from enumsol.proof.records import Branching, UndecidedRecord, Unloaded
+from enumsol.proof.records import Branching, Record, UndecidedRecord, Unloaded
+from enumsol.trusted.exclusion import exclusion_margin
+from enumsol.trusted.over_interval import EnclosedPiece
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
-    import numpy as np
-    from numpy.typing import NDArray
+    from enumsol.condensation.enclosure import EnclosedSystem
+    from enumsol.proof.writer import Part, Recorder
+    from enumsol.support.array_types import Codes, Floats, Indices
+    from enumsol.trusted.quadratic_forms import EnclosedForm
 
-    from enumsol.proof.compressed_parts import Part, Recorder
-    from enumsol.proof.records import Record
-    from enumsol.selections.solution import Codes
+    #: A lower bound over a partial assignment, proven by the multipliers of its rows.
+    Margin = Callable[[Codes, Indices, Floats], float]
 
 
 #: The balls written into a proof are wider than those found by this factor, so that a checker's own balls fit in.
@@ -106,7 +113,7 @@ class Bound(Protocol):
     def form(self) -> Any:
         """The form that ``bound`` is about: an EnclosedForm, in 3D a SlipForm; None for the energy."""
 
-    def multipliers(self) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    def multipliers(self) -> tuple[Indices, Floats]:
         """Rows and their multipliers, which prove ``bound``."""
 
 
@@ -245,3 +252,27 @@ class RecordingCertifier(Met):
     def _leaf(self, leaf: Record) -> None:
         self._leaves += 1
         self.recorder.write(leaf.write())
+
+
+#: How often the error bound of an exclusion with a form is subtracted where a proof is written.
+FORM_ERRORS = 4.0
+
+
+def energy_margin(within: EnclosedSystem | EnclosedPiece) -> Margin:
+    """Lower bounds on the energy, less twice the error bound (theory, sections 6.2 and 7.9)."""
+    try:
+        from enumsol.search.certifiers._margin import Margins
+    except ImportError:
+        return partial(exclusion_margin, within, errors=2.0)
+    if isinstance(within, EnclosedPiece):
+        return Margins(within.ends, within.low, within.high).margin
+    return Margins((within,), within.F, within.F).margin
+
+
+def margin_of_form(form: EnclosedForm, errors: float) -> Margin:
+    """Lower bounds on a form, less the error bound so many times (theory, section 6.12)."""
+    try:
+        from enumsol.search.certifiers._margin import FormMargins
+    except ImportError:
+        return partial(exclusion_margin, form, errors=errors)
+    return FormMargins(form, errors).margin

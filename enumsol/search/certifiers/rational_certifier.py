@@ -13,8 +13,8 @@ from enumsol.arithmetic.rationals import rational
 from enumsol.model.statuses import CONDITIONS, OPEN, SLIDING, RowKind
 from enumsol.relaxation.imposed_rows import INEQUALITY, imposed_rows
 from enumsol.search.certifiers.float_certifier import solve_or_open
-from enumsol.search.certifiers.protocol import WithoutProof
-from enumsol.search.fathoming import holds_below, propose
+from enumsol.search.certifiers.protocol import Bound, UndecidedPart, WithoutProof
+from enumsol.search.fathoming import Proposal, holds_below, propose
 from enumsol.selections.solution import SelectionSolution
 from enumsol.support.deadlines import look
 from enumsol.trusted.uniqueness import only_solution
@@ -22,19 +22,13 @@ from enumsol.trusted.uniqueness import only_solution
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
 
-    import numpy as np
-    from numpy.typing import NDArray
-
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.condensation.enclosure import EnclosedSystem
-    from enumsol.search.certifiers.protocol import Bound, UndecidedPart
-    from enumsol.search.fathoming import Point, Proposal
+    from enumsol.search.fathoming import Point
     from enumsol.selections.polytopes import Form
     from enumsol.selections.rational_selections import ExactSelections
-    from enumsol.selections.solution import Codes
+    from enumsol.support.array_types import Codes, Floats, Indices
     from enumsol.trusted.at_alpha import VerifiedSelection
-
-    Array = NDArray[np.float64]
 
 
 _NEWTON_STEPS = 8
@@ -42,10 +36,7 @@ _DISPLACEMENTS = (RowKind.PENETRATION, RowKind.SLIP_FORWARD, RowKind.SLIP_BACKWA
 
 
 def accepted(
-    rows: NDArray[np.intp],
-    values: NDArray[np.float64],
-    imposed: Callable[[int], Mapping[int, int]],
-    scaled: ScaledSystem,
+    rows: Indices, values: Floats, imposed: Callable[[int], Mapping[int, int]], scaled: ScaledSystem
 ) -> Iterator[tuple[int, int, Any]]:
     """Kind, node and multiplier, in the problem's units, of the rows that a node imposes and signs that they admit."""
     for row, value in zip(rows, values, strict=True):

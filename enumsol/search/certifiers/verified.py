@@ -14,9 +14,8 @@ import numpy as np
 from enumsol.model.statuses import CONDITIONS, RowKind
 from enumsol.proof import records
 from enumsol.proof.proof_file import coarse, fraction_text
-from enumsol.search.certifiers.margins import FORM_ERRORS, energy_margin, margin_of_form
-from enumsol.search.certifiers.protocol import WIDEN, Certified, Escalations, RecordingCertifier, UndecidedPart
-from enumsol.search.fathoming import propose, without_load
+from enumsol.search.certifiers import protocol
+from enumsol.search.fathoming import Proposal, propose, without_load
 from enumsol.search.reduction import NEAR
 from enumsol.selections.solution import SelectionSolution
 from enumsol.trusted.at_alpha import VerifiedSelection, holds_no_root, solve_selection
@@ -27,21 +26,16 @@ from enumsol.trusted.uniqueness import ClosedSolution, closed_solution, lone_roo
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
-
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.condensation.enclosure import EnclosedSystem
-    from enumsol.proof.compressed_parts import Recorder
     from enumsol.proof.records import EnclosureRecord, Record
-    from enumsol.search.certifiers.margins import Margin
-    from enumsol.search.certifiers.protocol import Bound
+    from enumsol.proof.writer import Recorder
     from enumsol.search.certifiers.rational_certifier import ExactCertifier
-    from enumsol.search.fathoming import Point, Proposal
+    from enumsol.search.fathoming import Point
     from enumsol.search.fathoming_in_contact import LoneProposal
-    from enumsol.selections.solution import Codes
+    from enumsol.support.array_types import Codes, Floats, Indices
     from enumsol.trusted.quadratic_forms import EnclosedForm
 
-    Array = NDArray[np.float64]
 
 _ROW_NAMES = {
     RowKind.NORMAL_FORCE: "the normal force of node {}",
@@ -55,7 +49,7 @@ _ROW_NAMES = {
 _CLEAR = 1e-6
 
 
-class VerifiedCertifier(RecordingCertifier):
+class VerifiedCertifier(protocol.RecordingCertifier):
     """Proves prunings and complete selections, and writes the proof.
 
     Parameters
@@ -73,7 +67,7 @@ class VerifiedCertifier(RecordingCertifier):
     """
 
     exactly, plain, lone = False, False, True
-    _escalations: Escalations
+    _escalations: protocol.Escalations
 
     def __init__(
         self,
@@ -88,19 +82,19 @@ class VerifiedCertifier(RecordingCertifier):
         self._precisely = precisely
         self._scaled = scaled
         self._enclosed = enclosed
-        self._margin = None if enclosed is None else energy_margin(enclosed)
+        self._margin = None if enclosed is None else protocol.energy_margin(enclosed)
         self._exact = exact
         self._node_ids = node_ids
-        self._escalations = Escalations()
+        self._escalations = protocol.Escalations()
         #: Forms in the order in which they were written.
         self._forms: dict[EnclosedForm, int] = {}
-        self._form_margins: dict[EnclosedForm, Margin] = {}
+        self._form_margins: dict[EnclosedForm, protocol.Margin] = {}
         #: A complete selection was not decided by balls.
         self.hard = False
         #: Selections of the roots found in rationals.
         self._known: list[Codes] = []
 
-    def excluded(self, codes: Codes, relaxation: Bound) -> bool:
+    def excluded(self, codes: Codes, relaxation: protocol.Bound) -> bool:
         """Whether the relaxation's multipliers are proven to exclude the partial assignment."""
         rows, values = relaxation.multipliers()
         if relaxation.form is not None:
@@ -119,11 +113,11 @@ class VerifiedCertifier(RecordingCertifier):
         self._escalations.refined += 1
         return False
 
-    def _excluded_by(self, form: EnclosedForm, codes: Codes, rows: NDArray[np.intp], values: Array) -> bool:
+    def _excluded_by(self, form: EnclosedForm, codes: Codes, rows: Indices, values: Floats) -> bool:
         """The same with a form in place of the energy."""
         margin = self._form_margins.get(form)
         if margin is None:
-            margin = self._form_margins[form] = margin_of_form(form, FORM_ERRORS)
+            margin = self._form_margins[form] = protocol.margin_of_form(form, protocol.FORM_ERRORS)
         kept = proven(margin, codes, rows, values)
         if kept is None:
             self._escalations.refined += 1
@@ -135,14 +129,14 @@ class VerifiedCertifier(RecordingCertifier):
         self._leaf(records.ExcludedByForm(len(self._forms) - self._forms[form], Terms(rows, kept)))
         return True
 
-    def _allowed(self, codes: Codes, rows: NDArray[np.intp], values: Array) -> Terms:
+    def _allowed(self, codes: Codes, rows: Indices, values: Floats) -> Terms:
         """Those rows and multipliers that may prove something."""
         kind, node = np.divmod(rows, self._scaled.p)
         signs = row_signs(np.array(codes), self._scaled.F)[node, kind]
         keep = (signs == FREE) | ((signs == NONNEGATIVE) & (values > 0))
         return Terms(rows[keep], values[keep])
 
-    def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
+    def selection(self, codes: Codes) -> SelectionSolution | protocol.UndecidedPart | None:
         """All roots in a complete selection."""
         ball = None if self._enclosed is None else solve_selection(self._enclosed, codes)
         if self._enclosed is not None and not (ball is not None and ball.is_root):
@@ -171,15 +165,15 @@ class VerifiedCertifier(RecordingCertifier):
                 self._take_note(ball.force.mid, ball.w.mid)
         return self._in_rationals(codes, solution)
 
-    def _open(self, codes: Codes, ball: VerifiedSelection | None) -> UndecidedPart:
+    def _open(self, codes: Codes, ball: VerifiedSelection | None) -> protocol.UndecidedPart:
         """Write a selection that balls do not decide, of a problem too large for rationals."""
         return self._undecided(codes, *_reason(codes, ball, self._node_ids))
 
     def _in_rationals(
-        self, codes: Codes, solution: SelectionSolution | UndecidedPart | None
-    ) -> SelectionSolution | UndecidedPart | None:
+        self, codes: Codes, solution: SelectionSolution | protocol.UndecidedPart | None
+    ) -> SelectionSolution | protocol.UndecidedPart | None:
         """Write what was found in rationals."""
-        if isinstance(solution, UndecidedPart):
+        if isinstance(solution, protocol.UndecidedPart):
             return self._undecided(codes, solution.reason, solution.hint)
         self._escalations.rationals += 1
         if solution is None:
@@ -217,7 +211,7 @@ class VerifiedCertifier(RecordingCertifier):
                 return [exactly]
         return found
 
-    def alone(self, codes: Codes, proposal: LoneProposal, bound: Bound) -> list[SelectionSolution] | None:
+    def alone(self, codes: Codes, proposal: LoneProposal, bound: protocol.Bound) -> list[SelectionSolution] | None:
         """The root of what is proposed, if it is proven to be the only one below a partial assignment; else None."""
         if self._enclosed is None:
             return None
@@ -229,7 +223,7 @@ class VerifiedCertifier(RecordingCertifier):
         self._escalations.balls += 1
         return [self._regular(proposal.selection, root, partial(records.Alone, *given, terms))]
 
-    def _take_note(self, force: Array, w: Array) -> None:
+    def _take_note(self, force: Floats, w: Floats) -> None:
         """Take note of nodes that slide without load at a solution."""
         self.sliding |= without_load(self._scaled, force, w)
 
@@ -288,7 +282,7 @@ class VerifiedCertifier(RecordingCertifier):
         self._verified[codes] = regular
         return SelectionSolution(codes, (regular.force.mid,), 0, regular.det_sign, strict=True)
 
-    def add(self, part: Certified) -> None:
+    def add(self, part: protocol.Certified) -> None:
         """Take over what the certifier of a subtree has proven."""
         super().add(part)
         if part.escalations is not None:
@@ -297,7 +291,7 @@ class VerifiedCertifier(RecordingCertifier):
     def forget(self) -> None:
         """Forget what was proven."""
         super().forget()
-        self._escalations = Escalations()
+        self._escalations = protocol.Escalations()
         self._forms.clear()
         self._known.clear()
 
@@ -309,18 +303,18 @@ class VerifiedCertifier(RecordingCertifier):
         self._leaf(leaf(self._ball(ball, ball.det_sign)))
         return SelectionSolution(codes, (ball.force.mid,), 0, ball.det_sign, strict=True)
 
-    def _undecided(self, codes: Codes, reason: str, hint: str) -> UndecidedPart:
+    def _undecided(self, codes: Codes, reason: str, hint: str) -> protocol.UndecidedPart:
         self._escalations.undecided += 1
         self._leaf(records.UndecidedRecord(reason))
-        return UndecidedPart(codes, reason, hint, examined=True)
+        return protocol.UndecidedPart(codes, reason, hint, examined=True)
 
     def _ball(self, found: VerifiedSelection | ClosedSolution, index: int | None) -> EnclosureRecord:
         """Where a root is, in the problem's units."""
         force = self._scaled.force
-        return records.EnclosureRecord(found.force.mid * force, found.force.rad * force * WIDEN, index)
+        return records.EnclosureRecord(found.force.mid * force, found.force.rad * force * protocol.WIDEN, index)
 
 
-def proven(margin: Margin, codes: Codes, rows: NDArray[np.intp], values: Array) -> Array | None:
+def proven(margin: protocol.Margin, codes: Codes, rows: Indices, values: Floats) -> Floats | None:
     """Multipliers that exclude a partial assignment, rounded if these do it as well; None if those given do not."""
     short = coarse(values)
     if margin(codes, rows, short) > _CLEAR:

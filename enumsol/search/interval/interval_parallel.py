@@ -12,16 +12,14 @@ import time
 from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from enumsol.search.interval.subintervals import Task
+from enumsol.search.interval.subintervals import IntervalSearch, Piece, Task, Worker
 from enumsol.search.outcome import Stop, StopReason
-from enumsol.support.workers import Crew
+from enumsol.support.workers import Crew, Job
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from enumsol.search.interval.interval_tree import Subtree, TreeResult
-    from enumsol.search.interval.subintervals import IntervalSearch, Piece, Worker
-    from enumsol.support.workers import Job
 
 
 def run_parallel(executor: Executor, search: IntervalSearch) -> None:

@@ -24,11 +24,8 @@ from enumsol.support.deadlines import Deadline, TimeOverError, within
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    import numpy as np
-    from numpy.typing import NDArray
-
     from enumsol.relaxation.engine import Relaxation
-    from enumsol.selections.solution import Codes
+    from enumsol.support.array_types import Codes, Floats, Indices
 
 #: Nodes by which a partial assignment that is empty at the middle may be settled before it is left to the halves.
 TRIED_AT_ONCE = 2
@@ -57,9 +54,9 @@ class EmptyLeaf(NamedTuple):
     """
 
     codes: Codes
-    rows: NDArray[np.intp]
-    values: NDArray[np.float64]
-    form: NDArray[np.float64] | None = None
+    rows: Indices
+    values: Floats
+    form: Floats | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +187,7 @@ class PieceTree:
         system: IntervalSystem,
         middle: IntervalSystem | None,
         excluded: Callable[[EmptyLeaf], bool],
-        convex: Callable[[NDArray[np.float64]], bool] | None = None,
+        convex: Callable[[Floats], bool] | None = None,
         *,
         long: bool = False,
     ) -> None:
@@ -198,7 +195,7 @@ class PieceTree:
         self._excluded, self._convex = excluded, convex
         self._result = TreeResult()
         self._form: PairedTerms | None = None
-        self._multipliers: NDArray[np.float64] | None = None
+        self._multipliers: Floats | None = None
         self._over, self._middle = _Program(system), None if middle is None else _Program(middle)
 
     def run(self, roots: Sequence[Subtree], max_nodes: int, deadline: float | None = None) -> TreeResult:

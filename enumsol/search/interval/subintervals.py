@@ -2,7 +2,7 @@
 
 A piece is a subinterval. It is searched by trees whose leaves cover all selections: a leaf is proven empty on the whole
 piece, or it is a complete selection that survives, or it is left to both halves of the piece. What was proven for the
-whole piece is proven for its halves, too.
+whole piece is proven for its halves, too. Bodies that nothing holds have a certifier of their own (section 14.8).
 """
 
 from __future__ import annotations
@@ -16,19 +16,23 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.model.statuses import UNDECIDED
 from enumsol.relaxation.interval_relaxation import IntervalSystem
+from enumsol.search.floating_solvers import WEAK
 from enumsol.search.interval.interval_tree import LARGEST_TREE, EmptyLeaf, PieceTree, Subtree, TreeResult
 from enumsol.search.outcome import Stop, StopReason
+from enumsol.trusted.exclusion import exclusion_margin
+from enumsol.trusted.over_interval import EnclosedPiece, PieceNumbers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
     from enumsol.condensation.condensed import CondensedProblem
-    from enumsol.selections.solution import Codes
-    from enumsol.trusted.piece_form import PieceNumbers
+    from enumsol.model.problem import ContactProblem
+    from enumsol.search.certifiers.protocol import Margin
+    from enumsol.support.array_types import Codes, Floats
+
 
 #: Pieces are not cut below this part of the interval.
 SMALLEST_PIECE = 2.0**-40
@@ -96,7 +100,7 @@ class IntervalCertifier:
         """Whether the dual bounds at both ends of the piece are positive."""
         raise NotImplementedError
 
-    def convex(self, piece: Piece, system: IntervalSystem, form: NDArray[np.float64]) -> bool:
+    def convex(self, piece: Piece, system: IntervalSystem, form: Floats) -> bool:
         """Whether the form of these multipliers is proven convex on the piece."""
         return False
 
@@ -329,3 +333,50 @@ class IntervalSearch:
         elif self.stopped is None and self.deadline is not None and time.perf_counter() > self.deadline:
             self.stopped = Stop(StopReason.TIME_LIMIT)
         return None if self.stopped is not None else self.worker.run(task, rest, self.deadline)
+
+
+#: As of other intervals.
+_MARGIN = 1e-12
+
+
+def on_weak_springs(problem: ContactProblem) -> CondensedProblem:
+    """What the relaxations are about: the body on weak springs at the degrees of freedom where springs hold it."""
+    modes = problem.modes
+    if modes is None:
+        raise AssertionError("the body is held")
+    condensed: CondensedProblem = problem.on_springs.replace(A=problem.A + WEAK * modes.springs()).condensed
+    return condensed
+
+
+class FloatingIntervalCertifier(IntervalCertifier):
+    """Accepts a leaf when the bounds of its multipliers prove it empty on the whole piece, within the bound or without.
+
+    What balls cannot exclude is branched on: complete selections are followed by algebra.
+
+    Parameters
+    ----------
+    problem : ContactProblem
+    checkable : bool
+        A proof is wanted.
+    """
+
+    def __init__(self, problem: ContactProblem, *, checkable: bool) -> None:
+        self._problem, self.checkable = problem, checkable
+        self._piece: tuple[Piece, Margin | None] | None = None
+
+    def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
+        """Whether the bounds at both ends of the piece are positive."""
+        if self._piece is None or self._piece[0] != piece:
+            self._piece = piece, self._on(piece, system)
+        margin = self._piece[1]
+        return margin is not None and margin(leaf.codes, leaf.rows, leaf.values) > _MARGIN
+
+    def _on(self, piece: Piece, system: IntervalSystem) -> Margin | None:
+        units = system.scaled
+        try:
+            within = EnclosedPiece.floating(self._problem, piece.a, piece.b, units.force, units.length)
+        except NotEnclosedError:
+            return None
+        if not all(end.smallest_eigenvalue > 0 for end in within.ends):
+            return None
+        return partial(exclusion_margin, within, errors=2.0)

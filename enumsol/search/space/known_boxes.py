@@ -13,11 +13,9 @@ from enumsol.trusted.space.boxed_solution import BoxedSolution, box_around, is_i
 from enumsol.trusted.space.leaves import Open, settle
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
+    from enumsol.support.array_types import Floats
 
-    Array = NDArray[np.float64]
 
 #: What a writer of proofs asks for (see ``solution_in_box``).
 _ERRORS = 2.0
@@ -41,7 +39,7 @@ class KnownBoxes:
     def __init__(self, system: SpaceSystem, enclosed: EnclosedSpace) -> None:
         self._system, self._enclosed = system, enclosed
         self._found: list[BoxedSolution] = []
-        self._passed: list[Array] = []
+        self._passed: list[Floats] = []
         self._wait = self._pause = 0
 
     @cached_property
@@ -67,7 +65,7 @@ class KnownBoxes:
         self._wait = self._pause
         return found if found is not None and is_inside(y, w, found.box, _ERRORS) else None
 
-    def _sought(self, y: Array, *, halved: bool) -> BoxedSolution | None:
+    def _sought(self, y: Floats, *, halved: bool) -> BoxedSolution | None:
         """A new solution near a point, in a box of its own; near a leaf to be ``halved``, one that no leaf settles."""
         with np.errstate(all="ignore"):
             near = self._problem.near(y, self._system)

@@ -11,18 +11,15 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.optimize import nnls
 
-from enumsol.trusted.space.sector_rows import FREE, OF_DISCS, row_sign, sector_row_terms
+from enumsol.trusted.space.sector_rows import FREE, OF_DISCS, Row, row_sign, sector_row_terms
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from enumsol.condensation.space_condensed import EnclosedSpace
+    from enumsol.support.array_types import Floats
     from enumsol.trusted.space.pieces import AlphaPiece
-    from enumsol.trusted.space.sector_rows import Row
 
-    Array = NDArray[np.float64]
 
 #: The weight of the squares of multipliers, each by the length of its row, which keeps them bounded.
 _RIDGE = 1e-6
@@ -30,7 +27,7 @@ _RIDGE = 1e-6
 _HALVINGS = 4
 
 
-def balanced(piece: AlphaPiece, codes: Sequence[int], rows: Sequence[Row]) -> Array | None:
+def balanced(piece: AlphaPiece, codes: Sequence[int], rows: Sequence[Row]) -> Floats | None:
     """Multipliers of rows for which the bounds (12.21) at both ends of a piece seem to be positive.
 
     With h = g + A m a bound is -h' S^-1 h / 4 - q'm, A and q by the rows at that end. A mean of both is largest at the
@@ -71,7 +68,7 @@ def balanced(piece: AlphaPiece, codes: Sequence[int], rows: Sequence[Row]) -> Ar
     return None
 
 
-def _columns(system: EnclosedSpace, rows: Sequence[Row]) -> tuple[Array, Array]:
+def _columns(system: EnclosedSpace, rows: Sequence[Row]) -> tuple[Floats, Floats]:
     """What each row adds to the load, (m, rows), and its value where y = 0, (rows,)."""
     size, units, discs = len(system.g), system.row_unit, system.discs.mid
     forces, slips = np.zeros((size, len(rows))), np.zeros((size, len(rows)))

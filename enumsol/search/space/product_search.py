@@ -15,18 +15,14 @@ import scipy.sparse
 from enumsol.model.sectors import DEEPEST, SECTORS, cut, level_of, width_of
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.support.deadlines import look
-from enumsol.trusted.space.boxed_solution import proposed_rho, solution_in_box
+from enumsol.trusted.space.boxed_solution import BoxedSolution, proposed_rho, solution_in_box
 from enumsol.trusted.space.product_forms import CONE, SIGNED, Ellipsoid, Frame
 from enumsol.trusted.space.sector_rows import sector_children
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from enumsol.condensation.space_condensed import EnclosedSpace
-    from enumsol.selections.solution import Codes
-    from enumsol.trusted.space.boxed_solution import BoxedSolution
+    from enumsol.support.array_types import Codes, Floats
 
-    Array = NDArray[np.float64]
 
 #: What a writer of proofs asks for (see ``Ellipsoid.of``).
 _ERRORS = 2.0
@@ -76,7 +72,7 @@ class ProductSearch:
         self._rho, self._tangents = proposed_rho(system), np.sum(system.tau >= 0, axis=1).tolist()
         self._boxes: list[BoxedSolution] = []
         #: A point of the last ellipsoid: what is far from zero is rounded more.
-        self._near: Array | None = None
+        self._near: Floats | None = None
         #: Programs solved.
         self.programs = 0
 
@@ -214,7 +210,7 @@ class ProductSearch:
         return ellipsoid, size * float(np.sqrt(max(-least, 1e-2)))
 
 
-def _solved(matrices: Array, kinds: list[int], size: float) -> tuple[Array, Array, float] | None:
+def _solved(matrices: Floats, kinds: list[int], size: float) -> tuple[Floats, Floats, float] | None:
     """Multipliers of the form with curvature one at least that has the largest minimum, where it is, and that minimum.
 
     u is measured by ``size``, in the minimum as well.
@@ -258,7 +254,7 @@ def _solved(matrices: Array, kinds: list[int], size: float) -> tuple[Array, Arra
     return (_allowed(z / norm, kinds), size * u, least) if np.isfinite(least) else None
 
 
-def _allowed(z: Array, kinds: list[int]) -> Array:
+def _allowed(z: Floats, kinds: list[int]) -> Floats:
     """Multipliers moved to where they are allowed."""
     z = np.where(np.array(kinds) == SIGNED, np.maximum(z, 0.0), z)
     first = 0
@@ -271,7 +267,7 @@ def _allowed(z: Array, kinds: list[int]) -> Array:
     return z
 
 
-def _packed(matrices: Array) -> Array:
+def _packed(matrices: Floats) -> Floats:
     """Upper triangles by columns, with what is off the diagonal times the root of two."""
     size = matrices.shape[-1]
     column, row = np.tril_indices(size)

@@ -22,15 +22,12 @@ from enumsol.trusted.space.space_uniqueness import LARGEST_UNIT, equations
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
     from enumsol.relaxation.engine import Relaxation
     from enumsol.search.fathoming_in_contact import KnownRoot
     from enumsol.search.space.product_search import Branched, Enclosed, Missed
-    from enumsol.selections.solution import Codes
+    from enumsol.support.array_types import Codes, Floats, Mask
 
-    Array = NDArray[np.float64]
 
 #: A condition of a scaled problem within this of zero may hold as an equation; only what is tried rests on it.
 NEAR = 1e-9
@@ -60,7 +57,7 @@ class SpaceClosing(Protocol):
 
     enclosed: EnclosedSpace
 
-    def close(self, numbers: Array, codes: Codes | None, normal: Array) -> list[Any] | None:
+    def close(self, numbers: Floats, codes: Codes | None, normal: Floats) -> list[Any] | None:
         """The only solution, as a list; None if not proven.
 
         Parameters
@@ -70,7 +67,7 @@ class SpaceClosing(Protocol):
         normal : (p,) array, lambda_n near the solution
         """
 
-    def alone(self, codes: Codes, numbers: Array, leaf: Codes) -> list[Any] | None:
+    def alone(self, codes: Codes, numbers: Floats, leaf: Codes) -> list[Any] | None:
         """The root of a leaf, as a list, if no other solution has the statuses of an assignment; None if not proven."""
 
     def fathom(self, codes: Codes, tree: Sequence[Branched | Missed | Enclosed]) -> list[Any]:
@@ -221,16 +218,16 @@ class Point:
     """
 
     system: SpaceSystem
-    n: Array
-    gap: Array
-    slip: Array
-    theta: Array
-    wide: NDArray[np.bool_]
+    n: Floats
+    gap: Floats
+    slip: Floats
+    theta: Floats
+    wide: Mask
     codes: Codes
     slack: float
 
     @classmethod
-    def of(cls, system: SpaceSystem, problem: Isotropic, y: Array) -> Point:
+    def of(cls, system: SpaceSystem, problem: Isotropic, y: Floats) -> Point:
         """Of forces y, (p, 3), which solve the problem up to rounding."""
         w = problem.displacements(y)
         n, gap, tau, v = np.maximum(y[:, 0], 0.0), np.maximum(-w[:, 0], 0.0), y[:, 1:], w[:, 1:]
@@ -250,7 +247,7 @@ class Point:
         return cls(system, np.where(loaded, n, 0.0), open_gap, v, theta, wide, codes, float(np.min(slack)))
 
     @staticmethod
-    def _code(system: SpaceSystem, i: int, direction: Array, loaded: bool, held: bool) -> int:
+    def _code(system: SpaceSystem, i: int, direction: Floats, loaded: bool, held: bool) -> int:
         axes = np.flatnonzero(system.tau[i] >= 0)
         if not loaded:
             return OPEN
@@ -262,7 +259,7 @@ class Point:
 
     # -- numbers ---------------------------------------------------------------------------------------------------
 
-    def numbers(self, enough: float, *, better: bool, held: Array | None = None) -> Array | None:
+    def numbers(self, enough: float, *, better: bool, held: Floats | None = None) -> Floats | None:
         """Numbers for which Q is definite, as a proof has them; plain ones, or better ones if these are asked for.
 
         Parameters
@@ -289,7 +286,7 @@ def _allows(code: int, final: int) -> bool:
     return code in (UNDECIDED, final) or (code == CONTACT and final != OPEN)
 
 
-def _sector(direction: Array, level: int) -> int:
+def _sector(direction: Floats, level: int) -> int:
     """The sector of a level that holds a direction."""
     x, y = direction.tolist()
     number = nearest(x, y, level)
@@ -328,11 +325,11 @@ class DefiniteForm:
     def __init__(
         self,
         system: SpaceSystem,
-        turns: Sequence[Array],
-        opened: NDArray[np.bool_],
-        off: Array,
-        discs: Array | None = None,
-        held: Array | None = None,
+        turns: Sequence[Floats],
+        opened: Mask,
+        off: Floats,
+        discs: Floats | None = None,
+        held: Floats | None = None,
     ) -> None:
         self._held = None if held is None else held.T @ held
         self._system, self._S, self._open, self._off = system, system.S, opened, off
@@ -345,7 +342,7 @@ class DefiniteForm:
         self.reach = np.where(off > 0, np.sqrt(np.sum(self._rows**2, axis=(1, 2))), 0.0)
         self._pushes = (tau >= 0) & ~self._open[:, None]
 
-    def best(self, enough: float, *, better: bool, hopeless: float = _HOPELESS) -> tuple[Array, Array, Array] | None:
+    def best(self, enough: float, *, better: bool, hopeless: float = _HOPELESS) -> tuple[Floats, Floats, Floats] | None:
         """mu, kappa and nu for which the smallest eigenvalue relative to S is more than ``enough``, or None.
 
         Plain ones, or better ones if these are asked for and plain ones are not below ``hopeless``.
@@ -356,7 +353,7 @@ class DefiniteForm:
             logs, shares, least = self.improved(logs, shares, least)
         return self._numbers(logs, shares) if least > enough else None
 
-    def least(self, logs: Array, shares: Array) -> float:
+    def least(self, logs: Floats, shares: Floats) -> float:
         """The smallest eigenvalue of Q relative to S."""
         numbers = self._numbers(logs, shares)
         try:
@@ -371,7 +368,7 @@ class DefiniteForm:
         except (np.linalg.LinAlgError, ValueError):
             return -np.inf
 
-    def improved(self, logs: Array, shares: Array, least: float) -> tuple[Array, Array, float]:
+    def improved(self, logs: Floats, shares: Floats, least: float) -> tuple[Floats, Floats, float]:
         """Better numbers: those with the largest soft minimum of the eigenvalues of Q relative to S."""
         from scipy.optimize import minimize  # seldom needed
 
@@ -389,22 +386,22 @@ class DefiniteForm:
             x, least = found.x, self.least(*self._split(found.x))
         return *self._split(x), least
 
-    def _split(self, x: Array) -> tuple[Array, Array]:
+    def _split(self, x: Floats) -> tuple[Floats, Floats]:
         p = self._system.p
         return x[: 2 * p].reshape(2, p), x[2 * p :].reshape(p, 2)
 
-    def _numbers(self, logs: Array, shares: Array) -> tuple[Array, Array, Array]:
+    def _numbers(self, logs: Floats, shares: Floats) -> tuple[Floats, Floats, Floats]:
         logs = np.where(self._open, np.mean(logs, axis=0), logs)
         mu, kappa = np.exp(logs - np.mean(logs))
         most = mu / self._discs
         return mu, kappa, np.where(self._pushes, most[:, None] * self._disc(shares)[0] * (1.0 - NEAR), 0.0)
 
     @staticmethod
-    def _disc(shares: Array) -> tuple[Array, Array]:
+    def _disc(shares: Floats) -> tuple[Floats, Floats]:
         root = np.sqrt(1.0 + np.sum(shares * shares, axis=1, keepdims=True))
         return shares / root, root
 
-    def _matrix(self, turn: Array, mu: Array, kappa: Array, nu: Array) -> Array:
+    def _matrix(self, turn: Floats, mu: Floats, kappa: Floats, nu: Floats) -> Floats:
         S, tau, p = self._S, self._system.tau, self._system.p
         form = S.copy()
         form[:p] = mu[:, None] * S[:p]
@@ -423,7 +420,7 @@ class DefiniteForm:
             form += self._held
         return 0.5 * (form + form.T)
 
-    def _value(self, x: Array, columns: Array, hardness: float) -> tuple[float, Array]:
+    def _value(self, x: Floats, columns: Floats, hardness: float) -> tuple[float, Floats]:
         """The logarithm of sum exp(-hardness e) over the eigenvalues e, by the hardness, and its gradient."""
         logs, shares = self._split(x)
         mu, kappa, nu = self._numbers(logs, shares)
@@ -436,7 +433,7 @@ class DefiniteForm:
             gradient += self._gradient(turn, (turned * (part / total)) @ turned.T, mu, kappa, nu, shares)
         return float(np.log(total) / hardness - least), gradient
 
-    def _gradient(self, turn: Array, P: Array, mu: Array, kappa: Array, nu: Array, shares: Array) -> Array:
+    def _gradient(self, turn: Floats, P: Floats, mu: Floats, kappa: Floats, nu: Floats, shares: Floats) -> Floats:
         tau, p, SP = self._system.tau, self._system.p, self._S @ P
         node = np.arange(p)
         by_mu, by_kappa, by_nu = np.diagonal(SP)[:p].copy(), np.zeros(p), np.zeros((p, 2))

@@ -9,14 +9,12 @@ from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from enumsol.condensation.space_condensed import FloatingSpace
+from enumsol.condensation.space_condensed import EnclosedSpace, FloatingSpace, SpaceSystem
 from enumsol.model.statuses import CONTACT, UNDECIDED
-from enumsol.proof.records import NoRoot, Unbalanced
+from enumsol.proof.records import Exclusion, NoRoot, Unbalanced
 from enumsol.proof.space_records import FLOATING_LEAVES, ExcludedInSpace
 from enumsol.relaxation.engine import PRUNE_MARGIN
-from enumsol.search.certifiers.protocol import Refine, UndecidedPart, Unrecorded
+from enumsol.search.certifiers.protocol import Bound, Refine, UndecidedPart, Unrecorded
 from enumsol.search.floating_solvers import FloatingReader, weakly_held
 from enumsol.search.setup import HeldByNothing
 from enumsol.search.space.space_search import SpaceCertifier
@@ -29,18 +27,11 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from fractions import Fraction
 
-    from numpy.typing import NDArray
-
-    from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
-    from enumsol.proof.compressed_parts import Recorder
-    from enumsol.proof.records import Exclusion
+    from enumsol.proof.writer import Recorder
     from enumsol.relaxation.space_relaxation import SpaceEngine
-    from enumsol.search.certifiers.protocol import Bound
-    from enumsol.selections.solution import Codes
+    from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.space.boxed_solution import BoxedSolution
     from enumsol.trusted.space.sector_rows import Row
-
-    Array = NDArray[np.float64]
 
 
 class FloatingSpaceSolvers(HeldByNothing, SpaceSolvers):
@@ -48,7 +39,7 @@ class FloatingSpaceSolvers(HeldByNothing, SpaceSolvers):
 
     offered = '"verified"'
 
-    def _in_balls(self, alpha: Fraction, force: Array, length: Array) -> FloatingSpace:
+    def _in_balls(self, alpha: Fraction, force: Floats, length: Floats) -> FloatingSpace:
         return FloatingSpace.of(self.problem, alpha, force, length)
 
     @cached_property
@@ -91,7 +82,7 @@ class SpaceExclusions:
         self.system, self.free = enclosed, unbounded(enclosed)
 
     def record(
-        self, codes: Codes, rows: Sequence[Row], values: Array, *, within: bool
+        self, codes: Codes, rows: Sequence[Row], values: Floats, *, within: bool
     ) -> tuple[Exclusion | NoRoot, bool] | None:
         """A record that excludes a partial assignment, and whether it needs the bound; or None.
 

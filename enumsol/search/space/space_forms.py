@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from enumsol.condensation.space_condensed import EnclosedSpace
     from enumsol.relaxation.space_relaxation import SpaceEngine
     from enumsol.search.splitting import ImposedRows
-    from enumsol.selections.solution import Codes
+    from enumsol.support.array_types import Codes
     from enumsol.trusted.space.slip_forms import SlipForm
 
 #: Nodes examined with the energy before a form is tried, and the share of the tree that is left then.

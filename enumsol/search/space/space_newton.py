@@ -10,11 +10,9 @@ import numpy as np
 from enumsol.support.deadlines import look
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from enumsol.condensation.space_condensed import SpaceSystem
+    from enumsol.support.array_types import Floats
 
-    Array = NDArray[np.float64]
 
 #: Steps of Newton's method, halvings of one, and steps that may pass without a merit half as large.
 _STEPS, _HALVINGS, _PATIENCE = 40, 7, 12
@@ -38,10 +36,10 @@ class Isotropic:
         Steps of the natural map y - P(y + rho w), one for lambda_n and one for tau of every node.
     """
 
-    S: Array
-    g: Array
-    unit: Array
-    rho: Array
+    S: Floats
+    g: Floats
+    unit: Floats
+    rho: Floats
 
     @classmethod
     def of(cls, system: SpaceSystem) -> Isotropic:
@@ -58,18 +56,18 @@ class Isotropic:
         rho[:, 1:] = np.where(np.isfinite(friction), friction, 1.0)
         return cls(S, np.where(occurs, system.g[places] / unit, 0.0), unit, rho.ravel())
 
-    def displacements(self, y: Array) -> Array:
+    def displacements(self, y: Floats) -> Floats:
         """w, (p, 3)."""
         return (self.g - self.S @ y.ravel()).reshape(-1, 3)
 
-    def solution(self) -> Array | None:
+    def solution(self) -> Floats | None:
         """A solution y, (p, 3), or None: by Newton's method from 0, else with discs that grow from nothing."""
         found = self._newton(np.zeros_like(self.g), 1.0)
         if found is None:
             found = self._grown()
         return None if found is None else found.reshape(-1, 3)
 
-    def near(self, y: Array, system: SpaceSystem) -> Array | None:
+    def near(self, y: Floats, system: SpaceSystem) -> Floats | None:
         """A solution like y near one, both as ``system`` has them, (m,); None if Newton's method finds none."""
         found = self._newton(self.by_node(y, system).ravel(), 1.0)
         if found is None:
@@ -81,12 +79,12 @@ class Isotropic:
         return near
 
     @staticmethod
-    def by_node(y: Array, system: SpaceSystem) -> Array:
+    def by_node(y: Floats, system: SpaceSystem) -> Floats:
         """Forces as ``system`` has them, (m,), as they are here, (p, 3)."""
         units = np.where(system.tau >= 0, system.unit[system.tau], 1.0)
         return np.column_stack([y[: system.p], system.tangential(y) * units])
 
-    def _grown(self) -> Array | None:
+    def _grown(self) -> Floats | None:
         y = self._newton(np.zeros_like(self.g), 0.0)
         radius, step = 0.0, _FIRST
         for _ in range(_RADII):
@@ -102,7 +100,7 @@ class Isotropic:
                 y, radius, step = found, further, 1.5 * step
         return y if radius >= 1.0 else None
 
-    def _newton(self, y: Array, radius: float) -> Array | None:
+    def _newton(self, y: Floats, radius: float) -> Floats | None:
         """A solution for discs |tau| <= radius lambda_n from a point near it, (3 p,)."""
         H, J = self._natural(y, radius)
         size, best, waited = self._merit(H), np.inf, 0
@@ -131,10 +129,10 @@ class Isotropic:
             size = self._merit(H)
         return y if size <= _SOLVED else None
 
-    def _merit(self, H: Array) -> float:
+    def _merit(self, H: Floats) -> float:
         return float(np.linalg.norm(H / self.unit))
 
-    def _natural(self, y: Array, radius: float) -> tuple[Array, Array]:
+    def _natural(self, y: Floats, radius: float) -> tuple[Floats, Floats]:
         """The natural map y - P(y + rho w), with discs as large as y + rho w has lambda_n, and its Jacobian."""
         m = len(y)
         z, dz = y + self.rho * (self.g - self.S @ y), np.eye(m) - self.rho[:, None] * self.S

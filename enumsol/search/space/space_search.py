@@ -9,21 +9,11 @@ import numpy as np
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.model.sectors import DEEPEST, RUN, SECTORS, around, direction, end_number, is_sector, level_of, nearest
 from enumsol.model.statuses import CONTACT, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.proof import space_records
 from enumsol.proof.records import EnclosureRecord, Limits, NoRoot, RegularRoot, UndecidedRecord
-from enumsol.proof.space_records import (
-    LEAVES,
-    BoxedRoot,
-    DeclaredProductForm,
-    DeclaredSlipForm,
-    EnclosedByProducts,
-    ExcludedBySlipForm,
-    ExcludedInSpace,
-    MissedByProducts,
-    OnlyRoot,
-)
-from enumsol.relaxation.engine import PRUNE_MARGIN
+from enumsol.relaxation.engine import PRUNE_MARGIN, Relaxation
 from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
-from enumsol.search.certifiers.protocol import WIDEN, Certified, RecordingCertifier, Refine, UndecidedPart
+from enumsol.search.certifiers.protocol import WIDEN, Bound, Certified, RecordingCertifier, Refine, UndecidedPart
 from enumsol.search.resume import RecordedBound
 from enumsol.search.space.known_boxes import KnownBoxes
 from enumsol.search.space.product_search import Branched, Enclosed, Missed
@@ -37,18 +27,13 @@ from enumsol.trusted.space.turning import turned_by
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from numpy.typing import NDArray
-
     from enumsol.condensation.space_condensed import EnclosedSpace
-    from enumsol.proof.compressed_parts import Recorder
-    from enumsol.relaxation.engine import Relaxation
-    from enumsol.search.certifiers.protocol import Bound
+    from enumsol.proof.writer import Recorder
     from enumsol.search.fathoming_in_contact import LoneProposal
-    from enumsol.selections.solution import Codes
+    from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.space.boxed_solution import BoxedSolution
     from enumsol.trusted.space.space_uniqueness import LooseSolution
 
-    Array = NDArray[np.float64]
 
 #: Forces that are known no better than this, relative to the largest one, are left to the tree.
 _PLACED = 1e-3
@@ -109,7 +94,7 @@ class SpaceReader:
         Balls for its system, by which forms are proven.
     """
 
-    kinds = LEAVES
+    kinds = space_records.LEAVES
 
     def __init__(self, engine: SpaceEngine, enclosed: EnclosedSpace) -> None:
         self._engine, self._enclosed = engine, enclosed
@@ -121,11 +106,11 @@ class SpaceReader:
         """Take note of a form; ValueError where the record makes no sense."""
         system = self._engine.system
         limits = Limits((UNDECIDED,) * system.p, components=len(system.g))
-        if len(record) in DeclaredProductForm.sizes:
-            said = DeclaredProductForm.read(record, limits)
+        if len(record) in space_records.DeclaredProductForm.sizes:
+            said = space_records.DeclaredProductForm.read(record, limits)
             self._ellipsoid = Ellipsoid.of(self._enclosed, said.codes, said.centre / system.unit, said.numbers)
             return
-        numbers = DeclaredSlipForm.read(record, limits).numbers
+        numbers = space_records.DeclaredSlipForm.read(record, limits).numbers
         # parts of one search declare the same form
         if self._form is None or not np.array_equal(self._form.numbers, numbers):
             self._form = SlipForm.of(self._enclosed, numbers)
@@ -143,15 +128,17 @@ class SpaceReader:
     def bound(self, codes: Codes, record: list[Any]) -> Bound:
         """What is said to exclude a partial assignment; ValueError where the record makes no sense."""
         engine, p = self._engine, len(codes)
-        if record[0] == MissedByProducts.kind:
-            MissedByProducts.read(record, Limits(codes))
+        if record[0] == space_records.MissedByProducts.kind:
+            space_records.MissedByProducts.read(record, Limits(codes))
             if self._ellipsoid is None:
                 raise ValueError("there is no ellipsoid")
             return RecordedBound(np.zeros(0, dtype=np.intp), np.zeros(0), self._ellipsoid)
-        by_form = record[0] == ExcludedBySlipForm.kind
+        by_form = record[0] == space_records.ExcludedBySlipForm.kind
         if by_form and self._form is None:
             raise ValueError("its form was not declared")
-        said = (ExcludedBySlipForm if by_form else ExcludedInSpace).read(record, Limits(codes))
+        said = (space_records.ExcludedBySlipForm if by_form else space_records.ExcludedInSpace).read(
+            record, Limits(codes)
+        )
         rows = said.rows
         for row in rows:
             sector_row_terms(row, engine.system.tau, len(engine.system.g))  # there is such a row
@@ -201,8 +188,8 @@ class SpaceCertifier(RecordingCertifier):
             return False
         if form is not None and form is not self._form:
             self._form = form
-            self.recorder.write(DeclaredSlipForm(form.numbers).write())
-        self._leaf((ExcludedInSpace if form is None else ExcludedBySlipForm)(rows, values))
+            self.recorder.write(space_records.DeclaredSlipForm(form.numbers).write())
+        self._leaf((space_records.ExcludedInSpace if form is None else space_records.ExcludedBySlipForm)(rows, values))
         return True
 
     def add(self, part: Certified) -> None:
@@ -222,7 +209,7 @@ class SpaceCertifier(RecordingCertifier):
             self._leaf(NoRoot())
         elif isinstance(answer, Open):
             if (boxed := self._boxed(answer)) is not None:
-                return self._in_box(codes, boxed, BoxedRoot)
+                return self._in_box(codes, boxed, space_records.BoxedRoot)
             if answer.node is not None and level_of(codes[answer.node] - SECTORS) < DEEPEST:
                 return Refine(answer.node)
             reason = answer.cause.value if answer.mode is None else f"{answer.cause.value} (rigid mode {answer.mode})"
@@ -234,7 +221,7 @@ class SpaceCertifier(RecordingCertifier):
             answer = self._verified[codes] = self._placed(codes, answer)
         return answer
 
-    def _in_box(self, codes: Codes, found: BoxedSolution, kind: type[BoxedRoot]) -> BoxedSolution:
+    def _in_box(self, codes: Codes, found: BoxedSolution, kind: type[space_records.BoxedRoot]) -> BoxedSolution:
         """The solution of a box, and its leaf written."""
         self._verified[codes], unit = found, self.enclosed.unit
         centre, radius, rho = found.box.numbers
@@ -246,7 +233,7 @@ class SpaceCertifier(RecordingCertifier):
         if not refines(codes, ellipsoid.codes) or not ellipsoid.misses(codes):
             return False
         self._declare(ellipsoid)
-        self._leaf(MissedByProducts())
+        self._leaf(space_records.MissedByProducts())
         return True
 
     def _declare(self, ellipsoid: Ellipsoid) -> None:
@@ -254,7 +241,7 @@ class SpaceCertifier(RecordingCertifier):
         if ellipsoid is not self._ellipsoid:
             self._ellipsoid = ellipsoid
             centre = ellipsoid.frame.centre * self.enclosed.unit
-            self.recorder.write(DeclaredProductForm(ellipsoid.codes, centre, ellipsoid.numbers).write())
+            self.recorder.write(space_records.DeclaredProductForm(ellipsoid.codes, centre, ellipsoid.numbers).write())
 
     def fathom(self, codes: Codes, tree: Sequence[Branched | Missed | Enclosed]) -> list[BoxedSolution]:
         """The solutions of boxes in a tree below an assignment that is proven already, which is written.
@@ -275,9 +262,9 @@ class SpaceCertifier(RecordingCertifier):
                 continue
             self._declare(node.ellipsoid)
             if isinstance(node, Enclosed):
-                found.append(self._in_box(codes, node.found, EnclosedByProducts))
+                found.append(self._in_box(codes, node.found, space_records.EnclosedByProducts))
             else:
-                self._leaf(MissedByProducts())
+                self._leaf(space_records.MissedByProducts())
         return found
 
     def _boxed(self, leaf: Open) -> BoxedSolution | None:
@@ -297,7 +284,7 @@ class SpaceCertifier(RecordingCertifier):
         again = settle(self.enclosed, tuple(there)) if turning else None
         return again if isinstance(again, SpaceRoot) else root
 
-    def close(self, numbers: Array, codes: Codes | None, normal: Array) -> list[SpaceRoot | OnlySolution] | None:
+    def close(self, numbers: Floats, codes: Codes | None, normal: Floats) -> list[SpaceRoot | OnlySolution] | None:
         """The only solution of the whole problem, as a list, and its leaf written; None if that is not proven.
 
         Parameters
@@ -318,10 +305,10 @@ class SpaceCertifier(RecordingCertifier):
             return None
         self._verified[codes or (UNDECIDED,) * len(normal)] = found
         ball = self._ball(found)
-        self._leaf(OnlyRoot(numbers, codes or (), ball.mid, ball))
+        self._leaf(space_records.OnlyRoot(numbers, codes or (), ball.mid, ball))
         return [found]
 
-    def alone(self, codes: Codes, numbers: Array, leaf: Codes) -> list[SpaceRoot] | None:
+    def alone(self, codes: Codes, numbers: Floats, leaf: Codes) -> list[SpaceRoot] | None:
         """The root of a leaf, if no other solution has the statuses of an assignment, and that record written; or None.
 
         Parameters
@@ -334,7 +321,7 @@ class SpaceCertifier(RecordingCertifier):
         if found is None:
             return None
         ball = self._ball(found)
-        self._leaf(OnlyRoot(numbers, leaf, ball.mid, ball))
+        self._leaf(space_records.OnlyRoot(numbers, leaf, ball.mid, ball))
         found = self._verified[leaf] = self._placed(leaf, found)
         return [found]
 

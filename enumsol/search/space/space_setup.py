@@ -7,31 +7,22 @@ from fractions import Fraction
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, cast
 
-import numpy as np
-
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
-from enumsol.proof.writer import point_header, unit_exponents
+from enumsol.proof.writer import Recorder, point_header, unit_exponents
 from enumsol.relaxation.space_relaxation import SpaceEngine
-from enumsol.search.certifiers.protocol import Unrecorded
+from enumsol.search.certifiers.protocol import Certifier, Unrecorded
 from enumsol.search.setup import SearchSetup
-from enumsol.search.space.space_fathoming import SpaceCloser
+from enumsol.search.space.space_fathoming import SpaceCloser, SpaceClosing
 from enumsol.search.space.space_forms import SpaceForms
 from enumsol.search.space.space_search import SpaceCertifier, SpaceReader, SpaceSplitting
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from numpy.typing import NDArray
-
     from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.proof.compressed_parts import Recorder
-    from enumsol.search.certifiers.protocol import Certifier
     from enumsol.search.resume import Reader
-    from enumsol.search.space.space_fathoming import SpaceClosing
-    from enumsol.support.arguments import Alpha
-
-    Array = NDArray[np.float64]
+    from enumsol.support.array_types import Alpha, Floats
 
 
 class SpaceSolvers(SearchSetup):
@@ -77,7 +68,7 @@ class SpaceSolvers(SearchSetup):
             return floats, str(error)
         return enclosed, None
 
-    def _in_balls(self, alpha: Fraction, force: Array, length: Array) -> EnclosedSpace:
+    def _in_balls(self, alpha: Fraction, force: Floats, length: Floats) -> EnclosedSpace:
         """The problem in balls; NotEnclosedError where that cannot be."""
         return EnclosedSpace.of_problem(self.problem.enclosure, alpha, force, length)
 

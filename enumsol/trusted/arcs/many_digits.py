@@ -23,13 +23,11 @@ from enumsol.support.deadlines import look, tell
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
+    from enumsol.model.problem import ContactProblem
+    from enumsol.support.array_types import Floats, NDArray
 
     Signs = NDArray[np.int8]
-    from enumsol.model.problem import ContactProblem
 
-    Array = NDArray[np.float64]
-    Integers = NDArray[Any]
 
 #: Bits of the arithmetic.
 PRECISION = 320
@@ -174,11 +172,11 @@ def refined_table(problem: ContactProblem) -> list[list[Any]] | None:
 class _Integers:
     """Floats as integers: value * 2^-bits, of any shape."""
 
-    values: Integers
+    values: NDArray[Any]
     bits: int
 
     @classmethod
-    def of(cls, floats: Array) -> _Integers:
+    def of(cls, floats: Floats) -> _Integers:
         whole, exponent = _parts(floats)
         bits = -int(np.min(exponent, where=whole != 0, initial=0))
         return cls(whole.astype(object) << np.where(whole != 0, exponent + bits, 0).astype(object), bits)
@@ -195,12 +193,12 @@ class _Columns:
     units : list of m int
     """
 
-    values: Integers
+    values: NDArray[Any]
     bits: int
     units: list[int]
 
     @classmethod
-    def of(cls, columns: Array, scale: Array) -> _Columns:
+    def of(cls, columns: Floats, scale: Floats) -> _Columns:
         whole, exponent = _parts(columns)
         # a product by a power of two, without the underflow that floats may have
         exponent = exponent + np.frexp(scale)[1][:, None] - 1
@@ -211,15 +209,15 @@ class _Columns:
         return cls(whole.astype(object) << (exponent + bits).astype(object), bits, units.tolist())
 
 
-def _parts(floats: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _parts(floats: Floats) -> tuple[NDArray[Any], NDArray[Any]]:
     """Integers m and e with floats = m 2^e."""
     mantissa, exponent = np.frexp(floats)
     return np.ldexp(mantissa, 53).astype(np.int64), exponent.astype(np.int64) - 53
 
 
 def _refined(
-    problem: ContactProblem, A: sp.csr_array, entries: _Integers, K: _Columns, scale: Array
-) -> tuple[Integers, Integers, int]:
+    problem: ContactProblem, A: sp.csr_array, entries: _Integers, K: _Columns, scale: Floats
+) -> tuple[NDArray[Any], NDArray[Any], int]:
     """X times 2^_SOLUTION_BITS, the exact residual K - A X times 2^bits, and bits."""
     bits = entries.bits + _SOLUTION_BITS + K.bits
     E = K.values << (bits - K.bits)
@@ -245,7 +243,7 @@ def _refined(
     return X, E, bits
 
 
-def _product(A: sp.csr_array, entries: Integers, X: Integers) -> Integers:
+def _product(A: sp.csr_array, entries: NDArray[Any], X: NDArray[Any]) -> NDArray[Any]:
     """A X in integers; every row of A has an entry."""
     parts = []
     for start in range(0, A.shape[0], _ROWS):

@@ -11,22 +11,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, upper_sum
-from enumsol.trusted.arcs.over_parts import expansions
+from enumsol.trusted.arcs.over_parts import Expansion, expansions
 from enumsol.trusted.arcs.series import bernstein_values
-from enumsol.trusted.piece_form import definite
+from enumsol.trusted.over_interval import PieceNumbers, definite
 from enumsol.trusted.selection import signed
 from enumsol.trusted.status_rows import OPEN
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
-    from enumsol.trusted.arcs.over_parts import Expansion
+    from enumsol.support.array_types import Floats, Indices
     from enumsol.trusted.arcs.selection_balls import ArcSelection
-    from enumsol.trusted.piece_form import PieceNumbers
 
-    Array = NDArray[np.float64]
     Span = tuple[ArcSelection, float, float]
 
 #: How often an interval of alpha is halved, and how many parts are expanded together.
@@ -110,12 +106,12 @@ class _Along:
         self.hopeless = not all(definite(form, margin) for form in forms)
         return not self.hopeless and all(definite(form - taken, margin) for form in forms)
 
-    def _affine(self, constant: Array, slope: Array, tau: float) -> Ball:
+    def _affine(self, constant: Floats, slope: Floats, tau: float) -> Ball:
         """constant + alpha slope at the alpha of a tau."""
         middle, turn = self._linear(constant, slope)
         return middle + turn * Ball.exact(np.full(1, tau))
 
-    def _slopes(self, friction: Sequence[Ball], size: Array) -> tuple[Ball, Ball, Array] | None:
+    def _slopes(self, friction: Sequence[Ball], size: Floats) -> tuple[Ball, Ball, Floats] | None:
         """theta of all nodes at both ends, affine between them, and by how much it may be off there.
 
         None where no theta is known that serves the solution.
@@ -150,7 +146,7 @@ class _Along:
                 theta.mid[opened], theta.rad[opened] = sides * F.mid[opened], np.abs(sides) * F.rad[opened]
         return (first, last, off) if np.all(np.isfinite(off)) else None
 
-    def _sides(self, opened: NDArray[np.intp], size: Array) -> Array | None:
+    def _sides(self, opened: Indices, size: Floats) -> Floats | None:
         """theta / F of open nodes, 0 where the gap allows that, else the sign of w_t; None where neither is proven."""
         numbers = self._numbers
         low, high = _between(self._slips(opened), self._ends)
@@ -163,7 +159,7 @@ class _Along:
         sides = np.where(still, 0.0, sides)
         return sides if np.all(np.isfinite(sides)) else None
 
-    def _slips(self, nodes: NDArray[np.intp]) -> Ball:
+    def _slips(self, nodes: Indices) -> Ball:
         """t w_t of some nodes: t g - S (t lambda)."""
         system, rows, p, series = self._system, self._rows, self._system.p, self._series
         length = self._t.mid.shape[1] + 1
@@ -181,13 +177,13 @@ class _Along:
         t = Ball(np.repeat(self._t.mid, len(nodes), axis=0), np.repeat(self._t.rad, len(nodes), axis=0))
         return _turned(g0 + g1 * middle, g1 * radius, t) - system.S[p + nodes] @ force
 
-    def _linear(self, constant: Array, slope: Array) -> tuple[Ball, Ball]:
+    def _linear(self, constant: Floats, slope: Floats) -> tuple[Ball, Ball]:
         """constant + alpha slope by powers of tau."""
         middle, radius = (Ball.exact(np.full(1, value)) for value in (self._series.middle, self._series.radius))
         return Ball.exact(constant) + Ball.exact(slope) * middle, Ball.exact(slope) * radius
 
 
-def _between(polynomials: Ball, ends: tuple[float, float]) -> tuple[Array, Array]:
+def _between(polynomials: Ball, ends: tuple[float, float]) -> tuple[Floats, Floats]:
     """Bounds of polynomials over a part of [-1, 1]."""
     low, high = (np.array([end]) for end in ends)
     values = bernstein_values(polynomials.mid[None], low, high)[0]
@@ -197,7 +193,7 @@ def _between(polynomials: Ball, ends: tuple[float, float]) -> tuple[Array, Array
     return least - error - 2 * UNIT * (np.abs(least) + error), largest + error + 2 * UNIT * (np.abs(largest) + error)
 
 
-def _values(coefficients: Array, tau: float) -> Array:
+def _values(coefficients: Floats, tau: float) -> Floats:
     """Polynomials at one tau; no claim rests on them."""
     return np.asarray(coefficients @ tau ** np.arange(coefficients.shape[1]))
 

@@ -22,11 +22,9 @@ from enumsol.trusted.arcs.series import Series, bernstein_values, expand, signs_
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
+    from enumsol.support.array_types import Floats, Indices, NDArray
     from enumsol.trusted.arcs.selection_balls import ArcSelection
 
-    Array = NDArray[np.float64]
     Signs = NDArray[np.int8]
 
 #: Imaginary parts (tau) of what counts as a zero; coefficients that do not matter for it, by the polynomial's size and
@@ -73,7 +71,7 @@ class OverInterval:
         return self.regular and bool(np.all(self.conditions > 0))
 
     @property
-    def doubtful(self) -> NDArray[np.intp]:
+    def doubtful(self) -> Indices:
         """Numbers of the conditions whose signs are not known."""
         return np.flatnonzero(self.conditions == 0)
 
@@ -254,7 +252,7 @@ def _over(asked: Sequence[tuple[Expansion, float, float]]) -> list[OverInterval]
     return found
 
 
-def _stacked(parts: Sequence[Array], fill: float = 0.0) -> Array:
+def _stacked(parts: Sequence[Floats], fill: float = 0.0) -> Floats:
     """Arrays of different lengths in one."""
     found = np.full((len(parts), max(map(len, parts)), *parts[0].shape[1:]), fill)
     for k, part in enumerate(parts):
@@ -262,7 +260,7 @@ def _stacked(parts: Sequence[Array], fill: float = 0.0) -> Array:
     return found
 
 
-def _companion(polynomial: Array) -> Array:
+def _companion(polynomial: Floats) -> Floats:
     """A matrix whose eigenvalues are the zeros."""
     degree = len(polynomial) - 1
     found = np.eye(degree, k=-1)

@@ -36,9 +36,8 @@ from enumsol.trusted.selection import Selection
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from enumsol.model.problem import ContactProblem
+    from enumsol.support.array_types import NDArray
 
     Signs = NDArray[np.int8]
     Number = float | Fraction

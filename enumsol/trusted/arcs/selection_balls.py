@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, Ball, solution
-from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
+from enumsol.support.array_types import Floats
 from enumsol.trusted.selection import Selection
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from enumsol.condensation.enclosure import CondensedEnclosure
-
-    Array = NDArray[np.float64]
 
 #: Smallest quotient of units, far above underflow.
 _LEAST_PAIR = 2.0**-1000
@@ -39,23 +31,23 @@ class ArcSystem:
     S: Ball
     g0: Ball
     g1: Ball
-    F0: Array
-    F1: Array
+    F0: Floats
+    F1: Floats
 
     @classmethod
-    def of(cls, enclosure: CondensedEnclosure, force: Array, length: Array, side: float = 0.0) -> ArcSystem:
+    def of(cls, enclosure: CondensedEnclosure, force: Floats, length: Floats, side: float = 0.0) -> ArcSystem:
         """An enclosed problem; with ``side`` 1 or -1 for the constant load +-g1 (see trusted.over_interval)."""
         with np.errstate(over="ignore", invalid="ignore"):  # what overflows proves nothing
             return cls._of(enclosure, force, length, side)
 
     @classmethod
-    def _of(cls, enclosure: CondensedEnclosure, force: Array, length: Array, side: float) -> ArcSystem:
+    def _of(cls, enclosure: CondensedEnclosure, force: Floats, length: Floats, side: float) -> ArcSystem:
         pair = force[:, None] / length[None, :]
         if not np.all(pair >= _LEAST_PAIR):
             raise NotEnclosedError("the units of the arcs underflow float64; expected data in other units")
         F0, F1 = (np.asarray(part, dtype=np.float64) for part in enclosure.problem.friction)
 
-        def in_units(value: Array, radius: Array) -> Ball:
+        def in_units(value: Floats, radius: Floats) -> Ball:
             return Ball(value / length, radius / length + TINY)
 
         g0, g1 = in_units(enclosure.g0, enclosure.g0_rad), in_units(enclosure.g1, enclosure.g1_rad)
@@ -116,7 +108,7 @@ class ArcSelection:
         return int(value > radius) - int(value < -radius)
 
     @cached_property
-    def forms(self) -> tuple[Array, Array, Array, Array]:
+    def forms(self) -> tuple[Floats, Floats, Floats, Floats]:
         """H0, H1 and their radii: H0 + alpha H1 are rows of coefficients for (y, t), [M, -g_R] and the conditions."""
         system, rows, parts = self.system, self.rows, []
         for g, F, unit in ((system.g0, system.F0, 1), (system.g1, system.F1, 0)):

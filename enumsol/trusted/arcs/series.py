@@ -18,13 +18,11 @@ from enumsol.arithmetic.balls import SAFE, TINY, Ball, gamma, upper_sum
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from numpy.typing import NDArray
-
+    from enumsol.support.array_types import Floats, NDArray
     from enumsol.trusted.arcs.selection_balls import ArcSelection
 
     Asked = tuple[ArcSelection, float, float]
 
-    Array = NDArray[np.float64]
     Signs = NDArray[np.int8]
 
 
@@ -61,9 +59,9 @@ class Series:
 
     middle: float
     radius: float
-    coefficients: Array
-    error: Array
-    slope_error: Array
+    coefficients: Floats
+    error: Floats
+    slope_error: Floats
     truncated: bool
     bordered: Ball
 
@@ -114,7 +112,7 @@ class _Stack:
         # bounds of rounding errors below are themselves rounded, in two products and a few operations
         self._safe = (1.0 + gamma(2 * self._k + 8)) * SAFE
 
-    def _forms(self) -> tuple[Array, Array, Array, Array]:
+    def _forms(self) -> tuple[Floats, Floats, Floats, Floats]:
         """H and H1 with radii; the last row of N is left empty."""
         k, most = self._k, max(m for _, m in self._sizes)
         found = np.zeros((4, len(self._asked), k + most + 1, k))
@@ -132,7 +130,7 @@ class _Stack:
         H1_rad = radius * H1_rad + gamma(4) * np.abs(radius * H1)
         return H0 + moved, radius * H1, H0_rad * SAFE + TINY, H1_rad * SAFE + TINY
 
-    def _directions(self) -> Array:
+    def _directions(self) -> Floats:
         """The last rows of N: z at the middle, of length one, so that N is regular even where det M vanishes."""
         M, g = self._H[:, : self._k - 1, :-1], -self._H[:, : self._k - 1, -1:]
         # with infinite entries lapack may not come back
@@ -189,7 +187,7 @@ class _Stack:
             for b, good in enumerate(np.isfinite(growth).tolist())
         ]
 
-    def _one(self, b: int, sums: Array, values: Array, slopes: Array, *, truncated: bool) -> Series | None:
+    def _one(self, b: int, sums: Floats, values: Floats, slopes: Floats, *, truncated: bool) -> Series | None:
         """One of them, without what was filled up."""
         size, m = self._sizes[b]
         rows, kept = [*range(m), -1], [*range(size), self._k - 1]
@@ -206,7 +204,7 @@ class _Stack:
             bordered=Ball(self._H[b][inner], self._H_rad[b][inner]),
         )
 
-    def _guess(self, z: Array, Q: Array) -> tuple[Array, list[Array]]:
+    def _guess(self, z: Floats, Q: Floats) -> tuple[Floats, list[Floats]]:
         """The series of z, z_k = -Q z_(k-1), and powers Q, Q^2, Q^4, ...; no claim rests on its accuracy."""
         Z, powers = np.concatenate([z, -Q @ z], axis=2), [Q]
         while Z.shape[2] < self._terms:
@@ -215,11 +213,11 @@ class _Stack:
             Z = np.concatenate([Z, powers[-1] @ Z], axis=2)
         return Z, powers
 
-    def _norm(self, product: Array, u: Array) -> Array:
+    def _norm(self, product: Floats, u: Floats) -> Floats:
         """Bound of a matrix, from the product of its absolute values and u."""
         return np.asarray(np.max((product[:, :, 0] * self._safe + TINY) / u[:, :, 0], axis=1) * SAFE)
 
-    def _growth(self, powers: list[Array], wrong: Array, u: Array) -> Array:
+    def _growth(self, powers: list[Floats], wrong: Floats, u: Floats) -> Floats:
         """Bounds of (R N)^{-1} for |tau| <= 1, where R N = I + tau Q - E and |E| <= wrong; nan where none is found.
 
         With X = -tau Q it is (I - X)^{-1} = (I + X)(I + X^2)(I + X^4) ... (I - X^q)^{-1}, q a power of two.
@@ -245,14 +243,14 @@ class _Stack:
         return np.asarray(np.where(found * self._errors < _LARGEST_GROWTH, found, np.nan))
 
 
-def _last_row(k: int) -> Array:
+def _last_row(k: int) -> Floats:
     """The last row of N with which t = 1."""
     found = np.zeros(k)
     found[-1] = 1.0
     return found
 
 
-def _each(function: Callable[..., Array], *stacks: Array) -> Array:
+def _each(function: Callable[..., Floats], *stacks: Floats) -> Floats:
     """A function of numpy.linalg of stacks of matrices; nan for those that are singular."""
     try:
         return np.asarray(function(*stacks))
@@ -262,7 +260,7 @@ def _each(function: Callable[..., Array], *stacks: Array) -> Array:
         return np.concatenate([_each(function, *(s[b : b + 1] for s in stacks)) for b in range(len(stacks[0]))])
 
 
-def _shifted(constant: Array, slope: Array) -> Array:
+def _shifted(constant: Floats, slope: Floats) -> Floats:
     """Coefficients of a + tau b, given those of a and b by powers of tau."""
     found = np.zeros((*constant.shape[:2], constant.shape[2] + 1))
     found[:, :, :-1] = constant
@@ -270,7 +268,7 @@ def _shifted(constant: Array, slope: Array) -> Array:
     return found
 
 
-def bernstein_values(coefficients: Array, low: Array, high: Array) -> Array:
+def bernstein_values(coefficients: Floats, low: Floats, high: Floats) -> Floats:
     """Bernstein coefficients (c, m, d + 1) of polynomials (c, m, d + 1), of every c over its own part.
 
     The first and the last are the values at ``low`` and ``high``. Rounding errors are at most gamma_(8d+8) times the
@@ -279,13 +277,13 @@ def bernstein_values(coefficients: Array, low: Array, high: Array) -> Array:
     return np.asarray(coefficients @ to_bernstein(coefficients.shape[2] - 1, low, high))
 
 
-def signs_beyond(values: Array, error: Array) -> Signs:
+def signs_beyond(values: Floats, error: Floats) -> Signs:
     """1 or -1 where all values along the last axis are larger than an error, or smaller than minus it; else 0."""
     positive, negative = np.min(values, axis=-1) > error, np.max(values, axis=-1) < -error
     return np.asarray(positive.astype(np.int8) - negative.astype(np.int8))
 
 
-def to_bernstein(degree: int, low: Array, high: Array) -> Array:
+def to_bernstein(degree: int, low: Floats, high: Floats) -> Floats:
     """Bernstein coefficients over parts [low, high] of 1, tau, ..., a row each: (c, d + 1, d + 1).
 
     That of number j of tau^k is the mean of the products of k of the numbers low, .., low, high, .., high, of which j
@@ -304,7 +302,7 @@ def to_bernstein(degree: int, low: Array, high: Array) -> Array:
 
 
 @cache
-def _weights(degree: int) -> Array:
+def _weights(degree: int) -> Floats:
     """Shares of high^i low^(k - i) in Bernstein coefficient j of tau^k, by [k, j, i]."""
     n = range(degree + 1)
     return np.array(

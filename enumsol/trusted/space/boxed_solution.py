@@ -19,12 +19,10 @@ from enumsol.trusted.space.space_uniqueness import LARGEST_UNIT, LooseSolution
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from numpy.typing import NDArray
-
     from enumsol.condensation.space_condensed import EnclosedSpace
+    from enumsol.support.array_types import Floats, Indices
     from enumsol.trusted.space.leaves import SpaceRoot
 
-    Array = NDArray[np.float64]
 
 #: Steps towards the zero of a box, and halvings of a box that may hold too much.
 _STEPS, _HALVINGS = 8, 24
@@ -46,18 +44,18 @@ class Box:
         The displacements w_c of the centre.
     """
 
-    centre: Array
-    radius: Array
-    rho: Array
+    centre: Floats
+    radius: Floats
+    rho: Floats
     w: Ball
 
     @classmethod
-    def of(cls, system: EnclosedSpace, centre: Array, radius: Array, rho: Array) -> Box:
+    def of(cls, system: EnclosedSpace, centre: Floats, radius: Floats, rho: Floats) -> Box:
         """The box of one problem."""
         return cls(centre, radius, rho, _displacements(system, Ball.exact(centre)))
 
     @property
-    def numbers(self) -> tuple[Array, Array, Array]:
+    def numbers(self) -> tuple[Floats, Floats, Floats]:
         """Centre, radius and rho."""
         return self.centre, self.radius, self.rho
 
@@ -88,7 +86,7 @@ def solution_in_box(system: EnclosedSpace, box: Box, errors: float = 1.0) -> Box
         return None if found is None else found.solution(box, errors)
 
 
-def box_around(system: EnclosedSpace, y: Array) -> Box | None:
+def box_around(system: EnclosedSpace, y: Floats) -> Box | None:
     """A box, as large as is found, that seems to hold one solution, near scaled forces y; no claim."""
     if not _moderate(system) or not np.all(np.isfinite(y)):
         return None
@@ -114,7 +112,7 @@ def _displacements(system: EnclosedSpace, y: Ball) -> Ball:
     return g - (S @ y[:, None])[:, 0]
 
 
-def proposed_rho(system: EnclosedSpace) -> list[Array]:
+def proposed_rho(system: EnclosedSpace) -> list[Floats]:
     """rho, one for lambda_n and one for tau of every node, scaled: between 1 / S_ii and the stiffness S^-1_ii."""
     soft = system.unit**2 / np.diagonal(system.S)
     try:
@@ -180,13 +178,13 @@ class _NaturalMap:
     system: EnclosedSpace
     S: Ball
     g: Ball
-    rho: Array
+    rho: Floats
     T: Ball
     free: Ball
     discs: Discs
 
     @classmethod
-    def of(cls, system: EnclosedSpace, rho: Array) -> _NaturalMap | None:
+    def of(cls, system: EnclosedSpace, rho: Floats) -> _NaturalMap | None:
         """With these rho, scaled; None where T is not enclosed."""
         # powers of two: what is rounded is less than TINY
         pair = np.outer(system.unit, system.unit)
@@ -218,7 +216,7 @@ class _NaturalMap:
         y.mid[gone] = y.rad[gone] = 0.0
         return BoxedSolution.of(self.system, y, smaller(w, _displacements(self.system, y)), index, box=box)
 
-    def proposed(self, y: Array) -> Box | None:
+    def proposed(self, y: Floats) -> Box | None:
         """A large box that holds one solution, around a point that is as near to it as floats can be."""
         unit = self.system.unit
         centre = self._zero(y * unit)
@@ -231,7 +229,7 @@ class _NaturalMap:
             radius *= 0.5
         return None
 
-    def _zero(self, point: Array) -> Array | None:
+    def _zero(self, point: Floats) -> Floats | None:
         """A zero of the natural map near a point, by Newton's method."""
         for _ in range(_STEPS):
             step = self._step(point, np.zeros(len(point)))
@@ -240,7 +238,7 @@ class _NaturalMap:
             point = point + self.T.mid @ step.move.mid
         return point
 
-    def _mapped(self, centre: Array, radius: Array, errors: float) -> tuple[Step, Array] | None:
+    def _mapped(self, centre: Floats, radius: Floats, errors: float) -> tuple[Step, Floats] | None:
         """The step around a box, and a reach of zeta, with which it maps a set that holds the box into its interior."""
         reach = radius
         for _ in range(_WIDENINGS):
@@ -254,7 +252,7 @@ class _NaturalMap:
             reach = np.maximum(reach, needed) * (1.0 + MARGIN)
         return None
 
-    def _closer(self, centre: Array) -> tuple[Ball, Ball] | None:
+    def _closer(self, centre: Floats) -> tuple[Ball, Ball] | None:
         """Bounds of y and w of a solution near a point, as narrow as floats can give; None where none is proven."""
         point = self._zero(centre)
         near = None if point is None else self._step(point, np.zeros(len(centre)))
@@ -268,18 +266,18 @@ class _NaturalMap:
             radius *= 4.0
         return None
 
-    def _placed(self, centre: Array, reach: Array) -> tuple[Ball, Ball]:
+    def _placed(self, centre: Floats, reach: Floats) -> tuple[Ball, Ball]:
         """y and w where |zeta| <= reach: w = w_c - S T zeta, and rho S T = I - T."""
         y, w = self._forces_and_displacements(centre)
         moved = Ball.exact(np.eye(len(centre))) - self.T
         slips = upper_sum(moved.size * reach, axis=1) / self.rho * SAFE
         return Ball(y.mid, upper_sum(self.T.size * reach, axis=1) * SAFE), Ball(w.mid, (w.rad + slips) * SAFE)
 
-    def _forces_and_displacements(self, centre: Array) -> tuple[Ball, Ball]:
+    def _forces_and_displacements(self, centre: Floats) -> tuple[Ball, Ball]:
         point = Ball.exact(centre)
         return point, self.g - (self.S @ point[:, None])[:, 0]
 
-    def _surely_open(self, w: Ball) -> NDArray[np.intp]:
+    def _surely_open(self, w: Ball) -> Indices:
         """Places of the forces of nodes that are open at every solution with such displacements."""
         tau = self.discs.tau
         gone = [i for i in range(len(tau)) if w.mid[i] + w.rad[i] < 0]
@@ -287,7 +285,7 @@ class _NaturalMap:
 
     # -- the operator ----------------------------------------------------------------------------------------------
 
-    def _step(self, centre: Array, radius: Array) -> Step | None:
+    def _step(self, centre: Floats, radius: Floats) -> Step | None:
         """Krawczyk's operator for |zeta| <= radius; None where its middle matrix is singular."""
         point, w = self._forces_and_displacements(centre)
         z = point + Ball.exact(self.rho) * w

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from fractions import Fraction
 
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, Ball
-from enumsol.trusted.space.solution_curve import lies_in, only_curve, parameter_in
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from fractions import Fraction
-
-    from enumsol.trusted.space.solution_curve import AlphaProblem, CurveBox, SolutionCurve
+from enumsol.trusted.space.solution_curve import (
+    AlphaProblem,
+    CurveBox,
+    SolutionCurve,
+    lies_in,
+    only_curve,
+    parameter_in,
+)
 
 
 @dataclass(frozen=True, eq=False)

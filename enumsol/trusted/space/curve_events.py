@@ -5,24 +5,16 @@ Which way alpha goes, where it turns back, and where a node changes its status.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, solution, upper_norm
+from enumsol.support.array_types import Floats
 from enumsol.trusted.space.natural_map import Directions, upper_product
 from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, STICK
-from enumsol.trusted.space.solution_curve import SLIP
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from numpy.typing import NDArray
-
-    from enumsol.trusted.space.solution_curve import AlphaProblem, SolutionCurve
-
-    Array = NDArray[np.float64]
+from enumsol.trusted.space.solution_curve import SLIP, AlphaProblem, SolutionCurve
 
 #: Pairs of statuses between which one condition decides: the sign of |z_t| - F z_n, or of z_n.
 _BY_FRICTION = frozenset({STICK, SLIP})
@@ -44,7 +36,7 @@ class CurveMotion:
         curve is a point.
     """
 
-    def __init__(self, problem: AlphaProblem, curve: SolutionCurve, border: Array | None = None) -> None:
+    def __init__(self, problem: AlphaProblem, curve: SolutionCurve, border: Floats | None = None) -> None:
         self.problem = problem
         unit, box = np.append(problem.force, 1.0), curve.box
         self._border, steps = (box.border if border is None else border) * unit, np.ones(3 * problem.p)

@@ -33,11 +33,9 @@ from enumsol.trusted.space.turning import LIBRARY, Box, Turning, turned_by
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from numpy.typing import NDArray
-
     from enumsol.condensation.space_condensed import EnclosedSpace
+    from enumsol.support.array_types import Floats, Mask
 
-    Array = NDArray[np.float64]
 
 #: A sector's box of directions is this share of its width wider on both sides: a root on an end lies inside two boxes.
 _WIDENED = 0.125
@@ -55,7 +53,7 @@ _DEPENDENT = 1e-9
 _NEGLIGIBLE, _SINGULAR = 2.0**-44, 2.0**-36
 
 
-def _cut(angle: Array, radius: Array, reach: Array, move: Ball) -> tuple[Array, Array]:
+def _cut(angle: Floats, radius: Floats, reach: Floats, move: Ball) -> tuple[Floats, Floats]:
     """The part of a box of angles that lies within ``move`` of its centre."""
     low, high = np.maximum(move.mid - move.rad, -radius), np.minimum(move.mid + move.rad, radius)
     middle = 0.5 * (low + high)
@@ -86,10 +84,10 @@ class SpaceRoot:
 
     y: Ball
     w: Ball
-    centre: Array
-    angle: Array
-    angle_rad: Array
-    reach: Array
+    centre: Floats
+    angle: Floats
+    angle_rad: Floats
+    reach: Floats
     index: int
     slack: float
     rigid: Ball | None = None
@@ -127,9 +125,9 @@ class Open:
     node: int | None
     y: Ball | None
     w: Ball | None
-    centre: Array
-    angle: Array
-    angle_rad: Array
+    centre: Floats
+    angle: Floats
+    angle_rad: Floats
     cause: Cause
     mode: int | None = None
 
@@ -212,7 +210,7 @@ class _Leaf:
         rank = int(np.sum(sizes > _DEPENDENT * np.max(np.abs(moved))))
         return sorted(order[rank:].tolist())
 
-    def _boxes(self) -> tuple[Array, Array]:
+    def _boxes(self) -> tuple[Floats, Floats]:
         """A direction in the middle of every sector, and an angle on both sides that covers it."""
         centres, halves = [], []
         for number in self.numbers:
@@ -265,7 +263,7 @@ class _Leaf:
                 rough = True
         return self._left_open(angle, radius, state)
 
-    def _cut_free(self, angle: Array, radius: Array) -> tuple[Array, Array] | None:
+    def _cut_free(self, angle: Floats, radius: Floats) -> tuple[Floats, Floats] | None:
         """The box with the free unknowns that its angles leave; None if there are none.
 
         G and the rows of equilibrium are affine in them: G = G_0 + R s, so that (Y R) s = -Y G_0 with any Y.
@@ -290,7 +288,7 @@ class _Leaf:
         wide = np.maximum(high - middle, middle - low) * SAFE + slack + TINY
         return np.r_[angle[:q], middle], np.r_[radius[:q], np.maximum(wide, 0.0)]
 
-    def _move(self, angle: Array, radius: Array, state: _State, *, rough: bool = False) -> Ball | None:
+    def _move(self, angle: Floats, radius: Floats, state: _State, *, rough: bool = False) -> Ball | None:
         """Krawczyk's operator: a ball of psi - angle for all zeros psi in a box over which the state is known.
 
         ``rough``: only in the directions in which dG/dpsi is surely not singular, so that those of other nodes are cut.
@@ -322,7 +320,7 @@ class _Leaf:
             move = Ball(move.mid, (move.rad + along.size) * SAFE)
         return move
 
-    def _refined(self, angle: Array, radius: Array, reach: Array) -> SpaceRoot | Open | None:
+    def _refined(self, angle: Floats, radius: Floats, reach: Floats) -> SpaceRoot | Open | None:
         """The one zero of a box, enclosed as closely as floats can."""
         for _ in range(_OVER_PIECE if self.piece else _REFINEMENTS):
             if np.any(self._outside(angle, radius)):
@@ -345,7 +343,7 @@ class _Leaf:
             return None
         return self._root(state, angle, radius, reach)
 
-    def _left_open(self, angle: Array, radius: Array, state: _State | None) -> Open:
+    def _left_open(self, angle: Floats, radius: Floats, state: _State | None) -> Open:
         """What is known of a leaf that is not settled."""
         node = None
         # what is proven does not depend on which sector is halved, and whether any is
@@ -362,7 +360,7 @@ class _Leaf:
         box = 0.5 * (low + high), 0.5 * np.abs(high - low) * SAFE + 4 * UNIT
         return Open(node, y, w, self.centre, *box, cause, mode)
 
-    def _free_mode(self, angle: Array) -> int:
+    def _free_mode(self, angle: Floats) -> int:
         """The rigid mode that moves most along what the equations in the middle leave free; no claim."""
         point, q = self._state(angle, np.zeros(len(angle))), len(self.turning)
         if self.free and point is not None and point.J.finite:
@@ -375,7 +373,7 @@ class _Leaf:
         _, _, rows = np.linalg.svd((self.system.balls[0].mid @ E)[self.rows])
         return int(np.argmax(np.abs(rows[-1][-k:])))
 
-    def _cause(self, angle: Array, state: _State | None) -> Cause:
+    def _cause(self, angle: Floats, state: _State | None) -> Cause:
         point = self._state(angle, np.zeros(len(angle)))
         if state is None or point is None:
             return Cause.RIGID if len(self.system.reach) else Cause.EQUATIONS
@@ -385,7 +383,7 @@ class _Leaf:
             return Cause.ROUNDING
         return Cause.DIRECTIONS if len(angle) and nearly_singular(point.J.mid) else Cause.EQUALITY
 
-    def _worth_halving(self, angle: Array, radius: Array, state: _State | None) -> Array:
+    def _worth_halving(self, angle: Floats, radius: Floats, state: _State | None) -> Floats:
         """What is expected of halving each sector; 0 where smaller ones would be left open, too."""
         point = self._state(angle, np.zeros(len(angle)))
         if state is not None and point is not None and np.all(point.y.rad <= _POINT):
@@ -401,12 +399,12 @@ class _Leaf:
         worth = changes if turning is None else np.max(turning.coupling(radius[: len(self.half)]), axis=0)
         return worth if changes[int(np.argmax(worth))] > _SINGULAR else np.zeros_like(worth)
 
-    def _outside(self, angle: Array, radius: Array) -> NDArray[np.bool_]:
+    def _outside(self, angle: Floats, radius: Floats) -> Mask:
         """Which directions are outside of their sectors for certain; what lies there belongs to another leaf."""
         q = len(self.turning)
         return np.abs(angle[:q]) - radius[:q] > self.half * (1.0 + 1e-9)
 
-    def _root(self, state: _State, angle: Array, radius: Array, reach: Array) -> SpaceRoot | Open:
+    def _root(self, state: _State, angle: Floats, radius: Floats, reach: Floats) -> SpaceRoot | Open:
         slack = self._slacks(state.y, state.w, angle, radius)
         turning = self._turning(angle) if np.all(slack > 0) else None
         sign = 0 if turning is None else turning.sign * determinant_sign(state.J)
@@ -423,7 +421,7 @@ class _Leaf:
 
     # -- evaluation over a box -------------------------------------------------------------------------------------
 
-    def _directions(self, angle: Array, radius: Array) -> tuple[Ball, Ball]:
+    def _directions(self, angle: Floats, radius: Floats) -> tuple[Ball, Ball]:
         """d (q, 2) and d' (q, 2) over a box of angles."""
         q = len(self.turning)
         mid_d, mid_turned = turned_by(self.centre, angle[:q])
@@ -433,7 +431,7 @@ class _Leaf:
         d = Ball(mid_d, np.minimum(np.abs(mid_turned) * r + bent, r) * SAFE + LIBRARY)
         return d, Ball(mid_turned, np.minimum(np.abs(mid_d) * r + bent, r) * SAFE + LIBRARY)
 
-    def _turning(self, angle: Array) -> Turning | None:
+    def _turning(self, angle: Floats) -> Turning | None:
         """The linear equations with the directions at these angles in the middle; None if not proven regular there."""
         angle = angle[: len(self.turning)]
         key = angle.tobytes()
@@ -443,7 +441,7 @@ class _Leaf:
             self._last = key, Turning.of(self.system, self.E, at, directions, self.discs, self.free)
         return self._last[1]
 
-    def _state(self, angle: Array, radius: Array, *, still: bool = False) -> _State | None:
+    def _state(self, angle: Floats, radius: Floats, *, still: bool = False) -> _State | None:
         """y, w, G and dG/dpsi over a box; None where the linear system is not proven regular in it.
 
         Over all of a piece of alpha, if there is one, or ``still`` in its middle.
@@ -473,7 +471,7 @@ class _Leaf:
             J = Ball.beside(along, across)
         return _State(box.y, box.w, G, J, box)
 
-    def _bends(self, state: _State, angle: Array, radius: Array) -> Ball:
+    def _bends(self, state: _State, angle: Floats, radius: Floats) -> Ball:
         """Second derivatives of G over a box, (q, q, q)."""
         box, (d, turned), own = state.box, self._directions(angle, radius), np.arange(len(angle))
         (b1, b2), (dv1, dv2), (v1, v2) = (self._slips(part) for part in (box.bends(), box.dw, box.w))
@@ -498,7 +496,7 @@ class _Leaf:
         one, other = (Ball(part.mid * scale, part.rad * scale) for part, scale in pairs)
         return one, other
 
-    def _conditions(self, y: Ball, w: Ball) -> tuple[Array, Array]:
+    def _conditions(self, y: Ball, w: Ball) -> tuple[Floats, Floats]:
         """Conditions that a root has to satisfy but for directions, as midpoints and radii; stick by |tau| in both.
 
         Those of slips and of sticking are in the units of ``slips`` and ``taus`` of FrictionUnits.
@@ -526,7 +524,7 @@ class _Leaf:
             mid, rad = [*mid, *ends.mid], [*rad, *ends.rad]
         return np.array(mid), np.array(rad)
 
-    def _forward(self, w: Ball, angle: Array, radius: Array) -> tuple[Array, Array]:
+    def _forward(self, w: Ball, angle: Floats, radius: Floats) -> tuple[Floats, Floats]:
         """v . d of the nodes in sectors, and v_1 d_1 and v_2 d_2 alone, as midpoints and radii, (3, q) each.
 
         Where G vanishes v = t d: none of the three is negative if t >= 0, and t > 0 if one is positive. A component
@@ -537,13 +535,13 @@ class _Leaf:
         products = (v1 * d[:, 0] + v2 * d[:, 1], w[self.t[:, 0]] * d[:, 0], w[self.t[:, 1]] * d[:, 1])
         return np.array([product.mid for product in products]), np.array([product.rad for product in products])
 
-    def _broken(self, y: Ball, w: Ball, angle: Array, radius: Array) -> bool:
+    def _broken(self, y: Ball, w: Ball, angle: Floats, radius: Floats) -> bool:
         """Whether some condition is broken at every zero of G in the box."""
         mid, rad = self._conditions(y, w)
         forward, uncertain = self._forward(w, angle, radius)
         return bool(np.any(mid < -rad) or np.any(forward < -uncertain))
 
-    def _slacks(self, y: Ball, w: Ball, angle: Array, radius: Array) -> Array:
+    def _slacks(self, y: Ball, w: Ball, angle: Floats, radius: Floats) -> Floats:
         """Lower bounds of the conditions at zeros of G in the box; of directions, numbers of the same signs."""
         mid, rad = self._conditions(y, w)
         forward, uncertain = self._forward(w, angle, radius)

@@ -7,18 +7,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Self
 
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, upper_norm, upper_sum
-
-if TYPE_CHECKING:
-    from typing import Self
-
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+from enumsol.support.array_types import Floats, Indices, Mask
 
 #: What a writer of proofs asks for beyond what a checker does.
 MARGIN = 2.0**-10
@@ -31,8 +25,8 @@ class Corners:
     """Derivatives of P in a box: those in ``core`` plus sum t_k u_k v_k', |t_k| <= 1/2, u_k and v_k columns."""
 
     core: Ball
-    u: Array
-    v: Array
+    u: Floats
+    v: Floats
 
 
 @dataclass(frozen=True)
@@ -51,7 +45,7 @@ class Discs:
         The derivative of F with respect to the last argument; None where there is no such argument.
     """
 
-    tau: NDArray[np.intp]
+    tau: Indices
     F: Ball
     slope: Ball | None = None
 
@@ -122,11 +116,11 @@ class _Blocks:
     paired : (p,) bool array
     """
 
-    mid: Array
-    rad: Array
-    u: Array
-    v: Array
-    paired: NDArray[np.bool_]
+    mid: Floats
+    rad: Floats
+    u: Floats
+    v: Floats
+    paired: Mask
 
     @property
     def middle(self) -> Ball:
@@ -193,11 +187,11 @@ class _Blocks:
     def slide(
         self,
         at: Directions,
-        ratios: tuple[Array, Array],
-        factors: tuple[Array, Array],
-        sliding: NDArray[np.bool_],
-        sticks: NDArray[np.bool_],
-        loose: NDArray[np.bool_],
+        ratios: tuple[Floats, Floats],
+        factors: tuple[Floats, Floats],
+        sliding: Mask,
+        sticks: Mask,
+        loose: Mask,
     ) -> None:
         """Fill in nodes whose tau has a direction and that slip at some points of the box.
 
@@ -251,12 +245,12 @@ class Directions:
         1 - e e' of the middle, and how far any other one is from it up to rounding; so for e e'.
     """
 
-    least: Array
-    most: Array
-    e: Array
-    turn: Array
-    across: Array
-    bent: Array
+    least: Floats
+    most: Floats
+    e: Floats
+    turn: Floats
+    across: Floats
+    bent: Floats
 
     @classmethod
     def of(cls, x: Ball) -> Directions:
@@ -282,7 +276,7 @@ class Directions:
         return cls(least, most, e, turn, side[:, :, None] * side[:, None, :], bent)
 
 
-def middle_inverse(M: Ball) -> tuple[Array, Array] | None:
+def middle_inverse(M: Ball) -> tuple[Floats, Floats] | None:
     """Y, about the inverse of the middle of M, and a bound of |I - Y M|; None where that middle is singular."""
     try:
         Y = np.asarray(np.linalg.inv(M.mid), dtype=np.float64)
@@ -316,20 +310,20 @@ class Step:
     """
 
     move: Ball
-    E: Array
+    E: Floats
     G: Ball
     V: Ball
-    Y: Array
-    drift: Array
-    first: Array
-    along: Array
+    Y: Floats
+    drift: Floats
+    first: Floats
+    along: Floats
 
     @cached_property
-    def slopes(self) -> Array:
+    def slopes(self) -> Floats:
         """Bounds of V G / 2."""
         return np.asarray(0.5 * (self.V @ Ball.exact(self.G.mid)).size)
 
-    def shares(self, radius: Array, h: float = 0.0, moved: float = 1.0) -> Array | None:
+    def shares(self, radius: Floats, h: float = 0.0, moved: float = 1.0) -> Floats | None:
         """s > 0 for which what is called xi below is less; no claim. None where there is none."""
         more = 1.0 + 4.0 * MARGIN
         asked = more * (0.5 * self.V.size @ radius + self.along * h + moved * np.abs(self.first))
@@ -339,7 +333,7 @@ class Step:
             return None
         return np.asarray(found + TINY) if np.all(found >= 0) else None
 
-    def balanced(self, h: float, moved: float, room: float) -> Array | None:
+    def balanced(self, h: float, moved: float, room: float) -> Floats | None:
         """A radius with which the step seems to contract, with as much room; no claim. None where there is none."""
         G, V, m = np.abs(self.G.mid), self.V.size, len(self.move.mid)
         more = 1.0 + 8.0 * MARGIN
@@ -352,28 +346,28 @@ class Step:
             return None
         return np.asarray(found[:m]) if np.all(found >= 0) and np.all(np.isfinite(found)) else None
 
-    def reach(self, radius: Array, shares: Array) -> Array:
+    def reach(self, radius: Floats, shares: Floats) -> Floats:
         """Bounds of G s + b with |b| <= radius and |s| <= shares."""
         return (radius + upper_product(np.abs(self.G.mid), shares)) * SAFE
 
-    def xi(self, radius: Array, shares: Array, h: float = 0.0, moved: float = 1.0) -> Array:
+    def xi(self, radius: Floats, shares: Floats, h: float = 0.0, moved: float = 1.0) -> Floats:
         """Bounds of the shares of what comes out; without what does not depend on b and t where ``moved`` is 0."""
         own = upper_product(self.slopes, shares) + 0.5 * upper_product(self.V.size, radius)
         return np.asarray((own + self.along * h + moved * np.abs(self.first)) * SAFE)
 
-    def left(self, radius: Array, shares: Array, h: float = 0.0, moved: float = 1.0) -> Array:
+    def left(self, radius: Floats, shares: Floats, h: float = 0.0, moved: float = 1.0) -> Floats:
         """Bounds of the rest of what comes out; without ``move`` where ``moved`` is 0."""
         out = moved * self.move.size + upper_product(self.E, self.reach(radius, shares)) + self.drift * h
         return np.asarray((out + upper_product(self.G.rad, self.xi(radius, shares, h, moved))) * SAFE)
 
-    def contracts(self, radius: Array, shares: Array, errors: float, h: float = 0.0, moved: float = 1.0) -> bool:
+    def contracts(self, radius: Floats, shares: Floats, errors: float, h: float = 0.0, moved: float = 1.0) -> bool:
         """Whether the step maps all G s + b with |b| <= radius and |s| <= shares to such with less of both."""
         more = SAFE * (1.0 + (errors - 1.0) * MARGIN)
         xi, left = self.xi(radius, shares, h, moved), self.left(radius, shares, h, moved)
         return bool(np.all(xi * more < shares) and np.all(left * SAFE * more < radius))
 
 
-def split_off(G: Ball, vector: Ball) -> tuple[Array, Ball]:
+def split_off(G: Ball, vector: Ball) -> tuple[Floats, Ball]:
     """Numbers s, and the rest of a ball of vectors without G s, which is small where it lies near the columns of G."""
     if not G.shape[1]:
         return np.zeros(0), vector
@@ -381,11 +375,11 @@ def split_off(G: Ball, vector: Ball) -> tuple[Array, Ball]:
     return s, vector - (Ball.exact(G.mid) @ Ball.exact(s[:, None]))[:, 0]
 
 
-def upper_product(matrix: Array, vector: Array) -> Array:
+def upper_product(matrix: Floats, vector: Floats) -> Floats:
     """Upper bound of a product without negative entries."""
     return np.asarray(upper_sum(matrix * vector, axis=1))
 
 
-def _outwards(middle: Array, radius: Array) -> tuple[Array, Array]:
+def _outwards(middle: Floats, radius: Floats) -> tuple[Floats, Floats]:
     low, high = middle - radius, middle + radius
     return low - 2 * UNIT * np.abs(low) - TINY, high + 2 * UNIT * np.abs(high) + TINY

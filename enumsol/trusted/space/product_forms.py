@@ -22,11 +22,9 @@ from enumsol.trusted.space.space_uniqueness import LARGEST_UNIT
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from enumsol.condensation.space_condensed import EnclosedSpace
+    from enumsol.support.array_types import Floats
 
-    Array = NDArray[np.float64]
 
 #: Kinds of multipliers of products: of a sign, of any sign, and triples whose first is at least the length of the rest.
 SIGNED, FREE, CONE = range(3)
@@ -43,11 +41,11 @@ _HEAVIER, _NEAR = 16.0, 0.5
 _ROOM = 1.01
 
 
-def _times(a: Array, b: Array) -> Array:
+def _times(a: Floats, b: Floats) -> Floats:
     return 0.5 * (np.outer(a, b) + np.outer(b, a))
 
 
-def _basis() -> tuple[Array, Array, Array]:
+def _basis() -> tuple[Floats, Floats, Floats]:
     unit = np.eye(5)
     return unit[_N], unit[_T], unit[_V]
 
@@ -97,7 +95,7 @@ class Frame:
 
     system: EnclosedSpace
     codes: tuple[int, ...]
-    centre: Array
+    centre: Floats
     w: Ball
     parts: Ball
     values: Ball
@@ -105,7 +103,7 @@ class Frame:
     rest: Ball
 
     @classmethod
-    def of(cls, system: EnclosedSpace, codes: Sequence[int], centre: Array) -> Frame:
+    def of(cls, system: EnclosedSpace, codes: Sequence[int], centre: Floats) -> Frame:
         """Around scaled forces.
 
         Raises
@@ -153,7 +151,7 @@ class Frame:
                 found += [(i, matrix, kind) for matrix, kind in zip(*node_products(code), strict=True)]
         return found
 
-    def matrices(self, numbers: Array) -> Ball | None:
+    def matrices(self, numbers: Floats) -> Ball | None:
         """The products of every node times their multipliers, (p, 5, 5); None where a multiplier is not allowed."""
         products = self.products()
         if numbers.shape != (len(products),) or not np.all(np.isfinite(numbers)):
@@ -188,8 +186,8 @@ class Ellipsoid:
     """
 
     frame: Frame
-    numbers: Array
-    T: Array
+    numbers: Floats
+    T: Floats
     reach: float
 
     @property
@@ -199,7 +197,7 @@ class Ellipsoid:
 
     @classmethod
     def of(
-        cls, system: EnclosedSpace, codes: Sequence[int], centre: Array, numbers: Array, errors: float = 1.0
+        cls, system: EnclosedSpace, codes: Sequence[int], centre: Floats, numbers: Floats, errors: float = 1.0
     ) -> Ellipsoid | None:
         """That of the form with these multipliers; None where the form is not proven convex.
 
@@ -256,7 +254,7 @@ class Ellipsoid:
         """Whether the assignment has no solution."""
         return self.reach < 0
 
-    def _bounds(self, rows: Ball, value: Ball) -> tuple[Array, Array]:
+    def _bounds(self, rows: Ball, value: Ball) -> tuple[Floats, Floats]:
         """Lower and upper bounds of value + rows (y - centre)."""
         moved = Ball.exact(self.T).T @ rows.T
         away = upper_norm(moved.size, axis=0) * self.reach * SAFE + value.rad
@@ -298,7 +296,7 @@ class Ellipsoid:
             size = (away.size + upper_norm(columns.size, axis=1) * self.reach) * SAFE
             return bool(np.all(size * SAFE <= (1.0 - (errors - 1.0) * MARGIN) * box.radius))
 
-    def box(self, rho: Array) -> Box | None:
+    def box(self, rho: Floats) -> Box | None:
         """A box that holds the ellipsoid, for boxes with such a rho; no claim."""
         T, system = self.T, self.frame.system
         with np.errstate(all="ignore"):
@@ -321,7 +319,7 @@ def _within(code: int, over: int) -> bool:
     return over > SECTORS and code > SECTORS and contains(over - SECTORS, code - SECTORS)
 
 
-def _columns(frame: Frame, sums: Array) -> tuple[Array, Array] | None:
+def _columns(frame: Frame, sums: Floats) -> tuple[Floats, Floats] | None:
     """Columns in which the form with the squares of the equations is near the unit matrix, and their weights' roots.
 
     No claim: what is near it is proven.

@@ -9,14 +9,13 @@ import numpy as np
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma
 from enumsol.model.sectors import SECTORS, direction, end_number
 from enumsol.trusted.floating_bounds import balanced, bounds_within
-from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, Multiplied
+from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, Multiplied, Row
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.arithmetic.balls import Array
     from enumsol.condensation.space_condensed import FloatingSpace
-    from enumsol.trusted.space.sector_rows import Row
+    from enumsol.support.array_types import Floats
 
 #: A disc of forces lies in a polygon of so many corners.
 _CORNERS = 16
@@ -24,7 +23,7 @@ _CORNERS = 16
 
 @np.errstate(over="ignore", invalid="ignore")
 def floating_margin(
-    system: FloatingSpace, codes: Sequence[int], lines: Sequence[Row], multipliers: Array, errors: float = 1.0
+    system: FloatingSpace, codes: Sequence[int], lines: Sequence[Row], multipliers: Floats, errors: float = 1.0
 ) -> float:
     """Proven lower bound on e - h'q over a partial assignment, as ``sector_margin``; the better one of both of (14.6).
 
@@ -52,11 +51,11 @@ def floating_margin(
     return max(first, _finite(bounds_within(system, y[None], y_rad[None], c, c_rad, errors, at_balance=True)))
 
 
-def _finite(bounds: Array) -> float:
+def _finite(bounds: Floats) -> float:
     return float(bounds[0]) if np.isfinite(bounds[0]) else -np.inf
 
 
-def is_unbalanced_in_space(system: FloatingSpace, codes: Sequence[int], z: Array) -> bool:
+def is_unbalanced_in_space(system: FloatingSpace, codes: Sequence[int], z: Floats) -> bool:
     """Whether no forces below a partial assignment are in balance with the load, by z (r,); see theory, (14.7).
 
     z'h > 0, and z'G y <= 0 for all y of every node: (1, tau) with tau in the disc, or on the arc of its sector.
@@ -86,7 +85,7 @@ def is_unbalanced_in_space(system: FloatingSpace, codes: Sequence[int], z: Array
     return True
 
 
-def _most_friction(code: int, across: Array, length: float, spread: float) -> float:
+def _most_friction(code: int, across: Floats, length: float, spread: float) -> float:
     """What across . tau is at most for the tau of a node of this code, |tau| <= 1."""
     if code == FRICTIONLESS:
         return 0.0
@@ -106,7 +105,7 @@ def unbounded(system: FloatingSpace) -> FloatingSpace:
     return system.reaching(np.full_like(system.reach, np.inf))
 
 
-def resultants(system: FloatingSpace, codes: Sequence[int]) -> list[Array]:
+def resultants(system: FloatingSpace, codes: Sequence[int]) -> list[Floats]:
     """Resultants G y, (r,) each, whose cone holds all that the forces of an assignment can have, but for rounding."""
     G = system.rows.G.mid / system.unit
     found = []

@@ -10,30 +10,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, gamma, upper_norm, upper_sum
-from enumsol.model.sectors import (
-    DEEPEST,
-    RUN,
-    SECTORS,
-    chord_of,
-    contains,
-    cut,
-    direction,
-    end_number,
-    is_sector,
-    level_of,
-    span,
-)
+from enumsol.model import sectors
 from enumsol.trusted.energy_bounds import energy_bounds, form_bounds
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from enumsol.condensation.space_condensed import EnclosedSpace
+    from enumsol.support.array_types import Floats, Indices
     from enumsol.trusted.space.slip_forms import SlipForm
 
-    Array = NDArray[np.float64]
 
 OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS, CONTACT, UNDECIDED = range(7)
 #: Kinds of rows (theory, section 12.2); a row is (kind, node, number), the number that of a direction or sector.
@@ -53,22 +39,24 @@ def sector_children(code: int, tangents: int) -> tuple[int, ...]:
     if code == CONTACT:
         if tangents == 1:
             return STICK, SLIP_PLUS, SLIP_MINUS
-        return STICK, *(SECTORS + i for i in range(4, 8))
-    if code > SECTORS:
-        one, other = cut(code - SECTORS, 0, 1)
-        return SECTORS + one, SECTORS + other
+        return STICK, *(sectors.SECTORS + i for i in range(4, 8))
+    if code > sectors.SECTORS:
+        one, other = sectors.cut(code - sectors.SECTORS, 0, 1)
+        return sectors.SECTORS + one, sectors.SECTORS + other
     return ()
 
 
 def is_sector_covering(code: int, children: Sequence[int], tangents: int) -> bool:
     """Whether statuses, in any order, cover a partial one: those of ``sector_children``, or any parts of a sector."""
-    if code <= SECTORS:
+    if code <= sectors.SECTORS:
         return bool(children) and sorted(children) == sorted(sector_children(code, tangents))
-    numbers = [child - SECTORS for child in children]
-    if len(numbers) < 2 or not all(is_sector(number) and level_of(number) <= DEEPEST + 1 for number in numbers):
+    numbers = [child - sectors.SECTORS for child in children]
+    if len(numbers) < 2 or not all(
+        sectors.is_sector(number) and sectors.level_of(number) <= sectors.DEEPEST + 1 for number in numbers
+    ):
         return False
-    spans = sorted(map(span, numbers))
-    begin, end = span(code - SECTORS)
+    spans = sorted(map(sectors.span, numbers))
+    begin, end = sectors.span(code - sectors.SECTORS)
     return [a for a, _ in spans] + [end] == [begin] + [b for _, b in spans]
 
 
@@ -90,10 +78,10 @@ def row_sign(code: int, row: Row) -> int:
         return NONNEGATIVE if code == (SLIP_PLUS if number > 0 else SLIP_MINUS) else FORBIDDEN
     if kind == TANGENT:
         return NONNEGATIVE
-    return NONNEGATIVE if code > SECTORS and contains(number, code - SECTORS) else FORBIDDEN
+    return NONNEGATIVE if code > sectors.SECTORS and sectors.contains(number, code - sectors.SECTORS) else FORBIDDEN
 
 
-def sector_row_terms(row: Row, tau: NDArray[np.intp], size: int) -> tuple[tuple[int, ...], tuple[float, ...]]:
+def sector_row_terms(row: Row, tau: Indices, size: int) -> tuple[tuple[int, ...], tuple[float, ...]]:
     """A row as a sum over y and, from ``size`` on, over w: indices and coefficients, off by half a unit at most.
 
     Raises
@@ -121,15 +109,15 @@ def _terms(row: Row, t1: int, t2: int, size: int) -> tuple[tuple[int, ...], tupl
         t = max(t1, t2)
         return ((node, t), (1.0, -float(number))) if kind == END else ((size + t,), (float(number),))
     _exists(t1 >= 0 and t2 >= 0 and number >= 4)
-    x, y = direction(number)
+    x, y = sectors.direction(number)
     if kind == TANGENT:
-        _exists(number < RUN)
+        _exists(number < sectors.RUN)
         return (node, t1, t2), (1.0, -x, -y)
-    _exists(is_sector(number))
+    _exists(sectors.is_sector(number))
     if kind == CHORD:
-        along, across, most = chord_of(number)
+        along, across, most = sectors.chord_of(number)
         return (t1, t2, node), (along, across, -most)
-    p, q = direction(end_number(number))
+    p, q = sectors.direction(sectors.end_number(number))
     return ((size + t1, size + t2), (-y, x)) if kind == LEFT else ((size + t1, size + t2), (q, -p))
 
 
@@ -149,14 +137,14 @@ class Multiplied:
         Of the rows on w, the multiplier and its terms in y by their places, each off by half a unit at most.
     """
 
-    y: Array
-    y_rad: Array
-    c: Array
-    c_rad: Array
+    y: Floats
+    y_rad: Floats
+    c: Floats
+    c_rad: Floats
     pushes: list[tuple[float, list[tuple[int, float]]]]
 
     @classmethod
-    def of(cls, system: EnclosedSpace, codes: Sequence[int], rows: Sequence[Row], values: Array) -> Multiplied | None:
+    def of(cls, system: EnclosedSpace, codes: Sequence[int], rows: Sequence[Row], values: Floats) -> Multiplied | None:
         """None where a multiplier has the wrong sign."""
         size, units, tau = len(system.g), system.row_unit.tolist(), system.tau.tolist()
         discs, known = system.discs.mid.tolist(), system.discs.rad.tolist()
@@ -198,7 +186,7 @@ def sector_margin(
     system: EnclosedSpace,
     codes: Sequence[int],
     rows: Sequence[Row],
-    values: Array,
+    values: Floats,
     errors: float = 1.0,
     form: SlipForm | None = None,
 ) -> float:

@@ -15,11 +15,8 @@ from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
 from enumsol.trusted.quadratic_forms import QuadraticForm
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from enumsol.condensation.space_condensed import EnclosedSpace
-
-    Array = NDArray[np.float64]
+    from enumsol.support.array_types import Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +31,10 @@ class SlipForm(QuadraticForm):
         mu and kappa of all nodes, and the components of c, one for each tau, in their order in y.
     """
 
-    numbers: Array
+    numbers: Floats
 
     @classmethod
-    def of(cls, system: EnclosedSpace, numbers: Array) -> SlipForm:
+    def of(cls, system: EnclosedSpace, numbers: Floats) -> SlipForm:
         """The form of given multipliers.
 
         Raises

@@ -22,12 +22,10 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import Self
 
-    from numpy.typing import NDArray
-
     from enumsol.condensation.space_condensed import EnclosedSpace
+    from enumsol.support.array_types import Floats, Mask
 
-    Array = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
+    Flags = Mask
 
 #: Directions whose squared length is as near to one stand for the direction of length one.
 _UNIT_LENGTH = 2.0**-40
@@ -84,7 +82,7 @@ class OnlySolution(LooseSolution):
 
 
 def only_solution_in_space(
-    system: EnclosedSpace, numbers: Array, normal: Array, errors: float = 1.0
+    system: EnclosedSpace, numbers: Floats, normal: Floats, errors: float = 1.0
 ) -> OnlySolution | None:
     """The only solution near a point, or None where that is not proven.
 
@@ -106,7 +104,7 @@ def only_solution_in_space(
         return None if form is None else form.enclosed(normal, errors)
 
 
-def only_root(system: EnclosedSpace, numbers: Array, codes: Sequence[int], errors: float = 1.0) -> SpaceRoot | None:
+def only_root(system: EnclosedSpace, numbers: Floats, codes: Sequence[int], errors: float = 1.0) -> SpaceRoot | None:
     """The regular root of a leaf, if it is proven that it has one and that there is no other solution at all.
 
     Parameters and errors as for ``only_solution_in_space``; ``codes`` are those of the leaf.
@@ -123,7 +121,7 @@ def only_root(system: EnclosedSpace, numbers: Array, codes: Sequence[int], error
 
 
 def lone_root(
-    system: EnclosedSpace, codes: Sequence[int], numbers: Array, leaf: Sequence[int], errors: float = 1.0
+    system: EnclosedSpace, codes: Sequence[int], numbers: Floats, leaf: Sequence[int], errors: float = 1.0
 ) -> SpaceRoot | None:
     """The regular root of a leaf, if it is proven that no other solution has the statuses of an assignment.
 
@@ -206,16 +204,16 @@ class SpaceWeights:
     whole : (p,) bool array
     """
 
-    mu: Array
-    kappa: Array
-    wide: Array
-    nu: Array
-    theta: Array
-    off: Array
+    mu: Floats
+    kappa: Floats
+    wide: Floats
+    nu: Floats
+    theta: Floats
+    off: Floats
     whole: Flags
 
     @classmethod
-    def of(cls, system: EnclosedSpace, numbers: Array) -> SpaceWeights | None:
+    def of(cls, system: EnclosedSpace, numbers: Floats) -> SpaceWeights | None:
         """From one array: mu, kappa and wide of all nodes, then nu and theta of all tau, in the order of y.
 
         mu and kappa are positive, wide is not negative, |nu| <= mu, |theta| <= 1, and theta = 0 where wide is positive.
@@ -255,12 +253,12 @@ class _Form:
     system: EnclosedSpace
     numbers: SpaceWeights
     turn: Ball
-    push: Array
+    push: Floats
     held: Ball | None
     least: float
 
     @classmethod
-    def of(cls, system: EnclosedSpace, values: Array, held: Ball | None = None) -> _Form | None:
+    def of(cls, system: EnclosedSpace, values: Floats, held: Ball | None = None) -> _Form | None:
         """None where Q is not proven definite, or not with the squares of the rows that are held at zero."""
         numbers = SpaceWeights.of(system, values)
         if numbers is None or not system.smallest_eigenvalue > 0:
@@ -278,7 +276,7 @@ class _Form:
         least = form.smallest(np.zeros(len(unit)), np.zeros(len(unit)))
         return replace(form, least=least) if least > 0 else None
 
-    def smallest(self, off: Array, lost: Array) -> float:
+    def smallest(self, off: Floats, lost: Floats) -> float:
         """Lower bound of the eigenvalues of Q less what is lost where theta is off, at most 0 where none is positive.
 
         Where theta is not off ``lost`` is 0; elsewhere any positive numbers are right.
@@ -289,7 +287,7 @@ class _Form:
 
     # -- enclosure -------------------------------------------------------------------------------------------------
 
-    def enclosed(self, normal: Array, errors: float) -> OnlySolution | None:
+    def enclosed(self, normal: Floats, errors: float) -> OnlySolution | None:
         """The only solution by its distance from a point, None where it is not proven to be the only one."""
         tau, p = self.system.tau, len(self.system.tau)
         n = np.maximum(normal, 0.0)
@@ -316,7 +314,7 @@ class _Form:
         S, g = Ball(self.system.S, self.system.S_rad), Ball(self.system.g, self.system.g_rad)
         return g - (S @ Ball(y.mid[:, None], y.rad[:, None]))[:, 0]
 
-    def _change(self, n: Array, w: Ball) -> Array:
+    def _change(self, n: Floats, w: Ball) -> Floats:
         """How much the load has to change at most, row by row, that a point with these lambda_n is a solution."""
         system, numbers, p = self.system, self.numbers, len(n)
         change = w.size.copy()
@@ -347,7 +345,7 @@ class _Form:
         room = (numbers.mu[i] - float(upper_norm(numbers.nu[i])) * SAFE) / SAFE
         return bool(room * gap / SAFE >= numbers.kappa[i] * slip * SAFE * SAFE + TINY)
 
-    def _moved(self, change: Array) -> float:
+    def _moved(self, change: Floats) -> float:
         """Upper bound of ||D'delta||, |delta| <= change."""
         numbers, tau, p = self.numbers, self.system.tau, len(self.system.tau)
         moved = np.zeros_like(change)
@@ -400,7 +398,7 @@ class _Form:
         return off
 
 
-def slip_sizes(system: EnclosedSpace) -> Array:
+def slip_sizes(system: EnclosedSpace) -> Floats:
     """Upper bounds of the norms of the rows of S that give v, node by node, (p,)."""
     found = np.zeros(system.tau.shape)
     size = (np.abs(system.S) + system.S_rad) * SAFE
@@ -413,10 +411,10 @@ def slip_sizes(system: EnclosedSpace) -> Array:
 
 def least_eigenvalue(
     system: EnclosedSpace,
-    factors: tuple[Array, Array],
+    factors: tuple[Floats, Floats],
     turn: Ball,
-    push: Array,
-    rest: tuple[Array, Array],
+    push: Floats,
+    rest: tuple[Floats, Floats],
     held: Ball | None = None,
 ) -> float:
     """Lower bound of the smallest eigenvalue of Q, less what is lost, plus held'held; at most 0 if none is positive.

@@ -13,17 +13,15 @@ from enumsol.arithmetic.balls import SAFE, UNIT, Ball, Inverse, determinant_sign
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from numpy.typing import NDArray
-
     from enumsol.condensation.space_condensed import EnclosedSpace
+    from enumsol.support.array_types import Floats, Indices
 
-    Array = NDArray[np.float64]
 
 #: Cosine and sine of numerical libraries, and what is made of two of them here, are off by no more.
 LIBRARY = 64 * UNIT
 
 
-def turned_by(centre: Array, angle: Array) -> tuple[Array, Array]:
+def turned_by(centre: Floats, angle: Floats) -> tuple[Floats, Floats]:
     """Directions at angles from their centres and those a quarter turn further, (q, 2) each, off by ``LIBRARY``."""
     across = np.stack([-centre[:, 1], centre[:, 0]], axis=1)
     cos, sin = np.cos(angle)[:, None], np.sin(angle)[:, None]
@@ -111,24 +109,24 @@ class Turning:
         Over a piece of alpha forces in T are 1 + s share times d, with s from -1 to 1, which is free (PieceTurn).
     """
 
-    d: Array
-    turned: Array
+    d: Floats
+    turned: Floats
     x: Ball
     start: Ball
     B: Ball
     change: Ball
     matrix: Ball
     rows: Sequence[int]
-    off: Array
+    off: Floats
     share: Ball | None = None
 
     @classmethod
     def of(
         cls,
         system: EnclosedSpace,
-        E: Array,
-        at: tuple[Sequence[int], Sequence[int], NDArray[np.intp]],
-        directions: tuple[Array, Array],
+        E: Floats,
+        at: tuple[Sequence[int], Sequence[int], Indices],
+        directions: tuple[Floats, Floats],
         swept: tuple[Ball, Ball | None],
         free: Sequence[int] = (),
     ) -> Turning | None:
@@ -200,7 +198,7 @@ class Turning:
         """That of det P S E over every box in which the equations are regular; 0 where it is not proven."""
         return determinant_sign(self.matrix)
 
-    def over(self, radius: Array, free: Ball) -> Box | None:
+    def over(self, radius: Floats, free: Ball) -> Box | None:
         """What holds over all angles up to ``radius``, (q,), from the middle; None if they are not proven regular.
 
         ``free`` are the values of the free unknowns, (k,). In the middle directions are known but for rounding.
@@ -218,11 +216,11 @@ class Turning:
         """What holds in the middle, by values of the free unknowns."""
         return {}
 
-    def coupling(self, radius: Array) -> Array:
+    def coupling(self, radius: Floats) -> Floats:
         """Sizes of B_c D over a box, (q, q): nothing is singular in it while they are small."""
         return self._turned(self.B, radius)[0].size
 
-    def _turned(self, A: Ball, radius: Array) -> tuple[Ball, Ball, Ball]:
+    def _turned(self, A: Ball, radius: Floats) -> tuple[Ball, Ball, Ball]:
         """A D, A dD/dpsi and A d for directions d and their changes D over a box; A has two columns for every node."""
         turning = A[:, : 2 * len(self.d)]
         first, second = turning[:, 0::2], turning[:, 1::2]
@@ -239,7 +237,7 @@ class Turning:
             along * cos + across * sin + rounding,
         )
 
-    def _over(self, radius: Array, free: Ball, point: Box | None) -> Box | None:
+    def _over(self, radius: Floats, free: Ball, point: Box | None) -> Box | None:
         q, m = len(radius), len(self.start.mid) // 2
         lone, start, base = self.change[:, 2 * q :], self.start, self.x
         if len(free.mid):
@@ -281,7 +279,7 @@ class Turning:
         return Box(value[:m], w, slope[m:], lone[m:], x, z, along[m:], across[m:])
 
 
-def _quotient_error(one: Ball, other: Ball) -> Array:
+def _quotient_error(one: Ball, other: Ball) -> Floats:
     """Radius of a quotient of balls around that of their midpoints, of which the other's are positive."""
     size = np.abs(one.mid / other.mid)
     return np.asarray((4 * UNIT * size + (one.rad + size * other.rad) / (other.mid - other.rad)) * SAFE)
