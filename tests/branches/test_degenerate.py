@@ -10,7 +10,7 @@ from complete import whole_graph
 from effort import some
 from path_problems import assert_balanced, assert_same_roots, mirrored_problem, one_node
 
-from enumsol import ContactProblem, enumerate_roots
+from enumsol import ContactProblem, enumerate_roots, gallery, verify
 from enumsol.branches import branch_graph
 from enumsol.model.statuses import ContactStatus
 
@@ -186,3 +186,17 @@ def test_mirror_symmetric_problems():
             if lo == hi and v.kind not in ("transition", "end"):
                 assert_same_roots(graph.roots_at(lo), enumerate_roots(problem, lo, "exact"))
     assert {"bifurcation", "family", "fold", "transition"} <= kinds
+
+
+@pytest.mark.slow
+def test_a_condition_that_vanishes_everywhere_takes_few_boxes():
+    # 936 boxes of each selection that grazes, and 20 kB of proof, where these are cut as long as boxes are tried
+    problem = gallery.get("one-node-6.3").build()
+    graph = branch_graph(problem, (0.0, 4.0))
+    assert graph.complete
+    assert any(arc.grazing for arc in graph.arcs)
+    proof = graph.proof
+    assert proof.size < 5_000
+    report = verify(problem, proof)
+    assert report.ok
+    assert not report.complete

@@ -200,13 +200,17 @@ class Cutting:
         The box is not to be cut further: what is not decided stays open.
     flat : bool
         Nor is it where a condition is flat.
+    level : bool
+        Nor is it where all conditions in doubt are flat.
     sharpened : bool
         Bounds of events will be made narrower.
     """
 
-    def __init__(self, rows: Selection, expansion: AlphaExpansion, *, whole: bool, flat: bool, sharpened: bool) -> None:
+    def __init__(
+        self, rows: Selection, expansion: AlphaExpansion, *, whole: bool, flat: bool, level: bool, sharpened: bool
+    ) -> None:
         self._narrow = _NARROW_ENOUGH if sharpened else _NARROW
-        self._rows, self._whole, self._keep_flat = rows, whole, flat
+        self._rows, self._whole, self._keep_flat, self._keep_level = rows, whole, flat, level
         self._expansion: Any = expansion  # alphas are floats of the one, fractions of the other
         self.low: Number
         self.high: Number
@@ -355,6 +359,8 @@ class Cutting:
 
     def _stays_open(self, low: Number, high: Number, known: OverInterval) -> bool:
         """Whether a box of its own would not decide a part."""
+        if self._keep_level and all(k in self._flat for k in _in_doubt(known)):
+            return True
         return (self._expansion.final and self._tight(low, high, known)) or (self._keep_flat and self._is_flat(known))
 
     def _is_flat(self, known: OverInterval) -> bool:

@@ -46,6 +46,8 @@ _SINGULAR = 2.0**-26
 _MOST_TRIES, _MOST_BOXES = 200, 900
 #: Boxes shorter than this share of the interval are not cut because of a condition that cannot be told from zero.
 _FLAT_BOX = 2.0**-12
+#: Nor is any, after so many boxes in a row of which nothing else was left open: it vanishes everywhere.
+_LEVEL = 8
 
 
 def trace(
@@ -110,6 +112,8 @@ class _Tracing:
         self._tries = 0
         #: Length of the last box that many digits decided, and one of a box that they did not.
         self._decided, self._too_long = 0.0, np.inf
+        #: Boxes in a row that are open because of conditions that cannot be told from zero, and nothing else.
+        self._level = 0
         self.finished = False
 
     def run(self) -> Asking:
@@ -158,6 +162,7 @@ class _Tracing:
             box, rest = tried[0]
             if box.parts:
                 self._found.boxes.append(box)
+                self._level = self._level + 1 if all(part.cause is OpenCause.FLAT for part in box.parts) else 0
             return rest
         if whole or tiny:
             everywhere = frozenset(range(len(self._selection.rows.codes)))
@@ -173,7 +178,10 @@ class _Tracing:
         self, expansion: AlphaExpansion, *, whole: bool, flat: bool
     ) -> Generator[list[Question], list[Any], tuple[AlphaBox, list[Interval]]]:
         """The box of an expansion, and what is left of it."""
-        cutting = Cutting(self._selection.rows, expansion, whole=whole, flat=flat, sharpened=self._sharpened).run()
+        level, sharpened = self._level >= _LEVEL, self._sharpened
+        cutting = Cutting(
+            self._selection.rows, expansion, whole=whole, flat=flat, level=level, sharpened=sharpened
+        ).run()
         parts = next(cutting)
         while True:
             if isinstance(expansion, Expansion):
