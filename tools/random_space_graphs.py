@@ -1,11 +1,12 @@
 """Branch graphs of random problems in 3D against searches at single alphas.
 
     PYTHONPATH=tests/helpers python tools/random_space_graphs.py [--nodes P] [--first SEED] [--last SEED]
-        [--alphas N] [--max-nodes N]
+        [--alphas N] [--max-nodes N] [--plane]
 
 Prints for every problem what the tree took, arcs and vertices, why the graph is not complete, whether the proof is
 verified, and at how many alphas the graph's roots are not those of enumerate_roots. Friction, or load, or both depend
-on alpha. Of a graph that is not complete the number of roots must be at least what it says.
+on alpha. Of a graph that is not complete the number of roots must be at least what it says. With --plane the problems
+are those of a plane, written in 3D with a second tangent that nothing loads.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import time
 from collections import Counter
 
 import numpy as np
-from problems3d import random_over_alpha
+from problems3d import in_space, random_over_alpha, random_plane_over_alpha
 
 import enumsol
 
@@ -39,10 +40,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     for name, default in (("nodes", 2), ("first", 0), ("last", 9), ("alphas", 10), ("max-nodes", 1000)):
         parser.add_argument(f"--{name}", type=int, default=default)
+    parser.add_argument("--plane", action="store_true")
     options = parser.parse_args()
     for seed in range(options.first, options.last + 1):
         start = time.process_time()
-        problem = random_over_alpha(options.nodes, seed)
+        given = options.nodes, seed
+        problem = in_space(random_plane_over_alpha(*given)) if options.plane else random_over_alpha(*given)
         graph = enumsol.branch_graph(problem, (0, 1), max_nodes=options.max_nodes)
         made = time.process_time()
         proof = graph.proof

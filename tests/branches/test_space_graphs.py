@@ -4,6 +4,7 @@ import re
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from fractions import Fraction
+from itertools import pairwise, product
 from math import sqrt
 
 import numpy as np
@@ -16,8 +17,10 @@ from problems3d import (
     OneNode,
     forces,
     from_compliance,
+    in_space,
     random_compliance,
     random_over_alpha,
+    random_plane_over_alpha,
     sliding_node,
 )
 from refusals import bad_argument
@@ -336,3 +339,82 @@ def test_a_curve_is_whole_over_an_interval_in_which_continuation_has_to_take_ver
     chain = chain_through(AlphaProblem.of(node.problem.enclosure), node.problem, np.array([n, *t, alpha]), interval)
     assert chain.whole
     assert leaves_interval(chain.links, chain.joints, interval)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("first", range(0, 500, 20))
+def test_folds_of_many_nodes_are_those_of_the_closed_form(first):
+    for seed, load in product(range(first, first + 20), (True, False)):
+        node = OneNode(seed, load)
+        given = AlphaProblem.of(node.problem.enclosure)
+        for phi in node.folds():
+            fold = node.alpha(phi)
+            assert any(fold_is_found(node, given, phi, way) for way in (1e-3, -1e-3, 1e-2, -1e-2)), (seed, load, fold)
+
+
+def fold_is_found(node, given, phi, way):
+    """Whether a curve that begins beside a fold turns there once, at the alpha of the closed form."""
+    there, fold = node.at(phi + way), node.alpha(phi)
+    if there is None:
+        return False
+    alpha, n, t = there
+    reach = Fraction(5 * abs(alpha - fold))
+    interval = Fraction(fold) - reach, Fraction(fold) + reach
+    chain = chain_through(given, node.problem, np.array([n, *t, alpha]), interval)
+    if chain is None or not chain.whole:
+        return False
+    (turn,) = (part for part in runs_and_turns(given, chain) if isinstance(part, Turn))
+    low, high = turn.alphas
+    near = Fraction(1e-12 * max(1.0, abs(fold)))
+    assert low - near <= Fraction(fold) <= high + near
+    assert abs((low + high) / 2 - Fraction(fold)) <= near
+    assert high - low < 1e-9
+    return turn.settled and len(turn.selections) == 1
+
+
+# -- problems in 2D written in 3D --------------------------------------------------------------------------------------
+
+
+def check_the_same(plane, space):
+    """A graph in 3D has the vertices and the arcs of that in 2D, of which it is a rewriting, as far as it is told."""
+    assert plane.complete
+    critical = sorted({float(vertex.exact) for vertex in plane.vertices})
+    for a, b in pairwise(critical):
+        middle, count = 0.5 * (a + b), plane.multiplicity_at(0.5 * (a + b))
+        assert sum(arc.lo < middle < arc.hi for arc in space.arcs) == count
+        assert space.at_least(middle) <= count
+        assert not space.complete or space.multiplicity_at(middle) == count
+    for one, other in ((plane, space), (space, plane)):
+        for vertex in one.vertices:
+            assert any(vertex.kind == v.kind and close(vertex, v) for v in other.vertices), vertex
+
+
+def close(one, other):
+    (low, high), (a, b) = one.enclosure, other.enclosure
+    reach = Fraction(1, 10**12)
+    return low <= b + reach and a <= high + reach and high - low < 1e-8
+
+
+@pytest.mark.parametrize(
+    ("p", "seed"),
+    [
+        pytest.param(1, 1, marks=pytest.mark.slow),
+        *(pytest.param(1, seed, marks=pytest.mark.long) for seed in range(2, 40)),
+        *(pytest.param(2, seed, marks=pytest.mark.long) for seed in range(12)),
+        *(pytest.param(3, seed, marks=pytest.mark.long) for seed in range(6)),
+    ],
+)
+def test_a_second_tangent_that_nothing_loads_changes_nothing(p, seed):
+    problem = random_plane_over_alpha(p, seed)
+    space = enumsol.branch_graph(in_space(problem), (0, 1), max_nodes=100)
+    check_the_same(enumsol.branch_graph(problem, (0, 1)), space)
+
+
+@pytest.mark.long
+def test_two_folds_at_one_alpha_are_found_and_their_order_is_left_open():
+    # sticking and slipping along one line; at alpha = 3 two branches turn back
+    problem = enumsol.gallery.two_node_square()
+    space = enumsol.branch_graph(in_space(problem), (0, 10), max_nodes=2000)
+    check_the_same(enumsol.branch_graph(problem, (0, 10)), space)
+    assert len(space.reasons) == 1
+    assert "at the smaller alpha stayed open" in space.reasons[0]

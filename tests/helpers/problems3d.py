@@ -4,7 +4,7 @@ import numpy as np
 from parted_solids import on_springs
 from scipy.optimize import brentq
 
-from enumsol import ContactProblem3D, fem
+from enumsol import ContactProblem, ContactProblem3D, fem
 
 
 def from_compliance(S, g, friction, **more):
@@ -178,6 +178,35 @@ def random_over_alpha(p, seed):
     problem = from_compliance(X @ X.T + 0.05 * np.eye(3 * p), g, (F, F))
     load = None if seed % 3 == 1 else rng.standard_normal(problem.n)
     return problem.replace(friction=(F, F), friction_slope=(slope * F, slope * F), load_slope=load)
+
+
+def random_plane_over_alpha(p, seed):
+    """A problem in 2D in which friction, load or both change with alpha."""
+    rng = np.random.default_rng([seed, p, 29])
+    X = rng.standard_normal((2 * p, 2 * p))
+    A = np.linalg.inv(X @ X.T + 0.1 * np.eye(2 * p))
+    A, rows = 0.5 * (A + A.T), np.eye(2 * p)
+    g, F = rng.standard_normal(2 * p), 10 ** rng.uniform(-0.5, 0.6, p)
+    slope = A @ rng.standard_normal(2 * p) if seed % 3 else None
+    friction = ((0 * F, F), (F, 0 * F), (F, 0.5 * F))[seed % 3]
+    return ContactProblem(A, rows[:p], rows[p:], A @ g, friction=friction, load_slope=slope)
+
+
+def in_space(problem):
+    """A problem in 2D written in 3D: every node has a second tangent with a stiffness of its own, without load."""
+    p, n = problem.p, problem.n
+    F0, F1 = (np.broadcast_to(np.asarray(F, dtype=float), p) for F in problem.friction)
+    slope = problem.load_slope
+    A, Bn, Bt = (M.toarray() for M in (problem.A, problem.Bn, problem.Bt))
+    return ContactProblem3D(
+        np.block([[A, np.zeros((n, p))], [np.zeros((p, n)), np.eye(p)]]),
+        *(np.hstack([rows, np.zeros((p, p))]) for rows in (Bn, Bt)),
+        np.hstack([np.zeros((p, n)), np.eye(p)]),
+        np.append(problem.f, np.zeros(p)),
+        friction=(F0, F0),
+        friction_slope=(F1, F1),
+        load_slope=None if slope is None else np.append(slope, np.zeros(p)),
+    )
 
 
 def cross(a, b):
