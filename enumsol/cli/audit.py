@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from enumsol.cli.common import ExitStatus, finish, load_any_problem, parse_alpha, parse_interval, so_far
+from enumsol.cli.common import ExitStatus, finish, load_problem, parse_alpha, parse_interval, so_far
 from enumsol.cli.graph import build, read_graph
 from enumsol.cli.options import Arithmetic, JsonFile, ProblemArgument, Quiet, csv, file, number
 from enumsol.cli.output import check_outputs, deliver
@@ -89,7 +89,7 @@ def audit(
     check_outputs(json=json_file, csv=csv_file)
     if graph_file is not None and (first is not None or last is not None):
         raise InvalidArgumentError("--graph and --from or --to are both given; a graph has its own interval")
-    body = load_any_problem(problem)
+    body = load_problem(problem)
     runs = _read_runs(points, body, columns)
     known = None if graph_file is None else read_graph(graph_file, body)
     found, ended = so_far(lambda: known or build(body, _interval(runs, first, last), arithmetic))

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from enumsol.fem import Scene
-    from enumsol.model.problem import ContactProblem
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import Alpha
 
@@ -79,22 +78,8 @@ def scene_of(name: str) -> Scene | None:
     return read_mesh_scene(name)
 
 
-def load_problem(name: str) -> ContactProblem:
-    """The problem in 2D in a file or made of a mesh, or that of ``gallery:NAME`` or ``collection:NAME``.
-
-    Raises
-    ------
-    InvalidProblemError, InvalidArgumentError
-        It cannot be read, there is none of that name (the message gives names that are close), or it is one in 3D.
-    """
-    from enumsol.model.problem import ContactProblem
-    from enumsol.support.arguments import instance_of  # numpy: not for --help
-
-    return instance_of(load_any_problem(name), ContactProblem, name)
-
-
-def load_any_problem(name: str) -> AnyProblem:
-    """As load_problem, of 2D and 3D.
+def load_problem(name: str) -> AnyProblem:
+    """The problem in a file or made of a mesh, or that of ``gallery:NAME`` or ``collection:NAME``.
 
     Raises
     ------

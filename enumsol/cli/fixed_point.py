@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from enumsol.cli import output
-from enumsol.cli.common import ExitStatus, finish, load_any_problem, parse_alpha, so_far
+from enumsol.cli.common import ExitStatus, finish, load_problem, parse_alpha, so_far
 from enumsol.cli.options import JsonFile, PlotFile, ProblemArgument, Quiet, VtuFile, count, csv, file, number
 from enumsol.cli.progress import Display
 from enumsol.errors import InvalidArgumentError
@@ -68,7 +68,7 @@ def fixed_point(
     output.check_vtu(vtu_file)
     output.check_plot(plot_file)
     _check_combination(starts, npz_file, vtu_file, plot_file)
-    body = load_any_problem(problem)
+    body = load_problem(problem)
     value = _alpha(alpha, problem, body)
     options: dict[str, Any] = {"tolerance": tolerance, "max_iterations": max_iterations, "anderson": anderson}
     if starts is not None:

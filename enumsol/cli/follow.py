@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from enumsol.cli import options
-from enumsol.cli.common import ExitStatus, finish, load_any_problem, node_row, parse_alpha, parse_interval
+from enumsol.cli.common import ExitStatus, finish, load_problem, node_row, parse_alpha, parse_interval
 from enumsol.cli.graph import read_graph
 from enumsol.cli.output import check_outputs, check_plot, deliver, write_figure
 from enumsol.cli.progress import Display, SearchDisplay
@@ -93,7 +93,7 @@ def follow(
         raise InvalidArgumentError("--tangent is given without --root or --direction; expected one root and direction")
     steps = _steps(h_max, h_min, h_init, eps, max_steps, check_steps)
     interval, alpha, signs = parse_interval(first, last), parse_alpha(start, "--start"), _directions(direction)
-    body = load_any_problem(problem)
+    body = load_problem(problem)
     row = node_row(body, label)
     over = None if graph_file is None else read_graph(graph_file, body)
     followed = _Followed(body, (float(interval[0]), float(interval[1])), steps, tangent)

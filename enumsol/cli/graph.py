@@ -10,7 +10,7 @@ from enumsol.cli import options
 from enumsol.cli.common import (
     ExitStatus,
     finish,
-    load_any_problem,
+    load_problem,
     node_row,
     note,
     parse_interval,
@@ -79,7 +79,7 @@ def graph(
     check_outputs(json=json_file, csv=csv_file)
     check_named_files(save=save_file, graphml=graphml_file, proof=proof_file)
     check_plot(plot_file)
-    interval, body = parse_interval(first, last), load_any_problem(problem)
+    interval, body = parse_interval(first, last), load_problem(problem)
     chosen = None if nodes is None else [body.node_ids[node_row(body, label.strip())] for label in nodes.split(",")]
     drawn: dict[str, Any] = {"quantity": quantity, "nodes": chosen, "title": problem, "units": parse_units(units)}
     if chosen is not None and quantity in ("norm", "sum_n", "sum_t"):

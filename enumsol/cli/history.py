@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from enumsol.cli.common import TOML, ExitStatus, finish, load_any_problem, scene_of, so_far, workers
+from enumsol.cli.common import TOML, ExitStatus, finish, load_problem, scene_of, so_far, workers
 from enumsol.cli.options import (
     OUTPUT,
     PLOT,
@@ -103,7 +103,7 @@ def history(
         check_writable(path, option)
     if proof_file is not None and arithmetic != "verified":
         raise InvalidArgumentError(f"--proof is given with {arithmetic} arithmetic; expected verified")
-    given, body = _steps(problem, steps), load_any_problem(problem)
+    given, body = _steps(problem, steps), load_problem(problem)
     limits = {"max_branches": max_branches, "max_nodes": max_nodes, "time_limit": time_limit}
     options = {"arithmetic": arithmetic, "follow": follow, "merge": merge, "refine": refine, **limits}
     found, ended = so_far(lambda: _search(body, given, jobs, options))

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from enumsol.cli import options
-from enumsol.cli.common import ExitStatus, finish, load_any_problem, parse_interval, parse_units, scene_of, so_far
+from enumsol.cli.common import ExitStatus, finish, load_problem, parse_interval, parse_units, scene_of, so_far
 from enumsol.cli.graph import HowExact, as_content, build, graph_as_text, write_proof
 from enumsol.cli.output import check_named_files, check_outputs, checking_commands, deliver
 from enumsol.errors import MissingDependencyError
@@ -50,7 +50,7 @@ def report(
     check_named_files(output=output, proof=proof_file)
     if find_spec("plotly") is None:
         raise MissingDependencyError.of("reports", "plotly", "report")
-    interval, body, names = parse_interval(first, last), load_any_problem(problem), parse_units(units)
+    interval, body, names = parse_interval(first, last), load_problem(problem), parse_units(units)
     limits = {"max_nodes": max_nodes, "time_limit": time_limit}
     found, ended = so_far(lambda: build(body, interval, arithmetic, jobs, **limits))
 

@@ -187,7 +187,7 @@ def roots(problem: options.ProblemArgument, alpha: AtAlpha, *, quiet: options.Qu
     search = Search(**chosen)
     search.check()
     value = common.parse_alpha(alpha)
-    search.answer(problem, common.load_any_problem(problem), value, problem)
+    search.answer(problem, common.load_problem(problem), value, problem)
 
 
 def check_mirror(problem: AnyProblem, alpha: Alpha, mirror: str | None) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from enumsol.cli.common import ExitStatus, finish, load_any_problem, parse_alpha, parse_interval, so_far, workers
+from enumsol.cli.common import ExitStatus, finish, load_problem, parse_alpha, parse_interval, so_far, workers
 from enumsol.cli.options import Arithmetic, JsonFile, ProblemArgument, Quiet, count, csv, number, seconds
 from enumsol.cli.output import check_outputs, deliver
 from enumsol.cli.progress import Display
@@ -67,7 +67,7 @@ def table(
     141 if the program that read it has ended.
     """
     check_outputs(json=json_file, csv=csv_file)
-    values, body = _alphas(first, last, samples, alphas), load_any_problem(problem)
+    values, body = _alphas(first, last, samples, alphas), load_problem(problem)
     limits = {"max_nodes": max_nodes, "time_limit": time_limit}
     options = {name: limit for name, limit in limits.items() if limit is not None}
     frame, ended = so_far(lambda: _search(body, values, arithmetic, jobs, options))

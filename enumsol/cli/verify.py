@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from enumsol.cli.common import ExitStatus, load_any_problem
+from enumsol.cli.common import ExitStatus, load_problem
 from enumsol.cli.options import JsonFile, ProblemArgument, Quiet
 from enumsol.cli.output import check_outputs, deliver
 from enumsol.cli.progress import Display
@@ -50,7 +50,7 @@ def verify(
     from enumsol.proof.proof_file import Proof
 
     check_outputs(json=json_file)
-    body = load_any_problem(problem)
+    body = load_problem(problem)
     with Display("checking", _STEPS):
         report = check(body, Proof.load(proof))
     about = {"problem": problem, "proof": proof, "fingerprint": body.fingerprint}

@@ -196,18 +196,6 @@ def test_jobs_in_3d(capsys, tmp_path):
     assert run(capsys, *table, "--jobs", 2)[:2] == run(capsys, *table)[:2]
 
 
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ("report", "gallery:block3d-4", "--from", 0, "--to", 1),
-        ("report", "gallery:one-node-3d", "--from", 0, "--to", 1),
-    ],
-)
-def test_commands_for_2d_refuse_a_problem_in_3d(capsys, arguments):
-    found = f"{arguments[1]} is a ContactProblem3D; expected a ContactProblem (problems in 3D are taken by"
-    assert_refused(*run(capsys, *arguments), found)
-
-
 def test_help_and_version(capsys):
     for arguments in ((), ("gallery",), ("--help",), ("roots", "-h"), ("gallery", "write", "--help")):
         out = printed(capsys, *arguments)
