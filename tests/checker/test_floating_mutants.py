@@ -23,6 +23,7 @@ from helpers.proof_tools import (
 import enumsol
 from enumsol.condensation.floating import FloatingSystem, RigidRows
 from enumsol.condensation.space_condensed import FloatingSpace
+from enumsol.model import sectors
 from enumsol.model.sectors import SECTORS, nearest
 from enumsol.trusted.exclusion import exclusion_margin
 from enumsol.trusted.space import sector_rows as sr
@@ -264,5 +265,5 @@ def _inside(known, node, code):
         return True
     F = np.array(known.problem.friction).T[node]
     tau = known.lambda_t[node] / F
-    (x, y), (p, q) = sr.direction(code - SECTORS), sr.direction(sr.end_number(code - SECTORS))
+    (x, y), (p, q) = sectors.direction(code - SECTORS), sectors.direction(sectors.end_number(code - SECTORS))
     return x * tau[1] - y * tau[0] > 0 and tau[0] * q - tau[1] * p > 0
