@@ -83,6 +83,17 @@ class Skeleton:
     closed: bool
 
 
+@dataclass(frozen=True, eq=False)
+class _Corner:
+    """Places of a skeleton before and after a corner, the joints there and the link between them, if proven."""
+
+    low: float
+    high: float
+    start: SolutionCurve | None
+    link: CurveLink | None
+    end: SolutionCurve | None
+
+
 def chain_through(
     given: AlphaProblem, problem: ContactProblem3D, x: Array, interval: tuple[Fraction, Fraction]
 ) -> Chain | None:
@@ -150,17 +161,19 @@ class ChainBuilder:
         links: list[CurveLink] = []
         joints = [first]
         place, last = 0.0, len(line) - 1.0
-        for low, high in (*self._around(skeleton), (last, last)):
-            if not self._filled(line, place, low, links, joints, closed=skeleton.closed and low == last):
+        for corner in self._around(skeleton):
+            if not self._filled(line, place, corner.low, links, joints, corner.start, closed=skeleton.closed):
                 break
-            place = low
-            if low < high:
-                found = self._link(line, low, high, joints[-1], links[-1] if links else None)
-                if found is None:
-                    break
-                links.append(found[0])
-                joints.append(found[1])
-                place = high
+            place = corner.low
+            if corner.link is None or corner.end is None or (links and not goes_on(links[-1], corner.link, joints[-1])):
+                break
+            links.append(corner.link)
+            joints.append(corner.end)
+            place = corner.high
+        else:
+            known = first if skeleton.closed else None
+            if self._filled(line, place, last, links, joints, known, closed=skeleton.closed):
+                place = last
         whole = place == last
         closed = skeleton.closed and whole and bool(links) and goes_on(links[-1], links[0], first)
         return Chain(links, joints, closed, whole) if links else None
@@ -181,19 +194,21 @@ class ChainBuilder:
         corners = [kept.index(corner) for corner in skeleton.corners]
         return Skeleton(skeleton.points[kept], corners, skeleton.closed)
 
-    def _around(self, skeleton: Skeleton) -> list[tuple[float, float]]:
-        """Places before and after every corner between which one box is proven."""
+    def _around(self, skeleton: Skeleton) -> list[_Corner]:
+        """Places before and after every corner and what is proven between them, one box where that is possible."""
         line, last = skeleton.points, len(skeleton.points) - 1
         found = []
         for corner in skeleton.corners:
-            if 0 < corner < last:
-                share = _WIDEST
-                while share > _SHORTEST:
-                    start = self.joint(*self._at(line, corner - share))
-                    if start is not None and self._link(line, corner - share, corner + share, start, None) is not None:
-                        break
-                    share *= _NARROWER
-                found.append((corner - share, corner + share))
+            if not 0 < corner < last:
+                continue
+            share, start, proven = _WIDEST, None, None
+            while share > _SHORTEST:
+                start = self.joint(*self._at(line, corner - share))
+                proven = None if start is None else self._link(line, corner - share, corner + share, start, None)
+                if proven is not None:
+                    break
+                share *= _NARROWER
+            found.append(_Corner(corner - share, corner + share, start, *(proven or (None, None))))
         return found
 
     def _filled(
@@ -203,12 +218,13 @@ class ChainBuilder:
         last: float,
         links: list[CurveLink],
         joints: list[SolutionCurve],
+        known: SolutionCurve | None,
         *,
         closed: bool,
     ) -> bool:
         """Add links from one place of a skeleton to another one; whether that place is reached.
 
-        ``closed``: that place is the first joint.
+        ``known``: the joint there, if there is one; ``closed``: the skeleton is.
         """
         way, failed = 1.0, False
         while place < last:
@@ -219,7 +235,7 @@ class ChainBuilder:
             if further != last and abs(further - round(further)) < _BESIDE:
                 # points of the skeleton are perhaps folds, at which no side of a joint is that of a rising alpha
                 further -= _ASIDE * (further - place)
-            end = joints[0] if closed and further == last else None
+            end = known if further == last else None
             found = self._link(line, place, further, joints[-1], links[-1] if links else None, end)
             # that what a box at an end holds is beyond the interval is seen where alpha goes one way
             outer = not closed and (not links or further == len(line) - 1.0)

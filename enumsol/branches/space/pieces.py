@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: How often a part is halved; of bisections in floats; how far from what they find the points beside it are put first,
-#: relative to the part, by what factor farther then, and how often.
-_HALVINGS, _BISECTIONS = 12, 60
-_BESIDE, _FARTHER, _TRIALS = 2.0**-44, 8.0, 12
+#: How often a part is halved; how near to the place that bisection in floats finds the points beside it are put at
+#: best, relative to the part, how much of this that place may be off, by what factor farther others are, and how many.
+_HALVINGS = 12
+_BESIDE, _CLOSE, _FARTHER, _TRIALS = 2.0**-44, 0.25, 8.0, 12
 #: The same beside a smooth fold, where alpha is a square of the distance.
 _BESIDE_FOLD = 2.0**-24
 #: Parts are longer than the way between their ends by this, and wider than their ends are known.
@@ -333,23 +333,25 @@ class LinkCutter:
     ) -> tuple[Place, Place] | None:
         """Places close to where something changes, on both sides of it."""
         low, high = 0.0, 1.0
-        for _ in range(_BISECTIONS):
+        while high - low > _CLOSE * least:
             middle = 0.5 * (low + high)
             point = self._near(start, end, middle)
             if point is None or middle in (low, high):
                 break
             low, high = (middle, high) if is_before(point) else (low, middle)
-        share, away = 0.5 * (low + high), least
-        for _ in range(_TRIALS):
+        found, share = None, 0.5 * (low + high)
+        nearest, farthest = 0, _TRIALS
+        while nearest < farthest:
+            k = (nearest + farthest) // 2
+            away = least * _FARTHER**k
             # both ends may be as near to it as the points beside it are put
             before, after = max(share - away, 0.5 * share), min(share + away, 0.5 * (1.0 + share))
             sides = self._at(start, end, before), self._at(start, end, after)
             if sides[0] is not None and sides[1] is not None and self._tells(sides[0], sides[1]):
-                return sides[0], sides[1]
-            if before == 0.5 * share and after == 0.5 * (1.0 + share):
-                break
-            away *= _FARTHER
-        return None
+                found, farthest = (sides[0], sides[1]), k
+            else:
+                nearest = k + 1
+        return found
 
     @staticmethod
     def _tells(one: Place, other: Place) -> bool:
