@@ -81,8 +81,9 @@ class PieceProposals:
     def __init__(self, piece: AlphaPiece, system: SpaceSystem, middle: EnclosedSpace) -> None:
         self._piece, self._system, self._middle = piece, system, middle
 
-    def numbers(self, codes: Codes, parts: CurveParts) -> tuple[Array | None, bool]:
+    def numbers(self, codes: Codes, known: KnownCurve, passage: Passage) -> tuple[Array | None, bool]:
         """Those of a form that seems to serve all over the piece, or None, and whether a shorter piece may have one."""
+        parts = passage.parts
         p, places, whole = self._system.p, self._system.tau >= 0, self._piece.whole
         rows = None
         if any(code != UNDECIDED for code in codes):
@@ -96,18 +97,21 @@ class PieceProposals:
             form = DefiniteForm(self._system, [end.mid for end in psi], apart, off, discs, rows)
             found = form.best(_DEFINITE, better=better)
             if found is None:
-                # nothing is off in a piece that is short enough
-                turn = self._turn(parts)
-                form = DefiniteForm(self._system, [turn], apart, np.zeros(p), None, rows)
+                # what is off in a piece that is short enough
+                turn, off = self._turn(known.over(passage.run, self._piece.middle, self._piece.middle), apart)
+                form = DefiniteForm(self._system, [turn], apart, ERRORS * off, None, rows)
                 return None, form.best(_DEFINITE, better=better) is not None
         mu, kappa, nu = found
         return np.concatenate([mu, kappa, nu[places], *(theta[places] for theta in thetas)]), True
 
-    def _turn(self, parts: CurveParts) -> Array:
-        """theta of the curve at the middle of the piece, (p, 2)."""
-        k = int(np.argmin(np.abs(parts.alpha.mid - float(self._piece.middle))))
-        theta, far = self._served(parts)
-        return np.where((self._system.tau >= 0) & far[k][:, None], theta[k], 0.0)
+    def _turn(self, parts: CurveParts, apart: Flags) -> tuple[Array, Array]:
+        """theta of the curve at the middle of the piece, (p, 2), and how far it is from one that serves there, (p,)."""
+        if not len(parts.alpha.mid):
+            return np.zeros((self._system.p, 2)), np.ones(self._system.p)
+        theta, known = self._served(parts)
+        far = np.max(np.where(known, parts.thetas[1], 1.0), axis=0)
+        turn = np.where((self._system.tau >= 0) & known[0][:, None], theta[0], 0.0)
+        return turn, np.where(apart | np.all(self._system.tau < 0, axis=1), 0.0, np.minimum(far, 1.0))
 
     def _reference(self) -> Array:
         """F at the middle, of the first component that has friction."""

@@ -314,11 +314,11 @@ class PieceTree:
         if len(passages) != 1 or statuses in at.hopeless:
             return None
         (passage,) = passages
-        numbers, hopeful = at.proposals.numbers(statuses, passage.parts)
+        known = self.curves[passage.curve]
+        numbers, hopeful = at.proposals.numbers(statuses, known, passage)
         if not hopeful:
             at.hopeless.add(statuses)
             return None
-        known = self.curves[passage.curve]
         if numbers is not None and piece.lies_on(known, passage.run, statuses, numbers, ERRORS):
             before = sum(len(other.chain.links) for other in self.curves[: passage.curve])
             return OnlyOnCurve(numbers, before + passage.run.first, before + passage.run.last), []
