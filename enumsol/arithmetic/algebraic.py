@@ -3,7 +3,7 @@
 A critical alpha is either a rational number or the only root of a polynomial in an open interval with rational ends.
 Signs of other polynomials there are decided without rounding: a common root is found by the greatest common divisor,
 and a polynomial that does not vanish has constant sign once the interval is narrow enough. Arithmetic with an
-irrational alpha is that of the real number field Q(alpha) (section 7.4).
+irrational alpha is that of the real number field Q(alpha) (theory, section 7.4).
 """
 
 from __future__ import annotations

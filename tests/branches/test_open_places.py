@@ -10,7 +10,7 @@ import pytest
 from branches.test_degenerate import pair
 from complete import whole_graph
 from path_problems import generic_problem
-from problems3d import SLIDING
+from problems3d import SLIDING, OneNode
 from refusals import refusal
 
 from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery
@@ -157,24 +157,25 @@ def test_what_contradicts_a_search_is_told_as_a_defect():
 def gap_in_space(monkeypatch):
     """The reason that a graph in 3D gives for its only gap after a change of the search; it is complete otherwise."""
 
-    def told(name, value):
+    def told(name, value, problem, ends):
         monkeypatch.setattr(cover, name, value)
-        graph = branch_graph(SLIDING, (1.78, 1.82), max_nodes=60)
+        graph = branch_graph(problem, ends, max_nodes=60)
         assert not graph.complete
         (reason,) = graph.reasons
         low, high = (float(end) for end in re.search(r"\[(.*), (.*)\]: ", reason).groups())
-        assert 1.78 <= low < high <= 1.82
+        assert ends[0] <= low < high <= ends[1]
         return reason
 
     return told
 
 
 def test_a_curve_in_space_that_is_not_whole_is_told(gap_in_space):
-    reason = gap_in_space("_FAILURES", 0)
+    reason = gap_in_space("_FAILURES", 0, SLIDING, (1.78, 1.82))
     assert ": no curve through a solution there was proven to be whole; another interval, or data" in reason
 
 
 @pytest.mark.slow
 def test_a_piece_in_space_that_is_too_short_is_told(gap_in_space):
-    reason = gap_in_space("PieceTree", partial(cover.PieceTree, smallest=1.0))
+    whole = partial(cover.PieceTree, smallest=1.0)
+    reason = gap_in_space("PieceTree", whole, OneNode(3, load=True).problem, (-0.5, 0.5))
     assert ": pieces of alpha as short as are tried left statuses undecided; a graph over a short interval" in reason

@@ -8,6 +8,7 @@ from branches.test_degenerate import pair
 from browser import find_browser
 from pages import Reader, data_of
 from parted_solids import solid
+from problems3d import SLIDING
 
 import enumsol
 from enumsol import branch_graph, fem, gallery, write_report
@@ -130,7 +131,8 @@ def test_the_command_takes_a_problem_in_3d(tmp_path, capsys):
     assert f"enumsol verify {tmp_path / 'node.npz'} {proof}" in Reader(page.read_text()).text
     assert main([*command, "--jobs", "2"]) == 2
     assert "--jobs is 2 for a problem in 3D; expected 1" in capsys.readouterr().err
-    assert main([*command, "--max-nodes", "1"]) == 3
+    enumsol.write_problem(SLIDING, tmp_path / "node.npz")
+    assert main([*command, "--to", "3", "--max-nodes", "1"]) == 3
     capsys.readouterr()
     assert "This graph is not complete" in Reader(page.read_text()).text
 

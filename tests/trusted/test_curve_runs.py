@@ -113,7 +113,7 @@ def test_a_form_leaves_only_the_solutions_of_its_curve(p, seed):
                 parts = known.over(run, low, high)
                 for codes in product((UNDECIDED, OPEN, CONTACT, STICK), repeat=p):
                     all_runs += 1
-                    numbers, _ = at.proposals.numbers(codes, parts) if parts.allowed(codes) else (None, False)
+                    numbers = at.proposals.numbers(codes, parts) if parts.allowed(codes) else None
                     if numbers is None or not piece.lies_on(known, run, codes, numbers):
                         continue
                     accepted += 1
@@ -132,7 +132,7 @@ def test_numbers_that_make_no_sense_are_refused():
     piece = piece_over(cover, low, high)
     run = next(run for run in runs_over(known, low, high))
     codes = (UNDECIDED,)
-    numbers, _ = _Examined(piece).proposals.numbers(codes, known.over(run, low, high))
+    numbers = _Examined(piece).proposals.numbers(codes, known.over(run, low, high))
     assert piece.lies_on(known, run, codes, numbers)
     for place, value in ((0, -1.0), (1, 0.0), (2, 9.0), (4, np.inf), (5, 40.0)):
         changed = numbers.copy()

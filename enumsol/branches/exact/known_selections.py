@@ -1,6 +1,6 @@
 """Selections of a graph that the search found, with the alpha at which they hold (theory, section 7.6).
 
-Some are singular for every alpha: they hold families over an interval, sheets (section 7.5).
+Some are singular for every alpha: they hold families over an interval, sheets (theory, section 7.5).
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 A piece is a subinterval. It is searched by trees whose leaves cover all selections: a leaf is proven empty on the whole
 piece, or it is a complete selection that survives, or it is left to both halves of the piece. What was proven for the
-whole piece is proven for its halves, too. Bodies that nothing holds have a certifier of their own (section 14.8).
+whole piece is proven for its halves, too. Bodies that nothing holds have their own certifier (theory, section 14.8).
 """
 
 from __future__ import annotations

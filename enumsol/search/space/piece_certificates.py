@@ -81,36 +81,42 @@ class PieceProposals:
     def __init__(self, piece: AlphaPiece, system: SpaceSystem, middle: EnclosedSpace) -> None:
         self._piece, self._system, self._middle = piece, system, middle
 
-    def numbers(self, codes: Codes, known: KnownCurve, passage: Passage) -> tuple[Array | None, bool]:
-        """Those of a form that seems to serve all over the piece, or None, and whether a shorter piece may have one."""
-        parts = passage.parts
+    def numbers(self, codes: Codes, parts: CurveParts) -> Array | None:
+        """Those of a form that seems to serve all over the piece, or None."""
         p, places, whole = self._system.p, self._system.tau >= 0, self._piece.whole
-        rows = None
-        if any(code != UNDECIDED for code in codes):
-            rows = equations(self._middle, codes, _WEIGHT).mid
         with np.errstate(all="ignore"):
             thetas, apart = self._thetas(parts)
-            discs, better = whole.largest_discs, p >= _MANY
             psi = [Ball.exact(x * disc.mid[:, None]) for x, disc in zip(thetas, whole.end_discs, strict=True)]
             plain = PieceWeights(np.ones(p), np.ones(p), np.zeros((p, 2)), (thetas[0], thetas[1]))
             off = ERRORS * how_far_off(whole, (self._piece.low, self._piece.high), plain, psi, parts)
-            form = DefiniteForm(self._system, [end.mid for end in psi], apart, off, discs, rows)
-            found = form.best(_DEFINITE, better=better)
-            if found is None:
-                # what is off in a piece that is short enough
-                turn, off = self._turn(known.over(passage.run, self._piece.middle, self._piece.middle), apart)
-                form = DefiniteForm(self._system, [turn], apart, ERRORS * off, None, rows)
-                return None, form.best(_DEFINITE, better=better) is not None
+            turns, rows = [end.mid for end in psi], self._rows(codes)
+            found = DefiniteForm(self._system, turns, apart, off, whole.largest_discs, rows).best(
+                _DEFINITE, better=p >= _MANY
+            )
+        if found is None:
+            return None
         mu, kappa, nu = found
-        return np.concatenate([mu, kappa, nu[places], *(theta[places] for theta in thetas)]), True
+        return np.concatenate([mu, kappa, nu[places], *(theta[places] for theta in thetas)])
+
+    def is_hopeful(self, codes: Codes, parts: CurveParts) -> bool:
+        """Whether a shorter piece may have such a form: the middle has one, by the parts of the curve there."""
+        with np.errstate(all="ignore"):
+            apart = self._apart(parts)
+            turn, off = self._turn(parts, apart)
+            form = DefiniteForm(self._system, [turn], apart, ERRORS * off, None, self._rows(codes))
+            return form.best(_DEFINITE, better=self._system.p >= _MANY) is not None
+
+    def _rows(self, codes: Codes) -> Array | None:
+        """Rows that are zero for the difference of two solutions with these statuses."""
+        return None if all(code == UNDECIDED for code in codes) else equations(self._middle, codes, _WEIGHT).mid
 
     def _turn(self, parts: CurveParts, apart: Flags) -> tuple[Array, Array]:
         """theta of the curve at the middle of the piece, (p, 2), and how far it is from one that serves there, (p,)."""
         if not len(parts.alpha.mid):
             return np.zeros((self._system.p, 2)), np.ones(self._system.p)
         theta, known = self._served(parts)
-        far = np.max(np.where(known, parts.thetas[1], 1.0), axis=0)
         turn = np.where((self._system.tau >= 0) & known[0][:, None], theta[0], 0.0)
+        far = np.max(np.where(known, parts.thetas[1] + np.linalg.norm(theta - turn, axis=2), 1.0), axis=0)
         return turn, np.where(apart | np.all(self._system.tau < 0, axis=1), 0.0, np.minimum(far, 1.0))
 
     def _reference(self) -> Array:

@@ -315,14 +315,15 @@ class PieceTree:
             return None
         (passage,) = passages
         known = self.curves[passage.curve]
-        numbers, hopeful = at.proposals.numbers(statuses, known, passage)
-        if not hopeful:
-            at.hopeless.add(statuses)
-            return None
-        if numbers is not None and piece.lies_on(known, passage.run, statuses, numbers, ERRORS):
+        known, run = self.curves[passage.curve], passage.run
+        numbers = at.proposals.numbers(statuses, passage.parts)
+        if numbers is not None and piece.lies_on(known, run, statuses, numbers, ERRORS):
             before = sum(len(other.chain.links) for other in self.curves[: passage.curve])
-            return OnlyOnCurve(numbers, before + passage.run.first, before + passage.run.last), []
-        return self._halved(at, codes)
+            return OnlyOnCurve(numbers, before + run.first, before + run.last), []
+        if at.proposals.is_hopeful(statuses, known.over(run, piece.middle, piece.middle)):
+            return self._halved(at, codes)
+        at.hopeless.add(statuses)
+        return None
 
     def _passages(self, at: _Examined, statuses: tuple[int, ...]) -> list[Passage]:
         """Runs of known curves that pass a piece; the first ones are sought where no status is assigned."""
