@@ -50,8 +50,9 @@ _ALONE = 2.0**-26
 _SOUGHT = 8
 #: Leaves are tested from this level of their sectors on.
 _TRIED = 3
-#: Sectors above this level are halved, rather than alpha, where a leaf is settled in the middle only.
-_WIDE = 6
+#: Sectors above this level are halved, rather than alpha, where a leaf is settled in the middle only; by how many
+#: levels fewer sectors are halved than pieces.
+_WIDE, _NARROW = 6, 8
 
 
 @dataclass(frozen=True)
@@ -270,9 +271,11 @@ class PieceTree:
         sectors = [i for i, code in enumerate(codes) if code > SECTORS and level_of(code - SECTORS) < DEEPEST]
         return min(sectors, key=lambda i: width_level(codes[i] - SECTORS)) if sectors else -1
 
-    @staticmethod
-    def _is_wide(codes: Codes) -> bool:
-        return any(code > SECTORS and width_level(code - SECTORS) < _WIDE for code in codes)
+    def _is_wide(self, piece: AlphaPiece, codes: Codes) -> bool:
+        """Whether a sector is to be halved rather than the piece: those of short pieces may be narrow."""
+        share = float((piece.high - piece.low) / (self.interval[1] - self.interval[0]))
+        level = max(_WIDE, -np.log2(share) - _NARROW)
+        return any(code > SECTORS and width_level(code - SECTORS) < min(level, DEEPEST) for code in codes)
 
     def _branched(self, at: _Examined, codes: Codes, node: int, relaxation: Any) -> tuple[Any, list[Any]]:
         children = at.splitting.children(codes, node, relaxation)
@@ -321,7 +324,9 @@ class PieceTree:
             before = sum(len(other.chain.links) for other in self.curves[: passage.curve])
             return OnlyOnCurve(numbers, before + run.first, before + run.last), []
         if at.proposals.is_hopeful(statuses, known.over(run, piece.middle, piece.middle)):
-            return self._halved(at, codes)
+            # a leaf may be decided over a longer piece
+            done = None if {CONTACT, UNDECIDED} & set(codes) else self._leaf(at, codes)
+            return self._halved(at, codes) if done is None or isinstance(done[0], OpenLeaf) else done
         at.hopeless.add(statuses)
         return None
 
@@ -350,14 +355,14 @@ class PieceTree:
         # is it the piece or the sectors that are too wide? slip directions first: near a corner all are left open
         there = piece.point.held(codes)
         if there is None:
-            return None if self._is_wide(codes) else self._halved(at, codes)
+            return None if self._is_wide(piece, codes) else self._halved(at, codes)
         if isinstance(there, SpaceRoot):
             number = self._met(piece.point, there)
             if number is None and not self._is_known(self._middle(piece, there)):
                 return self._open(at, codes, piece.forces(there.y).mid), []
             if number is not None and isinstance(found, SpaceRoot):
                 return ThroughCurveBox(number), []
-            return None if self._is_wide(codes) else self._halved(at, codes)
+            return None if self._is_wide(piece, codes) else self._halved(at, codes)
         return None if self._box(piece.point, there) is None else self._halved(at, codes)
 
     def _box(self, piece: AlphaPiece, found: SpaceRoot | Open) -> int | None:
