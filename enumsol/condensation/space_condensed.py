@@ -305,6 +305,15 @@ class PieceSpace(EnclosedSpace):
             return (self.discs,)
         return self.along.disc - self.along.disc_turn, self.along.disc + self.along.disc_turn
 
+    @cached_property
+    def references(self) -> Floats:
+        """F of the first component with friction, exact, (p,): lambda_t of it is F tau; 1 where there is none."""
+        found = np.ones(len(self.tau))
+        for k in (1, 0):
+            has = self.tau[:, k] >= 0
+            found[has] = self.F[has, k] / self.unit[self.tau[has, k]]
+        return found
+
     @classmethod
     def over(
         cls,

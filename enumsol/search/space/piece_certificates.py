@@ -119,17 +119,11 @@ class PieceProposals:
         far = np.max(np.where(known, parts.thetas[1] + np.linalg.norm(theta - turn, axis=2), 1.0), axis=0)
         return turn, np.where(apart | np.all(self._system.tau < 0, axis=1), 0.0, np.minimum(far, 1.0))
 
-    def _reference(self) -> Array:
-        """F at the middle, of the first component that has friction."""
-        system = self._system
-        F = np.where(system.tau >= 0, system.F / np.where(system.tau >= 0, system.unit[system.tau], 1.0), 0.0)
-        return np.asarray(np.where(system.tau[:, 0] >= 0, F[:, 0], np.where(system.tau[:, 1] >= 0, F[:, 1], 1.0)))
-
     def _served(self, parts: CurveParts) -> tuple[Array, Flags]:
         """theta that serves, and where one is known: a shorter one than v / |v| where a node is open all the time."""
         (theta, far), normal, slip = parts.thetas, *(part.mid for part in parts.slips)
-        r = np.maximum(parts.F.mid, 0.0) / self._reference()
-        pushed = self._reference() * r * np.linalg.norm(slip, axis=2)
+        r = np.maximum(parts.F.mid, 0.0) / self._piece.whole.references
+        pushed = self._piece.whole.references * r * np.linalg.norm(slip, axis=2)
         shorter = np.maximum(1.0 - _SHARED * np.maximum(-normal, 0.0) / np.maximum(pushed, 1e-300), 0.0)
         apart = self._apart(parts)
         return np.where(apart[:, None], shorter[:, :, None] * theta, theta), np.isfinite(far) | apart
@@ -141,7 +135,7 @@ class PieceProposals:
 
     def _thetas(self, parts: CurveParts) -> tuple[Sequence[Array], Flags]:
         """Those at both ends whose psi is near to that of the curve all over the piece, (p, 2) each, and open nodes."""
-        low, high, reference = float(self._piece.low), float(self._piece.high), self._reference()
+        low, high, reference = float(self._piece.low), float(self._piece.high), self._piece.whole.references
         share = np.clip((parts.alpha.mid - low) / (high - low), 0.0, 1.0)
         r = np.maximum(parts.F.mid, 0.0) / reference
         ends = [np.maximum(end.mid, 0.0) for end in self._piece.whole.end_discs]

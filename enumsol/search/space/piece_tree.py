@@ -177,10 +177,15 @@ class PieceTree:
         """Whether a solution seems to lie on a known curve; no claim."""
         if not self._boxes:
             return False
-        off = self._given.placed(x) - self._c
-        t = np.sum(self._e * off, axis=1)
-        beside = np.abs(off - t[:, None] * self._d)
-        return bool(np.any((np.abs(t) <= self._h) & np.all(beside <= self._b, axis=1)))
+        return bool(np.any(self._around(self._given.placed(x), np.zeros_like(x), slice(None))))
+
+    def _around(self, x: Array, rad: Array, boxes: Any) -> NDArray[np.bool_]:
+        """Which of some boxes seem to hold a point, and all that is within a radius of it along t; no claim."""
+        off = x - self._c[boxes]
+        t = np.sum(self._e[boxes] * off, axis=1)
+        beside = np.abs(off - t[:, None] * self._d[boxes])
+        along = np.abs(t) + np.abs(self._e[boxes]) @ rad
+        return np.asarray((along <= self._h[boxes]) & np.all(beside <= self._b[boxes], axis=1))
 
     def _examined(self, low: Fraction, high: Fraction) -> _Examined:
         key = low, high
@@ -317,7 +322,6 @@ class PieceTree:
         if len(passages) != 1 or statuses in at.hopeless:
             return None
         (passage,) = passages
-        known = self.curves[passage.curve]
         known, run = self.curves[passage.curve], passage.run
         numbers = at.proposals.numbers(statuses, passage.parts)
         if numbers is not None and piece.lies_on(known, run, statuses, numbers, ERRORS):
@@ -373,11 +377,7 @@ class PieceTree:
         near = np.flatnonzero((self._low <= float(piece.low)) & (float(piece.high) <= self._high))
         if not len(near):
             return None
-        x, rad = place.mid - self._c[near], place.rad
-        t = np.sum(self._e[near] * x, axis=1)
-        inside = np.abs(t) + np.abs(self._e[near]) @ rad <= self._h[near]
-        beside = np.abs(x - t[:, None] * self._d[near])
-        inside &= np.all(beside <= self._b[near], axis=1)
+        inside = self._around(place.mid, place.rad, near)
         for k in near[inside].tolist():
             if lies_in(place, self._boxes[k], 2.0):
                 return int(k)

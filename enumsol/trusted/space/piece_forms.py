@@ -13,7 +13,13 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, upper_norm
 from enumsol.trusted.space.sector_rows import UNDECIDED
-from enumsol.trusted.space.space_uniqueness import LARGEST_UNIT, equations, least_eigenvalue, slip_sizes
+from enumsol.trusted.space.space_uniqueness import (
+    EQUATION_WEIGHTS,
+    LARGEST_UNIT,
+    equations,
+    least_eigenvalue,
+    slip_sizes,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -26,9 +32,6 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
     Flags = NDArray[np.bool_]
-
-#: Weights of equations that are tried, by the largest entry of S.
-_WEIGHTS = 16.0, 1024.0
 
 
 @dataclass(frozen=True)
@@ -102,7 +105,7 @@ def only_on_curve(
         turns = [Ball(end.mid / unit, end.rad / unit * SAFE + TINY * (system.tau >= 0)) for end in psi]
         factors, push, rest = (weights.mu, weights.kappa), weights.nu * unit, (off, lost)
         assigned = any(code != UNDECIDED for code in codes)
-        held = [equations(system, codes, weight) for weight in _WEIGHTS] if assigned else [None]
+        held = [equations(system, codes, weight) for weight in EQUATION_WEIGHTS] if assigned else [None]
         # between the ends the form is between those of both
         return any(
             all(least_eigenvalue(system, factors, turn, push, rest, rows) > 0 for turn in turns) for rows in held
@@ -135,7 +138,7 @@ def how_far_off(
     half = Ball.exact(np.array(0.5))
     middle, change = (psi[0] + psi[1]) * half, (psi[1] - psi[0]) * half
     at = Ball(middle.mid[None], middle.rad[None]) + shares[:, None, None] * change
-    reference = np.where(rubs, _references(system), 1.0)
+    reference = system.references
     inverse = 1.0 / reference
     r = parts.F * Ball(inverse, np.where(rubs, 2 * UNIT * inverse, 0.0))
     theta, far = parts.thetas
@@ -144,15 +147,6 @@ def how_far_off(
     off = np.minimum(np.where(np.isfinite(apart), apart, np.inf), unknown) * SAFE * SAFE
     off = np.where(_gap_serves(weights, reference, at, r, parts), 0.0, off)
     return np.where(rubs, np.max(off, axis=0), 0.0)
-
-
-def _references(system: PieceSpace) -> Array:
-    """The F of a piece by which lambda_t is F tau, (p,): of the first component that has friction, exact."""
-    found = np.zeros(len(system.tau))
-    for k in (1, 0):
-        has = system.tau[:, k] >= 0
-        found[has] = system.F[has, k] / system.unit[system.tau[has, k]]
-    return found
 
 
 def _gap_serves(weights: PieceWeights, reference: Array, psi: Ball, r: Ball, parts: CurveParts) -> Flags:

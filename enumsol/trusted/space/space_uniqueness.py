@@ -32,7 +32,7 @@ _UNIT_LENGTH = 2.0**-40
 #: Units of tau beyond this, or below its inverse, are left to the tree: nothing here underflows with others.
 LARGEST_UNIT = 2.0**128
 #: Weights of equations that are tried, by the largest entry of S.
-_WEIGHTS = 16.0, 1024.0
+EQUATION_WEIGHTS = 16.0, 1024.0
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ def lone_root(
         root = settle(system, leaf)
         if not isinstance(root, SpaceRoot):
             return None
-        forms = (_Form.of(system, numbers, equations(system, codes, weight)) for weight in _WEIGHTS)
+        forms = (_Form.of(system, numbers, equations(system, codes, weight)) for weight in EQUATION_WEIGHTS)
         served = any(form is not None and form.serves(root.y, root.w, errors) for form in forms)
         return root if served else None
 
