@@ -36,8 +36,9 @@ What checker and search share
       ``trusted.uniqueness_weights``, the form of both;
     - for the arcs of branch graphs: ``trusted.selection``, the numbers of unknowns and conditions;
       ``trusted.arcs.selection_balls``, ``trusted.arcs.series`` and ``trusted.arcs.over_parts``, a selection over an
-      interval as a series with bounds of its error; ``trusted.arcs.precise`` and ``trusted.arcs.many_digits``, the same
-      with many digits, loaded only where a box asks for it;
+      interval as a series with bounds of its error; ``trusted.arcs.precise``, ``trusted.arcs.bordered``,
+      ``trusted.arcs.taylor`` and ``trusted.arcs.many_digits``, the same with many digits, loaded only where a box asks
+      for it;
       ``trusted.arcs.only_branch``, the test by which the roots of arcs are the only solutions over a piece, with the
       form of ``trusted.over_interval`` (on maps, of which no proof is written, ``trusted.data_box`` has it, too);
     - for problems in 3D, and loaded for their proofs only: ``trusted.space.sector_rows``, the rows and branchings

@@ -7,6 +7,7 @@ import pytest
 from branches.test_degenerate import pair, uncoupled
 from complete import proven_graph, whole_graph
 from generators import through_the_unloaded_state, vanishing_problem
+from parted_meshes import grid, moved
 from path_problems import (
     generic_problem,
     grazing_problem,
@@ -18,7 +19,7 @@ from path_problems import (
 )
 from two_graphs import differences, steps, two_graphs
 
-from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery, verify
+from enumsol import ContactProblem, branch_graph, enumerate_roots, fem, gallery, verify
 from enumsol.branches import ways
 from enumsol.branches.enclosed import tracing
 
@@ -239,4 +240,51 @@ def test_places_that_need_many_digits_are_decided_beyond_250_degrees_of_freedom(
     assert problem.n == 270
     assert graph.complete, graph.reasons
     for alpha in (0.2, 0.3625, 0.3635, 1.5):
+        assert graph.multiplicity_at(alpha) == len(enumerate_roots(problem, alpha))
+
+
+def jamming(seed):
+    """A trapezoid of triangles on weak springs, pressed in between flanks of 57.5 degrees."""
+    mesh = grid(4, 4, 3, shake=0.04, seed=seed)
+    height = 8.0 / np.tan(np.radians(57.5))
+    mesh = moved(mesh, lambda at: np.stack([(at[:, 0] - 0.5) * (30.0 - 16.0 * at[:, 1]), at[:, 1] * height], axis=1))
+    return fem.mesh_problem(
+        mesh,
+        young=210e3,
+        poisson=0.3,
+        contact=["left", "right"],
+        load={"top": (0.0, -1.0)},
+        spring={"bottom": (1e-3, 1e-3)},
+        gap=-0.01,
+        friction=(0.0, 1.0),
+    )
+
+
+@pytest.mark.few(1)
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_boxes_are_long_where_a_body_is_about_to_jam(seed):
+    """Determinants nearly vanish at F = tan(57.5 degrees): boxes were a hundredth as long as far from it."""
+    problem = jamming(seed)
+    graph = proven_graph(problem, (1.55, 1.8))
+    assert graph.arcs_by == "balls"
+    assert [v.kind for v in graph.vertices].count("fold") == 1
+    for alpha in (1.5697, 1.65, 1.7, 1.75):
+        assert graph.multiplicity_at(alpha) == len(enumerate_roots(problem, alpha))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("cells", "interval", "near"), [((3, 2), (1.0001, 1.0003), 1.000195), ((4, 3), (1.0, 1.5), 1.0001375)]
+)
+def test_where_a_symmetric_body_loses_its_symmetry_both_sides_are_told_apart(cells, interval, near):
+    """The determinant of one selection vanishes there, and its conditions nearly do: within the matrices' rounding."""
+    problem = gallery.dovetail(*cells)
+    graph = proven_graph(problem, interval)
+    assert graph.arcs_by == "balls"
+    first, second = (vertex for vertex in graph.vertices if abs(vertex.alpha - near) < 1e-7)
+    assert {first.kind, second.kind} == {"fold", "transition"}
+    assert second.alpha - first.alpha < 1e-11
+    before, beyond = first.alpha - 1e-8, second.alpha + 1e-8
+    assert (graph.multiplicity_at(before), graph.multiplicity_at(beyond)) == (1, 3)
+    for alpha in (before, beyond, float(interval[1])):
         assert graph.multiplicity_at(alpha) == len(enumerate_roots(problem, alpha))

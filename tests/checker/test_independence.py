@@ -71,6 +71,7 @@ SHARED = {
     "trusted.arcs.over_parts": None,
     "trusted.over_interval": {"EnclosedPiece", "PieceNumbers", "as_computed"},
     "trusted.arcs.precise": None,
+    "trusted.arcs.bordered": None,
     "trusted.positions": {"certain_statuses", "tangential_positions"},
     "trusted.selection": None,
     "trusted.uniqueness": {

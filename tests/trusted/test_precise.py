@@ -1,20 +1,24 @@
 """What the kernel says of a selection in many digits is true: against isolated roots of exact polynomials."""
 
 from fractions import Fraction
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from effort import some
 from exact_arcs import Truth, beside, check_slopes, exact_of, interval_at, precise_system, random_data, two_zeros
-from flint import arb, arb_mat, ctx
+from flint import arb, arb_mat, ctx, fmpq
 from path_problems import generic_problem
 
 from enumsol import ContactProblem
+from enumsol.arithmetic.algebraic import real_roots
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.gallery import wedge
 from enumsol.trusted.arcs import many_digits as refined
-from enumsol.trusted.arcs.many_digits import PRECISION, ball_of, precision, taylor_around, upper
-from enumsol.trusted.arcs.precise import NowhereHeld, PreciseSelection, PreciseSystem
+from enumsol.trusted.arcs.bordered import BorderedExpansion
+from enumsol.trusted.arcs.many_digits import PRECISION, ball_of, precision, upper
+from enumsol.trusted.arcs.precise import PreciseSelection, PreciseSystem
+from enumsol.trusted.arcs.taylor import Smooth
 from enumsol.trusted.status_rows import FRICTIONLESS
 
 
@@ -65,31 +69,97 @@ def check_claims(count, start=0):
     return made
 
 
-def test_a_selection_that_holds_nowhere_is_told_at_zeros_of_its_determinant():
-    told = 0
-    for rng, selection, truth in selections(some(75, of=150), start=5000):
-        low, high = (Fraction(end) for end in interval_at(rng, truth))
-        for _ in range(60):
-            # bisected to where the determinant changes its sign
-            middle = (low + high) / 2
-            if truth.signs(truth.det, low, middle) >= {-1, 1}:
-                high = middle
-            elif truth.signs(truth.det, middle, high) >= {-1, 1}:
-                low = middle
-            else:
-                break
-        expansion = selection.expansion(low, high)
-        if isinstance(expansion, NowhereHeld):
-            told += truth.signs(truth.det, low, high) >= {-1, 1}
-            for a, b in ((low, high), (low, low), (low, (low + high) / 2)):
-                assert truth.is_true(expansion.over(a, b), a, b)
-    assert told > some(1, of=3), told
+def around_a_pole(rng, truth):
+    """An interval of any width in which the determinant vanishes, or None."""
+    poles = real_roots(truth.det, fmpq(-10), fmpq(10)) if truth.det.degree() > 0 else []
+    if not poles:
+        return None
+    centre = Fraction(float(poles[int(rng.integers(len(poles)))]))
+    width = Fraction(10.0 ** -rng.uniform(0.5, 14))
+    return centre - width * int(rng.integers(1, 9)), centre + width * int(rng.integers(1, 9))
+
+
+def check_claims_around_poles(count, start):
+    """The same around zeros of the determinant, of the bordered system."""
+    made = dict.fromkeys(("poles", "conditions", "none", "slopes", "index", "zeros"), 0)
+    for rng, selection, truth in selections(count, start):
+        ends = None if truth.det.is_zero() else around_a_pole(rng, truth)
+        expansion = ends and selection.expansion(*ends)
+        if not isinstance(expansion, BorderedExpansion):
+            continue
+        low, high = ends
+        made["poles"] += 1
+        zeros = [zero for k in range(len(selection.rows.conditions) + 1) for zero in expansion.zeros(k)]
+        assert all(low < zero < high for zero in zeros)
+        around = [zero + sign * (high - low) / 2**k for zero in zeros for k in (5, 20, 120) for sign in (-1, 1)]
+        cuts = sorted([low, high, *(alpha for alpha in around if low < alpha < high)])
+        for a, b in (*pairwise(cuts), (low, high), (low, low), *beside(rng, truth, low, high)):
+            known = expansion.over(a, b)
+            assert truth.is_true(known, a, b), (selection.rows.codes, a, b, known)
+            made["none"] += known.none
+            if not known.regular:
+                continue
+            made["conditions"] += int(np.count_nonzero(known.conditions))
+            made["index"] += 1
+            assert truth.signs(truth.det, a, b) == {known.index}
+            check_slopes(truth, expansion, known, a, b, made)
+    return made
+
+
+@pytest.mark.slow
+def test_claims_around_zeros_of_the_determinant_are_true():
+    made = check_claims_around_poles(some(150, of=400), 5000)
+    assert min(made.values()) > some(1, of=10), made
+
+
+@pytest.mark.parametrize("off", [0.0, 2.0**-20, 2.0**-50])
+def test_what_happens_beside_a_zero_of_the_determinant_is_told_apart(off):
+    """Two nodes slip alike, but for ``off``; where det M vanishes, one more and the other less, until one is open."""
+    S = np.array([[2.0, 1.0, 0.0, -1.0], [1.0, 2.0, -1.0, 0.0], [0.0, -1.0, 4.0, 0.0], [-1.0, 0.0, 0.0, 4.0]])
+    data = S, np.array([3.0 + off, 3.0, -10.0, -10.0]), np.zeros(4), np.zeros(2), np.ones(2)
+    codes = (3, 3)
+    system, truth = precise_system(data), Truth(exact_of(data), codes)
+    pole = next(root for root in truth.interesting if 0 < root < 10)
+    selection = PreciseSelection(system, codes)
+    low, high = Fraction(pole) - Fraction(1, 2**12), Fraction(pole) + Fraction(1, 2**13)
+    expansion = selection.expansion(low, high)
+    assert isinstance(expansion, BorderedExpansion)
+    zeros = sorted(zero for k in range(len(selection.rows.conditions) + 1) for zero in expansion.zeros(k))
+    assert len(zeros) == 5
+    gaps = [b - a for a, b in pairwise(zeros)]
+    assert min(gaps) > expansion.apart if off else max(gaps) < expansion.apart
+    beside = (low, zeros[0] - expansion.apart), (zeros[-1] + expansion.apart, high)
+    cuts = [low, *(zero + gap / 2 for zero, gap in zip(zeros, gaps, strict=False)), high]
+    known = {part: expansion.over(*part) for part in [*beside, *(pairwise(cuts) if off else ())]}
+    assert all(truth.is_true(said, *part) for part, said in known.items())
+    assert all(known[part].holds for part in beside)
+    if off:
+        first, *between, last = (known[part] for part in pairwise(cuts))
+        assert all(said.none for said in between)
+        assert [[*map(int, said.slopes[said.doubtful])] for said in (first, last)] == [[-1], [1]]
+        made = dict.fromkeys(("slopes", "zeros"), 0)
+        for part, said in known.items():
+            check_slopes(truth, expansion, said, *part, made)
+        assert made["zeros"] == 4
+    else:
+        # all vanish at the very same alpha
+        assert not expansion.over(low, high).regular
+        assert not expansion.over(low, high).none
 
 
 @pytest.mark.slow
 def test_claims_over_parts_are_true():
     made = check_claims(some(90, of=300))
     assert min(made.values()) > some(3, of=20), made
+
+
+def value_at(smooth, tau):
+    """Values and slopes of smooth functions at a ball of tau."""
+    value, slope = smooth.left, smooth.left_slope
+    for k, term in enumerate(smooth.terms):
+        value = value + term * tau**k
+        slope = slope + (term * (k * tau ** (k - 1)) if k else 0 * term)
+    return value, slope
 
 
 @pytest.mark.slow
@@ -104,17 +174,16 @@ def test_balls_over_an_interval_hold_the_unknowns_and_their_slopes():
                 continue
             y, M = solved
             rise = M.solve((selection._g[1] - selection._M[1] * y) * ball_of(radius))
-            found = taylor_around(rise, M.solve(selection._M[1] * ball_of(radius)))
+            found = Smooth.solution(y, rise, M.solve(selection._M[1] * ball_of(radius)))
             if found is None:
                 continue
-            bend, left, left_slope = found
             for tau in (Fraction(-1), Fraction(1), Fraction(int(rng.integers(-99, 100)), 100)):
                 alpha = middle + tau * radius
                 there = selection.solve(ball_of(alpha))
                 slope = there[1].solve(selection._g[1] - selection._M[1] * there[0]) * ball_of(radius)
                 compared += 1
                 t = ball_of(tau)
-                ours = y + rise * t - bend * (t * t) + left, rise - bend * (2 * t) + left_slope
+                ours = value_at(found, t)
                 for about, exact in zip(ours, (there[0], slope), strict=True):
                     for i in range(about.nrows()):
                         # the value at one alpha is known to some ninety digits
@@ -143,12 +212,12 @@ def test_balls_around_the_smallest_and_largest_numbers():
         for exponent in (-2000, -1074, -1000, 0, 1000):
             size = arb(2) ** exponent
             for rate in (arb(1) / 4, arb(2) ** -30, arb(2) ** -300):
-                found = taylor_around(arb_mat([[size]]), arb_mat([[rate]]))
+                found = Smooth.solution(arb_mat([[0]]), arb_mat([[size]]), arb_mat([[rate]]))
                 assert found is not None
-                bend, left, left_slope = (part[0, 0] for part in found)
                 for tau in (-1, 1):
-                    assert (tau * size - bend + left).contains((tau * size / (1 + tau * rate)).mid())
-                    assert (size - 2 * tau * bend + left_slope).contains((size / (1 + tau * rate) ** 2).mid())
+                    value, slope = (part[0, 0] for part in value_at(found, arb(tau)))
+                    assert value.contains((tau * size / (1 + tau * rate)).mid())
+                    assert slope.contains((size / (1 + tau * rate) ** 2).mid())
 
 
 def test_floats_are_upper_bounds():

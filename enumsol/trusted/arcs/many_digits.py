@@ -15,7 +15,6 @@ import numpy as np
 import scipy.sparse as sp
 from flint import arb, arb_mat, ctx, fmpq, fmpz_mat
 
-from enumsol.arithmetic.balls import SAFE, UNIT, upper_sum
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.products import scaled
 from enumsol.support.deadlines import look, tell
@@ -31,38 +30,20 @@ if TYPE_CHECKING:
 
 #: Bits of the arithmetic.
 PRECISION = 320
-#: Bound of how much M may change over an interval, and of rises that count as none where norms are chosen.
-_LARGEST_SHIFT, _NO_RISE = 0.5, 1e-250
-#: Covers underflow of some products.
-_SUBNORMAL = 2.0**-1070
-
-
-def taylor_around(rise: Any, P: Any) -> tuple[Any, Any, Any] | None:
-    """The second term of the unknowns as functions of tau, and balls around zero for what is left of them.
-
-    With M(0)^{-1} M' = P and the slopes ``rise`` at tau = 0 the unknowns are y + tau (I + tau P)^{-1} rise, and their
-    slopes (I + tau P)^{-2} rise (theory, (7.16)). The first result is bend = P rise, the second holds what the unknowns
-    differ by from y + tau rise - tau^2 bend, the third what their slopes do from rise - 2 tau bend, for all tau in
-    [-1, 1]. None where P is too large, in the norm max |x| / u.
-    """
-    bend = P * rise
-    third = P * bend
-    sizes, left = (np.array([upper(x[i, 0]) for i in range(x.nrows())]) for x in (rise, third))
-    largest = float(np.max(sizes))
-    u = sizes / largest + 1e-3 if largest > _NO_RISE else np.ones(len(sizes))
-    rows = np.array([[upper(P[i, j]) for j in range(P.ncols())] for i in range(P.nrows())])
-    k = float(np.max(upper_sum(rows * u, axis=1) / u)) * SAFE
-    if not k < _LARGEST_SHIFT:
-        return None
-    norm = float(np.max(left / u)) * SAFE
-    growths = ((1.0 + 8 * UNIT) / (1.0 - k), (3.0 + 2.0 * k) * (1.0 + 8 * UNIT) / (1.0 - k) ** 2)
-    first, second = (u * (norm * growth * SAFE) + _SUBNORMAL for growth in growths)
-    return bend, *(column([arb(0, float(e)) for e in error]) for error in (first, second))
+#: Zeros are enclosed to 2^-ZERO_BITS relative to the interval, and closer ones are one.
+ZERO_BITS = 200
 
 
 def upper(value: Any) -> float:
     """At least the size of all numbers in a ball."""
     return float(np.nextafter(float(abs(value).upper()), np.inf))
+
+
+def uppers(values: Any) -> Floats:
+    """The same of all entries of a matrix."""
+    sizes = np.array([[float(abs(x).upper()) for x in row] for row in values.tolist()])
+    bounds: Floats = np.nextafter(sizes, np.inf)
+    return bounds
 
 
 class precision:  # noqa: N801 (a context manager, used like a function)

@@ -17,7 +17,9 @@ from flint import arb, arb_mat
 
 from enumsol.arithmetic.balls import SAFE, Ball, upper_sum
 from enumsol.arithmetic.rationals import as_objects
+from enumsol.trusted.arcs.bordered import BorderedExpansion, BorderedLines, Lines
 from enumsol.trusted.arcs.many_digits import (
+    ZERO_BITS,
     ball_of,
     column,
     fraction_of,
@@ -27,10 +29,10 @@ from enumsol.trusted.arcs.many_digits import (
     rounded,
     sign_of,
     signs_of,
-    taylor_around,
     upper,
 )
 from enumsol.trusted.arcs.over_parts import OverInterval
+from enumsol.trusted.arcs.taylor import Smooth, columns_of, joined
 from enumsol.trusted.selection import Selection
 
 if TYPE_CHECKING:
@@ -42,12 +44,12 @@ if TYPE_CHECKING:
     Signs = NDArray[np.int8]
     Number = float | Fraction
 
-#: Zeros are enclosed to 2^-_ZERO_BITS relative to the interval, and closer ones are one.
-_ZERO_BITS = 200
 #: Steps of Newton's method from the middle of an interval, enlargements of a zero's bounds.
 _STEPS, _WIDENINGS = 8, 6
 #: Intervals shorter than this share of alpha are narrow beside the distances at which conditions bend.
 _NEAR = Fraction(1, 2**30)
+#: Where a matrix changes by no more than this over an interval, no zero of its determinant is near.
+_LITTLE = 2.0**-4
 #: Zeros are farther apart (tau), or the rounding of floats hides it.
 _LEAST_SPLIT = 1e-12
 
@@ -185,11 +187,8 @@ class PreciseSelection:
         solved = self.solve(a, algorithm)
         return None if solved is None else signs_of(self.values(a, solved[0]))
 
-    def expansion(self, low: Number, high: Number) -> PreciseExpansion | NowhereHeld | None:
-        """The conditions over [low, high]; None where the interval is too long.
-
-        Where the matrix may be singular, all that is told is that the selection has no root, if that is proven.
-        """
+    def expansion(self, low: Number, high: Number) -> PreciseExpansion | BorderedExpansion | None:
+        """The conditions over [low, high], also where the matrix may be singular; None where that is too long."""
         first, last = Fraction(low), Fraction(high)
         with precision():
             middle, radius = ball_of((first + last) / 2), ball_of((last - first) / 2)
@@ -198,47 +197,14 @@ class PreciseSelection:
                 values = constant + slope * ball_of(first).union(ball_of(last))
                 near = constant + slope * middle
                 return PreciseExpansion(self, first, last, values, slope * radius, self._constant_index, near)
-            return self._expansion(first, last, middle, radius) or self._nowhere(first, last, middle, radius)
-
-    def _nowhere(self, first: Fraction, last: Fraction, middle: Any, radius: Any) -> NowhereHeld | None:
-        """Whether the selection has no root, by the bordered system, which is regular where det M has a simple zero.
-
-        See theory, section 7.14: conditions, or one and t, of opposite signs.
-        """
-        M, M1 = self._M[0] + self._M[1] * middle, self._M[1] * radius
-        g, g1 = self._g[0] + self._g[1] * middle, self._g[1] * radius
-        size = M.nrows()
-        border = _kernel(M, g)
-        if border is None:
-            return None
-        rows = [[*(M[i, j] for j in range(size)), -g[i, 0]] for i in range(size)]
-        change = [[*(M1[i, j] for j in range(size)), -g1[i, 0]] for i in range(size)]
-        nothing = [arb(0)] * (size + 1)
-        try:
-            X = matrix([*rows, border]).solve(
-                matrix([[arb(int(i == size)), *line] for i, line in enumerate([*change, nothing])])
-            )
-        except ZeroDivisionError:
-            return None
-        P = matrix([[X[i, j + 1] for j in range(size + 1)] for i in range(size + 1)])
-        z = column([X[i, 0] for i in range(size + 1)])
-        rise = -(P * z)
-        found = taylor_around(rise, P)
-        if found is None:
-            return None
-        bend, left, _ = found
-        # the rows of all conditions, and of t
-        C, C1 = (
-            matrix([*([*held, constant] for held, (constant,) in zip(part.tolist(), free.tolist(), strict=True)), last])
-            for part, free, last in (
-                (self._C[0] + self._C[1] * middle, self._c[0] + self._c[1] * middle, [*nothing[1:], arb(1)]),
-                (self._C[1] * radius, self._c[1] * radius, nothing),
-            )
-        )
-        signs = signs_of(
-            _over_tau(C * z, C1 * z + C * rise, C1 * rise - C * bend, C1 * bend, (C + C1 * arb(0, 1)) * left)
-        )
-        return NowhereHeld(first, last, signs[:-1]) if np.any(signs > 0) and np.any(signs < 0) else None
+            found = self._expansion(first, last, middle, radius)
+            if found is not None and found.shift <= _LITTLE:
+                return found
+            # a zero of det M is near, or lies between them
+            off = middle + radius / 16 if found is None else middle
+            lines = BorderedLines.near(Lines(self._M, self._g, self._C, self._c), off, radius)
+            bordered = None if lines is None else lines.expansion(first, last)
+            return bordered if found is None or (bordered is not None and bordered.shift < found.shift / 2) else found
 
     def _expansion(self, first: Fraction, last: Fraction, middle: Any, radius: Any) -> PreciseExpansion | None:
         """The conditions by the powers of tau, with what is left of the unknowns (theory, (7.17))."""
@@ -247,27 +213,18 @@ class PreciseSelection:
         if not M.nrows():
             near, steep = self._c[0] + self._c[1] * middle, self._c[1] * radius
             return PreciseExpansion(self, first, last, near + steep * arb(0, 1), steep, 1, near)
-        g = [[self._g[0][i, 0] + self._g[1][i, 0] * middle, self._g[1][i, 0] * radius] for i in range(M.nrows())]
+        g, g1 = self._g[0] + self._g[1] * middle, self._g[1] * radius
         try:
-            X = M.solve(matrix([[*g[i], *(M1[i, j] for j in range(M.ncols()))] for i in range(M.nrows())]))
+            X = M.solve(joined(g, g1, M1))
         except ZeroDivisionError:
             return None
-        P = matrix([[X[i, j + 2] for j in range(M.ncols())] for i in range(M.nrows())])
-        y = column([X[i, 0] for i in range(M.nrows())])
-        rise = column([X[i, 1] for i in range(M.nrows())]) - P * y
-        found = taylor_around(rise, P)
-        if found is None:
+        y, rise, P = columns_of(X, 1, 1, M.ncols())
+        unknowns = Smooth.solution(y, rise - P * y, P)
+        if unknowns is None:
             return None
-        bend, left, left_slope = found
-        near = self.values(middle, y)
-        steep = (self._c[1] + self._C[1] * y) * radius + C * rise
-        curved, cubic = C1 * rise - C * bend, C1 * bend
-        # C + tau C1 and powers of tau, for |tau| <= 1
-        unit = arb(0, 1)
-        turned = C + C1 * unit
-        values = _over_tau(near, steep, curved, cubic, turned * left)
-        slopes = steep + curved * (2 * unit) - cubic * arb(1.5, 1.5) + C1 * left + turned * left_slope
-        return PreciseExpansion(self, first, last, values, slopes, sign_of(M.det()), near)
+        found = unknowns.mapped(C, C1, self._c[0] + self._c[1] * middle, self._c[1] * radius)
+        index = sign_of(M.det())
+        return PreciseExpansion(self, first, last, found.values, found.slopes, index, found.terms[0], found.shift)
 
     def newton(
         self, condition: int, low: Fraction, high: Fraction, width: Fraction, steps: int = _STEPS
@@ -301,7 +258,7 @@ class PreciseSelection:
 
         They are about ``width`` apart, by default as close as zeros are told apart.
         """
-        width = Fraction(1, 2**_ZERO_BITS) * (high - low) if width is None else width
+        width = Fraction(1, 2**ZERO_BITS) * (high - low) if width is None else width
         # bounds that are narrow already are so near that one step is enough
         near = high - low <= _NEAR * max(abs(low), abs(high))
         for steps, widenings in ((1, 1), (_STEPS, _WIDENINGS)) if near else ((_STEPS, _WIDENINGS),):
@@ -372,6 +329,8 @@ class PreciseExpansion:
     low, high : Fraction
     apart : Fraction
         Zeros closer than this are not told apart.
+    shift : float
+        Bound of how much the matrix changes.
     rough, final : bool
         A shorter interval gives neither smaller errors, nor does it tell more zeros apart.
     """
@@ -387,12 +346,13 @@ class PreciseExpansion:
         slopes: Any,
         index: int,
         near: Any,
+        shift: float = 0.0,
     ) -> None:
-        self.low, self.high = low, high
-        self.apart = (high - low) * Fraction(4, 2**_ZERO_BITS)
+        self.low, self.high, self.shift = low, high, shift
+        self.apart = (high - low) * Fraction(4, 2**ZERO_BITS)
         self._selection, self._index = selection, index
         self._whole, self._rises = signs_of(values), signs_of(slopes)
-        self._small = [bool(abs(values[k, 0]) < arb(2) ** -_ZERO_BITS) for k in range(values.nrows())]
+        self._small = [bool(abs(values[k, 0]) < arb(2) ** -ZERO_BITS) for k in range(values.nrows())]
         # about where conditions vanish, by tau in [-1, 1]
         self._crossings = [
             -float((near[k, 0] / slopes[k, 0]).mid()) if self._rises[k] else np.nan for k in range(values.nrows())
@@ -430,7 +390,7 @@ class PreciseExpansion:
         """Alphas inside the interval at which a condition seems to vanish; no claim rests on them."""
         if condition >= len(self._rises) or not self._rises[condition]:
             return []
-        width = (self.high - self.low) / 2**_ZERO_BITS
+        width = (self.high - self.low) / 2**ZERO_BITS
         found = self._selection.newton(condition, self.low, self.high, width)
         return [] if found is None or not self.low < found < self.high else [found]
 
@@ -442,48 +402,6 @@ class PreciseExpansion:
         """Bounds of the only zero of a condition in a part, at whose ends it has opposite signs."""
         part = Fraction(low), Fraction(high)
         return self._selection.enclosed(condition, *part) or part
-
-
-@dataclass(frozen=True, eq=False)
-class NowhereHeld:
-    """A short interval in which a selection has no root, although its matrix may be singular there.
-
-    Attributes
-    ----------
-    low, high : Fraction
-    signs : int8 array
-        Of the conditions, all multiplied by one number.
-    """
-
-    low: Fraction
-    high: Fraction
-    signs: Signs
-    rough = False
-    final = True
-
-    def over(self, low: Number, high: Number) -> OverInterval:
-        """What is known over a part of the interval."""
-        unknown = np.zeros_like(self.signs)
-        return OverInterval(self.signs, regular=False, none=True, index=0, ends=(unknown, unknown), slopes=unknown)
-
-
-def _over_tau(near: Any, steep: Any, curved: Any, cubic: Any, left: Any) -> Any:
-    """Values of near + tau steep + tau^2 curved - tau^3 cubic for all |tau| <= 1, and what is left besides."""
-    unit = arb(0, 1)
-    return near + steep * unit + curved * arb(0.5, 0.5) - cubic * unit + left
-
-
-def _kernel(M: Any, g: Any) -> list[Any] | None:
-    """About the direction of the solutions z of [M, -g] z = 0, as floats; no claim rests on it."""
-    table = np.array(
-        [[*(float(x.mid()) for x in row), -float(b[0].mid())] for row, b in zip(M.tolist(), g.tolist(), strict=True)]
-    )
-    if not table.size or not np.all(np.isfinite(table)):
-        return None
-    scale = np.max(np.abs(table), axis=1, keepdims=True)
-    if np.any(scale == 0):
-        return None
-    return [arb(float(x)) for x in np.linalg.svd(table / scale)[2][-1]]
 
 
 def _opposite(signs: Sequence[Any], condition: int) -> bool:
