@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from branches.test_degenerate import pair, uncoupled
 from complete import proven_graph, whole_graph
+from flint import fmpz_mat
 from generators import through_the_unloaded_state, vanishing_problem
 from parted_meshes import grid, moved
 from path_problems import (
@@ -22,6 +23,7 @@ from two_graphs import differences, steps, two_graphs
 from enumsol import ContactProblem, branch_graph, enumerate_roots, fem, gallery, verify
 from enumsol.branches import ways
 from enumsol.branches.enclosed import tracing
+from enumsol.condensation.exact import ExactCondensed
 
 KINDS = ("friction", "load", "both")
 
@@ -219,6 +221,16 @@ def test_boxes_far_from_zero_may_be_long(seed):
     graphs = two_graphs(problem, interval)
     assert all(high - low < 1e-3 for low, high, _ in graphs.open)
     assert differences(graphs) == []
+
+
+def test_what_exact_algebra_costs_grows_with_the_digits_of_determinants():
+    ratios = []
+    for problem, slip in ((gallery.wedge(3, 2), 3), (gallery.dovetail(2, 1), 6), (gallery.dovetail(2, 1), 3)):
+        codes = (2,) * slip + (0,) * (problem.p - slip)
+        S = ExactCondensed.from_problem(problem).integers.S
+        digits = fmpz_mat([[S[i][j] for j in range(slip)] for i in range(slip)]).det().bit_length()
+        ratios.append(ways._exact_work(problem, {codes}) / ((slip + 1) * slip**3 * digits))
+    assert max(ratios) < 1.5 * min(ratios)
 
 
 @pytest.mark.slow
