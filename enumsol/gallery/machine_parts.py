@@ -62,7 +62,9 @@ def dovetail(
 
     If all nodes slip outwards, the flanks carry the pull P by normal forces N and friction F N, and by balance N is
     P / (sin(a) + F cos(a)) on both together, with the angle a of the flanks. A flank steeper than friction holds,
-    tan(a) < F, would jam; those of blades are not: there is one solution for every F up to 0.5.
+    tan(a) < F, would jam; those of blades are not: there is one solution for every F up to 1. From F = 1.000138, just
+    above tan(a), to 1.171 there are three: one flank may stick, too. From there up to 3 there is one again, and both
+    stick.
 
     Parameters
     ----------

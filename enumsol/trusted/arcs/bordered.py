@@ -59,7 +59,7 @@ class Lines:
 class BorderedLines:
     """Equations with the column b and the row d: M v + mu b = 0, d v = 1, and M x + rho b = g, d x = 0.
 
-    mu (c + C x) - rho C v, of every condition, and mu as the last are what is examined (theory, (7.17b)).
+    mu (c + C x) - rho C v, of every condition, and mu as the last are what is examined (theory, section 7.14).
 
     Attributes
     ----------
