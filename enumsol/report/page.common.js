@@ -5,7 +5,12 @@ const p = data.nodes.length, { tangents } = data;
 const COLOURS = { open: "#ffffff", stick: "#1f5fa8", "slip+": "#d9730d", "slip-": "#2a8a4a", slip: "#c23b4b" };
 
 const safe = (text) => String(text).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
-const short = (x) => (x === null || x === undefined ? "?" : Number(x.toPrecision(6)).toString().replace("-", "\u2212"));
+const short = (x) => {
+  if (x === null || x === undefined) return "?";
+  const near = Number(x.toPrecision(6));
+  // 1.53e-6, as in the tables, not 0.00000153
+  return (near !== 0 && Math.abs(near) < 1e-4 ? near.toExponential() : near.toString()).replace(/-/g, "\u2212");
+};
 const signed = (k) => (k === null ? "unknown" : k > 0 ? `+${k}` : String(k).replace("-", "\u2212"));
 // of node k among n, in 3D the length of a vector
 const tangentialOf = (v, k, n = p) => (tangents === 1 ? v[n + k] : Math.hypot(v[n + k], v[2 * n + k]));

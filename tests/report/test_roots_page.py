@@ -295,3 +295,12 @@ def test_many_roots_are_on_several_pages(browser, pages, found):
     assert browser.evaluate(shown)[0] == "Root 0"
     assert len(found["many"]) == 9
     assert browser.complaints() == []
+
+
+@in_a_browser
+def test_small_numbers_are_written_as_in_tables(browser, pages):
+    """JavaScript writes those down to a millionth with zeros in front: 0.00000153 beside 6.29e-7."""
+    browser.open(pages["bare"])
+    numbers = "[0, 0.00000153, -0.000000629, 0.00012, -3.5, 1234567, null].map(short)"
+    expected = ["0", "1.53e\u22126", "\u22126.29e\u22127", "0.00012", "\u22123.5", "1234570", "?"]
+    assert browser.evaluate(numbers) == expected
