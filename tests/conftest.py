@@ -1,5 +1,6 @@
 """Set-up of the whole suite."""
 
+import dataclasses
 import os
 import signal
 from collections import defaultdict
@@ -33,6 +34,13 @@ def wedge():
     """A wedge with eight contact nodes, and an alpha at which it has five roots."""
     entry = gallery.get("wedge-8-5")
     return entry.build(), entry.alpha
+
+
+@pytest.fixture(scope="session")
+def pulled_wedge():
+    """A wedge with four contact nodes and friction 1; alpha is its pull."""
+    wedge = gallery.wedge(2, 2, friction=(1.0, 0.0))
+    return dataclasses.replace(wedge, f=0 * wedge.f, load_slope=wedge.f)
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from complete import whole_graph
 from effort import some
-from path_problems import assert_balanced, one_node
+from path_problems import balanced, one_node
 
 from enumsol.branches import branch_graph
 from enumsol.model.statuses import ContactStatus
@@ -17,8 +17,7 @@ BOTH = pytest.mark.parametrize("arithmetic", ["fast", "exact"])
 
 @BOTH
 def test_example_6_1_has_an_open_branch_and_a_fold(arithmetic):
-    graph = branch_graph(one_node((1.5, -4.0)), (0.0, 20.0), arithmetic)
-    assert_balanced(graph)
+    graph = balanced(branch_graph(one_node((1.5, -4.0)), (0.0, 20.0), arithmetic))
     assert graph.complete == (arithmetic == "exact")
     assert len(graph.branches) == len(graph.components) == 2
     (fold,) = graph.folds
@@ -41,8 +40,7 @@ def test_example_6_1_has_an_open_branch_and_a_fold(arithmetic):
 
 @BOTH
 def test_example_6_2_is_one_branch(arithmetic):
-    graph = branch_graph(one_node((1.5, 7.0)), (0.0, 20.0), arithmetic)
-    assert_balanced(graph)
+    graph = balanced(branch_graph(one_node((1.5, 7.0)), (0.0, 20.0), arithmetic))
     assert len(graph.branches) == 1
     assert graph.uniqueness_limit is None
     (transition,) = graph.transitions
@@ -51,8 +49,7 @@ def test_example_6_2_is_one_branch(arithmetic):
 
 @BOTH
 def test_example_6_3_joins_two_branches_by_a_vertical_segment(arithmetic):
-    graph = branch_graph(one_node((1.0, -2.0)), (0.0, 20.0), arithmetic)
-    assert_balanced(graph)
+    graph = balanced(branch_graph(one_node((1.0, -2.0)), (0.0, 20.0), arithmetic))
     assert len(graph.components) == 1
     (family,) = graph.families
     (vertex,) = graph.bifurcations
@@ -75,8 +72,7 @@ def test_example_6_3_joins_two_branches_by_a_vertical_segment(arithmetic):
 
 
 def test_a_small_perturbation_destroys_the_bifurcation_of_example_6_3():
-    graph = branch_graph(one_node((0.98, -2.0)), (0.0, 20.0), "exact")
-    assert_balanced(graph)
+    graph = balanced(branch_graph(one_node((0.98, -2.0)), (0.0, 20.0), "exact"))
     assert len(graph.branches) == 2
     assert not graph.bifurcations
     (fold,) = graph.folds
@@ -113,8 +109,7 @@ def test_random_one_node_problems_equal_the_closed_form(rng):
         f = tuple((rng.integers(-64, 65, size=2) / 16).tolist())
         if f[0] + (lame[0] + lame[1]) / (lame[0] + 3 * lame[1]) * f[1] == 0 or f[1] == 0:
             continue
-        graph = whole_graph(one_node(f, lame=lame), (0.0, 20.0), "exact")
-        assert_balanced(graph)
+        graph = balanced(whole_graph(one_node(f, lame=lame), (0.0, 20.0), "exact"))
         found = sorted(
             (arc.statuses[0].value, *(graph.vertices[v].enclosure[0] for v in (arc.tail, arc.head)))
             for arc in graph.arcs
@@ -135,8 +130,7 @@ def test_random_one_node_problems_equal_the_closed_form(rng):
 def test_the_bifurcation_of_case_jjj_lies_where_the_paper_puts_it():
     for lam, mu in ((1.0, 1.0), (3.0, 1.0), (0.5, 0.25), (7.0, 2.0)):
         f = (lam + mu, -(lam + 3 * mu))
-        graph = branch_graph(one_node(f, lame=(lam, mu)), (0.0, 20.0), "exact")
-        assert_balanced(graph)
+        graph = balanced(branch_graph(one_node(f, lame=(lam, mu)), (0.0, 20.0), "exact"))
         (vertex,) = graph.bifurcations
         assert abs(vertex.alpha - (lam + 3 * mu) / (lam + mu)) <= 1e-14
         assert len(graph.components) == 1

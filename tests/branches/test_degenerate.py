@@ -8,24 +8,15 @@ import numpy as np
 import pytest
 from complete import whole_graph
 from effort import some
-from path_problems import assert_balanced, assert_same_roots, mirrored_problem, one_node
+from path_problems import assert_same_roots, balanced, mirrored_problem, one_node, sheet_of_one_node, uncoupled
 
 from enumsol import ContactProblem, enumerate_roots, gallery, verify
 from enumsol.branches import branch_graph
 from enumsol.model.statuses import ContactStatus
 
-A = np.array([[2.0, -1.0], [-1.0, 2.0]])
-
-
-def uncoupled(*loads, **options):
-    """Several one-node problems that do not feel each other."""
-    p = len(loads)
-    rows = np.eye(2 * p)
-    return ContactProblem(np.kron(np.eye(p), A), rows[0::2], rows[1::2], np.concatenate(loads), **options)
-
 
 def test_a_sheet_is_one_edge_with_families_at_every_alpha():
-    graph = whole_graph(one_node((0.0, 0.0), friction=2.0, load_slope=[1.0, -2.0]), (0.25, 1.0), "exact")
+    graph = whole_graph(sheet_of_one_node(), (0.25, 1.0), "exact")
     (sheet,) = graph.sheets
     assert (sheet.dimension, sheet.index) == (1, 1)
     assert len(graph.arcs) == 1
@@ -36,25 +27,21 @@ def test_a_sheet_is_one_edge_with_families_at_every_alpha():
 
 
 def test_a_load_that_passes_zero_has_every_selection_there():
-    graph = whole_graph(one_node((0.0, 0.0), friction=2.0, load_slope=[1.0, -2.0]), (-1.0, 1.0), "exact")
+    graph = whole_graph(sheet_of_one_node(), (-1.0, 1.0), "exact")
     (origin,) = [v for v in graph.vertices if v.alpha == 0.0]
     assert len(origin.active[0]) == 4
     assert (origin.index_left, origin.index_right) == (1, 1)
-    graph = branch_graph(one_node((0.0, 0.0), friction=(2.0, 1.0), load_slope=[1.5, -4.0]), (-1.0, 2.0), "exact")
-    assert_balanced(graph)
+    graph = balanced(
+        branch_graph(one_node((0.0, 0.0), friction=(2.0, 1.0), load_slope=[1.5, -4.0]), (-1.0, 2.0), "exact")
+    )
     assert [v.alpha for v in graph.folds] == [pytest.approx(2 / 3, abs=1e-15)]
     assert len(graph.roots_at(0.0)) == 1
     assert len(graph.roots_at(0.0)[0].active[0]) == 4
 
 
 def test_an_origin_in_many_nodes_needs_no_list_of_all_selections():
-    p = 8
-    rows = np.eye(2 * p)
-    problem = ContactProblem(
-        np.kron(np.eye(p), A), rows[0::2], rows[1::2], np.zeros(2 * p), friction=0.5, load_slope=np.tile([1.0, 0.25], p)
-    )
-    graph = whole_graph(problem, (-1.0, 1.0), "exact")
-    assert len(graph.arcs) == 2
+    problem = uncoupled(*[[0.0, 0.0]] * 8, friction=0.5, load_slope=np.tile([1.0, 0.25], 8))
+    assert len(whole_graph(problem, (-1.0, 1.0), "exact").arcs) == 2
 
 
 def test_an_unloaded_body_rests():
@@ -76,8 +63,7 @@ def test_friction_that_starts_at_zero_is_glued_at_the_border():
 
 
 def test_corners_of_uncoupled_nodes():
-    graph = branch_graph(uncoupled([1.5, -4.0], [1.5, -4.0]), (0.0, 4.0), "exact")
-    assert_balanced(graph)
+    graph = balanced(branch_graph(uncoupled([1.5, -4.0], [1.5, -4.0]), (0.0, 4.0), "exact"))
     at = [v for v in graph.vertices if v.enclosure[0] == Fraction(8, 3)]
     assert sorted(v.kind for v in at) == ["bifurcation", "fold", "fold"]
     (corner,) = graph.bifurcations
@@ -87,16 +73,14 @@ def test_corners_of_uncoupled_nodes():
 
 
 def test_a_family_of_dimension_two():
-    graph = branch_graph(uncoupled([1.0, -2.0], [1.0, -2.0]), (0.0, 4.0), "exact")
-    assert_balanced(graph)
+    graph = balanced(branch_graph(uncoupled([1.0, -2.0], [1.0, -2.0]), (0.0, 4.0), "exact"))
     (family,) = graph.families
     assert (family.dimension, family.index, len(family.vertices)) == (2, 1, 4)
     assert_same_roots(graph.roots_at(2), enumerate_roots(uncoupled([1.0, -2.0], [1.0, -2.0]), 2, "exact"))
 
 
 def test_grazing_and_a_fold_elsewhere():
-    graph = branch_graph(uncoupled([1.0, -2.0], [1.5, -4.0]), (0.0, 4.0), "exact")
-    assert_balanced(graph)
+    graph = balanced(branch_graph(uncoupled([1.0, -2.0], [1.5, -4.0]), (0.0, 4.0), "exact"))
     assert sum(arc.grazing for arc in graph.arcs) == 4
     assert graph.multiplicity_at(3.0) == 6
 
@@ -137,9 +121,7 @@ def test_families_at_irrational_alphas(y):
         f = moves + np.concatenate([y, np.zeros(2)])
         slope = np.concatenate([np.zeros(2), signs * np.array(y)])
         problem = ContactProblem(stiffness, np.eye(4)[:2], np.eye(4)[2:], f, load_slope=slope)
-        graph = branch_graph(problem, (0, 6), "exact")
-        assert graph.complete, graph.reasons
-        assert_balanced(graph)
+        graph = balanced(whole_graph(problem, (0, 6), "exact"))
         vertices = [v for v in graph.vertices if v.family is not None]
         found += len(vertices)
         for v in vertices:
@@ -166,8 +148,7 @@ def test_a_pitchfork_and_the_perturbation_that_destroys_it():
     right = [arc for arc in graph.arcs if arc.tail == pitchfork.number]
     assert (pitchfork.alpha, len(left), len(right)) == (3.0, 1, 3)
     assert (pitchfork.index_left, pitchfork.index_right) == (-1, -1)
-    moved = whole_graph(pair(1e-6), (0.0, 6.0), "exact")
-    assert_balanced(moved)
+    moved = balanced(whole_graph(pair(1e-6), (0.0, 6.0), "exact"))
     assert not [v for v in moved.vertices if v.kind == "bifurcation"]
 
 
@@ -179,7 +160,7 @@ def test_mirror_symmetric_problems():
         problem = mirrored_problem(rng, load=bool(seed % 2))
         graph = branch_graph(problem, (0, 6), "exact")
         assert graph.complete, (seed, graph.reasons)
-        assert_balanced(graph)
+        balanced(graph)
         kinds |= {v.kind for v in graph.vertices}
         for v in graph.vertices:
             lo, hi = v.enclosure

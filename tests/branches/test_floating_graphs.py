@@ -5,8 +5,9 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-import scipy.sparse as sp
-from complete import accepted_report, whole_graph
+from alike import assert_same
+from complete import accepted_report, read_back, whole_graph
+from helpers.floating_bodies import held_by_springs, pushed_block
 from helpers.floating_oracle import Oracle, block_on_table, random_body
 from helpers.proof_tools import copied, multipliers, of_kind, proof_of, records_of, replaced, with_multipliers
 from rational_checker import check_records
@@ -22,12 +23,6 @@ def varying(seed):
         slope = np.random.default_rng(seed + 10**6).integers(-1, 2, problem.n)
         problem = problem.replace(load_slope=slope.astype(float))
     return problem
-
-
-def pushed(cells=2, press=1.0, **options):
-    """A block on a table that is pushed: it slides at alpha = 1 and at -1."""
-    data = block_on_table(cells=cells, press=press, **options)
-    return data.replace(load_slope=block_on_table(cells=cells, press=press, push=1.0).f - data.f)
 
 
 def places(graph):
@@ -86,7 +81,7 @@ def test_all_solutions_of_many_random_bodies():
 
 
 def test_a_block_that_is_pushed_until_it_slides(tmp_path):
-    problem = pushed(max_rigid_displacement=4.0)
+    problem = pushed_block(max_rigid_displacement=4.0)
     graph = whole_graph(problem, (-2, Fraction(3, 2)))
     assert "complete: yes (proven, within rigid displacements of 4)" in repr(graph)
     alphas, at, between = graph.steps
@@ -102,20 +97,18 @@ def test_a_block_that_is_pushed_until_it_slides(tmp_path):
     assert said == "no solution at or right above the first alpha; several at or right above alpha = -1"
     assert (len(graph.roots_at(1.25)), len(graph.roots_at(0.5))) == (0, 1)
     assert graph.roots_at(0.5).rigid_bound.needed
-    graph.save(tmp_path / "graph.json")
-    again = enumsol.BranchGraph.load(tmp_path / "graph.json")
-    assert again.problem.fingerprint == problem.fingerprint
-    assert again.steps == graph.steps
+    again = read_back(graph, tmp_path / "graph.json")
     assert repr(again) == repr(graph)
+    assert_same(again, graph, "problem.fingerprint", "steps")
     assert [v.bounded for v in again.vertices] == [v.bounded for v in graph.vertices]
-    one, other = (g.families[0].polytopes[0].rigid_coordinates for g in (graph, again))
-    assert np.array_equal(one, other)
-    assert np.array_equal(again.roots_at(0.5)[0].u, graph.roots_at(0.5)[0].u)
+    one, other = (g.families[0].polytopes[0] for g in (graph, again))
+    assert_same(one, other, "rigid_coordinates")
+    assert_same(again.roots_at(0.5)[0], graph.roots_at(0.5)[0], "u")
 
 
 def test_arcs_end_where_the_body_has_moved_as_far_as_was_asked():
     """Pushed more and more, the block gives way where it touches the table, before it slides."""
-    problem = pushed(max_rigid_displacement=1 / 64)
+    problem = pushed_block(max_rigid_displacement=1 / 64)
     graph = whole_graph(problem, (-1.5, 0))
     (end,) = (v for v in graph.vertices if v.kind == "bound")
     assert end.bounded
@@ -141,16 +134,16 @@ def test_a_body_that_slides_without_friction_is_a_sheet():
 
 
 def test_lower_bounds_of_a_graph_with_gaps_do_not_count_what_only_the_sum_of_indices_implies():
-    problem = pushed()
+    problem = pushed_block()
     graph = enumsol.branch_graph(problem, (-2, 2), max_nodes=1)
     assert not graph.complete
-    assert [graph.at_least(alpha) for alpha in (-1.75, 0.5, 1.75)] == [0, 0, 0]
+    assert {graph.at_least(alpha) for alpha in (-1.75, 0.5, 1.75)} == {0}
     assert min(graph.claims.steps().at) == 0
 
 
 @pytest.mark.slow
 def test_pictures_and_a_report(tmp_path):
-    graph = enumsol.branch_graph(pushed(cells=1, max_rigid_displacement=4.0), (0, 1.5))
+    graph = enumsol.branch_graph(pushed_block(1, max_rigid_displacement=4.0), (0, 1.5))
     graph.plot(file=tmp_path / "graph.png")
     enumsol.write_report(graph, tmp_path / "graph.html")
     assert "within rigid displacements of 4" in (tmp_path / "graph.html").read_text(encoding="utf-8")
@@ -161,7 +154,7 @@ def test_pictures_and_a_report(tmp_path):
 
 @pytest.mark.slow
 def test_with_workers_it_is_the_same():
-    problem = pushed()
+    problem = pushed_block()
     alone = enumsol.branch_graph(problem, (0, 1.5))
     with ThreadPoolExecutor(2) as executor:
         spread = enumsol.branch_graph(problem, (0, 1.5), executor=executor)
@@ -169,7 +162,7 @@ def test_with_workers_it_is_the_same():
     assert records_of(spread.proof) == records_of(alone.proof)
 
 
-PROBLEM = pushed(cells=1, max_rigid_displacement=4.0)
+PROBLEM = pushed_block(1, max_rigid_displacement=4.0)
 RECORDS = records_of(enumsol.branch_graph(PROBLEM, (-0.5, 0.5)).proof)
 
 
@@ -212,7 +205,7 @@ def test_forged_leaves_are_refused():
 
 
 def test_samples_are_linked_where_the_graph_has_a_branch():
-    problem = pushed(cells=1)
+    problem = pushed_block(1)
     graph = enumsol.branch_graph(problem, (-1.25, 1.25))
     sampled = enumsol.link_samples(problem, [-1.25, -0.75, 0, 0.75, 1.25])
     assert {roots.arithmetic for roots in sampled.root_sets} == {"verified"}
@@ -224,12 +217,8 @@ def test_samples_are_linked_where_the_graph_has_a_branch():
 
 
 def test_local_branches_at_vertices_are_those_on_weak_springs():
-    problem = pushed(cells=1)
-    A = sp.csc_array(problem.A + 1e-6 * sp.eye_array(problem.n))
-    held = enumsol.ContactProblem(
-        A, problem.Bn, problem.Bt, problem.f, friction=problem.friction, load_slope=problem.load_slope
-    )
-    free, weak = (enumsol.branch_graph(body, (-0.98, 0.98)) for body in (problem, held))
+    problem = pushed_block(1)
+    free, weak = (enumsol.branch_graph(body, (-0.98, 0.98)) for body in (problem, held_by_springs(problem, 1e-6)))
     for one, two in zip(free.vertices, weak.vertices, strict=True):
         assert one.active == two.active
         tests = [enumsol.local_branch_test(graph.problem, v) for graph, v in ((free, one), (weak, two))]

@@ -6,11 +6,11 @@ from fractions import Fraction
 import networkx as nx
 import numpy as np
 import pytest
-from complete import whole_graph
-from path_problems import assert_balanced, assert_same_roots, one_node
+from complete import read_back, whole_graph
+from path_problems import assert_same_roots, balanced, one_node, sheet_of_one_node
 from refusals import bad_argument
 
-from enumsol import ContactProblem, enumerate_roots, gallery
+from enumsol import enumerate_roots, gallery
 from enumsol.branches import BranchGraph, branch_graph
 from enumsol.branches.elements import VertexKind
 
@@ -32,15 +32,25 @@ def test_jumps_are_the_folds_that_no_arc_leaves_to_the_right(square):
     assert [v.alpha for v in square.jumps] == [pytest.approx(1 + 2 * np.sqrt(2.0))]
 
 
+VERY_SHORT = 1.5 * (4 - 2.5e-13)
+
+
+def sticks_for_a_while(c):
+    """F = 1.5 alpha, f_n = 4 - alpha, f_t = -c: stick and slip- exist where 1.5 alpha (4 - alpha) > c."""
+    return one_node((4.0, -c), friction=(0.0, 1.5), load_slope=[-1.0, 0.0])
+
+
+def only_loop(graph):
+    (closed,) = [branch for branch in graph.branches if branch.closed]
+    return closed
+
+
 def test_a_closed_branch_of_any_length():
-    # F = 1.5 alpha, f_n = 4 - alpha, f_t = -c: stick and slip- exist where 1.5 alpha (4 - alpha) > c
-    for c in (5.5, 5.9999, 1.5 * (4 - 2.5e-13)):
-        problem = one_node((4.0, -c), friction=(0.0, 1.5), load_slope=[-1.0, 0.0])
-        half = float((4 - Fraction(c) / Fraction(3, 2)) ** 1) ** 0.5
+    for c in (5.5, 5.9999, VERY_SHORT):
+        half = float(4 - Fraction(c) / Fraction(3, 2)) ** 0.5
         for arithmetic in ("fast", "exact"):
-            graph = branch_graph(problem, (0.0, 4.0), arithmetic)
-            assert_balanced(graph)
-            (closed,) = [branch for branch in graph.branches if branch.closed]
+            graph = balanced(branch_graph(sticks_for_a_while(c), (0.0, 4.0), arithmetic))
+            closed = only_loop(graph)
             assert len(closed.arcs) == len(closed.vertices) == 2
             lo, hi = (v.exact.enclosure()[0] for v in sorted(closed.folds, key=lambda v: v.alpha))
             assert float(hi - lo) == pytest.approx(2 * half, rel=1e-9)
@@ -48,11 +58,8 @@ def test_a_closed_branch_of_any_length():
 
 
 def test_a_branch_on_an_alpha_interval_of_length_1e_6_is_missed_by_samples():
-    c = 1.5 * (4 - 2.5e-13)
-    problem = one_node((4.0, -c), friction=(0.0, 1.5), load_slope=[-1.0, 0.0])
-    graph = branch_graph(problem, (0.0, 4.0))
-    (closed,) = [branch for branch in graph.branches if branch.closed]
-    lo, hi = closed.interval
+    problem = sticks_for_a_while(VERY_SHORT)
+    lo, hi = only_loop(branch_graph(problem, (0.0, 4.0))).interval
     assert 0.99e-6 < hi - lo < 1.01e-6
     samples = np.linspace(0.0, 4.0, 1000).tolist()
     assert not any(lo <= alpha <= hi for alpha in samples)
@@ -63,21 +70,19 @@ def test_pinned_closed_branch_of_the_two_node_square():
     problem = gallery.two_node_square(
         (3.7, -5.0), (1.1, 3.4), friction=(0.9, 1.7), load_slope=((-0.8, -0.1), (-1.0, 0.6))
     )
-    graph = whole_graph(problem, (0.0, 5.0), "exact")
-    assert_balanced(graph)
-    (closed,) = [branch for branch in graph.branches if branch.closed]
+    graph = balanced(whole_graph(problem, (0.0, 5.0), "exact"))
+    closed = only_loop(graph)
     assert len(closed.arcs) == 4
     assert closed.interval == pytest.approx((0.398590498429, 2.170936637865), abs=1e-10)
 
 
 def test_pinned_bifurcation_that_a_perturbation_of_the_load_destroys():
-    graph = branch_graph(gallery.chain(2, 0.4, (0.5, -3.0)), (0.0, 10.0), "exact")
+    chain = gallery.chain(2, 0.4, (0.5, -3.0))
+    graph = branch_graph(chain, (0.0, 10.0), "exact")
     (corner,) = graph.bifurcations
     assert corner.alpha == 6.0
     assert sum(arc.tail == corner.number for arc in graph.arcs) == 4
-    chain = gallery.chain(2, 0.4, (0.5, -3.0))
-    moved = ContactProblem(chain.A, chain.Bn, chain.Bt, chain.f + np.array([0.0, 0.0, 0.001, 0.0]))
-    graph = whole_graph(moved, (0.0, 10.0), "exact")
+    graph = whole_graph(chain.replace(f=chain.f + np.array([0.0, 0.0, 0.001, 0.0])), (0.0, 10.0), "exact")
     assert not graph.bifurcations
     assert len(graph.folds) == 2
 
@@ -98,10 +103,8 @@ def test_the_networkx_graph_holds_vertices_and_arcs(square):
 def test_arcs_continue_in_their_vertices(square):
     for arc in square.arcs:
         for alpha, vertex in ((arc.lo, square.vertices[arc.tail]), (arc.hi, square.vertices[arc.head])):
-            np.testing.assert_allclose(arc.values(alpha)[0], vertex.lambda_n, atol=1e-12)
-            np.testing.assert_allclose(arc.values(alpha)[1], vertex.lambda_t, atol=1e-12)
-            np.testing.assert_allclose(arc.displacements(alpha)[0], vertex.u_n, atol=1e-12)
-            np.testing.assert_allclose(arc.displacements(alpha)[1], vertex.u_t, atol=1e-12)
+            np.testing.assert_allclose(arc.values(alpha), (vertex.lambda_n, vertex.lambda_t), atol=1e-12)
+            np.testing.assert_allclose(arc.displacements(alpha), (vertex.u_n, vertex.u_t), atol=1e-12)
         bad_argument("expected a value on the arc", arc.values, arc.hi + 1.0)
 
 
@@ -133,9 +136,7 @@ def test_frames_and_summary(square):
 def test_a_saved_graph_is_read_back_to_the_last_bit(name, arithmetic, tmp_path):
     interval = (-3.0, 3.0) if "6.7" in name else (0.0, 8.0)
     graph = branch_graph(gallery.get(name).build(), interval, arithmetic)
-    file = tmp_path / "graph.json"
-    graph.save(file)
-    back = BranchGraph.load(file)
+    back = read_back(graph, tmp_path / "graph.json")
     assert repr(back) == repr(graph)
     assert back.reasons == graph.reasons
     assert back.to_frame().equals(graph.to_frame())
@@ -151,11 +152,8 @@ def test_a_saved_graph_is_read_back_to_the_last_bit(name, arithmetic, tmp_path):
 def test_files_that_are_no_graphs_are_refused(tmp_path):
     file = tmp_path / "graph.json"
     bad_argument("cannot be read", BranchGraph.load, file)
-    for text, message in (
-        ("{", "JSON"),
-        ("[]", "format"),
-        ('{"format": "enumsol-branch-graph", "version": 1}', "damaged"),
-    ):
+    old = '{"format": "enumsol-branch-graph", "version": 1}'
+    for text, message in (("{", "JSON"), ("[]", "format"), (old, "damaged")):
         file.write_text(text)
         bad_argument(message, BranchGraph.load, file)
 
@@ -175,7 +173,7 @@ def test_figures(square, quantity, tmp_path):
 @pytest.mark.slow
 def test_figures_of_families_and_sheets(tmp_path):
     branch_graph(one_node((1.0, -2.0)), (0.0, 5.0)).plot("u_t", file=tmp_path / "family.png")
-    sheet = branch_graph(one_node((0.0, 0.0), friction=2.0, load_slope=[1.0, -2.0]), (-1.0, 1.0))
+    sheet = branch_graph(sheet_of_one_node(), (-1.0, 1.0))
     sheet.plot(file=tmp_path / "sheet.png")
     bad_argument("quantity", sheet.plot, "pressure")
     bad_argument("nodes", sheet.plot, nodes=["x"])

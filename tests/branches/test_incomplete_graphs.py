@@ -4,14 +4,16 @@ import json
 import re
 
 import pytest
+from command_line import printed
+from complete import read_back
 from refusals import refusal
 
 from enumsol import BranchGraph, branch_graph, gallery
 from enumsol.branches.claims import Standing
-from enumsol.cli import main
 from enumsol.errors import IncompleteGraphError
 
 INTERVAL = (0.0, 10.0)
+GRAPH = ("graph", "gallery:two-node-6.4", "--from", 0, "--to", 10)
 #: Nodes after which the search over two-node-6.4 has found nothing, one arc, and two arcs.
 CUTS = {1: 0, 7: 1, 11: 2}
 #: How many solutions these arcs prove at alpha = 5, where there are three: all indices add up to +1, so that there is
@@ -49,9 +51,7 @@ def test_what_the_cut_broke_is_neither_jump_nor_fold_nor_transition(cut):
 
 def test_its_text_claims_neither_uniqueness_nor_a_jump(cut, capsys):
     nodes = next(n for n, arcs in CUTS.items() if arcs == len(cut.arcs))
-    command = ["graph", "gallery:two-node-6.4", "--from", "0", "--to", "10", "--max-nodes", str(nodes)]
-    assert main(command) == 3
-    out = capsys.readouterr().out
+    out = printed(capsys, *GRAPH, "--max-nodes", nodes, status=3)
     assert "not complete" in out.splitlines()[0]
     assert not re.search("one solution (throughout|below)|jump|fold|bifurcation", out)
     assert ("several solutions at or right above alpha = 3" in out) == (len(cut.arcs) > 0)
@@ -61,9 +61,7 @@ def test_its_text_claims_neither_uniqueness_nor_a_jump(cut, capsys):
 
 def test_its_json_claims_neither_uniqueness_nor_a_jump(cut, capsys):
     nodes = next(n for n, arcs in CUTS.items() if arcs == len(cut.arcs))
-    command = ["graph", "gallery:two-node-6.4", "--from", "0", "--to", "10", "--max-nodes", str(nodes), "--json", "-"]
-    assert main(command) == 3
-    found = json.loads(capsys.readouterr().out)
+    found = json.loads(printed(capsys, *GRAPH, "--max-nodes", nodes, "--json", "-", status=3))
     assert (found["complete"], found["standing"]) == (False, "incomplete")
     assert found["uniqueness_limit"] is found["unique_throughout"] is None
     assert found["jumps"] == found["folds"] == found["bifurcations"] == []
@@ -93,19 +91,21 @@ def test_its_plot_shows_a_lower_bound_and_says_that_it_is_not_complete(cut, tmp_
 
 
 def test_it_is_read_back_with_the_same_claims(cut, tmp_path):
-    cut.save(tmp_path / "cut.json")
-    read = BranchGraph.load(tmp_path / "cut.json")
+    read = read_back(cut, tmp_path / "cut.json")
     assert read.summary() == cut.summary()
     with pytest.raises(IncompleteGraphError):
         _ = read.uniqueness_limit
 
 
 def test_an_incomplete_graph_of_an_earlier_version_is_refused(cut, tmp_path):
-    cut.save(tmp_path / "cut.json")
-    record = json.loads((tmp_path / "cut.json").read_text())
-    (tmp_path / "old.json").write_text(json.dumps({**record, "version": 1}))
     with pytest.raises(ValueError, match="earlier version"):
-        BranchGraph.load(tmp_path / "old.json")
+        BranchGraph.load(of_version_1(cut, tmp_path / "old.json"))
+
+
+def of_version_1(graph, file):
+    graph.save(file)
+    file.write_text(json.dumps({**json.loads(file.read_text()), "version": 1}))
+    return file
 
 
 def test_a_complete_graph_still_answers(problem, tmp_path):
@@ -114,18 +114,14 @@ def test_a_complete_graph_still_answers(problem, tmp_path):
     assert (graph.uniqueness_limit, graph.multiplicity_at(3.5), graph.at_least(3.5)) == (3.0, 5, 5)
     assert graph.steps[2] == [1, 5, 3]
     assert [v.alpha for v in graph.jumps] == [pytest.approx(3.82842712474619)]
-    graph.save(tmp_path / "whole.json")
-    record = json.loads((tmp_path / "whole.json").read_text())
-    (tmp_path / "old.json").write_text(json.dumps({**record, "version": 1}))
-    assert BranchGraph.load(tmp_path / "old.json").complete
+    assert BranchGraph.load(of_version_1(graph, tmp_path / "old.json")).complete
 
 
 def test_fast_arithmetic_that_ran_to_its_end_is_not_proven(problem, capsys):
     graph = branch_graph(problem, INTERVAL, "fast")
     assert graph.claims.standing is Standing.NOT_PROVEN
     assert graph.uniqueness_limit == 3.0
-    assert main(["graph", "gallery:two-node-6.4", "--from", "0", "--to", "10", "--arithmetic", "fast"]) == 0
-    assert "one solution below alpha = 3, not proven" in capsys.readouterr().out
+    assert "one solution below alpha = 3, not proven" in printed(capsys, *GRAPH, "--arithmetic", "fast")
     assert json.loads(json.dumps(graph.summary()))["standing"] == "not proven"
 
 
@@ -139,12 +135,10 @@ def test_roots_of_an_incomplete_graph_are_a_part(cut):
 
 
 def test_a_search_cut_short_gives_lower_bounds_in_text_and_table(capsys):
-    assert main(["roots", "gallery:wedge-14-5", "--alpha", "2.2", "--stop-after", "2"]) == 3
-    out = capsys.readouterr().out
+    out = printed(capsys, "roots", "gallery:wedge-14-5", "--alpha", 2.2, "--stop-after", 2, status=3)
     assert "2 roots found, at least 2 in all" in out
     assert "index sum: unknown" in out
-    arguments = ["--alphas", "2.2", "--max-nodes", "150"]
-    assert main(["table", "gallery:wedge-14-5", *arguments]) == 3
-    row = capsys.readouterr().out.splitlines()[1].split()
+    out = printed(capsys, "table", "gallery:wedge-14-5", "--alphas", 2.2, "--max-nodes", 150, status=3)
+    row = out.splitlines()[1].split()
     assert row[1].startswith(">=")
     assert "?" in row

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from complete import whole_graph
 from effort import some
-from path_problems import assert_balanced, integer_problem
+from path_problems import balanced, integer_problem
 
 import enumsol
 from enumsol import BranchGraph, ContactProblem, branch_graph, enumerate_roots
@@ -48,12 +48,10 @@ def beside_grazing(rng):
 
 @pytest.mark.parametrize("arithmetic", ["verified", "exact", "fast"])
 def test_an_arc_of_degree_zero_may_begin_alone(arithmetic):
-    graph = branch_graph(fold_beside_grazing(0.25), (0, 5), arithmetic)
-    assert_balanced(graph)
+    graph = balanced(branch_graph(fold_beside_grazing(0.25), (0, 5), arithmetic))
     assert Counter(v.kind for v in graph.vertices) == {"terminal": 1, "fold": 1, "end": 5}
     (vertex,) = (v for v in graph.vertices if v.kind == "terminal")
-    assert vertex.alpha == 8 / 3
-    assert (vertex.index_left, vertex.index_right) == (0, 0)
+    assert (vertex.alpha, vertex.index_left, vertex.index_right) == (8 / 3, 0, 0)
     assert [arc.index for arc in graph.arcs if arc.tail == vertex.number] == [0]
     for alpha in (8 / 3, 3.0):
         assert graph.multiplicity_at(alpha) == len(enumerate_roots(fold_beside_grazing(0.25), alpha))
@@ -63,9 +61,7 @@ def test_an_arc_of_degree_zero_may_begin_alone(arithmetic):
 
 def test_it_may_end_alone_too():
     """The same body with a friction that falls: a load increase has to leave the branch there."""
-    forth = fold_beside_grazing(0.25)
-    back = ContactProblem(forth.A, forth.Bn, forth.Bt, forth.f, friction=([5.0, 5.0], [-1.0, 0.0]))
-    graph = whole_graph(back, (0, 5))
+    graph = whole_graph(fold_beside_grazing(0.25).replace(friction=([5.0, 5.0], [-1.0, 0.0])), (0, 5))
     (vertex,) = (v for v in graph.vertices if v.kind == "terminal")
     assert vertex.alpha == pytest.approx(7 / 3, abs=1e-15)
     assert vertex in graph.jumps
@@ -86,7 +82,7 @@ def test_no_complete_graph_has_a_vertex_that_is_broken(block):
         problem = beside_grazing(rng) if seed % 3 else integer_problem(rng, 2, "friction")
         graph = branch_graph(problem, (0, 5))
         assert graph.complete, (block, seed, graph.reasons)
-        assert_balanced(graph)
+        balanced(graph)
         kinds.update(v.kind for v in graph.vertices)
         degrees.update(arc.index for arc in graph.arcs if arc.grazing)
         alpha = float(rng.uniform(0, 5))

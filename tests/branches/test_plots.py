@@ -1,26 +1,27 @@
 """Figures of branch graphs, in pixels where it matters: labels, lines side by side, zooms, legends, titles."""
 
 from fractions import Fraction
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 import pytest
+from path_problems import sheet_of_one_node
 from refusals import bad_argument
 
-from enumsol import ContactProblem, branch_graph, gallery
+from enumsol import branch_graph, gallery
 from enumsol.branches.claims import MultiplicitySteps
 from enumsol.branches.figures.curves import QUANTITIES, Curve, curves, side_by_side
 from enumsol.branches.figures.marks import MARKERS, STATUS_STYLES, narrow_changes
 from enumsol.model.statuses import ContactStatus
+from enumsol.support.plotting import new_figure
 
 
 @pytest.fixture(scope="module")
 def graphs():
-    wedge = gallery.wedge(2, 3, (0, 5e-4), half_angle=5.0)
     return {
         "square": branch_graph(gallery.two_node_square(), (0, 10)),
         "chain": branch_graph(gallery.chain(3), (0, 10)),
-        "spike": branch_graph(wedge, (0, 1)),
+        "spike": branch_graph(gallery.wedge(2, 3, (0, 5e-4), half_angle=5.0), (0, 1)),
         "oblique": branch_graph(gallery.get("wedge-8-5").build(), (0, 5)),
     }
 
@@ -53,11 +54,8 @@ def test_numbers_neither_overlap_nor_leave_their_panel(graphs, name, quantity):
 def test_every_branch_is_named_beside_its_curve_or_in_the_note(graphs, name):
     graph = graphs[name]
     figure = graph.plot("lambda_n", zoom=False)
-    named = set()
-    for axis in figure.axes:
-        for text in numbers_of(axis):
-            words = text.get_text().split(" (")[0].replace(" ..", "").split(", ")
-            named.update(words)
+    labels = [text.get_text().split(" (")[0].replace(" ..", "") for axis in figure.axes for text in numbers_of(axis)]
+    named = {word for label in labels for word in label.split(", ")}
     note = figure.get_supxlabel()
     for branch in graph.branches:
         # a long label names the first, the second and the last of a group
@@ -132,7 +130,7 @@ def test_a_spike_is_shown_larger(graphs):
     graph = graphs["spike"]
     alphas, _, between = graph.steps
     low, high = next(
-        (float(a), float(b)) for a, b, n in zip(alphas, alphas[1:], between, strict=False) if n == 5 and b - a > 1e-9
+        (a, b) for (a, b), n in zip(pairwise(map(float, alphas)), between, strict=True) if n == 5 and b - a > 1e-9
     )
     assert high - low < 1e-3
     main, counts, zoomed, zoomed_counts = graph.plot().axes
@@ -196,11 +194,8 @@ def test_both_slips_have_styles_of_their_own():
 
 
 def test_title_units_and_other_axes(graphs):
-    from enumsol.support.plotting import new_figure
-
     figure = graphs["square"].plot("u_n", [1], title="square", units=("N", "mm"))
-    title = figure.axes[0].get_title("left")
-    assert title == "square, alpha in [0, 10]; complete: yes (proven)"
+    assert figure.axes[0].get_title("left") == "square, alpha in [0, 10]; complete: yes (proven)"
     assert figure.axes[0].get_ylabel() == "u_n of node 1 [mm]"
     axes = new_figure().subplots(1, 2)
     assert graphs["square"].plot("lambda_n", [0], ax=axes[1]) is axes[1].figure
@@ -223,18 +218,13 @@ def test_title_units_and_other_axes(graphs):
     ],
 )
 def test_what_cannot_be_drawn_is_refused(graphs, options, message):
-    from enumsol.support.plotting import new_figure
-
     if options.get("ax") == "axes":
         options = {**options, "ax": new_figure().subplots()}
     bad_argument(message, graphs["square"].plot, **options)
 
 
 def test_a_sheet_is_shaded_from_end_to_end():
-    triangle = gallery.one_node_triangle()
-    options = {"friction": 2.0, "load_slope": [1.0, -2.0]}
-    unloaded = ContactProblem(triangle.A, triangle.Bn, triangle.Bt, [0.0, 0.0], **options)
-    axis = branch_graph(unloaded, (-1, 1)).plot().axes[0]
+    axis = branch_graph(sheet_of_one_node(), (-1, 1)).plot().axes[0]
     (band,) = [part for part in axis.collections if part.get_label() != "A"]
     corners = band.get_paths()[0].vertices
     # the load (1, -2) grows like alpha, and so does the largest force, (1, -2) itself at alpha = 1

@@ -9,7 +9,8 @@ from math import sqrt
 
 import numpy as np
 import pytest
-from complete import accepted_report, whole_graph
+from alike import assert_same
+from complete import complete_report, only_root, read_back, whole_graph
 from effort import some
 from interruptions import CtrlC, interrupted
 from problems3d import (
@@ -57,10 +58,8 @@ def test_a_node_that_slips_until_it_sticks(graph):
     assert high - low < 1e-8
     assert vertex.active == (frozenset({SLIPPING, STICKING}),)
     assert vertex.lambda_t == pytest.approx(np.array([[1.5, 1.0]]), abs=1e-8)
-    assert [(arc.statuses, arc.index, arc.grazing) for arc in graph.arcs] == [
-        ((SLIPPING,), 1, False),
-        ((STICKING,), 1, False),
-    ]
+    assert [arc.statuses for arc in graph.arcs] == [(SLIPPING,), (STICKING,)]
+    assert {(arc.index, arc.grazing) for arc in graph.arcs} == {(1, False)}
     assert len(graph.branches) == len(graph.components) == 1
     assert graph.multiplicity_at(1.8) == graph.at_least(1.8) == 1
     assert graph.uniqueness_limit is None
@@ -83,8 +82,7 @@ def test_below_the_bound_of_the_stiffness_there_is_one_root():
         g = rng.normal(size=3 * p) * 3
         problem = from_compliance(random_compliance(rng, p), g, 0.0, friction_slope=slope)
         bound = uniqueness_bound(problem, (0.0, 100.0))
-        found = enumsol.enumerate_roots(problem, 0.999 * bound)
-        assert (found.complete, len(found)) == (True, 1)
+        only_root(problem, 0.999 * bound)
 
 
 def test_values_along_arcs_are_those_of_the_closed_form(graph):
@@ -117,11 +115,8 @@ def test_roots_within_the_bounds_of_a_vertex_are_undecided(graph):
 @pytest.mark.slow
 def test_the_only_solutions_of_pieces_lie_on_a_curve_that_passes_all_of_them():
     problem = enumsol.gallery.block3d(1, 1, 1)
-    graph = enumsol.branch_graph(problem, (0.5, 1.0))
-    report = enumsol.verify(problem, graph.proof)
-    assert graph.complete
-    assert report.complete
-    assert (report.curves, len(graph.branches)) == (1, 1)
+    graph = whole_graph(problem, (0.5, 1.0))
+    assert (complete_report(problem, graph.proof).curves, len(graph.branches)) == (1, 1)
     for alpha in (0.5, 0.7, 1.0):
         found, known = graph.roots_at(alpha), enumsol.enumerate_roots(problem, alpha)
         assert found.complete
@@ -138,16 +133,13 @@ def test_without_such_a_curve_that_they_are_the_only_ones_makes_no_graph(monkeyp
 
 
 def test_its_proof_is_verified(graph):
-    report = accepted_report(SLIDING, graph.proof)
-    assert report.complete
+    complete_report(SLIDING, graph.proof)
 
 
 def test_files_frames_and_figures(graph, tmp_path):
-    graph.save(tmp_path / "graph.json")
-    read = enumsol.BranchGraph.load(tmp_path / "graph.json")
+    read = read_back(graph, tmp_path / "graph.json")
     assert read.complete
-    assert read.problem.fingerprint == SLIDING.fingerprint
-    assert read.steps == graph.steps
+    assert_same(read, graph, "problem.fingerprint", "steps")
     for one, other in zip(graph.arcs, read.arcs, strict=True):
         assert np.array_equal(one.state(one.sample)[0], other.state(one.sample)[0])
     assert {"lambda_t1", "lambda_t2"} < set(graph.vertices_frame().columns)
@@ -190,11 +182,8 @@ def test_what_was_found_is_kept_when_the_time_is_over_or_somebody_interrupts():
 
 def test_what_is_refused():
     bad_argument('arithmetic is "fast" for a problem in 3D', enumsol.branch_graph, SLIDING, (1, 2), "fast")
-    with (
-        ThreadPoolExecutor(1) as workers,
-        pytest.raises(enumsol.InvalidArgumentError, match="executor is given for a problem in 3D"),
-    ):
-        enumsol.branch_graph(SLIDING, (1, 2), executor=workers)
+    with ThreadPoolExecutor(1) as workers:
+        bad_argument("executor is given for a problem in 3D", enumsol.branch_graph, SLIDING, (1, 2), executor=workers)
     bad_argument("expected F >= 0", enumsol.branch_graph, SLIDING, (-1, 2))
     with pytest.raises(enumsol.NotHeldError):
         enumsol.branch_graph(enumsol.gallery.block_on_table3d(), (0, 1))
@@ -274,6 +263,15 @@ def test_runs_and_turns_alternate(sliding):
     assert parts[0].index == 1
 
 
+def there_and_back(given, chain):
+    """The parts of a chain that turns back once, which is settled: there is an arc of either index."""
+    parts = runs_and_turns(given, chain)
+    assert [type(part) for part in parts] == [Run, Turn, Run]
+    assert parts[1].settled
+    assert sorted((parts[0].index, parts[2].index)) == [-1, 1]
+    return parts
+
+
 @pytest.mark.slow
 def test_both_nodes_of_a_symmetric_wedge_change_their_status_at_one_fold():
     problem = enumsol.gallery.wedge3d(2, 1, 2)
@@ -281,11 +279,9 @@ def test_both_nodes_of_a_symmetric_wedge_change_their_status_at_one_fold():
     root = enumsol.enumerate_roots(problem, 0.8485)[0]
     chain = chain_through(given, problem, np.append(forces(root), 0.8485), interval)
     assert chain.whole
-    parts = runs_and_turns(given, chain)
-    assert [type(part) for part in parts] == [Run, Turn, Run]
-    low, high = parts[1].alphas
-    assert parts[1].settled
-    assert set(parts[1].selections) == {(SLIP, SLIP), (STICK, STICK)}
+    _, turn, _ = there_and_back(given, chain)
+    low, high = turn.alphas
+    assert set(turn.selections) == {(SLIP, SLIP), (STICK, STICK)}
     assert high - low < 1e-8
     # the box of the corner: its curve bends away from the line in its middle, and what is beside it is not held
     corner = next(link.curve for link in chain.links if None in link.curve.statuses)
@@ -295,18 +291,20 @@ def test_both_nodes_of_a_symmetric_wedge_change_their_status_at_one_fold():
     away = Fraction(1, 10**5)
     counts = [len(enumsol.enumerate_roots(problem, alpha)) for alpha in (low - away, high + away)]
     assert counts == [1, 3]
-    assert sorted((parts[0].index, parts[2].index)) == [-1, 1]
 
 
 def test_orders_of_changes_lead_from_one_selection_to_the_other():
-    ways = orders((STICK, SLIP, STICK), (SLIP, SLIP, OPEN))
-    assert sorted(ways) == [
-        [(STICK, SLIP, STICK), (STICK, SLIP, OPEN), (SLIP, SLIP, OPEN)],
-        [(STICK, SLIP, STICK), (SLIP, SLIP, STICK), (SLIP, SLIP, OPEN)],
-    ]
+    first, last = (STICK, SLIP, STICK), (SLIP, SLIP, OPEN)
+    between = ((STICK, SLIP, OPEN), (SLIP, SLIP, STICK))
+    assert sorted(orders(first, last)) == [[first, middle, last] for middle in between]
 
 
 # -- folds -------------------------------------------------------------------------------------------------------------
+
+
+def around(alpha, reach):
+    """The interval of that reach around alpha."""
+    return Fraction(alpha) - Fraction(reach), Fraction(alpha) + Fraction(reach)
 
 
 @pytest.mark.parametrize("way", [1, -1])
@@ -317,25 +315,20 @@ def test_folds_of_one_node_are_those_of_the_closed_form(way):
     problem = node.problem.replace(load_slope=way * node.problem.load_slope)
     fold, given = way * node.alpha(phi), AlphaProblem.of(problem.enclosure)
     alpha, n, t = node.at(phi + 0.02)
-    start = np.array([n, *t, way * alpha])
-    interval = Fraction(fold) - Fraction(1, 500), Fraction(fold) + Fraction(1, 500)
-    parts = runs_and_turns(given, chain_through(given, problem, start, interval))
-    assert [type(part) for part in parts] == [Run, Turn, Run]
-    low, high = parts[1].alphas
-    assert parts[1].settled
-    assert parts[1].selections == ((SLIP,),)
+    chain = chain_through(given, problem, np.array([n, *t, way * alpha]), around(fold, Fraction(1, 500)))
+    before, turn, after = there_and_back(given, chain)
+    low, high = turn.alphas
+    assert turn.selections == ((SLIP,),)
     assert high - low < 1e-12
     assert low - Fraction(1, 10**14) < Fraction(fold) < high + Fraction(1, 10**14)
-    assert sorted((parts[0].index, parts[2].index)) == [-1, 1]
-    assert parts[0].rises == -parts[2].rises
+    assert before.rises == -after.rises
 
 
 def test_a_curve_is_whole_over_an_interval_in_which_continuation_has_to_take_very_short_steps():
     node = OneNode(20, load=True)
     phi = node.folds()[-1]
     fold, (alpha, n, t) = node.alpha(phi), node.at(phi + 0.01)
-    reach = Fraction(5 * abs(alpha - fold))
-    interval = Fraction(fold) - reach, Fraction(fold) + reach
+    interval = around(fold, 5 * abs(alpha - fold))
     chain = chain_through(AlphaProblem.of(node.problem.enclosure), node.problem, np.array([n, *t, alpha]), interval)
     assert chain.whole
     assert leaves_interval(chain.links, chain.joints, interval)
@@ -358,9 +351,7 @@ def fold_is_found(node, given, phi, way):
     if there is None:
         return False
     alpha, n, t = there
-    reach = Fraction(5 * abs(alpha - fold))
-    interval = Fraction(fold) - reach, Fraction(fold) + reach
-    chain = chain_through(given, node.problem, np.array([n, *t, alpha]), interval)
+    chain = chain_through(given, node.problem, np.array([n, *t, alpha]), around(fold, 5 * abs(alpha - fold)))
     if chain is None or not chain.whole:
         return False
     (turn,) = (part for part in runs_and_turns(given, chain) if isinstance(part, Turn))

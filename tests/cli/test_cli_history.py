@@ -8,7 +8,6 @@ import pytest
 from command_line import assert_refused, printed, run
 from complete import complete_report
 
-import enumsol
 from enumsol import History, Proof, verify, write_problem
 
 NODE = ("history", "gallery:one-node-6.1")
@@ -19,14 +18,6 @@ def wedge(tmp_path, pulled_wedge):
     write_problem(pulled_wedge, tmp_path / "wedge.npz")
     (tmp_path / "steps.csv").write_text("alpha\n-1\n0\n1/2  # pulled\n1\n")
     return tmp_path / "wedge.npz", tmp_path / "steps.csv"
-
-
-@pytest.fixture
-def pulled_wedge():
-    import dataclasses
-
-    wedge = enumsol.gallery.wedge(2, 2, friction=(1.0, 0.0))
-    return dataclasses.replace(wedge, f=0 * wedge.f, load_slope=wedge.f)
 
 
 @pytest.mark.slow

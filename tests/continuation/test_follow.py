@@ -2,15 +2,22 @@ from functools import partial
 
 import numpy as np
 import pytest
+from path_problems import closed_branch, stable_problem
 from refusals import bad_argument
 
 import enumsol
 from enumsol import gallery
+from enumsol.condensation import factorization
 from enumsol.continuation import AmbiguousStart, ContinuationOptions, SmoothPath, follow, newton, start_tangents
 
 enumerate_roots = partial(enumsol.enumerate_roots, arithmetic="fast")
 
 PAPER = [ContinuationOptions(h_max=h) for h in (0.1, 1.0, 5.0)]
+
+
+def root_in(status, problem, alpha):
+    """The first root in which the first node has a status."""
+    return next(root for root in enumerate_roots(problem, alpha) if root.statuses[0].value == status)
 
 
 def names(path):
@@ -103,54 +110,49 @@ def test_example_6_3_lists_all_tangents_at_the_bifurcation():
 
 def test_perturbed_example_6_3_has_its_fold_where_the_closed_form_puts_it():
     problem = gallery.get("one-node-6.3-perturbed").build()
-    root = next(r for r in enumerate_roots(problem, 5.0) if r.statuses[0].value == "stick")
-    (fold,) = follow(problem, root, -1, (0, 20)).folds
+    (fold,) = follow(problem, root_in("stick", problem, 5.0), -1, (0, 20)).folds
     assert fold.alpha == pytest.approx(2 / 0.98, abs=1e-12)
 
 
-def test_closed_branch_is_recognised(closed_problem):
-    root = next(r for r in enumerate_roots(closed_problem, 0.1) if r.statuses[0].value == "stick")
+CLOSED = closed_branch()
+STICKING = root_in("stick", CLOSED, 0.1)
+
+
+def test_closed_branch_is_recognised():
     for direction in (1, -1):
-        path = follow(closed_problem, root, direction, (-3, 3), ContinuationOptions(alpha_scale=1.0))
+        path = follow(CLOSED, STICKING, direction, (-3, 3), ContinuationOptions(alpha_scale=1.0))
         assert path.closed
         assert "closed" in path.message
         assert sorted(t.alpha for t in path.folds) == pytest.approx([-np.sqrt(0.5), np.sqrt(0.5)], abs=1e-12)
         assert path[-1].lambda_n == pytest.approx(path[0].lambda_n, abs=1e-12)
         assert path.alpha[-1] == pytest.approx(0.1, abs=1e-12)
-        assert on_solutions(closed_problem, path) < 1e-12
+        assert on_solutions(CLOSED, path) < 1e-12
 
 
-def test_closed_branch_from_its_fold(closed_problem):
-    root = next(r for r in enumerate_roots(closed_problem, 0.1) if r.statuses[0].value == "stick")
-    fold = follow(closed_problem, root, 1, (-3, 3)).folds[0]
-    start = follow(closed_problem, root, 1, (-3, 3))[fold.point]
-    assert {t.orientation for t in start_tangents(closed_problem, start, (-3, 3))} == {1, -1}
-    assert follow(closed_problem, start, 1, (-3, 3)).closed
+def test_closed_branch_from_its_fold():
+    path = follow(CLOSED, STICKING, 1, (-3, 3))
+    start = path[path.folds[0].point]
+    assert {t.orientation for t in start_tangents(CLOSED, start, (-3, 3))} == {1, -1}
+    assert follow(CLOSED, start, 1, (-3, 3)).closed
 
 
-def test_path_that_leaves_and_returns(closed_problem):
-    root = next(r for r in enumerate_roots(closed_problem, 0.1) if r.statuses[0].value == "stick")
-    stopped = follow(closed_problem, root, 1, (-3, 0.5))
-    assert stopped.status == "interval left"
-    assert stopped.alpha[-1] == 0.5
-    assert follow(closed_problem, root, 1, (-3, 0.5), ContinuationOptions(overshoot=0.5)).closed
+def test_path_that_leaves_and_returns():
+    stopped = follow(CLOSED, STICKING, 1, (-3, 0.5))
+    assert (stopped.status, stopped.alpha[-1]) == ("interval left", 0.5)
+    assert follow(CLOSED, STICKING, 1, (-3, 0.5), ContinuationOptions(overshoot=0.5)).closed
 
 
-def test_arrival_at_a_visited_path(closed_problem):
-    root = next(r for r in enumerate_roots(closed_problem, 0.1) if r.statuses[0].value == "stick")
-    first = follow(closed_problem, root, 1, (-3, 0.5))
-    other = next(r for r in enumerate_roots(closed_problem, 0.1) if r.statuses[0].value == "slip-")
-    path = follow(closed_problem, other, 1, (-3, 3), visited=[first])
+def test_arrival_at_a_visited_path():
+    first = follow(CLOSED, STICKING, 1, (-3, 0.5))
+    path = follow(CLOSED, root_in("slip-", CLOSED, 0.1), 1, (-3, 3), visited=[first])
     assert path.status == "visited"
-    assert path[-1].lambda_n == pytest.approx(root.lambda_n, abs=1e-10) or path[-1].kind == "transition"
+    assert path[-1].lambda_n == pytest.approx(STICKING.lambda_n, abs=1e-10) or path[-1].kind == "transition"
 
 
 def test_loading_path_is_piecewise_linear():
     problem = gallery.get("two-node-6.7-minus").build()
-    root = enumerate_roots(problem, -3.0)[0]
-    path = follow(problem, root, 1, (-3, 3))
-    assert path.alpha[-1] == 3
-    assert len(path.folds) == 2
+    path = follow(problem, enumerate_roots(problem, -3.0)[0], 1, (-3, 3))
+    assert (path.alpha[-1], len(path.folds)) == (3, 2)
     inside = [k for k in range(1, len(path) - 1) if path.kinds[k] == "step" and path.kinds[k - 1] != "transition"]
     for k in inside:
         a, b, c = (np.append(path.lambda_n[j], path.alpha[j]) for j in (k - 1, k, k + 1))
@@ -160,12 +162,8 @@ def test_loading_path_is_piecewise_linear():
 
 def test_smooth_path_closed_loop():
     problem = gallery.one_node_triangle(f=(1.0, -3.5))
-    path_data = SmoothPath(
-        F=lambda a: 4.0,
-        dF=lambda a: 0.0,
-        f=lambda a: np.array([1.0, -3.5 - 0.5 * a * a]),
-        df=lambda a: np.array([0.0, -a]),
-    )
+    load, slope = (lambda a: np.array([1.0, -3.5 - 0.5 * a * a])), (lambda a: np.array([0.0, -a]))
+    path_data = SmoothPath(F=lambda a: 4.0, dF=lambda a: 0.0, f=load, df=slope)
     root = newton(problem, 0.0, [1.0, -3.5], smooth_path=path_data)
     path = follow(problem, root, 1, (-3, 3), smooth_path=path_data)
     assert path.closed
@@ -186,14 +184,12 @@ def test_smooth_friction_that_ends_is_named():
     problem = gallery.one_node_triangle()
     smooth = SmoothPath(F=lambda a: 1 - a, dF=lambda a: -1.0)
     path = follow(problem, (0.0, [0.0], [0.0]), 1, (0, 3), smooth_path=smooth)
-    assert path.status == "friction"
-    assert path.alpha[-1] == pytest.approx(1, abs=1e-4)
+    assert (path.status, path.alpha[-1]) == ("friction", pytest.approx(1, abs=1e-4))
 
 
 def test_without_an_interval_friction_bounds_alpha():
     path = follow(gallery.one_node_triangle(), (5.0, [0.0], [0.0]), -1)
-    assert path.status == "interval left"
-    assert path.alpha[-1] == 0
+    assert (path.status, path.alpha[-1]) == ("interval left", 0)
 
 
 def test_smooth_path_wrong_derivative_is_named():
@@ -205,8 +201,8 @@ def test_smooth_path_wrong_derivative_is_named():
 @pytest.mark.few(4, 2)
 @pytest.mark.parametrize("loading", [False, True])
 @pytest.mark.parametrize("seed", range(12))
-def test_points_are_enumerated_roots(seed, loading, random_problems):
-    problem = random_problems(seed, loading)
+def test_points_are_enumerated_roots(seed, loading):
+    problem = stable_problem(seed, loading)
     interval = (-4.0, 4.0) if loading else (0.0, 10.0)
     rng = np.random.default_rng(seed)
     for root in enumerate_roots(problem, 1.7, method="exhaustive"):
@@ -220,19 +216,18 @@ def test_points_are_enumerated_roots(seed, loading, random_problems):
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_a_path_can_be_walked_back(seed, random_problems):
-    problem = random_problems(seed, loading=True)
+def test_a_path_can_be_walked_back(seed):
+    problem = stable_problem(seed, loading=True)
     for root in enumerate_roots(problem, 0.3):
         there = follow(problem, root, 1, (-4, 4))
         back = follow(problem, there[-1], -1, (-4, 4), visited=[there])
-        assert [t.alpha for t in back.transitions][: len(there.transitions)] == pytest.approx(
-            [t.alpha for t in there.transitions][::-1][: len(back.transitions)], abs=1e-8
-        )
+        one, two = ([t.alpha for t in path.transitions] for path in (there, back))
+        assert two[: len(one)] == pytest.approx(one[::-1][: len(two)], abs=1e-8)
 
 
 @pytest.mark.parametrize("r", [1e-2, 1e2])
-def test_r_does_not_change_the_branch(r, random_problems):
-    problem = random_problems(5)
+def test_r_does_not_change_the_branch(r):
+    problem = stable_problem(5)
     for root in enumerate_roots(problem, 5.0):
         one = follow(problem, root, 1, (0, 20))
         two = follow(problem, root, 1, (0, 20), ContinuationOptions(r=r))
@@ -240,13 +235,11 @@ def test_r_does_not_change_the_branch(r, random_problems):
         assert names(one) == names(two)
 
 
-def test_units_do_not_change_the_path(random_problems):
-    problem = random_problems(5, loading=True)
+def test_units_do_not_change_the_path():
+    problem = stable_problem(5, loading=True)
     force, length, time = 3.7e6, 2.9e-4, 1.3e2
-    scaled = enumsol.ContactProblem(
-        problem.A.toarray() * force / length, problem.Bn, problem.Bt, problem.f * force, friction=problem.friction,
-        load_slope=problem.load_slope * force / time,
-    )  # fmt: skip
+    data = {"A": problem.A * force / length, "f": problem.f * force, "load_slope": problem.load_slope * force / time}
+    scaled = problem.replace(**data)
     root = enumerate_roots(problem, 1.0)[0]
     one = follow(problem, root, 1, (-5, 5))
     start = (time * 1.0, root.lambda_n * force, root.lambda_t * force)
@@ -272,10 +265,7 @@ def test_point_where_four_selections_meet():
 
 @pytest.mark.slow
 def test_large_sparse_problem_is_factorised_once(monkeypatch):
-    from enumsol.condensation import factorization
-
-    calls = []
-    splu = factorization.splu
+    calls, splu = [], factorization.splu
     monkeypatch.setattr(factorization, "splu", lambda *a, **k: calls.append(1) or splu(*a, **k))
     problem = gallery.clamped_block(200, 50, contact=40, traction=(-0.3, -1.0))
     assert problem.n > 20_000

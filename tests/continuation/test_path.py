@@ -2,11 +2,13 @@ import json
 
 import numpy as np
 import pytest
+from alike import assert_same
+from complete import read_back
 from interruptions import CtrlC, interrupted
 from refusals import bad_argument
 
-from enumsol import gallery
-from enumsol.continuation import ContinuationOptions, Path, follow, newton
+from enumsol import branch_graph, gallery
+from enumsol.continuation import ContinuationOptions, Path, follow, follower, newton
 
 
 @pytest.fixture
@@ -35,12 +37,10 @@ def test_frame_has_the_columns_that_audits_read(path):
 
 
 def test_save_and_load(path, tmp_path):
-    path.save(tmp_path / "path.npz")
-    again = Path.load(tmp_path / "path.npz")
+    again = read_back(path, tmp_path / "path.npz")
     assert repr(again) == repr(path)
-    assert np.array_equal(again.lambda_n, path.lambda_n)
-    assert again.transitions[0].local_test == path.transitions[0].local_test
-    assert again.options == path.options
+    assert_same(again, path, "lambda_n", "options")
+    assert_same(again.transitions[0], path.transitions[0], "local_test")
 
 
 def test_load_refuses_other_files(tmp_path):
@@ -67,14 +67,13 @@ def test_resume_after_the_step_limit_is_the_same_path(problem, path, tmp_path):
     options = ContinuationOptions(max_steps=7)
     part = follow(problem, path[0], -1, (0, 20), options)
     assert part.status == "step limit"
-    part.save(tmp_path / "part.npz")
-    loaded = Path.load(tmp_path / "part.npz")
+    loaded = read_back(part, tmp_path / "part.npz")
     bad_argument("problem is missing", loaded.resume)
     whole = loaded.resume(problem, options=ContinuationOptions())
     assert whole.status == "interval left"
     assert whole.alpha == pytest.approx(path.alpha, abs=1e-9)
-    assert whole.transitions[0].point == path.transitions[0].point
-    assert whole.stats.accepted == path.stats.accepted
+    assert_same(whole.transitions[0], path.transitions[0], "point")
+    assert_same(whole, path, "stats.accepted")
 
 
 def test_resume_in_a_wider_interval(problem):
@@ -102,18 +101,15 @@ def test_plot(path):
 
 
 def test_plot_over_a_graph(problem, path, tmp_path):
-    from enumsol import branches
-
-    figure = path.plot(branches.branch_graph(problem, (0.0, 20.0)))
+    graph = branch_graph(problem, (0.0, 20.0))
+    figure = path.plot(graph)
     ax = figure.axes[0]
     figure.savefig(tmp_path / "figure.png")
     assert "steps" in {line.get_label() for line in ax.lines}
-    bad_argument("both given", path.plot, branches.branch_graph(problem, (0.0, 20.0)), ax=ax)
+    bad_argument("both given", path.plot, graph, ax=ax)
 
 
 def test_interruption_keeps_the_path(problem, path, monkeypatch):
-    from enumsol.continuation import follower
-
     monkeypatch.setattr(follower, "moore_penrose", CtrlC(call=6, then=follower.moore_penrose))
     partial = interrupted("resume", follow, problem, path[0], -1, (0, 20))
     assert len(partial) == 6

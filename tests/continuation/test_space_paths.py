@@ -3,8 +3,10 @@
 import numpy as np
 import oracles3d
 import pytest
+from alike import assert_close, assert_same
+from complete import read_back
 from effort import some
-from problems3d import OneNode, from_compliance, random_coupled
+from problems3d import OneNode, forces, from_compliance, in_space, random_coupled
 from refusals import bad_argument
 
 import enumsol
@@ -23,10 +25,6 @@ def random_path_problem(seed, p=None, load=True):
     if load:
         return from_compliance(S, g, (F[:, 0], F[:, 1]), load_slope=A @ rng.normal(size=3 * p))
     return from_compliance(S, g, (0 * F[:, 0], 0 * F[:, 1]), friction_slope=(F[:, 0], F[:, 1]))
-
-
-def forces(state):
-    return np.concatenate([state.lambda_n, *state.lambda_t.T])
 
 
 def violation(problem, point):
@@ -52,11 +50,10 @@ def test_newton_finds_enumerated_roots_with_their_indices_and_statuses(seed):
     for root in enumsol.enumerate_roots(problem, 0.5, "fast"):
         start = root if seed % 2 else forces(root) * 1.001
         found = newton(problem, 0.5, start)
-        assert found.statuses == root.statuses
-        assert found.index == root.index
+        assert_same(found, root, "statuses", "index")
         assert found.regular
         assert forces(found) == pytest.approx(forces(root), rel=1e-9, abs=1e-9)
-        assert np.allclose(found.u_t, root.u_t, rtol=1e-8, atol=1e-9)
+        assert_close(found, root, "u_t", rtol=1e-8, atol=1e-9)
         assert violation(problem, found) < 1e-10
 
 
@@ -149,8 +146,7 @@ def test_the_jammed_and_the_sliding_root_lie_on_one_branch_and_the_open_one_on_a
     problem = enumsol.gallery.get("one-node-3d-3").build().replace(friction=0.0, friction_slope=1.0)
     jammed, sliding, free = enumsol.enumerate_roots(problem, 5)
     path = follow(problem, jammed, -jammed.index, (0.5, 6))
-    assert path.status == "interval left"
-    assert path.alpha[-1] == 6
+    assert (path.status, path.alpha[-1]) == ("interval left", 6)
     (fold,) = path.folds
     assert 0.5 < fold.alpha < 5
     assert any(np.allclose(forces(one), forces(sliding), atol=1e-9) for one in crossings(problem, path, 5.0))
@@ -162,36 +158,22 @@ def test_the_jammed_and_the_sliding_root_lie_on_one_branch_and_the_open_one_on_a
         assert len(enumsol.enumerate_roots(problem, alpha)) == count
 
 
-def two_dimensional(seed):
-    rng = np.random.default_rng(seed)
-    p = 2
-    M = rng.normal(size=(2 * p, 2 * p))
-    S, g, slope = M @ M.T + 0.3 * np.eye(2 * p), 3 * rng.normal(size=2 * p), rng.normal(size=2 * p)
-    return S, g, slope, rng.uniform(0.3, 3, p)
-
-
-@pytest.mark.parametrize("across", ["friction", "none"])
+@pytest.mark.parametrize("across", [1.0, 0.0])
 @pytest.mark.parametrize("seed", range(2))
 def test_a_problem_in_2d_with_a_second_tangent_that_nothing_loads_has_the_same_path(seed, across):
-    S, g, slope, F = two_dimensional(seed)
-    p, A, rows = len(F), np.linalg.inv(S), np.eye(len(g))
-    flat = enumsol.ContactProblem(0.5 * (A + A.T), rows[:p], rows[p:], A @ g, friction=(F, 0.0), load_slope=A @ slope)
-    solid_S = np.eye(3 * p)
-    solid_S[: 2 * p, : 2 * p] = S
-    zero = np.zeros(p)
-    solid = from_compliance(
-        solid_S,
-        np.concatenate([g, zero]),
-        (F, F if across == "friction" else zero),
-        load_slope=np.concatenate([A @ slope, zero]),
-    )
+    rng, p = np.random.default_rng(seed), 2
+    M = rng.normal(size=(2 * p, 2 * p))
+    A, rows = np.linalg.inv(M @ M.T + 0.3 * np.eye(2 * p)), np.eye(2 * p)
+    f, slope = A @ (3 * rng.normal(size=2 * p)), A @ rng.normal(size=2 * p)
+    F = rng.uniform(0.3, 3, p)
+    flat = enumsol.ContactProblem(0.5 * (A + A.T), rows[:p], rows[p:], f, friction=(F, 0.0), load_slope=slope)
+    solid = in_space(flat).replace(friction=(F, across * F))
     for root in enumsol.enumerate_roots(flat, 0.1, "fast"):
         plane = follow(flat, root, 1, (-3, 3))
-        start = (0.1, root.lambda_n, np.column_stack([root.lambda_t, zero]))
+        start = (0.1, root.lambda_n, np.column_stack([root.lambda_t, np.zeros(p)]))
         space = follow(solid, start, 1, (-3, 3))
-        assert [item.alpha for item in space.transitions] == pytest.approx(
-            [item.alpha for item in plane.transitions], abs=1e-8
-        )
+        turns, expected = ([item.alpha for item in path.transitions] for path in (space, plane))
+        assert turns == pytest.approx(expected, abs=1e-8)
         assert len(space.folds) == len(plane.folds)
         assert space.alpha[-1] == pytest.approx(plane.alpha[-1])
         assert space.lambda_t[-1, :, 0] == pytest.approx(plane.lambda_t[-1], abs=1e-8)
@@ -236,10 +218,7 @@ def test_files_tables_pictures_and_resumed_paths(tmp_path):
     longer = path.resume(options=enumsol.ContinuationOptions())
     assert longer.status == "interval left"
     assert longer.lambda_t.shape == (len(longer), 2, 2)
-    longer.save(tmp_path / "path.npz")
-    again = enumsol.Path.load(tmp_path / "path.npz")
-    assert np.array_equal(again.lambda_t, longer.lambda_t)
-    assert again.selections == longer.selections
+    assert_same(read_back(longer, tmp_path / "path.npz"), longer, "lambda_t", "selections")
     columns = set(longer.to_frame().columns)
     assert {"lambda_n_0", "lambda_t1_0", "lambda_t2_1", "u_t2_0", "status_1"} <= columns
     assert "lambda_t_0" not in columns
@@ -259,8 +238,6 @@ def test_what_is_not_offered_in_3d_is_refused():
     bad_argument(r"start has shape \(2,\); expected a Root .* \(3,\) or \(1, 3\)", newton, problem, 0, [1.0, 2.0])
     bad_argument(r"lambda_t of start has shape \(1,\); expected \(1, 2\)", follow, problem, (0.0, [0.0], [0.0]))
     weakening = enumsol.gallery.block3d(1, 1, 1, friction=enumsol.FrictionTable([0, 1], [0.5, 0.4]))
-    for call in (
-        lambda: newton(weakening, 0),
-        lambda: follow(weakening, (0, np.zeros(weakening.p), np.zeros((weakening.p, 2)))),
-    ):
-        bad_argument("depends on the solution", call)
+    nothing = (0, np.zeros(weakening.p), np.zeros((weakening.p, 2)))
+    for call, start in ((newton, 0), (follow, nothing)):
+        bad_argument("depends on the solution", call, weakening, start)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from complete import limit_of
+from helpers.floating_bodies import violation
 from helpers.floating_oracle import Oracle, block_on_table, random_body
 from helpers.floating_space import known_body, on_weak_springs
 from scipy.optimize import linprog
@@ -11,22 +12,6 @@ import enumsol
 from enumsol.fixed_points import FixedPoint, Outcome, TrescaNotFeasible, fixed_point_residual
 
 ALPHAS = (0, 0.25, 0.5)
-
-
-def violation(problem, alpha, u, lambda_n, lambda_t, F=None, bound=None):
-    """How far displacements and forces are from solving the problem, from A, B and f as they are."""
-    p = problem.p
-    forces = np.concatenate([lambda_n, np.asarray(lambda_t).ravel(order="F")])
-    w = problem.contact_rows @ u
-    u_n, u_t = w[:p] - problem.gap, w[p:].reshape(-1, p).T - problem.slip_offset.reshape(p, -1)
-    F = problem.friction_at(alpha).reshape(p, -1) if F is None else F
-    bound = lambda_n if bound is None else bound
-    force = np.asarray(lambda_t).reshape(u_t.shape)
-    share = np.linalg.norm(np.divide(force, F, out=np.zeros_like(force), where=F > 0), axis=1)
-    power = np.sum(force * u_t, axis=1) - np.linalg.norm(F * u_t, axis=1) * bound
-    rest = problem.A @ u + problem.contact_rows.T @ forces - problem.load_at(alpha)
-    found = rest, np.maximum(u_n, 0), np.minimum(lambda_n, 0), u_n * lambda_n, power, np.where(F > 0, 0, force)
-    return max(*(np.max(np.abs(part)) for part in found), np.max(share - bound))
 
 
 def checked(problem, alpha, found):

@@ -10,6 +10,12 @@ def all_roots(problem, alpha, *arguments, **options):
     return roots
 
 
+def only_root(problem, alpha=0, *arguments, **options):
+    """The root of a problem that has no other, in such a search."""
+    (root,) = all_roots(problem, alpha, *arguments, **options)
+    return root
+
+
 def proven_roots(problem, alpha, *arguments, **options):
     """The same with a proof that the checker accepts."""
     roots = all_roots(problem, alpha, *arguments, **options)
@@ -43,6 +49,12 @@ def complete_report(problem, proof, *arguments, **options):
     report = verify(problem, proof, *arguments, **options)
     assert report.complete, report
     return report
+
+
+def read_back(result, file, *arguments):
+    """What the class of a result reads from the file to which this was saved."""
+    result.save(file)
+    return type(result).load(file, *arguments)
 
 
 def limit_of(problem, alpha, *arguments, **options):

@@ -14,6 +14,23 @@ def one_node(f, *, lame=(1.0, 1.0), friction=(0.0, 1.0), load_slope=None):
     return ContactProblem([[a, b], [b, a]], [[1.0, 0.0]], [[0.0, 1.0]], f, friction=friction, load_slope=load_slope)
 
 
+def closed_branch():
+    """One node, F = 4 - alpha, f = (1, -3.5) + alpha (1, -3): a closed branch of stick and slip-, alpha^2 < 1/2."""
+    return one_node((1.0, -3.5), friction=(4.0, -1.0), load_slope=[1.0, -3.0])
+
+
+def sheet_of_one_node():
+    """F = 2 makes slip singular: for every alpha > 0 a segment of solutions from no force to (alpha, -2 alpha)."""
+    return one_node((0.0, 0.0), friction=2.0, load_slope=[1.0, -2.0])
+
+
+def uncoupled(*loads, **options):
+    """Several one-node problems that do not feel each other."""
+    p = len(loads)
+    A, rows = np.kron(np.eye(p), [[2.0, -1.0], [-1.0, 2.0]]), np.eye(2 * p)
+    return ContactProblem(A, rows[0::2], rows[1::2], np.concatenate(loads), **options)
+
+
 def generic_problem(rng, p, kind):
     """A random problem on a friction path, a loading path, or both."""
     n = 2 * p + int(rng.integers(0, 3))
@@ -59,14 +76,15 @@ def mirrored_problem(rng, *, load):
     return ContactProblem(A + mirror @ A @ mirror.T, np.eye(4)[[0, 2]], np.eye(4)[[1, 3]], f, **options)
 
 
-def assert_balanced(graph):
-    """Degrees balance at every vertex inside the interval and sum to +1 between neighbouring critical alphas."""
+def balanced(graph):
+    """The graph, whose degrees balance at all vertices inside the interval and sum to +1 between critical alphas."""
     assert graph.reasons == ()
     for v in graph.vertices:
         assert v.border or v.index_left == v.index_right
     alphas = sorted({v.exact.enclosure() for v in graph.vertices})
     for (_, left), (right, _) in pairwise(alphas):
         assert sum(arc.index for arc in graph.arcs_at((left + right) / 2)) == 1
+    return graph
 
 
 def assert_same_roots(ours, theirs):

@@ -1,0 +1,25 @@
+"""Two results of one kind, compared attribute by attribute."""
+
+from operator import attrgetter
+
+import numpy as np
+import scipy.sparse as sp
+
+
+def _pairs(one, two, names):
+    for name in names:
+        values = (attrgetter(name)(part) for part in (one, two))
+        yield name, *(value.toarray() if sp.issparse(value) else value for value in values)
+
+
+def assert_close(one, two, *names, order=slice(None), **tolerances):
+    """Attributes of these names agree within the tolerances of numpy.allclose; those of one are taken in an order."""
+    for name, ours, theirs in _pairs(one, two, names):
+        assert np.allclose(np.asarray(ours)[order], theirs, **tolerances), name
+
+
+def assert_same(one, two, *names):
+    """Attributes of these names are equal, arrays to the last bit."""
+    for name, ours, theirs in _pairs(one, two, names):
+        same = np.array_equal(ours, theirs) if isinstance(ours, np.ndarray) else ours == theirs
+        assert same, (name, ours, theirs)
