@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import scipy.linalg
+from parted_meshes import constant_stress
 from refusals import bad_argument, bad_problem
 
 from enumsol import fem, gallery
@@ -51,15 +52,14 @@ def test_patch_test_on_a_distorted_mesh(distorted):
     lam, mu = 1.3, 0.7
     gradient = np.array([[0.2, -0.1], [0.4, 0.3]])
     force = (fem.stiffness(points, triangles, (lam, mu)) @ (points @ gradient.T).ravel()).reshape(-1, 2)
-    strain = 0.5 * (gradient + gradient.T)
-    stress = lam * np.trace(strain) * np.eye(2) + 2 * mu * strain
     mesh = fem.rectangle(4, 3)
     boundary = np.concatenate([mesh.bottom[:-1], mesh.right[:-1], mesh.top[:0:-1], mesh.left[:0:-1]])
     edges = np.stack([boundary, np.roll(boundary, -1)], axis=1)
     along = points[edges[:, 1]] - points[edges[:, 0]]
     outward = np.stack([along[:, 1], -along[:, 0]], axis=1) / np.linalg.norm(along, axis=1)[:, None]
     # constant stress is in equilibrium with its own tractions on the boundary, and with nothing inside
-    assert np.allclose(force, fem.edge_forces(points, edges, outward @ stress.T), rtol=0, atol=1e-13)
+    tractions = outward @ constant_stress(gradient, (lam, mu))
+    assert np.allclose(force, fem.edge_forces(points, edges, tractions), rtol=0, atol=1e-13)
 
 
 def test_body_forces_have_the_weight_of_the_body(distorted):
@@ -119,6 +119,10 @@ def test_assembly_stays_sparse():
 TRIANGLE = ([[0, 0], [1, 0], [0, 1]], [[0, 1, 2]], (1.0, 1.0))
 
 
+def at_one_node(**options):
+    return fem.contact_problem(*TRIANGLE, **({"contact": [0], "normals": (0, -1), "held": [1, 2]} | options))
+
+
 @pytest.mark.parametrize(
     ("build", "message"),
     [
@@ -130,22 +134,13 @@ TRIANGLE = ([[0, 0], [1, 0], [0, 1]], [[0, 1, 2]], (1.0, 1.0))
         (lambda: fem.stiffness([*TRIANGLE[0], [1, 1]], [[0, 1, 2]], (1, 1)), "cells leave node 3 out"),
         (lambda: fem.stiffness(*TRIANGLE[:2], (1, -1)), r"lame is \(1, -1\)"),
         (lambda: fem.edge_forces(TRIANGLE[0], [[0, 1]], [1.0]), r"traction is \[1\.0\]; expected two finite numbers"),
-        (lambda: fem.contact_problem(*TRIANGLE, contact=[0], normals=(0, -1), held=[0, 1]), "contact names node 0"),
-        (lambda: fem.contact_problem(*TRIANGLE, contact=[0, 0], normals=(0, -1)), "contact names a node twice"),
-        (lambda: fem.contact_problem(*TRIANGLE, contact=[0.5], normals=(0, -1)), "contact has .* float64; expected"),
-        (lambda: fem.contact_problem(*TRIANGLE, contact=[0], normals=(0, 0), held=[1, 2]), "normals row 0 is zero"),
-        (
-            lambda: fem.contact_problem(*TRIANGLE, contact=[0], normals=(0, -1), tangents=(1, 1), held=[1, 2]),
-            "tangents row 0 is not perpendicular",
-        ),
-        (
-            lambda: fem.contact_problem(*TRIANGLE, contact=[0], normals=(0, -1), springs=(1, -1)),
-            "springs has the value -1; expected stiffnesses >= 0",
-        ),
-        (
-            lambda: fem.contact_problem(*TRIANGLE, contact=[0], normals=(0, -1), held=[1, 2], forces=[1.0]),
-            r"forces has shape \(1,\); expected \(3, 2\)",
-        ),
+        (lambda: at_one_node(held=[0, 1]), "contact names node 0"),
+        (lambda: at_one_node(contact=[0, 0]), "contact names a node twice"),
+        (lambda: at_one_node(contact=[0.5]), "contact has .* float64; expected"),
+        (lambda: at_one_node(normals=(0, 0)), "normals row 0 is zero"),
+        (lambda: at_one_node(tangents=(1, 1)), "tangents row 0 is not perpendicular"),
+        (lambda: at_one_node(springs=(1, -1)), "springs has the value -1; expected stiffnesses >= 0"),
+        (lambda: at_one_node(forces=[1.0]), r"forces has shape \(1,\); expected \(3, 2\)"),
     ],
 )
 def test_bad_arguments_are_named(build, message):

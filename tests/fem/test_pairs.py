@@ -5,13 +5,15 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from alike import assert_close, assert_same
 from complete import all_roots
 from parted_meshes import grid
-from refusals import bad_argument
-from two_bodies import blocks, boxes, shifted, together
+from parted_solids import rotation
+from refusals import bad_argument, bad_problem
+from two_bodies import blocks, boxes, shifted, stacked, together
 
 import enumsol
-from enumsol import InvalidProblemError, fem
+from enumsol import fem
 from enumsol.fem.pairs import faced
 
 E, NU = 2.0, 0.3
@@ -22,25 +24,19 @@ SOLID_KINDS = (4, 8, 10, pytest.param(27, marks=pytest.mark.slow))
 
 ROLLERS = {2: ["lower.bottom", "lower.left", "upper.left"]}
 ROLLERS[3] = [*ROLLERS[2], "lower.front", "upper.front"]
+ENDS = ["upper.top", "lower.bottom"]
 
 
-def pressed(mesh, pairs=(("upper.bottom", "lower.top"),), **more):
+def pressed(mesh, **more):
     """On rollers, under uniform pressure; the upper body stands on the lower one but for a weak spring."""
-    given = {
-        "friction": 0, "symmetry": ROLLERS[mesh.points.shape[1]], "pressure": {"upper.top": 0.1},
-        "spring": {"upper.top": (1e-7, 1e-7)},
-    } | more  # fmt: skip
-    return fem.mesh_problem(mesh, **STEEL, pairs=pairs, **given)
+    given = {"symmetry": ROLLERS[mesh.points.shape[1]], "pressure": {"upper.top": 0.1}}
+    return stacked(mesh, **{"friction": 0, **given, "spring": {"upper.top": (1e-7, 1e-7)}} | more)
 
 
 def forces_on_nodes(problem, lambda_n, lambda_t):
     """Contact forces on all nodes, (N, d)."""
     forces = -problem.contact_rows.T @ np.concatenate([lambda_n, np.ravel(lambda_t, order="F")])
     return np.asarray(problem.mesh.motion @ forces).reshape(problem.mesh.points.shape)
-
-
-def stresses(problem, root):
-    return fem.cell_stresses(problem, root.u)
 
 
 # -- the patch test ----------------------------------------------------------------------------------------------------
@@ -51,7 +47,7 @@ def test_a_constant_pressure_passes_exactly_where_meshes_match(kind):
     problem = pressed(blocks(kind, shake=0.05))
     (root,) = all_roots(problem, 0)
     assert np.array_equal(problem.gap, np.zeros(problem.p))
-    assert np.allclose(stresses(problem, root), np.diag([0.0, -0.1]), rtol=0, atol=1e-6)
+    assert np.allclose(fem.cell_stresses(problem, root.u), np.diag([0.0, -0.1]), rtol=0, atol=1e-6)
     assert np.isclose(root.lambda_n.sum(), 0.2, rtol=1e-6)
 
 
@@ -60,7 +56,7 @@ def test_a_constant_pressure_passes_exactly_where_meshes_match(kind):
 def test_a_constant_pressure_passes_exactly_in_3d(kind):
     problem = pressed(boxes(kind, *((1, 1) if kind == 27 else (2, 2))))
     (root,) = enumsol.enumerate_roots(problem, 0)
-    assert np.allclose(stresses(problem, root), np.diag([0.0, 0.0, -0.1]), rtol=0, atol=1e-6)
+    assert np.allclose(fem.cell_stresses(problem, root.u), np.diag([0.0, 0.0, -0.1]), rtol=0, atol=1e-6)
     assert np.allclose(root.lambda_n, 0.1 * problem.areas, rtol=1e-5)
 
 
@@ -84,10 +80,8 @@ def test_where_meshes_do_not_match_the_pressure_converges(kind):
 
 @pytest.mark.parametrize("kind", [3, 9, (3, 4)])
 def test_forces_and_moments_on_both_sides_balance(kind):
-    problem = fem.mesh_problem(
-        blocks(kind, 3, 2), **STEEL, pairs=[("upper.bottom", "lower.top")], clamp="lower.bottom", friction=0.3,
-        spring={"upper.top": (0.1, 0.1)}, load={"upper.top": (0.05, -0.2)},
-    )  # fmt: skip
+    acting = {"spring": {"upper.top": (0.1, 0.1)}, "load": {"upper.top": (0.05, -0.2)}}
+    problem = stacked(blocks(kind, 3, 2), clamp="lower.bottom", **acting)
     (root,) = enumsol.enumerate_roots(problem, 0)
     assert {"slip+", "stick", "open"} & {str(status) for status in root.statuses}
     forces, points = forces_on_nodes(problem, root.lambda_n, root.lambda_t), problem.mesh.points
@@ -104,9 +98,7 @@ def test_forces_and_moments_balance_in_3d(kind):
     """For any forces, not only those of a solution; the bodies are apart, so that friction has a moment."""
     gap = 0.05
     mesh = boxes(kind, 2, 1, gap)
-    problem = fem.mesh_problem(
-        mesh, **STEEL, pairs=[("upper.bottom", "lower.top")], clamp=["lower.bottom", "upper.top"], friction=0.3
-    )
+    problem = stacked(mesh, clamp=ENDS)
     assert np.allclose(problem.gap, gap, rtol=1e-12)
     rng = np.random.default_rng(0)
     lambda_n, lambda_t = rng.uniform(size=problem.p), rng.normal(size=(problem.p, 2))
@@ -139,14 +131,9 @@ def test_the_rows_are_those_that_are_written_by_hand():
     held = np.concatenate([upper.top, size // 2 + lower.bottom])
     free = np.setdiff1d(np.arange(2 * size), [*(2 * held), *(2 * held + 1)])
     expected = enumsol.ContactProblem(A[np.ix_(free, free)], Bn[:, free], Bt[:, free], f[free], gap=0.001, friction=0.5)
-    problem = fem.mesh_problem(
-        mesh, **STEEL, pairs=[("upper.bottom", "lower.top")], gap=0.001, friction=0.5,
-        clamp=["upper.top", "lower.bottom"], load={"upper.right": (-0.3, -0.4)},
-    )  # fmt: skip
+    problem = stacked(mesh, gap=0.001, friction=0.5, clamp=ENDS, load={"upper.right": (-0.3, -0.4)})
     assert abs(problem.A - expected.A).max() < 1e-15
-    for name in ("Bn", "Bt", "f", "gap"):
-        one, two = getattr(problem, name), getattr(expected, name)
-        assert np.allclose(*(part if name in ("f", "gap") else part.toarray() for part in (one, two)), atol=1e-14), name
+    assert_close(problem, expected, "Bn", "Bt", "f", "gap", atol=1e-14)
     pairs = zip(enumsol.enumerate_roots(problem, 0), enumsol.enumerate_roots(expected, 0), strict=True)
     assert all(one.statuses == two.statuses for one, two in pairs)
 
@@ -209,13 +196,10 @@ def test_points_that_are_faced_are_where_lines_cross_in_rationals(seed):
 @pytest.mark.parametrize("kind", SOLID_KINDS)
 def test_linear_fields_are_interpolated_exactly_in_3d(kind):
     """On boxes turned in space: weights times positions are where the line along the normal meets the plane."""
-    rng = np.random.default_rng(kind)
-    Q, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    rng, Q = np.random.default_rng([kind, 1]), rotation(kind)
     flat = boxes(kind, 3, 2, 0.125)
     mesh = fem.SolidMesh(flat.points @ Q.T, flat.cells, flat.facets)
-    problem = fem.mesh_problem(
-        mesh, **STEEL, pairs=[("upper.bottom", "lower.top")], clamp=["lower.bottom", "upper.top"], friction=0.3
-    )
+    problem = stacked(mesh, clamp=ENDS)
     assert np.allclose(problem.gap, 0.125, rtol=1e-10)
     gradient = rng.normal(size=(3, 3))
     left = np.asarray(problem.mesh.motion.T @ (mesh.points @ gradient.T).ravel())
@@ -270,40 +254,30 @@ def test_gaps_between_arcs_that_do_not_match_converge(kind, order):
 def test_nodes_that_face_nothing_have_no_contact():
     wide, narrow = grid(4, 1, 4, 2.0), grid(2, 1, 4, 1.0)
     mesh = together(("upper", shifted(wide, (0, 1.25))), ("lower", narrow))
-    problem = fem.mesh_problem(
-        mesh, **STEEL, pairs=[("upper.bottom", "lower.top")], clamp=["upper.top", "lower.bottom"], friction=0.3
-    )
+    problem = stacked(mesh, clamp=ENDS)
     assert np.allclose(problem.coordinates[:, 0], [0, 0.5, 1])
     assert np.allclose(problem.gap, 0.25)
 
 
 def test_a_given_gap_takes_the_place_of_that_of_the_mesh():
     mesh = blocks(4, gap=0.25)
-    held = {"clamp": ["upper.top", "lower.bottom"], "friction": 0.3}
-    given = fem.mesh_problem(mesh, **STEEL, pairs=[("upper.bottom", "lower.top", -0.01)], **held)
+    given = stacked(mesh, pairs=[("upper.bottom", "lower.top", -0.01)], clamp=ENDS)
     assert np.array_equal(given.gap, np.full(3, -0.01))
-    both = fem.mesh_problem(mesh, **STEEL, pairs=[("upper.bottom", "lower.top")], gap=-0.05, **held)
-    assert np.allclose(both.gap, 0.2)
+    assert np.allclose(stacked(mesh, gap=-0.05, clamp=ENDS).gap, 0.2)
 
 
 @pytest.mark.parametrize("depth", [0.01, 0.4])
 def test_bodies_that_overlap_are_pressed_together(depth):
-    problem = fem.mesh_problem(
-        blocks(4, 3, 2, gap=-depth), **STEEL, pairs=[("upper.bottom", "lower.top")],
-        clamp=["upper.top", "lower.bottom"], friction=0.3,
-    )  # fmt: skip
+    problem = stacked(blocks(4, 3, 2, gap=-depth), clamp=ENDS)
     assert problem.p == 4
     assert np.allclose(problem.gap, -depth)
 
 
 def test_a_foundation_and_a_pair_in_one_problem():
     """Two blocks on a rigid floor: the lower one's nodes first, a chain of forces."""
-    mesh = blocks(4, 2, 3)
-    problem = fem.mesh_problem(
-        mesh, **STEEL, contact="lower.bottom", pairs=[("upper.bottom", "lower.top")], friction=0,
-        symmetry=["lower.left", "upper.left"], pressure={"upper.top": 0.1},
-        spring={"upper.top": (1e-7, 1e-7), "lower.right": (1e-7, 1e-7)},
-    )  # fmt: skip
+    springs = dict.fromkeys(("upper.top", "lower.right"), (1e-07, 1e-07))
+    given = {"symmetry": ["lower.left", "upper.left"], "pressure": {"upper.top": 0.1}, "spring": springs}
+    problem = stacked(blocks(4, 2, 3), contact="lower.bottom", friction=0, **given)
     assert problem.p == 4 + 3
     assert np.allclose(problem.coordinates[:4, 1], 0)
     (root,) = enumsol.enumerate_roots(problem, 0)
@@ -329,41 +303,30 @@ def test_a_node_at_which_both_parts_end_has_no_contact():
     points = np.concatenate([flat.points, flat.points[[3]]])
     cells = flat.cells.copy()
     cells[2:][cells[2:] == 3] = 9  # above the crack
-    facets = {
-        **flat.facets,
-        "above": np.array([[9, 4]]),
-        "below": np.array([[3, 4]]),
-        "left": np.array([[0, 3], [9, 6]]),
-    }
-    mesh = fem.PartedMesh(points, cells, facets)
+    sides = {"above": [[9, 4]], "below": [[3, 4]], "left": [[0, 3], [9, 6]]}
+    mesh = fem.PartedMesh(points, cells, flat.facets | {name: np.array(rows) for name, rows in sides.items()})
     problem = fem.mesh_problem(mesh, **STEEL, pairs=[("above", "below")], clamp="right", friction=0.3)
     assert problem.node_ids == (9,)
     # the tip is where both faces end; a foundation would be a wall in the crack
     for part, other in (("above", "below"), ("below", "above")):
-        with pytest.raises(enumsol.InvalidArgumentError, match=rf"{part}, a face of a crack .*the pair {part}:{other}"):
-            fem.mesh_problem(mesh, **STEEL, contact=part, clamp="right", friction=0.3)
+        message = rf"{part}, a face of a crack .*the pair {part}:{other}"
+        bad_argument(message, fem.mesh_problem, mesh, **STEEL, contact=part, clamp="right", friction=0.3)
 
 
 def test_displacements_that_are_given_on_the_other_body_are_gaps():
     """A clamped block below a block whose lower side is moved by hand, against a rigid obstacle that has moved."""
-    mesh, push = blocks(4), (0.002, 0.01)
-    data = {**STEEL, "friction": 0.3}
-    problem = fem.mesh_problem(
-        mesh, **data, pairs=[("upper.bottom", "lower.top")], clamp="upper.top",
-        displacement={"lower.top": push, "lower.bottom": push},
-    )  # fmt: skip
-    rigid = fem.mesh_problem(
-        shifted(grid(2, 2, 4, 2.0), (0, 1)), **data, contact="bottom", clamp="top", gap=-push[1]
-    ).replace(slip_offset=push[0])
-    (one,), (two,) = enumsol.enumerate_roots(problem, 0), enumsol.enumerate_roots(rigid, 0)
-    assert np.allclose(one.lambda_n, two.lambda_n)
-    assert np.allclose(one.lambda_t, two.lambda_t)
+    push = (0.002, 0.01)
+    problem = stacked(blocks(4), clamp="upper.top", displacement={"lower.top": push, "lower.bottom": push})
+    upper = shifted(grid(2, 2, 4, 2.0), (0, 1))
+    rigid = fem.mesh_problem(upper, **STEEL, contact="bottom", clamp="top", friction=0.3, gap=-push[1])
+    (one,) = enumsol.enumerate_roots(problem, 0)
+    (two,) = enumsol.enumerate_roots(rigid.replace(slip_offset=push[0]), 0)
+    assert_close(one, two, "lambda_n", "lambda_t")
     assert one.statuses == two.statuses
 
 
 def test_on_a_plane_of_symmetry_the_last_node_does_not_slip():
-    mesh = blocks(4)
-    problem = pressed(mesh, friction=0.4, load={"upper.right": (0.01, 0)})
+    problem = pressed(blocks(4), friction=0.4, load={"upper.right": (0.01, 0)})
     (root,) = enumsol.enumerate_roots(problem, 0)
     axis = int(np.argmin(problem.coordinates[:, 0]))
     assert root.u_t[axis] == root.lambda_t[axis] == 0
@@ -376,11 +339,10 @@ def test_pictures_files_and_mirrors_of_pairs(tmp_path):
     assert root.plot_body() is not None
     enumsol.write_problem(problem, tmp_path / "pair.npz")
     again = enumsol.read_problem(tmp_path / "pair.npz")
-    assert again.fingerprint == problem.fingerprint
-    assert np.array_equal(again.mesh.facets, problem.mesh.facets)
+    assert_same(again, problem, "fingerprint", "mesh.facets")
     for flat, rows in ((problem, problem.Bn), (again, again.Bn)):
         assert np.allclose(flat.mesh.directions(rows), [0, -1])
-    both = pressed(blocks(4), symmetry=[], clamp=["upper.top", "lower.bottom"])
+    both = pressed(blocks(4), symmetry=[], clamp=ENDS)
     assert enumsol.Mirror.across(both, "x").nodes.tolist() == [2, 1, 0]
 
 
@@ -401,7 +363,7 @@ def test_pictures_files_and_mirrors_of_pairs(tmp_path):
     ],
 )
 def test_bad_pairs_get_one_sentence(pairs, message):
-    bad_argument(message, fem.mesh_problem, blocks(4), **STEEL, pairs=pairs, clamp=["upper.top", "lower.bottom"])
+    bad_argument(message, fem.mesh_problem, blocks(4), **STEEL, pairs=pairs, clamp=ENDS)
 
 
 def test_bodies_that_share_their_nodes_are_one_body():
@@ -412,5 +374,4 @@ def test_bodies_that_share_their_nodes_are_one_body():
 
 
 def test_a_body_that_only_contact_holds_is_refused():
-    with pytest.raises(InvalidProblemError, match="is free to move as a rigid body; expected clamp"):
-        fem.mesh_problem(blocks(4), **STEEL, pairs=[("upper.bottom", "lower.top")], clamp="lower.bottom")
+    bad_problem("is free to move as a rigid body; expected clamp", stacked, blocks(4), clamp="lower.bottom")

@@ -4,22 +4,20 @@ import meshio
 import numpy as np
 import pytest
 import skfem
-from complete import all_roots
-from parted_solids import moved, solid
+from alike import assert_close, assert_same
+from complete import only_root
+from parted_meshes import constant_stress
+from parted_solids import NORMALS, moved, rotation, solid
 from refusals import bad_argument
 from skfem.models.elasticity import linear_elasticity
 
 import enumsol
-from enumsol import InvalidArgumentError, fem
+from enumsol import fem
 from enumsol.fem.bases import nodal_basis
 
 STEEL = {"young": 2.0, "poisson": 0.3}
 LAME = fem.lame(**STEEL)
 SECOND = (10, 27)
-SIDES = {
-    "left": (-1, 0, 0), "right": (1, 0, 0), "front": (0, -1, 0), "back": (0, 1, 0), "bottom": (0, 0, -1),
-    "top": (0, 0, 1),
-}  # fmt: skip
 
 
 def normals_of(problem):
@@ -34,15 +32,20 @@ def total(root, problem):
     return -(problem.contact_rows.T @ rows) @ np.eye(3)[problem.mesh.dofs % 3]
 
 
+def same_places(one, two):
+    """Which contact nodes of the first problem lie where those of the second do."""
+    order = [int(np.argmin(np.linalg.norm(one.coordinates - place, axis=1))) for place in two.coordinates]
+    assert_close(one, two, "coordinates", order=order)
+    return order
+
+
 @pytest.mark.few(0, 1)
 @pytest.mark.parametrize("kind", [4, 8, *SECOND])
 def test_patch_test(kind):
     """Constant stress is in equilibrium with its own tractions, on distorted cells."""
     mesh = solid((2, 2, 2), kind, (2.0, 1.5, 1.0), shake=0.08)
     gradient = np.array([[0.2, -0.1, 0.3], [0.4, 0.3, 0.0], [-0.2, 0.1, 0.5]])
-    strain = (gradient + gradient.T) / 2
-    stress = LAME[0] * np.trace(strain) * np.eye(3) + 2 * LAME[1] * strain
-    loads = {name: stress @ n for name, n in SIDES.items()}
+    loads = {name: constant_stress(gradient, LAME) @ n for name, n in NORMALS.items()}
     A = nodal_basis(mesh.points, mesh.cells).stiffness(*LAME)
     problem = fem.mesh_problem(mesh, **STEEL, contact="bottom", load=loads, spring={"top": (1, 1)})
     assert problem.n == mesh.points.size
@@ -105,22 +108,18 @@ def test_springs_are_positive_and_carry_their_share(kind):
 @pytest.mark.parametrize("kind", SECOND)
 def test_a_turned_body_has_the_same_roots(kind):
     mesh = solid((1, 1, 1), kind)
-    Q, _ = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))
-    Q *= np.sign(np.linalg.det(Q))
     loads, axis = np.array([0.3, 0.1, -0.6]), np.array([1.0, 0, 0])
     found = []
-    for turn in (np.eye(3), Q):
+    for turn in (np.eye(3), rotation(3)):
         problem = fem.mesh_problem(
             moved(mesh, lambda p, R=turn: p @ R.T), **STEEL, contact="bottom", spring={"top": (0.1, 0.1)},
             load={"top": turn @ loads}, friction=0.4, axis=turn @ axis,
         )  # fmt: skip
-        root = enumsol.successive_approximations(problem, 0)
         assert np.allclose(normals_of(problem), -turn[:, 2], atol=1e-12)
-        found.append(root)
-    one, two = found
-    assert np.max(one.lambda_n) > 0.05
-    assert np.allclose(one.lambda_n, two.lambda_n, rtol=1e-7, atol=1e-10)
-    assert np.allclose(one.lambda_t, two.lambda_t, rtol=1e-6, atol=1e-9)
+        found.append(enumsol.successive_approximations(problem, 0))
+    assert np.max(found[0].lambda_n) > 0.05
+    assert_close(*found, "lambda_n", rtol=1e-7, atol=1e-10)
+    assert_close(*found, "lambda_t", rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize("kind", SECOND)
@@ -139,9 +138,8 @@ def test_all_roots_on_tetrahedra_of_second_order():
         solid((1, 1, 1), 10), **STEEL, contact="bottom", spring={"top": (0.1, 0.1)}, load={"top": (0.1, 0.02, -0.3)},
         friction=0.4,
     )  # fmt: skip
-    roots = all_roots(problem, 0, max_nodes=20_000)
-    assert len(roots) == 1
-    assert np.allclose(roots[0].lambda_n, enumsol.successive_approximations(problem, 0).lambda_n, rtol=1e-6)
+    root = only_root(problem, 0, max_nodes=20_000)
+    assert_close(root, enumsol.successive_approximations(problem, 0), "lambda_n", rtol=1e-6)
 
 
 @pytest.mark.slow
@@ -186,12 +184,11 @@ def test_tetrahedra_in_any_orientation():
     turned = mesh.cells[:, [1, 0, 2, 3, 4, 6, 5, 8, 7, 9]]
     blocks = [("tetra10", turned), ("triangle6", mesh.part("bottom")[:, [1, 0, 2, 3, 5, 4]])]
     read = fem.read_solid(meshio.Mesh(mesh.points, blocks))
-    data = {**STEEL, "clamp": "boundary", "contact": "boundary"}
-    bad_argument("leave free", fem.mesh_problem, read, **data)
+    bad_argument("leave free", fem.mesh_problem, read, **STEEL, clamp="boundary", contact="boundary")
     one = fem.mesh_problem(read, **STEEL, contact="boundary", spring={"boundary": (1, 1)})
     two = fem.mesh_problem(mesh, **STEEL, contact="bottom", spring={"bottom": (1, 1)})
     assert abs(one.A - two.A).max() < 1e-14
-    assert np.allclose(one.Bn.toarray(), two.Bn.toarray(), atol=1e-14)
+    assert_close(one, two, "Bn", atol=1e-14)
     volume = np.linalg.det(read.points[read.cells[:, 1:4]] - read.points[read.cells[:, :1]])
     assert np.all(volume > 0)
 
@@ -210,12 +207,10 @@ def test_the_same_from_a_basis_of_scikit_fem():
     )  # fmt: skip
     two = fem.mesh_problem(mesh, **STEEL, contact="bottom", clamp="top", load={"right": (0.3, 0, -0.6)}, friction=0.4)
     assert one.p == two.p == 5
-    order = [int(np.argmin(np.linalg.norm(one.coordinates - place, axis=1))) for place in two.coordinates]
-    assert np.allclose(one.coordinates[order], two.coordinates)
+    order = same_places(one, two)
     found = [enumsol.successive_approximations(problem, 0) for problem in (one, two)]
     assert np.max(found[0].lambda_n) > 0.01
-    assert np.allclose(found[0].lambda_n[order], found[1].lambda_n, rtol=1e-6, atol=1e-10)
-    assert np.allclose(found[0].lambda_t[order], found[1].lambda_t, rtol=1e-6, atol=1e-10)
+    assert_close(*found, "lambda_n", "lambda_t", order=order, rtol=1e-6, atol=1e-10)
 
 
 # -- files -------------------------------------------------------------------------------------------------------------
@@ -255,10 +250,9 @@ def test_hexahedra_of_20_nodes_are_completed():
     data = {**STEEL, "friction": 0.4}
     one = fem.mesh_problem(read, **data, contact="floor", clamp="wall", load={"lid": (0.1, 0, -0.3)})
     two = fem.mesh_problem(all_nodes, **data, contact="bottom", clamp="left", load={"top": (0.1, 0, -0.3)})
-    order = [int(np.argmin(np.linalg.norm(one.coordinates - place, axis=1))) for place in two.coordinates]
     found = [enumsol.successive_approximations(problem, 0) for problem in (one, two)]
     assert one.n == two.n
-    assert np.allclose(found[0].lambda_n[order], found[1].lambda_n, rtol=1e-6, atol=1e-10)
+    assert_close(*found, "lambda_n", order=same_places(one, two), rtol=1e-6, atol=1e-10)
     lonely = meshio.Mesh(given.points, [*given.cells[:1], ("quad8", [[0, 1, 2, 6, 7, 8, 9, 10]])])
     bad_argument("boundary has facets that belong to no cell", fem.read_mesh, lonely)
 
@@ -270,29 +264,24 @@ def test_problems_of_second_order_are_written_and_drawn(kind, tmp_path):
         solid((1, 1, 1), kind), **STEEL, contact="bottom", clamp="left", load={"top": (0.1, 0, -0.3)}, friction=0.4
     )
     enumsol.write_problem(problem, tmp_path / "p.npz")
-    again = enumsol.read_problem(tmp_path / "p.npz")
-    assert again.fingerprint == problem.fingerprint
-    assert np.array_equal(again.mesh.facets, problem.mesh.facets)
+    assert_same(enumsol.read_problem(tmp_path / "p.npz"), problem, "fingerprint", "mesh.facets")
     root = enumsol.successive_approximations(problem, 0)
     enumsol.write_vtu(problem, root, tmp_path / "p.vtu")
     picture = meshio.read(tmp_path / "p.vtu")
-    assert [block.type for block in picture.cells] == {
-        10: ["tetra10", "triangle6"], 27: ["hexahedron27", "quad9"]
-    }[kind]  # fmt: skip
+    kinds = {10: ["tetra10", "triangle6"], 27: ["hexahedron27", "quad9"]}
+    assert [block.type for block in picture.cells] == kinds[kind]
     assert np.isclose(np.nansum(picture.point_data["lambda_n"]), root.lambda_n.sum())
-    norms = fem.h1_norms(problem)
-    assert norms.of_displacement(root.u) > 0
+    assert fem.h1_norms(problem).of_displacement(root.u) > 0
 
 
 def test_cells_that_are_of_no_kind():
-    mesh = solid((1, 1, 1), 20)
-    with pytest.raises(InvalidArgumentError, match="cells have 20 nodes each; expected one of 4, 8, 10, 27 in 3D"):
-        fem.mesh_problem(mesh, **STEEL, contact="bottom", clamp="top")
+    message = "cells have 20 nodes each; expected one of 4, 8, 10, 27 in 3D"
+    bad_argument(message, fem.mesh_problem, solid((1, 1, 1), 20), **STEEL, contact="bottom", clamp="top")
 
 
 def test_a_curved_tetrahedron_that_folds():
     mesh = solid((1, 1, 1), 10)
     points = mesh.points.copy()
     points[mesh.cells[0, 4]] += 0.9 * (points[mesh.cells[0, 3]] - points[mesh.cells[0, 4]])
-    with pytest.raises(InvalidArgumentError, match=r"cells row \d+ is flat, folded or inside out at a corner"):
-        fem.mesh_problem(moved(mesh, lambda _: points), **STEEL, contact="bottom", clamp="top")
+    message, folded = r"cells row \d+ is flat, folded or inside out at a corner", moved(mesh, lambda _: points)
+    bad_argument(message, fem.mesh_problem, folded, **STEEL, contact="bottom", clamp="top")

@@ -1,29 +1,25 @@
 """From a mesh in 3D to contact rows: nodes and patches, axes, the condition (3.1), the return operator, bad input."""
 
 import numpy as np
+import parted_solids
 import pytest
+from alike import assert_close, assert_same
+from parted_solids import moved, rotation
 from refusals import bad_argument, bad_problem
 
 from enumsol import fem
-from enumsol.errors import InvalidProblemError
 from enumsol.fem.solid_problems import ContactSurface
 
 KINDS = ("hexahedra", "tetrahedra")
 
 
 def on_bottom(mesh, **options):
-    arguments = {"contact": mesh.facets["bottom"], "held": mesh.nodes("left"), "friction": (0.5, 0.3)}
-    return fem.solid_contact_problem(mesh.points, mesh.cells, (1.0, 1.0), **(arguments | options))
+    return parted_solids.on_bottom(mesh, **({"friction": (0.5, 0.3)} | options))
 
 
 def free_part(problem, field):
     """u of a problem for displacements (N, 3) of all nodes."""
     return field.ravel()[problem.mesh.dofs]
-
-
-def turn(seed=0):
-    Q, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
-    return Q * np.sign(np.linalg.det(Q))
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -80,20 +76,16 @@ def test_default_normals_and_axes_on_a_cylinder():
 
 @pytest.mark.parametrize("multipliers", ["nodes", "elements"])
 def test_turning_everything_changes_nothing(multipliers):
-    mesh, Q = fem.box(4, 2, 2, cells="tetrahedra"), turn(2)
+    mesh, Q = fem.box(4, 2, 2, cells="tetrahedra"), rotation(2)
     patches = fem.blocks(mesh.points, mesh.facets["bottom"], 2) if multipliers == "elements" else None
     forces = fem.facet_forces(mesh.points, mesh.facets["top"], (0.3, 0.1, -1.0))
-    options = {"held": mesh.nodes("left"), "multipliers": multipliers, "patches": patches, "friction": (0.5, 0.3)}
-    options |= {"contact": mesh.facets["bottom"]}
+    options = {"lame": (1.3, 0.7), "multipliers": multipliers, "patches": patches}
     first, second = (
-        fem.solid_contact_problem(
-            mesh.points @ R.T, mesh.cells, (1.3, 0.7), forces=forces @ R.T, axes=R @ [0.6, 0.8, 0.0], **options
-        )
+        on_bottom(moved(mesh, lambda p, R=R: p @ R.T), forces=forces @ R.T, axes=R @ [0.6, 0.8, 0.0], **options)
         for R in (np.eye(3), Q)
     )
-    assert np.allclose(first.condensed.S, second.condensed.S, rtol=0, atol=1e-11)
-    assert np.allclose(first.condensed.g0, second.condensed.g0, rtol=0, atol=1e-11)
-    assert np.allclose(first.areas, second.areas)
+    assert_close(first, second, "condensed.S", "condensed.g0", rtol=0, atol=1e-11)
+    assert_close(first, second, "areas")
     if multipliers == "elements":
         u = np.random.default_rng(1).normal(size=mesh.points.shape)
         slips = [problem.slip_mean(free_part(problem, u @ R.T)) for problem, R in ((first, np.eye(3)), (second, Q))]
@@ -112,8 +104,8 @@ def test_axes_as_a_field():
     t2 = np.cross([0, 0, -1], t1)
     for axes in (t1, (t1, t2), (swirl, t2)):
         problem = on_bottom(mesh, axes=axes)
-        assert np.array_equal(problem.Bt1.toarray(), by_callable.Bt1.toarray())
-        assert np.allclose(problem.Bt2.toarray(), by_callable.Bt2.toarray(), rtol=0, atol=1e-15)
+        assert_same(problem, by_callable, "Bt1")
+        assert_close(problem, by_callable, "Bt2", rtol=0, atol=1e-15)
     left_handed = on_bottom(mesh, axes=(t1, -t2))
     assert np.allclose(left_handed.Bt2.toarray(), -by_callable.Bt2.toarray(), rtol=0, atol=1e-15)
 
@@ -165,16 +157,12 @@ def test_patches_by_labels_and_without_held_ones():
 
 
 def test_too_many_patches_violate_the_condition():
-    mesh = fem.box(4, 4, 1, cells="tetrahedra")
-    each = np.arange(32)
-    with pytest.raises(
-        InvalidProblemError, match=r"32 patches with 20 free contact nodes violate condition \(3\.1\).*a larger ratio"
-    ):
-        on_bottom(mesh, multipliers="elements", patches=each)
+    mesh, patches = fem.box(4, 4, 1, cells="tetrahedra"), {"multipliers": "elements", "patches": np.arange(32)}
+    message = r"{} free contact nodes violate condition \(3\.1\)"
+    bad_problem(message.format("32 patches with 20") + ".*a larger ratio", on_bottom, mesh, **patches)
     # fewer patches than nodes, and dependent all the same
-    mesh = fem.box(3, 3, 1, cells="tetrahedra")
-    with pytest.raises(InvalidProblemError, match=r"15 patches with 16 free contact nodes violate condition \(3\.1\)"):
-        on_bottom(mesh, multipliers="elements", held=mesh.nodes("top"), patches=np.minimum(np.arange(18), 14))
+    mesh, patches["patches"] = fem.box(3, 3, 1, cells="tetrahedra"), np.minimum(np.arange(18), 14)
+    bad_problem(message.format("15 patches with 16"), on_bottom, mesh, held=mesh.nodes("top"), **patches)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -242,9 +230,7 @@ def test_return_operator_approximates_to_first_order(kind):
 
 def test_a_contact_node_held_in_part_is_refused_unless_a_patch_holds_it():
     mesh = fem.box(2, 2, 1)
-    held = np.zeros((len(mesh.points), 3), dtype=bool)
-    held[mesh.nodes("left")] = True
-    held[mesh.nodes("front"), 1] = True
+    held = parted_solids.held_in_part(mesh)
     bad_argument("contact node 1 is held in some components only", on_bottom, mesh, held=held)
     assert on_bottom(mesh, held=held, multipliers="elements", ratio=1).p == 4
 

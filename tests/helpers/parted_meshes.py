@@ -8,6 +8,12 @@ from enumsol.fem.meshes import PartedMesh
 EDGES = {3: ((0, 1), (1, 2), (2, 0)), 4: ((0, 1), (1, 2), (2, 3), (3, 0))}
 
 
+def constant_stress(gradient, lame):
+    """The stress of a constant gradient of the displacement, in the plane or in space."""
+    (lam, mu), strain = lame, (gradient + gradient.T) / 2
+    return lam * np.trace(strain) * np.eye(len(gradient)) + 2 * mu * strain
+
+
 def grid(nx, ny, kind, length=1.0, height=1.0, shake=0.0, seed=0):
     """A rectangle of triangles (3, 6) or quadrilaterals (4, 8, 9) with four sides, distorted inside.
 

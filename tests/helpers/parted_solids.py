@@ -9,6 +9,17 @@ HEXA_EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0
 HEXA_SIDES = ((0, 3, 7, 4), (1, 2, 6, 5), (0, 1, 5, 4), (3, 2, 6, 7), (0, 1, 2, 3), (4, 5, 6, 7))
 
 
+#: Outward normals of the sides of a box.
+NORMALS = {"left": (-1, 0, 0), "right": (1, 0, 0), "front": (0, -1, 0), "back": (0, 1, 0)}
+NORMALS |= {"bottom": (0, 0, -1), "top": (0, 0, 1)}
+
+
+def rotation(seed=0):
+    """A random rotation of space."""
+    Q, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
+    return Q * np.sign(np.linalg.det(Q))
+
+
 def solid(counts, kind, size=(1.0, 1.0, 1.0), shake=0.0, seed=0):
     """A box of tetrahedra (4, 10) or hexahedra (8, 20, 27), its corners inside moved, edges between them straight."""
     mesh = fem.box(*counts, size, "tetrahedra" if kind in (4, 10) else "hexahedra")
@@ -50,6 +61,14 @@ def on_bottom(mesh, lame=(1, 1), **options):
     held = {} if "springs" in options else {"held": mesh.nodes("left")}
     given = {"contact": mesh.facets["bottom"], **held, **options}
     return fem.solid_contact_problem(mesh.points, mesh.cells, lame, **given)
+
+
+def held_in_part(mesh):
+    """Its left side is held, and its front along y alone."""
+    held = np.zeros((len(mesh.points), 3), dtype=bool)
+    held[mesh.nodes("left")] = True
+    held[mesh.nodes("front"), 1] = True
+    return held
 
 
 def on_springs(mesh, lame, spring, loads, friction):

@@ -19,6 +19,12 @@ def together(*named):
     return made(np.concatenate(points), np.concatenate(cells), facets)
 
 
+def stacked(mesh, **options):
+    """A body on another one in one mesh, with friction 0.3 where nothing else is said."""
+    given = {"young": 2.0, "poisson": 0.3, "friction": 0.3, "pairs": [("upper.bottom", "lower.top")]}
+    return fem.mesh_problem(mesh, **given | options)
+
+
 def shifted(mesh, by):
     return type(mesh)(mesh.points + np.asarray(by), mesh.cells, mesh.facets)
 

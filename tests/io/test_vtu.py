@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 import pytest
-from parted_solids import on_bottom
+from parted_solids import held_in_part, on_bottom
 from refusals import bad_argument, refusal
 
 import enumsol
@@ -101,10 +101,7 @@ def test_contact_nodes_alone(tmp_path):
 
 def test_directions_that_the_rows_do_not_tell_are_left_out(tmp_path):
     mesh = fem.box(2, 2, 1)
-    held = np.zeros((len(mesh.points), 3), dtype=bool)
-    held[mesh.nodes("left")] = True
-    held[mesh.nodes("front"), 1] = True
-    problem = on_bottom(mesh, held=held, multipliers="elements", axes=(0.6, 0.8, 0))
+    problem = on_bottom(mesh, held=held_in_part(mesh), multipliers="elements", axes=(0.6, 0.8, 0))
     write_vtu(problem, some_state(problem), tmp_path / "p.vtu")
     data = meshio.read(tmp_path / "p.vtu").cell_data
     assert "pressure" in data
