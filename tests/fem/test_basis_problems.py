@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 import skfem
+from alike import assert_close
+from complete import only_root
 from parted_meshes import grid
 from refusals import bad_argument
 from skfem.helpers import dot
@@ -35,10 +37,9 @@ def test_written_out_by_hand():
         x, y = (int(np.flatnonzero(free == dof)[0]) for dof in basis.nodal_dofs[:, node])
         Bn[row, y], Bt[row, x] = -1, 1
     byhand = enumsol.ContactProblem(K[free][:, free], Bn, Bt, push[free], gap=0.01, friction=0.4)
-    one, two = enumsol.enumerate_roots(problem, 0), enumsol.enumerate_roots(byhand, 0)
-    assert len(one) == len(two) == 1
-    assert np.allclose(one[0].lambda_n, two[0].lambda_n, rtol=1e-12)
-    assert np.allclose(one[0].u, two[0].u, rtol=1e-10)
+    one, two = only_root(problem), only_root(byhand)
+    assert_close(one, two, "lambda_n", rtol=1e-12)
+    assert_close(one, two, "u", rtol=1e-10)
     assert list(problem.node_ids) == nodes
 
 
@@ -64,15 +65,10 @@ def test_the_same_as_mesh_problem(kind):
         mesh, young=2.0, poisson=0.3, contact="bottom", clamp="left", load={"top": (0.05, -0.1)}, friction=0.4,
     )  # fmt: skip
     order = np.argsort(one.coordinates[:, 0])
-    assert np.allclose(one.coordinates[order], two.coordinates)
-    rows = [
-        np.where(np.abs(rows) > 0.5, sign, 0.0) for rows, sign in ((two.Bn.toarray(), -1.0), (two.Bt.toarray(), 1.0))
-    ]
-    two = enumsol.ContactProblem(two.A, *rows, two.f, friction=0.4, gap=0.01 * two.coordinates[:, 0])
-    found = [enumsol.enumerate_roots(problem, 0) for problem in (one, two)]
-    assert [len(roots) for roots in found] == [1, 1]
-    assert np.allclose(found[0][0].lambda_n[order], found[1][0].lambda_n, rtol=1e-8, atol=1e-12)
-    assert np.allclose(found[0][0].lambda_t[order], found[1][0].lambda_t, rtol=1e-8, atol=1e-12)
+    assert_close(one, two, "coordinates", order=order)
+    Bn, Bt = (np.where(np.abs(B.toarray()) > 0.5, sign, 0.0) for B, sign in ((two.Bn, -1.0), (two.Bt, 1.0)))
+    two = enumsol.ContactProblem(two.A, Bn, Bt, two.f, friction=0.4, gap=0.01 * two.coordinates[:, 0])
+    assert_close(only_root(one), only_root(two), "lambda_n", "lambda_t", order=order, rtol=1e-8, atol=1e-12)
 
 
 def test_given_displacements():
@@ -83,7 +79,7 @@ def test_given_displacements():
     problem = fem.basis_contact_problem(
         basis, K, contact="bottom", held=basis.get_dofs("top"), displacements=moved, gap=0.3, friction=0.5
     )
-    (root,) = enumsol.enumerate_roots(problem, 0)
+    root = only_root(problem)
     assert np.all(root.lambda_n == 0)
     assert np.allclose(root.u_n, -0.05)
 
@@ -92,9 +88,8 @@ def test_three_dimensions():
     mesh = fem.box(2, 2, 1)
     given = skfem.MeshHex.init_tensor(*(np.linspace(0, 1, n) for n in (3, 3, 2))).with_defaults()
     basis = skfem.Basis(given, skfem.ElementVector(skfem.ElementHex1()), intorder=3)
-    floor = given.facets_satisfying(lambda x: np.isclose(x[2], 0))
-    lid = given.facets_satisfying(lambda x: np.isclose(x[2], 1))
-    wall = given.facets_satisfying(lambda x: np.isclose(x[0], 0))
+    sides = ((2, 0), (2, 1), (0, 0))
+    floor, lid, wall = (given.facets_satisfying(lambda x, k=k, at=at: np.isclose(x[k], at)) for k, at in sides)
     push = skfem.LinearForm(lambda v, _: 0.3 * v[0] + 0.1 * v[1] - 0.6 * v[2]).assemble(basis.boundary(lid))
     one = fem.basis_contact_problem(
         basis, linear_elasticity(*LAME).assemble(basis), contact=floor, held=basis.get_dofs(wall), forces=push,
@@ -105,9 +100,9 @@ def test_three_dimensions():
         friction2=0.3,
     )  # fmt: skip
     places = [int(np.argmin(np.linalg.norm(two.coordinates - place, axis=1))) for place in one.coordinates]
-    found = [enumsol.successive_approximations(problem, 0) for problem in (one, two)]
-    assert np.allclose(found[0].lambda_n, found[1].lambda_n[places], rtol=1e-7)
-    assert np.allclose(found[0].lambda_t, found[1].lambda_t[places], rtol=1e-6, atol=1e-9)
+    found = [enumsol.successive_approximations(problem, 0) for problem in (two, one)]
+    assert_close(*found, "lambda_n", order=places, rtol=1e-7)
+    assert_close(*found, "lambda_t", order=places, rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.slow

@@ -29,8 +29,7 @@ def strains(problem):
 @pytest.mark.parametrize("kind", [3, 4, 6])
 def test_a_block_on_a_table(kind):
     problem, roots = solved(grid(3, 2, kind), **BLOCK, max_rigid_displacement="auto")
-    assert problem.modes.r == 3
-    assert problem.rigid_reach == 10.0
+    assert (problem.modes.r, problem.rigid_reach) == (3, 10.0)
     assert strains(problem) < 1e-14
     (root,) = roots
     assert root.lambda_n.sum() == pytest.approx(0.1, abs=1e-12)
@@ -58,22 +57,22 @@ def test_pushed_below_and_above_sliding(push, count):
 
 
 @pytest.mark.parametrize(
-    ("supports", "count", "moves"),
+    ("supports", "count"),
     [
-        ({"symmetry": "left"}, 1, [[0, 1]]),
-        ({"spring": {"left": (1.0, 0.0)}}, 1, [[0, 1]]),
-        ({"spring": {"left": (1.0, 1.0)}}, 0, None),
-        ({"clamp": "left"}, 0, None),
+        ({"symmetry": "left"}, 1),
+        ({"spring": {"left": (1.0, 0.0)}}, 1),
+        ({"spring": {"left": (1.0, 1.0)}}, 0),
+        ({"clamp": "left"}, 0),
     ],
 )
-def test_what_supports_leave_free(supports, count, moves):
-    mesh = fem.rectangle(4, 2).parted()
-    problem, _ = solved(mesh, **BLOCK, **supports, max_rigid_displacement="auto")
+def test_what_supports_leave_free(supports, count):
+    """If anything, the vertical displacement."""
+    problem, _ = solved(fem.rectangle(4, 2).parted(), **BLOCK, **supports, max_rigid_displacement="auto")
     assert (0 if problem.modes is None else problem.modes.r) == count
-    if moves is not None:
+    if count:
         moved = problem.mesh.displacements(problem.rigid_modes[:, 0])
         free = np.any(moved != 0, axis=1)
-        assert np.all(moved[free] == moved[free][0] * np.abs(moves[0]))
+        assert np.all(moved[free] == moved[free][0] * [0, 1])
         assert strains(problem) < 1e-14
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from complete import all_roots
 from parted_meshes import grid, moved
-from two_bodies import blocks, together
+from two_bodies import blocks, stacked, together
 
 import enumsol
 from enumsol import fem
@@ -80,18 +80,12 @@ def test_two_discs_whose_meshes_do_not_match_carry_the_load_as_hertz_has_it():
 def test_a_pair_that_sticks_is_one_body(kind):
     """Pressed and pushed, with so much friction that nothing slips: displacements of the same mesh without a cut."""
     two, whole = blocks(kind, 2, 2), grid(2, 4, kind, 2.0, 2.0)
-    loads = (0.05, -0.4)
-    more = {"young": E, "poisson": NU, "friction": 50.0}
-    pair = fem.mesh_problem(
-        two, **more, pairs=[("upper.bottom", "lower.top")], clamp="lower.bottom", load={"upper.top": loads},
-        spring={"upper.top": (1e-3, 1e-3)},
-    )  # fmt: skip
+    load, spring, more = (0.05, -0.4), (1e-3, 1e-3), {"young": E, "poisson": NU, "friction": 50.0}
+    pair = stacked(two, **more, clamp="lower.bottom", load={"upper.top": load}, spring={"upper.top": spring})
     (root,) = enumsol.enumerate_roots(pair, 0)
     assert {str(status) for status in root.statuses} == {"stick"}
-    body = fem.mesh_problem(
-        whole, **more, contact="left", clamp="bottom", load={"top": loads}, gap=100.0,
-        spring={"top": (1e-3, 1e-3)},
-    )  # fmt: skip
+    held = {"contact": "left", "clamp": "bottom", "gap": 100.0}
+    body = fem.mesh_problem(whole, **more, **held, load={"top": load}, spring={"top": spring})
     free = body.mesh.displacements(body.factorization.solve(body.f))
     found = pair.mesh.displacements(root.u)
     for k, place in enumerate(two.points):

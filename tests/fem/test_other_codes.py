@@ -6,7 +6,8 @@ from shutil import copy
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from complete import all_roots
+from alike import assert_close
+from complete import only_root
 from documents import ROOT, follow
 from parted_solids import on_bottom
 from scipy.io import mmwrite
@@ -37,14 +38,16 @@ def own():
     return on_bottom(mesh, fem.lame(2.5, 0.25), **frame, forces=forces, friction=0.3)
 
 
-def test_roots_of_the_matrices_of_calculix_are_our_own(seen, own):
-    roots, expected = seen["roots"], enumsol.enumerate_roots(own, 0)
+def assert_one_root(roots, expected):
     assert roots.complete
-    assert len(roots) == len(expected) == 1
-    assert roots[0].statuses == expected[0].statuses
+    (root,) = roots
+    assert root.statuses == expected.statuses
     for name in ("lambda_n", "lambda_t", "u_n", "u_t"):
-        ours = getattr(expected[0], name)
-        assert np.allclose(getattr(roots[0], name), ours, rtol=0, atol=1e-11 * np.max(np.abs(ours)) + 1e-13)
+        assert_close(root, expected, name, rtol=0, atol=1e-11 * np.max(np.abs(getattr(expected, name))) + 1e-13)
+
+
+def test_roots_of_the_matrices_of_calculix_are_our_own(seen, own):
+    assert_one_root(seen["roots"], only_root(own))
     assert enumsol.read_problem(seen["folder"] / "block.npz").fingerprint == seen["block"].fingerprint
 
 
@@ -68,20 +71,19 @@ def test_the_format_of_abaqus(seen, tmp_path, both):
     assert same(seen["from_abaqus"](tmp_path / "block_STIF1.mtx", held=(1, 4, 7, 10)), (A, places))
 
 
-@pytest.mark.parametrize("symmetry", ["symmetric", "general"])
-def test_the_format_of_ansys(seen, tmp_path, symmetry):
+@pytest.mark.parametrize(
+    ("part", "symmetry", "heading", "row"),
+    [
+        (sp.csc_array, "symmetric", ["  Matrix Eqn     Node     DOF"], "{:>12}{:>12}{:>8}"),
+        (sp.csc_array, "general", ["  Matrix Eqn     Node     DOF"], "{:>12}{:>12}{:>8}"),
+        (sp.triu, "general", [], "{} {} {}"),  # one triangle, and all the same called general
+    ],
+)
+def test_the_format_of_ansys(seen, tmp_path, part, symmetry, heading, row):
     A, places = seen["from_calculix"](str(FILES / "block"))
-    mmwrite(tmp_path / "block.mtx", sp.coo_array(A), symmetry=symmetry, precision=17)
-    lines = [f"{k + 1:>12}{node:>12}{LABELS[d - 1]:>8}" for k, (node, d) in enumerate(places)]
-    (tmp_path / "block.mapping").write_text("\n".join(["  Matrix Eqn     Node     DOF", *lines]) + "\n")
-    assert same(seen["from_ansys"](str(tmp_path / "block")), (A, places))
-
-
-def test_one_triangle_in_matrix_market_that_is_called_general(seen, tmp_path):
-    A, places = seen["from_calculix"](str(FILES / "block"))
-    mmwrite(tmp_path / "block.mtx", sp.coo_array(sp.triu(A)), symmetry="general", precision=17)
-    lines = [f"{k + 1} {node} {LABELS[d - 1]}" for k, (node, d) in enumerate(places)]
-    (tmp_path / "block.mapping").write_text("\n".join(lines) + "\n")
+    mmwrite(tmp_path / "block.mtx", sp.coo_array(part(A)), symmetry=symmetry, precision=17)
+    lines = [row.format(k + 1, node, LABELS[d - 1]) for k, (node, d) in enumerate(places)]
+    (tmp_path / "block.mapping").write_text("\n".join([*heading, *lines]) + "\n")
     assert same(seen["from_ansys"](str(tmp_path / "block")), (A, places))
 
 
@@ -114,15 +116,9 @@ def test_two_bodies_that_calculix_assembled_have_our_own_roots(seen):
         mesh, young=2.5, poisson=0.25, pairs=[("upper.bottom", "lower.top")], clamp=["upper.top", "lower.bottom"],
         load={"upper.right": (0.3, 0.1, -0.8)}, gap=0.001, friction=0.3, axis=(1.0, 0.0, 0.0),
     )  # fmt: skip
-    expected = all_roots(own, 0)
-    assert found.complete
     assert [k - 1 for k in slave] == list(own.node_ids)
-    assert len(found) == len(expected) == 1
-    assert found[0].statuses == expected[0].statuses
+    assert_one_root(found, only_root(own))
     assert np.max(found[0].lambda_n) > 0.01
-    for name in ("lambda_n", "lambda_t", "u_n", "u_t"):
-        ours = getattr(expected[0], name)
-        assert np.allclose(getattr(found[0], name), ours, rtol=0, atol=1e-11 * np.max(np.abs(ours)) + 1e-13)
 
 
 def numbers(line):
