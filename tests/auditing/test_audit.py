@@ -8,7 +8,7 @@ from path_problems import stable_problem
 from refusals import bad_argument
 
 import enumsol
-from enumsol import gallery
+from enumsol import branch_graph, gallery
 from enumsol.auditing import audit, follow_all, follow_arc
 from enumsol.auditing.graph_map import GraphMap
 from enumsol.continuation import ContinuationOptions, follow, newton
@@ -44,12 +44,6 @@ class Vertex:
 
 
 @dataclass
-class Branch:
-    number: int
-    arcs: tuple
-
-
-@dataclass
 class Graph:
     """The paper's Example 6.1 in closed form, sharing nothing with the package but the problem."""
 
@@ -73,7 +67,9 @@ class Graph:
             Arc(1, (STICK,), fold, 20.0, 2, 3, forces[1]),
             Arc(2, (MINUS,), fold, 20.0, 2, 4, forces[2]),
         )
-        self.branches = (Branch(0, self.arcs[:1]), Branch(1, self.arcs[1:]))
+        self.branches = tuple(
+            SimpleNamespace(number=k, arcs=arcs) for k, arcs in ((0, self.arcs[:1]), (1, self.arcs[1:]))
+        )
 
     def starting_points(self):
         roots = enumerate_roots(self.problem, 5.0)
@@ -168,14 +164,10 @@ def test_a_graph_that_does_not_say_whether_it_is_complete_is_refused(graph, path
 class TestBranchGraph:
     """Against the exact branch graphs."""
 
-    @pytest.fixture
-    def branch_graph(self):
-        return pytest.importorskip("enumsol.branches.construction").branch_graph
-
     @pytest.mark.few(0, 1)
     @pytest.mark.parametrize("loading", [False, True])
     @pytest.mark.parametrize("seed", range(5))
-    def test_follow_all_visits_every_arc(self, branch_graph, seed, loading):
+    def test_follow_all_visits_every_arc(self, seed, loading):
         problem = stable_problem(seed, loading)
         interval = (-5.0, 5.0) if loading else (0.0, 20.0)
         result = follow_all(problem, interval, graph=branch_graph(problem, interval))
@@ -186,13 +178,13 @@ class TestBranchGraph:
     @pytest.mark.parametrize(
         "name", ["one-node-6.1", "one-node-6.2", "two-node-6.4", "two-node-6.5", "chain-2-coupled"]
     )
-    def test_gallery(self, branch_graph, name):
+    def test_gallery(self, name):
         problem = gallery.get(name).build()
         result = follow_all(problem, (0.0, 8.0), graph=branch_graph(problem, (0.0, 8.0)))
         assert result.complete
         assert not result.failures
 
-    def test_every_arc_at_the_vertical_segment_can_be_taken(self, branch_graph):
+    def test_every_arc_at_the_vertical_segment_can_be_taken(self):
         problem = gallery.get("one-node-6.3").build()
         graph = branch_graph(problem, (0.0, 20.0))
         (family,) = [v for v in graph.vertices if v.family is not None]
@@ -206,7 +198,7 @@ class TestBranchGraph:
         assert result.complete
 
     @pytest.mark.parametrize("nodes", [1, 2, 3])
-    def test_distances_from_sheets(self, branch_graph, nodes):
+    def test_distances_from_sheets(self, nodes):
         """Nodes at which slip is singular for F = 2, and one that is not: polytopes of up to two dimensions."""
         slopes = [[1.0, -2.0], [1.0, 0.5], [2.0, -4.0]][:nodes]
         load = [0.0, 0.0, 1.0, -1.0, 0.0, 0.0][: 2 * nodes]
@@ -229,7 +221,7 @@ class TestBranchGraph:
                         )
                         assert found < 1e-8 or size
 
-    def test_every_arc_at_a_bifurcation_can_be_taken(self, branch_graph):
+    def test_every_arc_at_a_bifurcation_can_be_taken(self):
         problem = gallery.get("chain-2").build()
         graph = branch_graph(problem, (0.0, 6.0))
         (vertex,) = graph.bifurcations

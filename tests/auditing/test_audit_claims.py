@@ -8,24 +8,20 @@ import numpy as np
 import pandas as pd
 import pytest
 from command_line import assert_refused, printed, run
-from complete import whole_graph
+from complete import read_back, whole_graph
+from path_problems import sheet_of_one_node
 from refusals import bad_argument
 
-from enumsol import BranchGraph, ContactProblem, audit, branch_graph, follow, follow_all, gallery, link_samples, newton
+from enumsol import audit, branch_graph, follow, follow_all, gallery, link_samples, newton
 
-EXAMPLE = "one-node-6.1"
+AUDIT = ("audit", "gallery:one-node-6.1")
 #: What the report says of a graph that is complete, and of no other.
 COMPLETE = re.compile(r": (not )?ok, (complete|every arc was visited)")
 
 
 @pytest.fixture(scope="module")
-def problem():
-    return gallery.get(EXAMPLE).build()
-
-
-@pytest.fixture(scope="module")
-def graph(problem):
-    return branch_graph(problem, (0.0, 20.0))
+def problem(graph):
+    return graph.problem
 
 
 @pytest.fixture(scope="module")
@@ -50,16 +46,14 @@ def everything(problem, graph):
 def test_points_outside_the_interval_are_counted_listed_and_not_ok(problem, everything):
     report = audit(everything, branch_graph(problem, (0.0, 10.0)))
     outside = everything.index[everything["alpha"].gt(10 + 1e-4)]
+    points = [report.points[k] for k in report.not_compared]
     assert len(outside)
     assert not report.ok
-    assert [report.points[k].row for k in report.not_compared] == outside.tolist()
-    assert all(
-        point.reason == "outside the graph's interval [0, 10]"
-        for point in map(report.points.__getitem__, report.not_compared)
-    )
+    assert [point.row for point in points] == outside.tolist()
+    assert {point.reason for point in points} == {"outside the graph's interval [0, 10]"}
     assert all(np.isnan(report.distances[k]) for k in report.not_compared)
     assert f"not compared      {len(outside)} points" in repr(report)
-    first = report.points[report.not_compared[0]]
+    first = points[0]
     assert f"path {first.path}, rows {first.row} to " in repr(report)
     assert "ok, complete" not in repr(report)
     frame = report.to_frame()
@@ -88,8 +82,7 @@ def test_only_points_outside_say_nothing_about_distances(everything, graph):
 def test_points_not_compared_have_an_exit_status_of_their_own(capsys, tmp_path, everything):
     points, result, rows = (tmp_path / name for name in ("p.csv", "r.json", "r.csv"))
     everything.to_csv(points, index=False)
-    options = ("--to", 10, "--json", result, "--csv", rows)
-    out = printed(capsys, "audit", f"gallery:{EXAMPLE}", points, *options, status=4)
+    out = printed(capsys, *AUDIT, points, "--to", 10, "--json", result, "--csv", rows, status=4)
     assert "not compared" in out
     assert "ok, complete" not in out
     content = json.loads(result.read_text())
@@ -100,8 +93,8 @@ def test_points_not_compared_have_an_exit_status_of_their_own(capsys, tmp_path, 
     assert (~pd.read_csv(rows)["compared"]).sum() == len(outside)
     # whatever else was found
     everything.assign(lambda_n_0=everything["lambda_n_0"] + 1).to_csv(points, index=False)
-    assert run(capsys, "audit", f"gallery:{EXAMPLE}", points, "--to", 10)[0] == 4
-    assert run(capsys, "audit", f"gallery:{EXAMPLE}", points)[0] == 3
+    assert run(capsys, *AUDIT, points, "--to", 10)[0] == 4
+    assert run(capsys, *AUDIT, points)[0] == 3
 
 
 def test_the_help_names_every_exit_status(capsys):
@@ -113,20 +106,27 @@ def test_the_help_names_every_exit_status(capsys):
 # -- graphs that are not complete --------------------------------------------------------------------------------------
 
 
+def both_ways(problem, cut):
+    """Paths along the only arc of a graph that was cut short."""
+    (start, *_), low = cut.starting_points(), cut.arcs[0].lo + 0.1
+    return [follow(problem, start, direction, (low, 20.0)) for direction in (1, -1)]
+
+
+def assert_not_proven(report):
+    """All points lie on the graph and visit its arcs, which are not proven to be all."""
+    assert report.ok
+    assert report.all_visited
+    assert not report.complete
+    assert not COMPLETE.search(repr(report))
+
+
 def test_complete_is_not_said_against_an_incomplete_graph(problem, cut, tmp_path):
     """Every arc that it holds is visited and every point is on it."""
-    arc = cut.arcs[0]
-    start = next(root for root in cut.starting_points())
-    on_it = audit([follow(problem, start, d, (arc.lo + 0.1, 20.0)) for d in (1, -1)], cut)
-    cut.save(tmp_path / "cut.json")
-    loaded = audit(follow(problem, start, 1, (arc.lo + 0.1, 20.0)), BranchGraph.load(tmp_path / "cut.json"))
-    for report in (on_it, loaded):
-        assert report.ok
-        assert report.all_visited
-        assert not report.complete
+    paths = both_ways(problem, cut)
+    for report in (audit(paths, cut), audit(paths[0], read_back(cut, tmp_path / "cut.json"))):
+        assert_not_proven(report)
         assert report.graph_reasons == cut.reasons
         assert not report.graph_complete
-        assert not COMPLETE.search(repr(report))
         assert f"but the graph is not complete: {cut.reasons[0]}" in repr(report)
         assert report.summary()["complete"] is False
         assert report.summary()["graph_reasons"] == list(cut.reasons)
@@ -160,12 +160,8 @@ def test_two_points_that_a_graph_with_a_hole_does_not_join_are_no_jump():
     path = follow(problem, newton(problem, 6.0, graph.starting_point(branch)), -1, (0.0, 8.0))
     report = audit(path, graph)
     assert report.ok
-    rows = [
-        k
-        for k, place in enumerate(report.places)
-        if place.kind == "arc" and place.number in (before.number, after.number)
-    ]
-    some = path.to_frame().iloc[rows]
+    ends = [("arc", arc.number) for arc in (before, after)]
+    some = path.to_frame().iloc[[k for k, place in enumerate(report.places) if (place.kind, place.number) in ends]]
     assert audit(some, graph).visited >= {between.number}
     report = audit(some, holed(graph, between.number))
     assert report.jumps == ()
@@ -205,35 +201,26 @@ def test_a_fast_graph_is_not_proven(capsys, tmp_path, problem, everything):
     graph = branch_graph(problem, (0.0, 20.0), "fast")
     assert not graph.reasons
     report = audit(everything, graph)
-    assert report.ok
-    assert report.all_visited
-    assert not report.complete
+    assert_not_proven(report)
     assert "every arc that the graph holds was visited, but the graph is not proven complete" in repr(report)
-    assert not COMPLETE.search(repr(report))
     everything.to_csv(tmp_path / "p.csv", index=False)
-    arguments = ("audit", f"gallery:{EXAMPLE}", tmp_path / "p.csv", "--arithmetic", "fast")
-    status, out, _ = run(capsys, *arguments)
+    arguments = (*AUDIT, tmp_path / "p.csv", "--arithmetic", "fast")
     # as enumsol graph: nothing is known to be missing
-    assert status == 0
-    assert not COMPLETE.search(out)
+    assert not COMPLETE.search(printed(capsys, *arguments))
     assert json.loads(run(capsys, *arguments, "--json", "-")[1])["complete"] is False
 
 
 def test_the_command_line_never_says_complete_of_an_incomplete_graph(capsys, tmp_path, cut, problem):
-    start = next(iter(cut.starting_points()))
-    low = cut.arcs[0].lo + 0.1
-    pd.concat([follow(problem, start, d, (low, 20.0)).to_frame().assign(path=d) for d in (1, -1)]).to_csv(
-        tmp_path / "p.csv", index=False
-    )
+    frames = [path.to_frame().assign(path=k) for k, path in enumerate(both_ways(problem, cut))]
+    pd.concat(frames).to_csv(tmp_path / "p.csv", index=False)
     cut.save(tmp_path / "cut.json")
-    arguments = ("audit", f"gallery:{EXAMPLE}", tmp_path / "p.csv", "--graph", tmp_path / "cut.json")
+    arguments = (*AUDIT, tmp_path / "p.csv", "--graph", tmp_path / "cut.json")
     out = printed(capsys, *arguments, status=3)
     assert out.startswith("Audit of ")
     assert "ok, every arc that the graph holds was visited, but the graph is not complete: " in out.splitlines()[0]
     assert not COMPLETE.search(out)
     content = json.loads(run(capsys, *arguments, "--json", "-")[1])
-    assert content["complete"] is False
-    assert content["graph_complete"] is False
+    assert content["complete"] is content["graph_complete"] is False
     assert content["graph_reasons"] == list(cut.reasons)
 
 
@@ -242,8 +229,7 @@ def test_follow_all_is_not_complete_against_an_incomplete_graph(problem, cut):
     empty = branch_graph(problem, (0.0, 20.0), max_nodes=1)
     assert not empty.arcs
     result = follow_all(problem, (0.0, 20.0), graph=empty)
-    assert not result.complete
-    assert not result.report.ok
+    assert (result.complete, result.report.ok) == (False, False)
     assert not COMPLETE.search(repr(result))
     assert not follow_all(problem, (0.0, 20.0), graph=branch_graph(problem, (0.0, 20.0), "fast")).complete
 
@@ -270,16 +256,13 @@ def test_the_file_and_row_without_a_path_are_named(capsys, tmp_path, everything)
     frame.loc[7, "path"] = np.nan
     file = tmp_path / "holes.csv"
     frame.to_csv(file, index=False)
-    assert_refused(*run(capsys, "audit", f"gallery:{EXAMPLE}", file), f"{file}: path is empty in row 7;")
+    assert_refused(*run(capsys, *AUDIT, file), f"{file}: path is empty in row 7;")
 
 
 @pytest.mark.parametrize("name", [float, str, lambda k: f"run {k}", lambda k: k - 0.5, "category"])
 def test_no_row_is_dropped_whatever_paths_are_called(graph, everything, name):
-    frame = (
-        everything.astype({"path": name})
-        if name == "category"
-        else everything.assign(path=everything["path"].map(name))
-    )
+    path = everything["path"]
+    frame = everything.assign(path=path.astype(name) if name == "category" else path.map(name))
     mixed = frame.sample(frac=1, random_state=1).sort_values("arclength", kind="stable")
     for given in (frame, mixed):
         report = audit(given, graph)
@@ -291,8 +274,7 @@ def test_no_row_is_dropped_whatever_paths_are_called(graph, everything, name):
 def test_an_audit_of_no_points_is_not_ok(graph, everything):
     for nothing in (everything.iloc[:0], everything.drop(columns="path").iloc[:0], []):
         report = audit(nothing, graph)
-        assert not report.ok
-        assert not report.complete
+        assert (report.ok, report.complete) == (False, False)
         assert "Audit of 0 points of 0 paths: not ok (there is no point to compare)" in repr(report)
         assert report.to_frame().empty
 
@@ -305,9 +287,7 @@ def test_a_tolerance_that_no_point_can_miss_is_refused(graph, everything, tolera
     wrong = everything.assign(lambda_n_0=everything["lambda_n_0"] + 0.5)
     bad_argument(r"tolerance is .*; expected a number above 0 and below 1", audit, wrong, graph, tolerance=tolerance)
     wrong.to_csv(tmp_path / "p.csv", index=False)
-    assert_refused(
-        *run(capsys, "audit", f"gallery:{EXAMPLE}", tmp_path / "p.csv", f"--tolerance={tolerance}"), "tolerance is "
-    )
+    assert_refused(*run(capsys, *AUDIT, tmp_path / "p.csv", f"--tolerance={tolerance}"), "tolerance is ")
 
 
 @pytest.mark.parametrize("detour", [np.nan, np.inf, 0.5])
@@ -319,18 +299,14 @@ def test_a_detour_that_no_jump_exceeds_is_refused(graph, everything, detour):
 
 
 def test_points_on_a_sheet_are_on_the_graph():
-    """F = 2 makes slip singular: for every alpha a segment of solutions from no force to (alpha, -2 alpha) / 2."""
-    problem = ContactProblem(
-        [[2.0, -1.0], [-1.0, 2.0]], [[1.0, 0.0]], [[0.0, 1.0]], [0.0, 0.0], friction=2.0, load_slope=[1.0, -2.0]
-    )
-    graph = whole_graph(problem, (0.25, 1.0))
+    graph = whole_graph(sheet_of_one_node(), (0.25, 1.0))
     assert [arc.dimension for arc in graph.arcs] == [1]
     alpha = np.linspace(0.25, 1.0, 20)
     share = np.linspace(0.1, 0.9, 20) * graph.roots_at(1.0).families[0].vertices.max(axis=0)[0, 0]
     frame = pd.DataFrame({"alpha": alpha, "lambda_n_0": share * alpha, "lambda_t_0": -2 * share * alpha})
     report = audit(frame, graph)
-    assert report.ok
-    assert report.complete
+    assert (report.ok, report.complete) == (True, True)
     assert report.max_distance < 1e-8
     frame.loc[4, "lambda_t_0"] += 1e-3
-    assert [audit(frame, graph).points[k].row for k in audit(frame, graph).off] == [4]
+    report = audit(frame, graph)
+    assert [report.points[k].row for k in report.off] == [4]

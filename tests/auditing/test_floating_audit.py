@@ -5,21 +5,14 @@ import dataclasses
 import numpy as np
 import pytest
 from effort import some
-from helpers.floating_oracle import block_on_table, random_body
+from helpers.floating_bodies import pushed_block
+from helpers.floating_oracle import random_body
 from refusals import bad_argument
 
 import enumsol
 from enumsol.auditing import follow_arc, read_points
-from enumsol.errors import InvalidArgumentError
 
-
-def pushed(cells=2, **options):
-    """A block on a table that is pushed: it slides at alpha = 1 and at -1."""
-    data = block_on_table(cells=cells, max_rigid_displacement=4.0, **options)
-    return data.replace(load_slope=block_on_table(cells=cells, push=1.0).f - data.f)
-
-
-PROBLEM = pushed(1)
+PROBLEM = pushed_block(1, max_rigid_displacement=4.0)
 GRAPH = enumsol.branch_graph(PROBLEM, (-1.5, 1.5))
 PATH = enumsol.follow(PROBLEM, enumsol.newton(PROBLEM, 0), interval=(-1.5, 1.5))
 
@@ -58,9 +51,9 @@ def test_two_points_with_the_same_forces_are_told_apart_by_the_rigid_displacemen
 
 
 def test_points_without_their_rigid_displacement_are_refused():
-    with pytest.raises(InvalidArgumentError, match="no column 'rigid_1'; expected one for every coordinate"):
-        enumsol.audit(PATH.to_frame().drop(columns="rigid_1"), GRAPH)
     frame = PATH.to_frame()
+    message = "no column 'rigid_1'; expected one for every coordinate"
+    bad_argument(message, enumsol.audit, frame.drop(columns="rigid_1"), GRAPH)
     frame.insert(0, "rigid_1", 0.0, allow_duplicates=True)
     bad_argument("2 columns 'rigid_1'", enumsol.audit, frame, GRAPH)
     held = enumsol.gallery.two_node_square()
@@ -80,8 +73,7 @@ def test_arcs_are_followed_from_their_vertices():
 def followed(seed):
     """All paths of a random body and their audit; None of what has no arcs but sheets, or too many free modes."""
     problem = random_body(seed)
-    slope = np.random.default_rng(seed + 10**6).integers(-1, 2, problem.n)
-    problem = problem.replace(load_slope=slope.astype(float))
+    problem = problem.replace(load_slope=np.random.default_rng(seed + 10**6).integers(-1, 2, problem.n).astype(float))
     graph = enumsol.branch_graph(problem, (0, 2)) if problem.modes.r < 5 else None
     if graph is None or all(arc.dimension for arc in graph.arcs):
         return None
