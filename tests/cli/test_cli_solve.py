@@ -2,6 +2,7 @@
 
 import json
 import os
+import shlex
 from inspect import signature
 from pathlib import Path
 
@@ -16,18 +17,7 @@ from enumsol.cli.app import app
 from enumsol.cli.solve import MESH_OPTIONS
 
 BODY = (Path(__file__).parents[1] / "fem" / "meshes" / "block.22.msh").read_text()
-OPTIONS = (
-    "--contact",
-    "floor",
-    "--young",
-    "2.5",
-    "--poisson",
-    "0.25",
-    "--spring",
-    "lid=1,0.5",
-    "--load",
-    "lid=0.2,-0.5",
-)
+OPTIONS = shlex.split("--contact floor --young 2.5 --poisson 0.25 --spring lid=1,0.5 --load lid=0.2,-0.5")
 TOML = """mesh = "body.msh"
 contact = "floor"
 young = 2.5
@@ -46,9 +36,8 @@ def here(tmp_path, monkeypatch):
 
 
 def test_from_a_mesh_to_the_roots(here, capsys):
-    status, out, err = run(
-        capsys, "solve", "body.msh", *OPTIONS, "--alpha", "0.5", "-o", "body.npz", "--json", "r.json"
-    )
+    command = ("solve", "body.msh", *OPTIONS, "--alpha", "0.5", "-o", "body.npz", "--json", "r.json")
+    status, out, err = run(capsys, *command)
     assert status == 0
     assert "RootSet at alpha = 0.5: 1 root" in out
     assert out.endswith("complete: yes (proven: one solution, by one certificate)\n")
@@ -65,26 +54,22 @@ def test_from_a_mesh_to_the_roots(here, capsys):
 @pytest.mark.parametrize(
     "command",
     [
-        ("solve", "body.toml", "--alpha", "0.5"),
-        ("roots", "body.toml", "--alpha", "0.5"),
-        ("table", "body.toml", "--alphas", "0.5"),
-        ("graph", "body.toml", "--from", "0", "--to", "1"),
-        ("follow", "body.toml", "--from", "0", "--to", "1", "--start", "0.5"),
-        ("fixed-point", "body.toml", "--alpha", "0.2"),
+        "solve body.toml --alpha 0.5",
+        "roots body.toml --alpha 0.5",
+        "table body.toml --alphas 0.5",
+        "graph body.toml --from 0 --to 1",
+        "follow body.toml --from 0 --to 1 --start 0.5",
+        "fixed-point body.toml --alpha 0.2",
     ],
 )
 def test_every_command_takes_the_toml_file(here, capsys, command):
-    out = printed(capsys, *command)
-    assert out
+    assert printed(capsys, *command.split())
 
 
 def test_a_mesh_is_no_problem_yet(here, capsys):
-    status, out, err = run(capsys, "roots", "body.msh", "--alpha", "0.5")
-    assert (status, out) == (2, "")
-    assert err == (
-        "enumsol: error: body.msh is a mesh; expected a problem, which enumsol solve body.msh --output FILE.npz or a "
-        ".toml file makes\n"
-    )
+    said = "which enumsol solve body.msh --output FILE.npz or a .toml file makes\n"
+    expected = f"enumsol: error: body.msh is a mesh; expected a problem, {said}"
+    assert run(capsys, "roots", "body.msh", "--alpha", "0.5") == (2, "", expected)
 
 
 @pytest.mark.parametrize(
@@ -101,19 +86,16 @@ def test_friction_and_loads_may_depend_on_alpha(here, capsys):
     status, out, _ = run(capsys, *command, "--friction", "0.2,0.3", "-o", "p.npz")
     assert (status, out) == (0, "")  # it depends on alpha and is written only
     problem = read_problem("p.npz")
-    assert problem.friction[0].tolist() == [0.2] * 3
-    assert problem.friction[1].tolist() == [0.3] * 3
+    assert np.array_equal(problem.friction, [[0.2] * 3, [0.3] * 3])
     assert problem.load_slope.sum() == pytest.approx(-2 + 1)
     out = printed(capsys, "solve", "body.msh", *OPTIONS, "--friction", "0.5")
     assert "RootSet at alpha = 0: 1 root" in out
 
 
 def test_options_of_supports_and_obstacles(here, capsys):
-    out = printed(
-        capsys, "solve", "body.msh", "--contact", "floor", "--young", 1, "--poisson", 0, "--displacement",
-        "lid=free,-0.2", "--spring", "lid=0,1", "--obstacle", "plane=0,-0.1,0,1", "--gap", "-0.05", "--friction", "0.3",
-        "--plane", "stress", "--body-force", "0,-0.01", "-o", "p.npz", note="wrote a problem",
-    )  # fmt: skip
+    supports = "--displacement lid=free,-0.2 --spring lid=0,1 --obstacle plane=0,-0.1,0,1 --gap -0.05 --friction 0.3"
+    command = f"solve body.msh --contact floor --young 1 --poisson 0 {supports} --plane stress --body-force 0,-0.01"
+    out = printed(capsys, *command.split(), "-o", "p.npz", note="wrote a problem")
     problem = read_problem("p.npz")
     assert problem.gap == pytest.approx([0.05] * 3)
     assert problem.n == 9
@@ -122,61 +104,55 @@ def test_options_of_supports_and_obstacles(here, capsys):
 
 @pytest.mark.few(22)
 @pytest.mark.parametrize(
-    ("arguments", "part"),
+    ("command", "part"),
     [
-        (("solve",), "missing argument 'MESH'"),
-        (("solve", "body.msh"), "error: --young, --poisson, --contact are missing"),
-        (("solve", "body.msh", *OPTIONS[:4]), "error: --poisson is missing"),
-        (("solve", "body.msh", *OPTIONS), "--alpha is missing, on which friction or load depend"),
+        ("solve", "missing argument 'MESH'"),
+        ("solve body.msh", "error: --young, --poisson, --contact are missing"),
+        ("solve body.msh --contact floor --young 2.5", "error: --poisson is missing"),
+        ("solve body.msh OPTIONS", "--alpha is missing, on which friction or load depend"),
+        ("solve body.msh OPTIONS --contact flor --alpha 1", "no facets named 'flor'; expected one of flo"),
+        ("solve body.msh OPTIONS --load lid=1,2 --alpha 1", "--load is given twice for lid"),
+        ("solve body.msh OPTIONS --load top --alpha 1", "--load is top; expected NAME=NUMBERS"),
+        ("solve body.msh OPTIONS --pressure lid=1,2 --alpha 1", "--pressure is 1,2; expected numbers"),
+        ("solve body.msh OPTIONS --pressure lid=x --alpha 1", "--pressure is x; expected numbers"),
+        ("solve body.msh OPTIONS --gap nan --alpha 1", "gap is nan; expected a finite number"),
+        ("solve body.msh OPTIONS --obstacle wall=1 --alpha 1", "obstacle is 'wall'; expected one of"),
+        ("solve body.toml --young 1 --alpha 1", "--young is given beside body.toml, which has all options"),
+        ("solve nowhere.msh OPTIONS --alpha 1", "nowhere.msh: there is no such file; expected a mesh with"),
+        ("solve nowhere.msh", "nowhere.msh: there is no such file; expected a mesh with"),
+        ("solve bdoy.msh OPTIONS", "bdoy.msh: there is no such file; did you mean body.msh"),
+        ("solve '' OPTIONS", "MESH is an empty text; expected the name of a mesh file"),
+        ("solve folder.msh OPTIONS", "folder.msh: it is a directory; expected a mesh with named parts"),
+        ("solve pipe.msh OPTIONS", "pipe.msh: it is not a regular file; expected a mesh with named parts"),
+        ("solve dangling.msh OPTIONS", "dangling.msh: there is no such file; expected a mesh with named parts"),
+        ("solve p.npz OPTIONS", "p.npz is a problem; expected a mesh (enumsol roots p.npz solves a problem)"),
+        ("solve gallery:wedge-8-5", "gallery:wedge-8-5 is a problem; expected a mesh"),
+        ("solve pipe.toml", "pipe.toml: it is not a regular file; expected a TOML file of options"),
+        ("roots pipe.npz --alpha 1", "pipe.npz: it is not a regular file; expected a .npz file"),
+        ("roots pipe.toml --alpha 1", "pipe.toml: it is not a regular file; expected a TOML file of options"),
+        ("roots pipe.msh --alpha 1", "pipe.msh is a mesh; expected a problem"),
+        ("roots folder.toml --alpha 1", "folder.toml: the directory has no MatrixMarket files; expected A.mtx"),
+        ("roots nowhere.h5 --alpha 1", "nowhere.h5: there is no such file or directory; expected a .npz file"),
+        ("solve nowhere.toml --alpha 1", "nowhere.toml: there is no such file"),
+        ("roots body.tml --alpha 1", "did you mean body.toml?"),
+        ("solve body.msh OPTIONS --alpha 1 -o p.txt", "p.txt: its name ends in '.txt'"),
+        ("solve body.msh OPTIONS --alpha 1 --proof -", "a proof is a binary file"),
         (
-            ("solve", "body.msh", *OPTIONS, "--contact", "flor", "--alpha", 1),
-            "no facets named 'flor'; expected one of flo",
+            "solve body.msh --contact floor --young 2.5 --poisson 0.25 --alpha 1",
+            "the body is free to move as a rigid body; expected clamp",
         ),
-        (("solve", "body.msh", *OPTIONS, "--load", "lid=1,2", "--alpha", 1), "--load is given twice for lid"),
-        (("solve", "body.msh", *OPTIONS, "--load", "top", "--alpha", 1), "--load is top; expected NAME=NUMBERS"),
-        (("solve", "body.msh", *OPTIONS, "--pressure", "lid=1,2", "--alpha", 1), "--pressure is 1,2; expected numbers"),
-        (("solve", "body.msh", *OPTIONS, "--pressure", "lid=x", "--alpha", 1), "--pressure is x; expected numbers"),
-        (("solve", "body.msh", *OPTIONS, "--gap", "nan", "--alpha", 1), "gap is nan; expected a finite number"),
-        (("solve", "body.msh", *OPTIONS, "--obstacle", "wall=1", "--alpha", 1), "obstacle is 'wall'; expected one of"),
-        (
-            ("solve", "body.toml", "--young", "1", "--alpha", 1),
-            "--young is given beside body.toml, which has all options",
-        ),
-        (("solve", "nowhere.msh", *OPTIONS, "--alpha", 1), "nowhere.msh: there is no such file; expected a mesh with"),
-        (("solve", "nowhere.msh"), "nowhere.msh: there is no such file; expected a mesh with"),
-        (("solve", "bdoy.msh", *OPTIONS), "bdoy.msh: there is no such file; did you mean body.msh"),
-        (("solve", "", *OPTIONS), "MESH is an empty text; expected the name of a mesh file"),
-        (("solve", "folder.msh", *OPTIONS), "folder.msh: it is a directory; expected a mesh with named parts"),
-        (("solve", "pipe.msh", *OPTIONS), "pipe.msh: it is not a regular file; expected a mesh with named parts"),
-        (("solve", "dangling.msh", *OPTIONS), "dangling.msh: there is no such file; expected a mesh with named parts"),
-        (("solve", "p.npz", *OPTIONS), "p.npz is a problem; expected a mesh (enumsol roots p.npz solves a problem)"),
-        (("solve", "gallery:wedge-8-5"), "gallery:wedge-8-5 is a problem; expected a mesh"),
-        (("solve", "pipe.toml"), "pipe.toml: it is not a regular file; expected a TOML file of options"),
-        (("roots", "pipe.npz", "--alpha", 1), "pipe.npz: it is not a regular file; expected a .npz file"),
-        (("roots", "pipe.toml", "--alpha", 1), "pipe.toml: it is not a regular file; expected a TOML file of options"),
-        (("roots", "pipe.msh", "--alpha", 1), "pipe.msh is a mesh; expected a problem"),
-        (
-            ("roots", "folder.toml", "--alpha", 1),
-            "folder.toml: the directory has no MatrixMarket files; expected A.mtx",
-        ),
-        (("roots", "nowhere.h5", "--alpha", 1), "nowhere.h5: there is no such file or directory; expected a .npz file"),
-        (("solve", "nowhere.toml", "--alpha", 1), "nowhere.toml: there is no such file"),
-        (("roots", "body.tml", "--alpha", 1), "did you mean body.toml?"),
-        (("solve", "body.msh", *OPTIONS, "--alpha", 1, "-o", "p.txt"), "p.txt: its name ends in '.txt'"),
-        (("solve", "body.msh", *OPTIONS, "--alpha", 1, "--proof", "-"), "a proof is a binary file"),
-        (("solve", "body.msh", *OPTIONS[:6], "--alpha", 1), "the body is free to move as a rigid body; expected clamp"),
     ],
 )
-def test_bad_calls_get_one_sentence(here, capsys, arguments, part):
+def test_bad_calls_get_one_sentence(here, capsys, command, part):
     for name in ("folder.msh", "folder.toml"):
         (here / name).mkdir()
     for name in ("pipe.msh", "pipe.toml", "pipe.npz"):
         os.mkfifo(here / name)
     (here / "dangling.msh").symlink_to(here / "nothing")
-    assert_refused(*run(capsys, *arguments), part)
+    assert_refused(*run(capsys, *shlex.split(command.replace("OPTIONS", " ".join(OPTIONS)))), part)
 
 
-PAIR = ("--young", "2.5", "--poisson", "0.25", "--friction", "0.3", "--clamp", "roof", "--clamp", "floor")
+PAIR = shlex.split("--young 2.5 --poisson 0.25 --friction 0.3 --clamp roof --clamp floor")
 
 
 @pytest.fixture
@@ -198,16 +174,12 @@ def test_a_pair_is_the_same_by_option_file_and_call(two_bodies, capsys):
         "contact_pair = [['upper', 'lower', -0.01]]\n"
     )
     (two_bodies / "two.toml").write_text(text)
-    out = printed(
-        capsys, "solve", "two.msh", *PAIR, "--pair", "upper:lower:-0.01", "-o", "two.npz", note="wrote a problem"
-    )
-    assert "complete: yes (proven" in out
-    direct = fem.mesh_problem(
-        "two.msh", young=2.5, poisson=0.25, friction=0.3, clamp=["roof", "floor"], pairs=[("upper", "lower", -0.01)]
-    )
+    command = ("solve", "two.msh", *PAIR, "--pair", "upper:lower:-0.01", "-o", "two.npz")
+    assert "complete: yes (proven" in printed(capsys, *command, note="wrote a problem")
+    given = {"friction": 0.3, "clamp": ["roof", "floor"], "pairs": [("upper", "lower", -0.01)]}
+    direct = fem.mesh_problem("two.msh", young=2.5, poisson=0.25, **given)
     assert read_problem("two.npz").fingerprint == direct.fingerprint == fem.read_mesh_problem("two.toml").fingerprint
-    status, out, _ = run(capsys, "solve", "two.msh", *PAIR, "--pair", "upper:lower", "--pressure", "right=0")
-    assert status == 2
+    assert run(capsys, "solve", "two.msh", *PAIR, "--pair", "upper:lower", "--pressure", "right=0")[0] == 2
 
 
 def test_materials_and_friction_by_part_in_a_file_on_the_command_line_and_in_a_call(two_bodies, capsys):
@@ -219,12 +191,12 @@ def test_materials_and_friction_by_part_in_a_file_on_the_command_line_and_in_a_c
         "clamp = 'roof'\nspring.lower = [1, 1]\n"
     )
     (two_bodies / "two.toml").write_text(text)
-    printed(
-        capsys, "solve", "two.msh", "--young", "pad=5e3", "--young", "disc=2e5", "--poisson", "pad=0.45", "--poisson",
-        "disc=0.3", "--thickness", "pad=2", "--thickness", "disc=1", "--plane", "stress", "--friction", "upper=0.2",
-        "--friction", "floor=0.1,0.5", "--gap", "floor=0.5", "--body-force", "disc=0,-1", "--contact", "floor",
-        "--pair", "upper:lower", "--clamp", "roof", "--spring", "lower=1,1", "-o", "two.npz", note="wrote a problem",
-    )  # fmt: skip
+    command = (
+        "solve two.msh --young pad=5e3 --young disc=2e5 --poisson pad=0.45 --poisson disc=0.3 --thickness pad=2 "
+        "--thickness disc=1 --plane stress --friction upper=0.2 --friction floor=0.1,0.5 --gap floor=0.5 "
+        "--body-force disc=0,-1 --contact floor --pair upper:lower --clamp roof --spring lower=1,1 -o two.npz"
+    )
+    printed(capsys, *command.split(), note="wrote a problem")
     direct = fem.mesh_problem(
         "two.msh", young={"pad": 5e3, "disc": 2e5}, poisson={"pad": 0.45, "disc": 0.3},
         thickness={"pad": 2, "disc": 1}, plane="stress", friction={"upper": 0.2, "floor": (0.1, 0.5)},
@@ -254,11 +226,10 @@ def test_a_scene_that_is_no_problem_is_printed_before_it_is_refused(here, capsys
     assert err.startswith("enumsol: error: the body is free to move as a rigid body")
     assert err.endswith("or --max-rigid-displacement, if contact alone is to hold it\n")
     (here / "body.toml").write_text(TOML.replace("spring", "pressure_slope").replace("[1, 0.5]", "1"))
-    status, out, err = run(capsys, "roots", "body.toml", "--alpha", "1")
+    status, _, err = run(capsys, "roots", "body.toml", "--alpha", "1")
     assert status == 2
     assert err.startswith("enumsol: error: body.toml: the body is free to move")
-    status, out, again = run(capsys, "solve", "body.toml", "--alpha", "1")
-    assert (status, out, again) == (2, "", err)
+    assert run(capsys, "solve", "body.toml", "--alpha", "1") == (2, "", err)
 
 
 def test_notes_and_a_picture_beside_the_roots(here, capsys):
@@ -270,31 +241,24 @@ def test_notes_and_a_picture_beside_the_roots(here, capsys):
     assert_refused(*run(capsys, "solve", "body.msh", *OPTIONS, "--plot", "scene.txt"), "scene.txt")
 
 
+MATERIAL = "--poisson 0 --friction 0 --clamp roof --clamp floor --pair upper:lower"
+
+
 @pytest.mark.parametrize(
     ("options", "part"),
     [
-        (("--young", "1", "--young", "2"), "--young is given 2 times; expected one value, or NAME=VALUE each"),
-        (("--young", "pad=1", "--young", "2"), "--young is 2; expected NAME=NUMBERS"),
-        (("--young", "pad=1", "--young", "pad=2"), "--young is given twice for pad"),
-        (("--young", "1", "--thickness", "pad=x"), "--thickness is x; expected numbers"),
+        (f"{MATERIAL} --young 1 --young 2", "--young is given 2 times; expected one value, or NAME=VALUE each"),
+        (f"{MATERIAL} --young pad=1 --young 2", "--young is 2; expected NAME=NUMBERS"),
+        (f"{MATERIAL} --young pad=1 --young pad=2", "--young is given twice for pad"),
+        (f"{MATERIAL} --young 1 --thickness pad=x", "--thickness is x; expected numbers"),
+        ("PAIR --pair upper", "--pair is upper; expected NAME:NAME, or NAME:NAME:GAP"),
+        ("PAIR --pair upper:lower:x", "--pair is upper:lower:x; expected numbers such as 0.5"),
+        ("PAIR --pair upper:low", "the mesh has no facets named 'low'; expected one of"),
+        ("PAIR --pair roof:floor", "pair roof:floor has no node that faces a facet of floor along its normal"),
     ],
 )
-def test_bad_materials_on_the_command_line(two_bodies, capsys, options, part):
-    command = ("solve", "two.msh", "--poisson", "0", "--pair", "upper:lower", "--clamp", "floor", "--clamp", "roof")
-    assert_refused(*run(capsys, *command, *options, "--friction", "0"), part)
-
-
-@pytest.mark.parametrize(
-    ("text", "part"),
-    [
-        ("upper", "--pair is upper; expected NAME:NAME, or NAME:NAME:GAP"),
-        ("upper:lower:x", "--pair is upper:lower:x; expected numbers such as 0.5"),
-        ("upper:low", "the mesh has no facets named 'low'; expected one of"),
-        ("roof:floor", "roof of the pair roof:floor has no node that faces a facet of floor along its normal"),
-    ],
-)
-def test_bad_pairs_on_the_command_line(two_bodies, capsys, text, part):
-    assert_refused(*run(capsys, "solve", "two.msh", *PAIR, "--pair", text), part)
+def test_bad_materials_and_pairs_on_the_command_line(two_bodies, capsys, options, part):
+    assert_refused(*run(capsys, "solve", "two.msh", *options.replace("PAIR", " ".join(PAIR)).split()), part)
 
 
 def test_a_pair_is_called_by_one_name_in_a_file(two_bodies):

@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from plain_arrays import BN, BT, A, F, problem
+from plain_arrays import BN, BT, A, F, free_bar, problem
 from refusals import bad_argument, bad_problem
 
 from enumsol import ContactProblem, InvalidProblemError, enumerate_roots, fem, gallery
@@ -16,13 +16,6 @@ def with_entry(array, index, value):
     changed = np.array(array, dtype=float)
     changed[index] = value
     return changed
-
-
-def bar(n):
-    """A free bar of n springs in a row: singular, its rigid motion is (1, .., 1)."""
-    main = np.full(n, 2.0)
-    main[[0, -1]] = 1.0
-    return sp.diags_array([-np.ones(n - 1), main, -np.ones(n - 1)], offsets=(-1, 0, 1))
 
 
 BAD = {
@@ -36,7 +29,7 @@ BAD = {
     ),
     "A indefinite": ({"A": A - 1.7 * np.eye(4)}, "A is not positive definite"),
     "A zero": ({"A": np.zeros((4, 4))}, "A is not positive definite: its diagonal entry 0 is 0"),
-    "A rigid": ({"A": bar(4)}, "the body is free to move as a rigid body"),
+    "A rigid": ({"A": free_bar(4)}, "the body is free to move as a rigid body"),
     "A NaN": ({"A": with_entry(A, (1, 1), np.nan)}, r"A has the value nan at index \(1, 1\); expected finite"),
     "A inf": ({"A": sp.csc_array(with_entry(A, (2, 3), np.inf))}, r"A has the value inf at index \(2, 3\)"),
     "Bn columns": ({"Bn": BN[:, :3]}, r"Bn has shape \(2, 3\); expected \(p, n\) = \(2, 4\)"),
@@ -76,7 +69,7 @@ def test_bad_data_get_one_sentence(case):
 def test_a_body_held_in_one_direction_only_is_named_as_free():
     # a plane block without any support: three rigid motions
     block = gallery.clamped_block(3, 2)
-    free = np.kron(bar(3).toarray(), np.eye(2))
+    free = np.kron(free_bar(3).toarray(), np.eye(2))
     bad_problem("free to move as a rigid body", ContactProblem, free, np.eye(6)[:1], np.eye(6)[1:2], np.ones(6))
     assert block.p == 3
 
