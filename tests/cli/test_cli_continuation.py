@@ -5,25 +5,27 @@ import json
 import pandas as pd
 import pytest
 from command_line import assert_refused, on_terminal, printed, run
+from path_problems import closed_branch
 
-from enumsol import ContactProblem, Interrupted, branch_graph, enumerate_roots, follow, gallery, write_problem
+from enumsol import Interrupted, branch_graph, enumerate_roots, follow, gallery, write_problem
 
 FOLLOW = ("follow", "gallery:one-node-6.1", "--from", 0, "--to", 20, "--start", 5)
+
+
+AUDIT = ("audit", "gallery:one-node-6.1")
 
 
 @pytest.fixture
 def points(capsys, tmp_path):
     """All branches of the paper's Example 6.1, followed."""
-    file = tmp_path / "points.csv"
-    assert run(capsys, *FOLLOW, "--csv", file)[0] == 0
-    return file
+    printed(capsys, *FOLLOW, "--csv", tmp_path / "points.csv")
+    return tmp_path / "points.csv"
 
 
 @pytest.fixture
 def graph(capsys, tmp_path):
-    file = tmp_path / "graph.json"
-    assert run(capsys, "graph", "gallery:one-node-6.1", "--from", 0, "--to", 20, "--save", file)[0] == 0
-    return file
+    printed(capsys, "graph", "gallery:one-node-6.1", "--from", 0, "--to", 20, "--save", tmp_path / "graph.json")
+    return tmp_path / "graph.json"
 
 
 # -- follow ------------------------------------------------------------------------------------------------------------
@@ -44,14 +46,11 @@ def test_all_roots_and_none_twice(capsys):
 
 @pytest.mark.slow
 def test_follow_csv_names_columns_by_label(capsys, tmp_path):
-    body = gallery.two_node_square()
-    labels = ("toe", "heel")
-    labelled = ContactProblem(body.A, body.Bn, body.Bt, body.f, friction=body.friction, node_ids=labels)
-    frames = []
-    for name, problem in (("rows", body), ("labels", labelled)):
+    body, labels, frames = gallery.two_node_square(), ("toe", "heel"), []
+    for name, problem in (("rows", body), ("labels", body.replace(node_ids=labels))):
         write_problem(problem, tmp_path / f"{name}.npz")
-        arguments = ("follow", tmp_path / f"{name}.npz", "--from", 0, "--to", 10, "--start", 5)
-        assert run(capsys, *arguments, "--csv", tmp_path / f"{name}.csv")[0] == 0
+        interval = ("--from", 0, "--to", 10, "--start", 5)
+        printed(capsys, "follow", tmp_path / f"{name}.npz", *interval, "--csv", tmp_path / f"{name}.csv")
         frames.append(pd.read_csv(tmp_path / f"{name}.csv"))
     for quantity in ("lambda_n", "lambda_t", "u_n", "u_t", "status"):
         by_row = frames[0][[f"{quantity}_{row}" for row in range(2)]]
@@ -65,8 +64,7 @@ def test_follow_csv_names_columns_by_label(capsys, tmp_path):
 
 
 def test_columns_go_by_row_where_two_labels_are_the_same_text():
-    body = gallery.two_node_square()
-    problem = ContactProblem(body.A, body.Bn, body.Bt, body.f, friction=body.friction, node_ids=["1", 1])
+    problem = gallery.two_node_square().replace(node_ids=["1", 1])
     path = follow(problem, enumerate_roots(problem, 5.0)[0], interval=(0.0, 10.0))
     assert {"lambda_n_0", "lambda_n_1", "status_1"} <= set(path.to_frame().columns)
 
@@ -86,29 +84,18 @@ def test_follow_csv_and_json(capsys, tmp_path):
     assert (turn["before"], turn["after"], turn["local_branch"]) == (["slip-"], ["stick"], False)
 
 
-def test_closed_branches_are_followed_once(capsys, tmp_path, closed_file):
-    out = printed(capsys, "follow", closed_file, "--from", -3, "--to", 3, "--start", 0.1)
+def test_closed_branches_are_followed_once(capsys, tmp_path):
+    write_problem(closed_branch(), tmp_path / "closed.npz")
+    out = printed(capsys, "follow", tmp_path / "closed.npz", "--from", -3, "--to", 3, "--start", 0.1)
     assert "closed" in out
     assert out.count("path ") >= 2
     assert "lies on path" in out
 
 
-@pytest.fixture
-def closed_file(tmp_path):
-    """One node, F = 4 - alpha, f = (1, -3.5) + alpha (1, -3): stick and slip- form a closed branch."""
-    from enumsol import ContactProblem
-
-    file = tmp_path / "closed.npz"
-    data = {"friction": (4.0, -1.0), "load_slope": [1.0, -3.0]}
-    write_problem(ContactProblem([[2.0, -1.0], [-1.0, 2.0]], [[1.0, 0.0]], [[0.0, 1.0]], [1.0, -3.5], **data), file)
-    return file
-
-
 @pytest.mark.slow
 def test_steps_can_be_set(capsys):
     def rows(*options):
-        _, out, _ = run(capsys, *FOLLOW, "--root", 0, "--direction", "+1", "--csv", "-", *options)
-        return len(out.splitlines())
+        return len(printed(capsys, *FOLLOW, "--root", 0, "--direction", "+1", "--csv", "-", *options).splitlines())
 
     assert rows("--h-max", 0.1) > 2 * rows() > 2 * rows("--h-max", 5)
     # the first step is no longer than the longest
@@ -117,9 +104,8 @@ def test_steps_can_be_set(capsys):
 
 def test_the_algorithm_as_printed_jumps_and_the_audit_says_so(capsys, tmp_path):
     file = tmp_path / "points.csv"
-    options = ("--root", 2, "--direction", "-1", "--no-check-steps", "--h-max", 0.5, "--csv", file)
-    run(capsys, *FOLLOW, *options)
-    out = printed(capsys, "audit", "gallery:one-node-6.1", file, "--from", 0, "--to", 20, status=3)
+    run(capsys, *FOLLOW, "--root", 2, "--direction", "-1", "--no-check-steps", "--h-max", 0.5, "--csv", file)
+    out = printed(capsys, *AUDIT, file, "--from", 0, "--to", 20, status=3)
     assert "jumps             1\n" in out
     assert "branch 1 -> 0" in out
 
@@ -132,22 +118,20 @@ def test_step_limit_is_status_3(capsys):
 def test_degenerate_starts(capsys):
     example = ("follow", "gallery:one-node-6.1", "--from", 0, "--to", 20, "--start", "8/3")
     # the fold itself: one tangent of each orientation, on both arcs
-    out = printed(capsys, *example, "--root", 1)
-    assert "2 paths" in out
+    assert "2 paths" in printed(capsys, *example, "--root", 1)
     # where stick and slip of both nodes meet: several tangents, and the user is told how to choose
     chain = ("follow", "gallery:chain-2", "--from", 0, "--to", 6, "--start", "8/3")
-    out = printed(capsys, *chain, status=3)
-    assert "choose with tangent=k" in out
-    answer = run(capsys, *chain, "--root", 3, "--direction", "+1")
-    assert_refused(*answer, "admissible tangents have orientation +1")
-    printed(capsys, *chain, "--root", 3, "--direction", "+1", "--tangent", 0)
+    assert "choose with tangent=k" in printed(capsys, *chain, status=3)
+    forward = (*chain, "--root", 3, "--direction", "+1")
+    assert_refused(*run(capsys, *forward), "admissible tangents have orientation +1")
+    printed(capsys, *forward, "--tangent", 0)
 
 
 @pytest.mark.slow
 def test_follow_plots(capsys, tmp_path, graph):
+    file = tmp_path / "path.png"
     for options in ((), ("--graph", graph, "--quantity", "u_t", "--node", "0")):
-        file = tmp_path / "path.png"
-        assert run(capsys, *FOLLOW, "--plot", file, *options)[0] == 0
+        printed(capsys, *FOLLOW, "--plot", file, *options)
         assert file.read_bytes().startswith(b"\x89PNG")
         file.unlink()
 
@@ -172,7 +156,7 @@ def test_ctrl_c_prints_the_paths_so_far(tmp_path):
 
 
 def test_audit_of_all_branches(capsys, points):
-    out = printed(capsys, "audit", "gallery:one-node-6.1", points)
+    out = printed(capsys, *AUDIT, points)
     assert ": ok, complete" in out
     assert "jumps             0" in out
     assert "3 visited, 0 missed" in out
@@ -181,36 +165,31 @@ def test_audit_of_all_branches(capsys, points):
 
 
 def test_audit_names_a_missed_branch(capsys, points, tmp_path):
-    frame = pd.read_csv(points)
-    some = tmp_path / "some.csv"
+    frame, some = pd.read_csv(points), tmp_path / "some.csv"
     frame[frame["root"] > 0].to_csv(some, index=False)
-    out = printed(capsys, "audit", "gallery:one-node-6.1", some, "--from", 0, status=3)
-    assert "arc 0 of branch 0, alpha from 0 to 20: open" in out
+    assert "arc 0 of branch 0, alpha from 0 to 20: open" in printed(capsys, *AUDIT, some, "--from", 0, status=3)
 
 
 def test_audit_reads_stdin(capsys, points, monkeypatch):
     monkeypatch.setattr("sys.stdin", io.StringIO(points.read_text()))
-    out = printed(capsys, "audit", "gallery:one-node-6.1", "-")
-    assert ": ok, complete" in out
+    assert ": ok, complete" in printed(capsys, *AUDIT, "-")
 
 
 def test_audit_reads_points_before_it_searches(capsys, tmp_path, monkeypatch):
     file = tmp_path / "bad.csv"
     file.write_text("alpha,lambda_n_0\n1,2\n2,2\n")
     monkeypatch.setattr("enumsol.cli.audit.build", lambda *_, **__: pytest.fail("the graph was built"))
-    assert_refused(*run(capsys, "audit", "gallery:one-node-6.1", file), "no column 'lambda_t_0'")
+    assert_refused(*run(capsys, *AUDIT, file), "no column 'lambda_t_0'")
 
 
 def test_ctrl_c_audits_what_was_found(capsys, points, monkeypatch):
-    body = gallery.get("one-node-6.1").build()
-    partial = branch_graph(body, (0.0, 20.0), max_nodes=3)
+    partial = branch_graph(gallery.get("one-node-6.1").build(), (0.0, 20.0), max_nodes=3)
 
     def interrupted(*_, **__):
         raise Interrupted("interrupted", partial)
 
     monkeypatch.setattr("enumsol.cli.audit.build", interrupted)
-    out = printed(capsys, "audit", "gallery:one-node-6.1", points, status=130)
-    assert "but the graph is not complete: stopped" in out
+    assert "but the graph is not complete: stopped" in printed(capsys, *AUDIT, points, status=130)
 
 
 # -- bad input ---------------------------------------------------------------------------------------------------------
@@ -252,32 +231,30 @@ def test_bad_starts(capsys, alpha, name, part):
 
 
 def test_bad_points_get_one_sentence(capsys, tmp_path, points, graph):
-    audit = ("audit", "gallery:one-node-6.1")
     file = tmp_path / "bad.csv"
-    assert_refused(*run(capsys, *audit, tmp_path / "none.csv"), "expected a CSV file of points")
-    file.write_text("")
-    assert_refused(*run(capsys, *audit, file), "expected a CSV file of points")
-    file.write_text("lambda_n_0,lambda_t_0\n1,2\n")
-    assert_refused(*run(capsys, *audit, file), "no column 'alpha'")
-    file.write_text("alpha,lambda_n_0,lambda_t_0\n1,0,0\n")
-    assert_refused(*run(capsys, *audit, file), "alpha goes from 1 to 1; expected an interval")
-    assert_refused(*run(capsys, *audit, points, "--graph", graph, "--to", 3), "a graph has its own interval")
+    assert_refused(*run(capsys, *AUDIT, file), "expected a CSV file of points")
+    for text, part in (
+        ("", "expected a CSV file of points"),
+        ("lambda_n_0,lambda_t_0\n1,2\n", "no column 'alpha'"),
+        ("alpha,lambda_n_0,lambda_t_0\n1,0,0\n", "alpha goes from 1 to 1; expected an interval"),
+    ):
+        file.write_text(text)
+        assert_refused(*run(capsys, *AUDIT, file), part)
+    assert_refused(*run(capsys, *AUDIT, points, "--graph", graph, "--to", 3), "a graph has its own interval")
     other = ("audit", "gallery:one-node-6.2", points, "--graph", graph)
     assert_refused(*run(capsys, *other), "a graph of another problem")
-    assert_refused(*run(capsys, *audit, points, "--graph", points), "is not a JSON file")
+    assert_refused(*run(capsys, *AUDIT, points, "--graph", points), "is not a JSON file")
 
 
 def test_two_node_branches_end_to_end(capsys, tmp_path):
     file = tmp_path / "points.csv"
     write_problem(gallery.get("two-node-6.4").build(), tmp_path / "p.npz")
-    start = ("follow", tmp_path / "p.npz", "--from", 0, "--to", 10, "--start", 3.5, "--csv", file)
-    assert run(capsys, *start)[0] == 0
-    assert run(capsys, "audit", tmp_path / "p.npz", file, "--arithmetic", "exact")[0] == 0
+    printed(capsys, "follow", tmp_path / "p.npz", "--from", 0, "--to", 10, "--start", 3.5, "--csv", file)
+    printed(capsys, "audit", tmp_path / "p.npz", file, "--arithmetic", "exact")
 
 
 def test_follow_takes_problems_in_3d(capsys, tmp_path):
-    csv = tmp_path / "points.csv"
-    sliding = ("follow", "gallery:block3d-4", "--from", 0, "--to", 0.5, "--start", 0.25, "--csv", csv)
-    out = printed(capsys, *sliding)
-    assert "left the interval or closed" in out
-    assert "lambda_t2_" in csv.read_text().splitlines()[0]
+    file = tmp_path / "points.csv"
+    sliding = ("follow", "gallery:block3d-4", "--from", 0, "--to", 0.5, "--start", 0.25, "--csv", file)
+    assert "left the interval or closed" in printed(capsys, *sliding)
+    assert "lambda_t2_" in file.read_text().splitlines()[0]

@@ -3,12 +3,11 @@
 import json
 import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from cli.test_cli_solve import BODY, TOML
+from command_line import assert_refused, call, printed, run
 
 from enumsol import gallery
 from enumsol.cli import main
@@ -20,62 +19,53 @@ from enumsol.cli.progress import Display, remaining
 from enumsol.support.deadlines import tell
 
 SQUARE = "gallery:two-node-6.4"
+#: A call of every verb, in a folder with the files that it reads.
+VERBS = {
+    "roots": "gallery:two-node-6.4 --alpha 3.5",
+    "solve": "body.toml --alpha 0.5",
+    "table": "gallery:two-node-6.4 --alphas 1,3.5",
+    "graph": "gallery:two-node-6.4 --from 0 --to 10",
+    "report": "gallery:two-node-6.4 --from 0 --to 10 -o page.html",
+    "follow": "gallery:two-node-6.4 --from 0 --to 10 --start 3.5",
+    "audit": "gallery:two-node-6.4 points.csv --from 0 --to 10",
+    "fixed-point": "gallery:two-node-6.4 --alpha 1",
+    "history": "gallery:two-node-6.4 --steps 1,0.5",
+    "verify": "gallery:two-node-6.4 square.proof",
+    "gallery write": "two-node-6.4 square.npz",
+    "gallery list": "",
+    "collection check": "triangle-3.json",
+    "collection export": "collection triangle-3",
+    "collection list": "",
+}
 
 
 @pytest.fixture
-def proof(tmp_path, capsys):
-    assert main(["roots", SQUARE, "--alpha", "3.5", "--proof", str(tmp_path / "square.proof")]) == 0
-    capsys.readouterr()
-    return str(tmp_path / "square.proof")
-
-
-def verbs(proof, folder):
-    (folder / "body.msh").write_text(BODY)
-    (folder / "body.toml").write_text(TOML)
-    points = str(folder / "points.csv")
-    assert main(["follow", SQUARE, "--from", "0", "--to", "10", "--start", "3.5", "--csv", points, "--quiet"]) == 0
-    return {
-        "roots": ["roots", SQUARE, "--alpha", "3.5"],
-        "solve": ["solve", str(folder / "body.toml"), "--alpha", "0.5"],
-        "table": ["table", SQUARE, "--alphas", "1,3.5"],
-        "graph": ["graph", SQUARE, "--from", "0", "--to", "10"],
-        "report": ["report", SQUARE, "--from", "0", "--to", "10", "-o", str(folder / "page.html")],
-        "follow": ["follow", SQUARE, "--from", "0", "--to", "10", "--start", "3.5"],
-        "audit": ["audit", SQUARE, points, "--from", "0", "--to", "10"],
-        "fixed-point": ["fixed-point", SQUARE, "--alpha", "1"],
-        "history": ["history", SQUARE, "--steps", "1,0.5"],
-        "verify": ["verify", SQUARE, proof],
-        "gallery write": ["gallery", "write", "two-node-6.4", str(folder / "square.npz")],
-        "gallery list": ["gallery", "list"],
-        "collection check": ["collection", "check", answers(folder)],
-        "collection export": ["collection", "export", str(folder / "collection"), "triangle-3"],
-        "collection list": ["collection", "list"],
-    }
-
-
-def answers(folder):
-    file = folder / "triangle-3.json"
-    file.write_text('{"lambda_n": [0], "lambda_t": [0]}')
-    return str(file)
+def here(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "body.msh").write_text(BODY)
+    (tmp_path / "body.toml").write_text(TOML)
+    (tmp_path / "triangle-3.json").write_text('{"lambda_n": [0], "lambda_t": [0]}')
+    assert main(["roots", SQUARE, "--alpha", "3.5", "--proof", "square.proof", "--quiet"]) == 0
+    return tmp_path
 
 
 @pytest.mark.slow
-def test_every_verb_can_be_quiet_and_writes_json(proof, tmp_path, capsys):
+def test_every_verb_can_be_quiet_and_writes_json(here, capsys):
     pytest.importorskip("plotly")
-    commands = verbs(proof, tmp_path)
+    assert main(f"follow --csv points.csv --quiet {VERBS['follow']}".split()) == 0
     names = [item.name for item in app.registered_commands]
     names += [
         f"{group.name} {item.name or item.callback.__name__.strip('_')}"
         for group in app.registered_groups
         for item in group.typer_instance.registered_commands
     ]
-    assert sorted(commands) == sorted(names)
-    for name, command in commands.items():
-        file = tmp_path / "result.json"
-        status = main([*command, "--json", str(file)])
+    assert sorted(VERBS) == sorted(names)
+    for name, options in VERBS.items():
+        command = f"{name} {options}".split()
+        status = main([*command, "--json", "result.json"])
         said = capsys.readouterr()
         assert said.out, name
-        json.loads(file.read_text())
+        json.loads((here / "result.json").read_text())
         if name.endswith(" list"):
             continue  # it has nothing to say but its list
         assert main([*command, "--quiet" if len(name) % 2 else "-q"]) == status, name
@@ -84,21 +74,16 @@ def test_every_verb_can_be_quiet_and_writes_json(proof, tmp_path, capsys):
         assert capsys.readouterr() == said, name  # loud again
 
 
-def test_json_of_a_proof_and_of_the_gallery(proof, capsys):
-    assert main(["verify", SQUARE, proof, "--json", "-"]) == 0
-    found = json.loads(capsys.readouterr().out)
+def test_json_of_a_proof_and_of_the_gallery(here, capsys):
+    found = json.loads(printed(capsys, "verify", SQUARE, "square.proof", "--json", "-"))
     assert (found["ok"], found["complete"], found["alpha"]) == (True, True, 3.5)
     assert found["fingerprint"] == gallery.get("two-node-6.4").build().fingerprint
-    assert main(["gallery", "list", "--json", "-"]) == 0
-    listed = json.loads(capsys.readouterr().out)
+    listed = json.loads(printed(capsys, "gallery", "list", "--json", "-"))
     assert [entry["name"] for entry in listed] == list(gallery.GALLERY)
 
 
 def test_quiet_commands_still_say_what_is_wrong(capsys):
-    assert main(["roots", "nowhere.npz", "--alpha", "1", "--quiet"]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert "no such file" in err
+    assert_refused(*run(capsys, "roots", "nowhere.npz", "--alpha", 1, "--quiet"), "no such file")
 
 
 def test_the_table_of_exit_statuses_is_complete():
@@ -117,19 +102,8 @@ def test_the_table_of_exit_statuses_is_complete():
     ],
 )
 def test_completion(words, expected):
-    environment = {
-        **os.environ,
-        "_ENUMSOL_COMPLETE": "complete_bash",
-        "COMP_WORDS": words,
-        "COMP_CWORD": str(len(words.split()) - 1),
-    }
-    done = subprocess.run(
-        [sys.executable, "-c", "import enumsol.cli; enumsol.cli.main()"],
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    asked = {"_ENUMSOL_COMPLETE": "complete_bash", "COMP_WORDS": words, "COMP_CWORD": str(len(words.split()) - 1)}
+    done = call(env={**os.environ, **asked})
     assert set(done.stdout.split()) == expected, done.stderr
 
 
@@ -138,16 +112,8 @@ def test_files_and_problems_are_completed(tmp_path, monkeypatch):
     for name in ("block.npz", "block.txt", "blocks.h5"):
         (tmp_path / name).touch()
     (tmp_path / "block.dir").mkdir()
-    assert problem_names("block") == [
-        "block.dir",
-        "block.npz",
-        "blocks.h5",
-        "block-on-table-5",
-        "block3d-4",
-        "block3d-9",
-        "block3d-16",
-        "block3d-100",
-    ]
+    files, ours = ["block.dir", "block.npz", "blocks.h5"], [f"block3d-{p}" for p in (4, 9, 16, 100)]
+    assert problem_names("block") == [*files, "block-on-table-5", *ours]
     assert problem_names("gallery:chain-2") == ["gallery:chain-2", "gallery:chain-2-coupled"]
     assert problem_names("[") == []
 
@@ -166,9 +132,15 @@ def test_the_time_that_is_left(seconds, share, expected):
     assert remaining(seconds, share) == expected
 
 
-def test_a_bar_goes_on_between_two_reports(monkeypatch):
+@pytest.fixture
+def clock(monkeypatch):
+    """What the timer of a bar shows."""
     clock = [0.0]
     monkeypatch.setattr("enumsol.cli.progress.time.perf_counter", lambda: clock[0])
+    return clock
+
+
+def test_a_bar_goes_on_between_two_reports(clock):
     display, said = Display("graph"), []
     for now, share, step in ((4.0, 0.5, "search"), (10.0, 1.0, "search"), (12.0, 0.0, "arcs"), (20.0, 0.5, "arcs")):
         clock[0] = now
@@ -186,9 +158,7 @@ def test_a_bar_goes_on_between_two_reports(monkeypatch):
     ]
 
 
-def test_what_a_long_call_tells_stands_behind_the_bar_until_the_next_report(monkeypatch):
-    clock = [0.0]
-    monkeypatch.setattr("enumsol.cli.progress.time.perf_counter", lambda: clock[0])
+def test_what_a_long_call_tells_stands_behind_the_bar_until_the_next_report(clock):
     said = []
     with Display("checking", {"leaves": (0.0, 0.5)}) as display:
         tell("factors of A")
@@ -214,7 +184,9 @@ def test_what_a_long_call_tells_stands_behind_the_bar_until_the_next_report(monk
     ]
 
 
-def test_a_bar_appears_although_nothing_is_told(monkeypatch):
+@pytest.fixture
+def shown(monkeypatch):
+    """What is shown by the bar of a terminal, which appears at once."""
     shown = []
 
     class Bar:
@@ -223,16 +195,20 @@ def test_a_bar_appears_although_nothing_is_told(monkeypatch):
 
         start = stop = lambda self: None
 
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    monkeypatch.setattr("enumsol.cli.progress._PROGRESS_DELAY", 0.0)
+    monkeypatch.setattr("enumsol.cli.progress._progress_bar", lambda *_: (Bar(), 0))
+    return shown
+
+
+def test_a_bar_appears_although_nothing_is_told(monkeypatch, shown):
     class Now:
         """A timer whose time is over at once."""
 
         def __init__(self, _, call):
             self.start, self.cancel = call, lambda: None
 
-    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    monkeypatch.setattr("enumsol.cli.progress._PROGRESS_DELAY", 0.0)
     monkeypatch.setattr("enumsol.cli.progress.Timer", Now)
-    monkeypatch.setattr("enumsol.cli.progress._progress_bar", lambda *_: (Bar(), 0))
     with Display("assembling") as display:
         assert shown == [0.0]
     display._draw()  # by a timer that was late
@@ -240,27 +216,12 @@ def test_a_bar_appears_although_nothing_is_told(monkeypatch):
 
 
 @pytest.mark.slow
-def test_the_bar_of_a_graph_never_falls_back_nor_is_full_before_the_end(monkeypatch):
-    done, stages = [], []
-    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
-    monkeypatch.setattr("enumsol.cli.progress._PROGRESS_DELAY", 0.0)
-
-    class Bar:
-        def update(self, _, completed):
-            done.append(completed)
-
-        def start(self):
-            pass
-
-        stop = start
-
-    monkeypatch.setattr("enumsol.cli.progress._progress_bar", lambda *_: (Bar(), 0))
+def test_the_bar_of_a_graph_never_falls_back_nor_is_full_before_the_end(monkeypatch, shown):
+    stages, show = [], Display.show
     monkeypatch.setattr(
-        Display,
-        "show",
-        lambda self, share, note, step, show=Display.show: (stages.append(note), show(self, share, note, step)),
+        Display, "show", lambda self, share, note, step: stages.append(note) or show(self, share, note, step)
     )
     build(gallery.taper(4, 4), (0.0, 0.3))
     assert list(dict.fromkeys(stages)) == ["step 1 of 2, search", "step 2 of 2, arcs"]
-    assert done == sorted(done)
-    assert done[-1] < 1.0
+    assert shown == sorted(shown)
+    assert shown[-1] < 1.0

@@ -2,18 +2,19 @@
 
 import numpy as np
 import pytest
+from command_line import assert_refused, printed, run
+from refusals import bad_argument
 
 import enumsol
 from enumsol import gallery
-from enumsol.cli import main
 
 meshio = pytest.importorskip("meshio")
 
 
 @pytest.mark.parametrize("name", ["wedge-8-3", "wedge3d-2-3"])
 def test_every_root_has_a_file(tmp_path, capsys, name):
-    assert main(["roots", f"gallery:{name}", "--alpha", "1", "--vtu", str(tmp_path / "wedge.vtu")]) == 0
-    assert capsys.readouterr().out.endswith("complete: yes (proven)\n")
+    out = printed(capsys, "roots", f"gallery:{name}", "--alpha", 1, "--vtu", tmp_path / "wedge.vtu")
+    assert out.endswith("complete: yes (proven)\n")
     names = sorted(file.name for file in tmp_path.iterdir())
     assert names == ["wedge-0.vtu", "wedge-1.vtu", "wedge-2.vtu", "wedge.pvd"]
     problem = gallery.get(name).build()
@@ -24,22 +25,20 @@ def test_every_root_has_a_file(tmp_path, capsys, name):
         assert "stress" in back.cell_data
 
 
-def test_a_limit_in_2d_has_a_file(tmp_path):
+def test_a_limit_in_2d_has_a_file(capsys, tmp_path):
     file = tmp_path / "limit.vtu"
-    assert main(["fixed-point", "gallery:one-node-6.1", "--alpha", "1", "--vtu", str(file)]) == 0
+    printed(capsys, "fixed-point", "gallery:one-node-6.1", "--alpha", 1, "--vtu", file)
     assert "displacement" in meshio.read(file).point_data
 
 
 def test_a_continuum_has_no_file(tmp_path, capsys):
-    command = ["roots", "gallery:one-node-6.3", "--alpha", "2", "--vtu", str(tmp_path / "p.vtu")]
-    assert main(command) == 0
-    error = capsys.readouterr().err
+    status, _, error = run(capsys, "roots", "gallery:one-node-6.3", "--alpha", 2, "--vtu", tmp_path / "p.vtu")
+    assert status == 0
     assert "no isolated root was found" in error
     assert "--vtu holds the isolated roots only, --json the 1 family too" in error
     assert list(tmp_path.iterdir()) == []
-    problem = gallery.get("one-node-6.3").build()
-    with pytest.raises(enumsol.InvalidArgumentError, match="a RootSet without isolated roots, whose 1 family no file"):
-        enumsol.write_vtu(problem, enumsol.enumerate_roots(problem, 2), tmp_path / "p.vtu")
+    problem, message = gallery.get("one-node-6.3").build(), "a RootSet without isolated roots, whose 1 family no file"
+    bad_argument(message, enumsol.write_vtu, problem, enumsol.enumerate_roots(problem, 2), tmp_path / "p.vtu")
 
 
 @pytest.mark.parametrize(
@@ -55,8 +54,4 @@ def test_refused_before_the_search(tmp_path, monkeypatch, capsys, problem, file,
     monkeypatch.chdir(tmp_path)
     enumsol.write_problem(enumsol.ContactProblem([[2, 0], [0, 2]], [[1, 0]], [[0, 1]], [1, 0]), "bare.npz")
     for command in ("roots", "fixed-point"):
-        assert main([command, problem, "--alpha", "1", "--vtu", file]) == 2
-        out, err = capsys.readouterr()
-        assert out == ""
-        assert message in err
-        assert err.count("\n") == 1
+        assert_refused(*run(capsys, command, problem, "--alpha", 1, "--vtu", file), message)

@@ -32,11 +32,16 @@ if __name__ == "__main__":
     ids=["result", "task", "work"],
 )
 def test_leaving_never_waits(call, wait, tmp_path):
-    script = tmp_path / "script.py"
-    script.write_text(SCRIPT.format(call=call, wait=wait, rounds=some(1, of=3)))
     # without its end such a program never ends
-    done = subprocess.run([sys.executable, script], capture_output=True, timeout=100, text=True, check=False)
+    output_of(tmp_path / "script.py", SCRIPT.format(call=call, wait=wait, rounds=some(1, of=3)))
+
+
+def output_of(file, program):
+    """What a program prints that ends within a time, and without an error."""
+    file.write_text(program)
+    done = subprocess.run([sys.executable, file], capture_output=True, timeout=100, text=True, check=False)
     assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
 TOLD = """
@@ -64,11 +69,7 @@ if __name__ == "__main__":
 
 @pytest.mark.slow
 def test_what_a_worker_is_at_is_heard_if_it_takes_long(tmp_path):
-    script = tmp_path / "script.py"
-    script.write_text(TOLD)
-    done = subprocess.run([sys.executable, script], capture_output=True, timeout=100, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    what, count = done.stdout.rsplit(" ", 1)
+    what, count = output_of(tmp_path / "script.py", TOLD).rsplit(" ", 1)
     assert what == "{('columns in a worker', 3, 40)}"
     assert 1 <= int(count) <= 3
 

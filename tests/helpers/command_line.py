@@ -30,14 +30,18 @@ def call(*arguments, **options):
     return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, **options)
 
 
-def assert_refused(status, out, err, *parts):
-    assert status == 2
-    assert out == ""
+def assert_one_line(err, *parts):
+    """An error is told in one line, which says all of this."""
     assert err.startswith("enumsol: error: ")
-    assert err.count("\n") == 1
-    assert not err.endswith(".\n")
+    assert err.count("\n") == 1, err
     for part in parts:
         assert part in err
+
+
+def assert_refused(status, out, err, *parts):
+    assert (status, out) == (2, "")
+    assert_one_line(err, *parts)
+    assert not err.endswith(".\n")
 
 
 @contextlib.contextmanager
