@@ -84,6 +84,21 @@ class Browser:
             "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 600
         )
 
+    def show(self, path, width=1280, height=900):
+        """Open a file in a window of that size."""
+        self.size(width, height)
+        self.open(path)
+
+    def choose(self, name, value):
+        """Choose a value of a control of the page."""
+        self.evaluate(f"byId('{name}').value = '{value}'; byId('{name}').dispatchEvent(new Event('change'))")
+        self.settle()
+
+    def open_details(self):
+        """Unfold what is folded on all cards."""
+        self.evaluate("document.querySelectorAll('#cards details').forEach((d) => { d.open = true; })")
+        self.settle()
+
     def open(self, path):
         """Open a file, and wait until its script has started."""
         self._events.clear()

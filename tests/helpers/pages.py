@@ -3,10 +3,25 @@
 import json
 import re
 from html.parser import HTMLParser
+from pathlib import Path
+
+from enumsol import write_report
+
+
+def page_of(solutions, folder, **options):
+    """The text of a page that is written into a folder."""
+    write_report(solutions, folder / "page.html", **options)
+    return (folder / "page.html").read_text(encoding="utf-8")
+
+
+def text_of(page):
+    """What is read on a page, or in the file of one, outside of scripts and styles."""
+    return Reader(page.read_text(encoding="utf-8") if isinstance(page, Path) else page).text
 
 
 def data_of(page):
-    """The numbers that the page's script draws."""
+    """The numbers that the script of a page, or of the file of one, draws."""
+    page = page.read_text(encoding="utf-8") if isinstance(page, Path) else page
     return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)[1])
 
 

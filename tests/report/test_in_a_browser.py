@@ -45,8 +45,7 @@ def slide_to(browser, position):
 @pytest.mark.parametrize("width", [1280, 400])
 @pytest.mark.parametrize("name", ["wedge", "bare"])
 def test_it_opens_without_complaint_and_fits(browser, pages, name, width):
-    browser.size(width, 900)
-    browser.open(pages[name])
+    browser.show(pages[name], width)
     assert browser.complaints() == []
     assert browser.evaluate("document.title") == HOSTILE
     assert browser.evaluate("document.documentElement.scrollWidth") <= width
@@ -59,8 +58,7 @@ def test_it_opens_without_complaint_and_fits(browser, pages, name, width):
 
 
 def test_the_slider_shows_as_many_solutions_as_there_are(browser, pages, graphs):
-    browser.size(1280, 900)
-    browser.open(pages["wedge"])
+    browser.show(pages["wedge"])
     last = browser.evaluate("data.slider.length") - 1
     seen = set()
     for position in (0, last // 3, last // 2, last // 2 + 1, last // 2 + 2, last - 3):
@@ -83,23 +81,20 @@ def test_the_slider_shows_as_many_solutions_as_there_are(browser, pages, graphs)
 
 
 def test_arrows_and_marks_are_those_of_the_roots(browser, pages, graphs):
-    browser.size(1280, 900)
-    browser.open(pages["wedge"])
+    browser.show(pages["wedge"])
     browser.evaluate("showAlpha(2.2)")
     roots = enumsol.enumerate_roots(graphs["wedge"].problem, 2.2)
     each = "[...document.querySelectorAll('#cards .card')]"
     pressed = browser.evaluate(f"{each}.map((c) => c.querySelectorAll('.arrow').length)")
     assert sorted(pressed) == sorted(sum(root.lambda_n > 0) for root in roots)
-    browser.evaluate("document.querySelectorAll('#cards details').forEach((d) => { d.open = true; })")
-    browser.settle()
+    browser.open_details()
     rows = "[...c.querySelectorAll('tbody tr')].map((r) => r.children[1].textContent)"
     found = sorted(browser.evaluate(f"{each}.map((c) => {rows})"))
     assert found == sorted([status.value for status in root.statuses] for root in roots)
 
 
 def test_pointing_and_clicking(browser, pages, graphs):
-    browser.size(1280, 900)
-    browser.open(pages["wedge"])
+    browser.show(pages["wedge"])
     branch = graphs["wedge"].branches[1]
     arc = max(branch.arcs, key=lambda arc: arc.length)
     place = f"""(() => {{
@@ -133,15 +128,13 @@ def test_pointing_and_clicking(browser, pages, graphs):
 
 @pytest.mark.slow
 def test_every_quantity_and_node_is_drawn(browser, pages, graphs):
-    browser.size(1280, 900)
-    browser.open(pages["bare"])
+    browser.show(pages["bare"])
     graph = graphs["bare"]
     arc = graph.arcs[1]
     for name in ("norm", "sum_n", "lambda_n", "lambda_t", "u_n", "u_t"):
         for node in (0, 1):
-            browser.evaluate(f"byId('quantity').value = '{name}'; byId('node').value = '{node}'")
-            browser.evaluate("byId('quantity').dispatchEvent(new Event('change'))")
-            browser.settle()
+            browser.evaluate(f"byId('node').value = '{node}'")
+            browser.choose("quantity", name)
             trace = f"byId('diagram').data.find((t) => t.meta === {arc.number})"
             x, y = (browser.evaluate(f"{trace}.{part}[3]") for part in ("x", "customdata"))
             n, t = arc.values(x)
@@ -151,8 +144,7 @@ def test_every_quantity_and_node_is_drawn(browser, pages, graphs):
             expected = overviews[name] if name in overviews else by_node[name][node]
             assert y == pytest.approx(expected, rel=1e-7, abs=1e-12)
     # lambda_n of node 1 is 0 on two branches, which are drawn apart
-    browser.evaluate("byId('quantity').value = 'lambda_n'; byId('quantity').dispatchEvent(new Event('change'))")
-    browser.settle()
+    browser.choose("quantity", "lambda_n")
     flat = "byId('diagram').data.filter((t) => t.meta !== undefined && t.customdata.every((y) => y === 0))"
     heights = browser.evaluate(f"{flat}.map((t) => t.y[0])")
     assert len(heights) == 2
@@ -163,8 +155,7 @@ def test_every_quantity_and_node_is_drawn(browser, pages, graphs):
 
 @pytest.mark.slow
 def test_more_solutions_than_fit_are_on_further_pages(browser, pages):
-    browser.size(1280, 900)
-    browser.open(pages["chain"])
+    browser.show(pages["chain"])
     browser.evaluate("showAlpha(5)")
     assert browser.evaluate("byId('count').textContent") == "27 solutions at alpha = 5"
     assert cards(browser) == 12
@@ -176,8 +167,7 @@ def test_more_solutions_than_fit_are_on_further_pages(browser, pages):
 
 @pytest.mark.slow
 def test_a_graph_cut_short_never_counts_as_complete(browser, pages):
-    browser.size(1280, 900)
-    browser.open(pages["cut"])
+    browser.show(pages["cut"])
     for position in range(0, browser.evaluate("data.slider.length"), 20):
         slide_to(browser, position)
         assert "there may be more" in browser.evaluate("byId('count').textContent")

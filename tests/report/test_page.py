@@ -7,23 +7,35 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
-from pages import Reader, data_of
+from command_line import assert_refused, printed, run
+from pages import Reader, data_of, page_of, text_of
+from path_problems import sheet_of_one_node
 from refusals import bad_argument, refusal
 
 import enumsol
-from enumsol import MissingDependencyError, branch_graph, enumerate_roots, fem, gallery, histories, write_report
-from enumsol.cli import main
+from enumsol import (
+    ContactProblem,
+    MissingDependencyError,
+    branch_graph,
+    enumerate_roots,
+    fem,
+    gallery,
+    histories,
+    write_report,
+)
+from enumsol.model.shapes import body_shape
 from enumsol.report import body as bodies, content, history_page
 from enumsol.report.body import body_record
 from enumsol.report.content import rounded_list, slider_alphas
 
 pytest.importorskip("plotly")
 HOSTILE = '</script><script>alert("2")</script>'
+REPORT = ("report", "gallery:two-node-6.4", "--from", 0, "--to", 10)
 
 
-def page_of(graph, folder, **options):
-    write_report(graph, folder / "page.html", **options)
-    return (folder / "page.html").read_text(encoding="utf-8")
+def matrices(problem):
+    """What a problem has without its mesh."""
+    return problem.A, problem.Bn, problem.Bt, problem.f
 
 
 @pytest.fixture(scope="module")
@@ -40,8 +52,7 @@ def wedge_page(wedge, tmp_path_factory):
 def test_the_numbers_are_those_of_the_graph(wedge, wedge_page):
     data = data_of(wedge_page)
     p = wedge.problem.p
-    assert data["interval"] == [0, 3]
-    assert data["complete"] is True
+    assert (data["interval"], data["complete"]) == ([0, 3], True)
     assert data["nodes"] == [str(label) for label in wedge.problem.node_ids]
     assert (data["steps"]["alphas"], data["steps"]["at"], data["steps"]["between"]) == tuple(
         [float(x) if k == 0 else x for x in part] for k, part in enumerate(wedge.steps)
@@ -100,8 +111,6 @@ def test_bodies_move_as_the_roots_say(wedge, wedge_page):
         for force, acts in zip(forces, body["acts"], strict=True):
             for node, x, y in acts:
                 nodal[node] += force * np.array([x, y])
-        from enumsol.model.shapes import body_shape
-
         expected = body_shape(wedge.problem).contact_forces(wedge.problem, root.lambda_n, root.lambda_t)
         np.testing.assert_allclose(nodal, expected, atol=1e-8 * max(np.max(np.abs(expected)), 1e-30))
     assert [[node for node, _ in row] for row in body["rows"]] == [[node] for node in wedge.problem.node_ids]
@@ -122,18 +131,16 @@ def test_large_meshes_are_drawn_by_their_boundary_or_not_at_all():
 
 def test_what_is_said_of_a_body_that_is_not_drawn(monkeypatch):
     square = gallery.two_node_square()
-    bare = enumsol.ContactProblem(square.A, square.Bn, square.Bt, square.f)
-    graph = enumsol.branch_graph(bare, (0, 1))
-    made = content.report_content(graph)
+    bare, meshed = (branch_graph(one, (0, 1)) for one in (ContactProblem(*matrices(square)), square))
+    made = content.report_content(bare)
     assert (made["body"], made["no_body"]) == (None, "The problem has no mesh, so no body is drawn")
     monkeypatch.setattr(bodies, "_MOST_NUMBERS", 10)
-    made = content.report_content(enumsol.branch_graph(square, (0, 1)))
+    made = content.report_content(meshed)
     assert made["body"] is None
     assert "too large to draw: the displacements of 4 nodes" in made["no_body"]
     monkeypatch.undo()
-    made = content.report_content(enumsol.branch_graph(square, (0, 1)))
-    assert len(made["body"]["points"]) == 4
-    assert made["no_body"] == ""
+    made = content.report_content(meshed)
+    assert (len(made["body"]["points"]), made["no_body"]) == (4, "")
 
 
 def test_the_slider_reaches_every_narrow_step():
@@ -185,15 +192,15 @@ def test_the_page_is_small_and_asks_the_network_for_nothing(wedge_page):
 
 def test_names_are_escaped(tmp_path):
     square = gallery.two_node_square()
-    problem = enumsol.ContactProblem(square.A, square.Bn, square.Bt, square.f, node_ids=[HOSTILE, "<b>&amp;"])
+    problem = ContactProblem(*matrices(square), node_ids=[HOSTILE, "<b>&amp;"])
     page = page_of(branch_graph(problem, (0, 10)), tmp_path, title=HOSTILE, units=(HOSTILE, "<i>"), commands=[HOSTILE])
     plain = page_of(branch_graph(square, (0, 10)), tmp_path, commands=["enumsol"])
     names = [[tag for tag, _ in Reader(text).tags] for text in (page, plain)]
     assert names[0] == names[1]
-    assert HOSTILE in Reader(page).text
+    assert HOSTILE in text_of(page)
     assert HOSTILE not in page
-    assert data_of(page)["nodes"] == [HOSTILE, "<b>&amp;"]
-    assert data_of(page)["body"] is None
+    data = data_of(page)
+    assert (data["nodes"], data["body"]) == ([HOSTILE, "<b>&amp;"], None)
 
 
 @pytest.mark.parametrize("nodes", [1, 8, 12])
@@ -201,12 +208,10 @@ def test_a_graph_cut_short_says_so(tmp_path, nodes):
     graph = branch_graph(gallery.two_node_square(), (0, 10), max_nodes=nodes)
     assert not graph.complete
     page = page_of(graph, tmp_path)
-    text = Reader(page).text
-    assert "complete: yes" not in text
-    assert "It is proven" not in text
-    assert "This graph is not complete" in text
-    assert graph.completeness() in text
-    assert "numbers of solutions are lower bounds" in text
+    text = text_of(page)
+    assert not re.search("complete: yes|It is proven", text)
+    for said in ("This graph is not complete", graph.completeness(), "numbers of solutions are lower bounds"):
+        assert said in text
     data = data_of(page)
     assert (data["complete"], data["exact_counts"]) == (False, False)
 
@@ -214,9 +219,8 @@ def test_a_graph_cut_short_says_so(tmp_path, nodes):
 def test_fast_arithmetic_proves_nothing(tmp_path):
     graph = branch_graph(gallery.two_node_square(), (0, 10), "fast")
     page = page_of(graph, tmp_path)
-    assert "complete: yes" not in Reader(page).text
-    assert "It is proven" not in Reader(page).text
-    assert "Nothing is proven" in Reader(page).text
+    assert not re.search("complete: yes|It is proven", text_of(page))
+    assert "Nothing is proven" in text_of(page)
     assert data_of(page)["complete"] is False
 
 
@@ -225,45 +229,39 @@ def test_continua_and_sheets(tmp_path):
     (family,) = [v["family"] for v in data["vertices"] if v["family"] is not None]
     assert family["dimension"] == 1
     assert family["f"] == [[0, 0], [1, -2]]
-    triangle = gallery.one_node_triangle()
-    options = {"friction": 2.0, "load_slope": [1.0, -2.0]}
-    unloaded = enumsol.ContactProblem(triangle.A, triangle.Bn, triangle.Bt, [0.0, 0.0], **options)
-    page = page_of(branch_graph(unloaded, (-1, 1)), tmp_path)
+    page = page_of(branch_graph(sheet_of_one_node(), (-1, 1)), tmp_path)
     (sheet,) = [arc for arc in data_of(page)["arcs"] if arc["dimension"]]
     assert "a" not in sheet
     assert (sheet["lo"], sheet["hi"]) == (0, 1)
-    assert "sheet (a continuum over an interval)" in Reader(page).text
+    assert "sheet (a continuum over an interval)" in text_of(page)
 
 
 def test_what_cannot_be_written_is_refused(tmp_path, monkeypatch):
-    graph = branch_graph(gallery.one_node_triangle(), (0, 5))
-    bad_argument("solutions is a int", write_report, 3, tmp_path / "page.html")
-    bad_argument("title is a int", write_report, graph, tmp_path / "page.html", title=3)
-    bad_argument("units is 'N'", write_report, graph, tmp_path / "page.html", units="N")
+    graph, page = branch_graph(gallery.one_node_triangle(), (0, 5)), tmp_path / "page.html"
+    bad_argument("solutions is a int", write_report, 3, page)
+    bad_argument("title is a int", write_report, graph, page, title=3)
+    bad_argument("units is 'N'", write_report, graph, page, units="N")
     bad_argument("cannot be written", write_report, graph, tmp_path / "nowhere" / "page.html")
     monkeypatch.setitem(sys.modules, "plotly.offline", None)
-    refusal(MissingDependencyError, r"enumsol\[report\]", write_report, graph, tmp_path / "page.html")
-    assert not (tmp_path / "page.html").exists()
+    refusal(MissingDependencyError, r"enumsol\[report\]", write_report, graph, page)
+    assert not page.exists()
 
 
 @pytest.mark.slow
 def test_the_command(tmp_path, capsys):
     page, proof = tmp_path / "a page.html", tmp_path / "square.proof"
-    command = ["report", "gallery:two-node-6.4", "--from", "0", "--to", "10", "-o", str(page), "--proof", str(proof)]
-    assert main(command) == 0
-    assert capsys.readouterr().out.endswith("complete: yes (proven)\n")
-    text = Reader(page.read_text(encoding="utf-8")).text
+    assert printed(capsys, *REPORT, "-o", page, "--proof", proof).endswith("complete: yes (proven)\n")
+    text = text_of(page)
     assert f"enumsol verify gallery:two-node-6.4 {proof}" in text
     assert text.startswith("gallery:two-node-6.4")
-    assert main(["verify", "gallery:two-node-6.4", str(proof)]) == 0
-    capsys.readouterr()
-    assert main([*command[:8], "--max-nodes", "3", "--title", "<T>", "--units", "kN,m", "--json", "-"]) == 3
-    found = json.loads(capsys.readouterr().out)
+    printed(capsys, "verify", "gallery:two-node-6.4", proof)
+    options = ("--max-nodes", 3, "--title", "<T>", "--units", "kN,m", "--json", "-")
+    found = json.loads(printed(capsys, *REPORT, "-o", page, *options, status=3))
     assert (found["report"], found["complete"]) == (str(page), False)
     page_text = page.read_text(encoding="utf-8")
     assert "<h1>&lt;T&gt;</h1>" in page_text
     assert data_of(page_text)["units"] == ["kN", "m"]
-    assert "enumsol verify gallery" not in Reader(page_text).text
+    assert "enumsol verify gallery" not in text_of(page)
 
 
 @pytest.mark.parametrize(
@@ -276,11 +274,7 @@ def test_the_command(tmp_path, capsys):
     ],
 )
 def test_the_command_refuses_before_it_searches(capsys, options, message):
-    assert main(["report", "gallery:two-node-6.4", "--from", "0", "--to", "10", *options]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert message in err
-    assert err.count("\n") == 1
+    assert_refused(*run(capsys, *REPORT, *options), message)
 
 
 # -- what was given ----------------------------------------------------------------------------------------------------
@@ -295,28 +289,20 @@ def scene():
 
 def test_the_problem_is_told_as_it_was_given(scene, tmp_path):
     graph = branch_graph(scene.problem(), (0, 1))
-    cells = {
-        "young": ["210000", "N/mm²"],
-        "poisson": ["0.3", ""],
-        "plane": ["stress", ""],
-        "contact": ["bottom", ""],
-        "symmetry": ["left", ""],
-        "spring": ["right: 20, 10", "N/mm³"],
-        "load": ["top: 30, -60", "N/mm²"],
-        "gap": ["0.0001", "mm"],
-        "friction": ["0.3", ""],
-        "thickness": ["1", "mm"],
-    }
+    cells = {"young": ["210000", "N/mm²"], "spring": ["right: 20, 10", "N/mm³"], "load": ["top: 30, -60", "N/mm²"]}
+    cells |= {"gap": ["0.0001", "mm"], "thickness": ["1", "mm"]}
+    bare = {"poisson": "0.3", "plane": "stress", "contact": "bottom", "symmetry": "left", "friction": "0.3"}
+    cells |= {name: [value, ""] for name, value in bare.items()}
     page = page_of(graph, tmp_path, units=("N", "mm"), scene=scene)
     given = page[page.index('<section id="given">') :]
     rows = re.findall(r'<tr><th scope="row">(.*?)</th>(.*?)</tr>', given[: given.index("</table>")])
     assert {name: re.findall("<td>(.*?)</td>", row) for name, row in rows} == cells
-    text = Reader(page).text
+    text = text_of(page)
     assert "resultant (30, -60)" in text
     assert "gap 0.0001 mm" in text
     roots = enumerate_roots(scene.problem(), 0)
     plain = page_of(roots, tmp_path, scene=scene)
-    assert "Numbers are in the user's own consistent units" in Reader(plain).text
+    assert "Numbers are in the user's own consistent units" in text_of(plain)
     assert 'id="given"' not in page_of(roots, tmp_path)
     bad_argument("scene is a str; expected a Scene", write_report, graph, tmp_path / "page.html", scene="scene.toml")
 
@@ -369,19 +355,16 @@ def test_commands_tell_what_a_toml_file_gave(tmp_path, capsys, monkeypatch):
     keys = 'mesh = "block.inp"\nyoung = 7\npoisson = 0.3\ncontact = "bottom"\nclamp = "left"\nload.top = [0.1, -0.3]\n'
     (tmp_path / "block.toml").write_text(keys + "friction = 0.4\n")
     for verb in ("roots", "solve"):
-        assert main([verb, "block.toml", "--alpha", "0", "--report", f"{verb}.html", "--units", "kN,m"]) == 0
-        text = Reader((tmp_path / f"{verb}.html").read_text(encoding="utf-8")).text
-        assert "top: 0.1, -0.3 kN/m²" in text
-    capsys.readouterr()
-    assert main(["roots", "block.toml", "--alpha", "0", "--units", "kN"]) == 2
-    assert "--units is kN; expected units of force and length" in capsys.readouterr().err
+        assert run(capsys, verb, "block.toml", "--alpha", 0, "--report", f"{verb}.html", "--units", "kN,m")[0] == 0
+        assert "top: 0.1, -0.3 kN/m²" in text_of(tmp_path / f"{verb}.html")
+    answer = run(capsys, "roots", "block.toml", "--alpha", 0, "--units", "kN")
+    assert_refused(*answer, "--units is kN; expected units of force and length")
 
 
 def test_no_outline_is_as_wide_as_a_body_is_long():
     """One unit of a picture is one of length: outlines are measured in pixels, or by their shape."""
-    rules = dict(
-        re.findall(r"^svg ([^{]+) \{ (.*) \}$", files("enumsol.report").joinpath("page.css").read_text(), re.M)
-    )
+    sheet = files("enumsol.report").joinpath("page.css").read_text()
+    rules = dict(re.findall(r"^svg ([^{]+) \{ (.*) \}$", sheet, re.M))
     drawn = {names: rule for names, rule in rules.items() if re.search(r"stroke: var", rule)}
     assert {".before", ".after", ".held", ".wall"} <= rules.keys()
     measured = " ".join(names for names, rule in rules.items() if "non-scaling-stroke" in rule)
@@ -397,12 +380,11 @@ def test_an_incomplete_history_says_so(tmp_path, monkeypatch):
     monkeypatch.setattr(history_page, "_image", lambda _, words: f"<p>Picture of {words}.</p>")
     problem = gallery.one_node_triangle()
     history = histories(problem, [5, 4], follow="nearest")
-    write_report(history, tmp_path / "page.html", units=("N", "mm"))
-    page = Reader((tmp_path / "page.html").read_text())
+    text = text_of(page_of(history, tmp_path, units=("N", "mm")))
     assert not history.complete
-    assert "This history is not complete." in page.text
-    assert "these are all histories" not in page.text
+    assert "This history is not complete." in text
+    assert "these are all histories" not in text
     for said in (history.completeness(), *history.reasons, problem.fingerprint, "enumsol verify PROBLEM FILE"):
-        assert said in page.text
+        assert said in text
     for drawn in ("alpha against displacement", "lambda_n against step", "deformed bodies of step 2"):
-        assert f"Picture of {drawn}." in page.text
+        assert f"Picture of {drawn}." in text

@@ -49,12 +49,7 @@ def brightness(browser, folder):
 @pytest.mark.parametrize(
     ("width", "colours", "medium"),
     [
-        (400, "light", ""),
-        (800, "light", ""),
-        (1280, "light", ""),
-        (400, "dark", ""),
-        (800, "dark", ""),
-        (1280, "dark", ""),
+        *((width, colours, "") for colours in ("light", "dark") for width in (400, 800, 1280)),
         (703, "dark", "print"),  # A4 without its margins
     ],
 )
@@ -126,13 +121,7 @@ def test_enlargements(browser, page):
     first = browser.evaluate(outline)
     browser.evaluate(f"(() => {{ const i = {inputs}[1]; i.value = '7'; i.dispatchEvent(new Event('change')); }})()")
     assert browser.evaluate(values) == [own[0], 7, *own[2:]]
-    assert [new == old for new, old in zip(browser.evaluate(outline), first, strict=True)] == [
-        True,
-        False,
-        True,
-        True,
-        True,
-    ]
+    assert [k for k, (new, old) in enumerate(zip(browser.evaluate(outline), first, strict=True)) if new != old] == [1]
     browser.evaluate("[...document.querySelectorAll('#looks button')][1].click()")
     assert browser.evaluate(values) == [2 * own[0], 14, *(2 * scale for scale in own[2:])]
     choose(browser, 0, "same")
@@ -202,10 +191,9 @@ def test_stresses_are_those_of_finite_elements(browser, tmp_path, kind):
     sigma = fem.cell_stresses(root.problem, root.u)
     largest = np.max(np.abs(sigma))
     half = (sigma[:, 0, 0] - sigma[:, 1, 1]) / 2
-    np.testing.assert_allclose(
-        [part["mean"] for part in found], np.trace(sigma, axis1=1, axis2=2) / 2, atol=1e-5 * largest
-    )
-    np.testing.assert_allclose([part["shear"] for part in found], np.hypot(half, sigma[:, 0, 1]), atol=1e-5 * largest)
+    mean, shear = np.trace(sigma, axis1=1, axis2=2) / 2, np.hypot(half, sigma[:, 0, 1])
+    np.testing.assert_allclose([part["mean"] for part in found], mean, atol=1e-5 * largest)
+    np.testing.assert_allclose([part["shear"] for part in found], shear, atol=1e-5 * largest)
     choose(browser, 1, "shear")
     fills = browser.evaluate("[...document.querySelectorAll('path.after')].map((path) => path.style.fill)")
     assert len(fills) == len(mesh.cells)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from branches.test_degenerate import pair
 from browser import find_browser
-from pages import Reader, data_of
+from command_line import assert_refused, printed, run
+from pages import data_of, text_of
 from parted_solids import solid
 from problems3d import SLIDING
 
@@ -14,7 +15,6 @@ import enumsol
 from enumsol import branch_graph, fem, gallery, write_report
 from enumsol.branches import ways
 from enumsol.branches.figures.curves import QUANTITIES, curves
-from enumsol.cli import main
 from enumsol.model.shapes import body_shape
 from enumsol.report.given import given_section
 
@@ -69,8 +69,7 @@ def check_arcs(data, graph):
 
 
 def test_the_numbers_of_a_node_and_the_words(turning, node_page):
-    page = node_page.read_text()
-    data, text = data_of(page), Reader(page).text
+    data, text = data_of(node_page), text_of(node_page)
     check_arcs(data, turning)
     assert data["tangents"] == 2
     assert data["no_body"] == "The problem has no mesh and no coordinates, so no body is drawn"
@@ -94,7 +93,7 @@ def test_components_are_near_the_arcs_where_forces_turn(turning):
 
 @pytest.mark.slow
 def test_the_bodies_of_a_graph_move_as_the_roots_say(wedge, wedge_page):
-    data = data_of(wedge_page.read_text())
+    data = data_of(wedge_page)
     check_arcs(data, wedge)
     body, alpha = data["body"], 1.02
     shape = body_shape(wedge.problem)
@@ -125,16 +124,13 @@ def test_options_of_plane_bodies_are_not_told_of_a_solid():
 def test_the_command_takes_a_problem_in_3d(tmp_path, capsys):
     enumsol.write_problem(TURNING, tmp_path / "node.npz")
     page, proof = tmp_path / "node.html", tmp_path / "node.proof"
-    command = ["report", str(tmp_path / "node.npz"), "--from", "0", "--to", "1/4", "-o", str(page)]
-    assert main([*command, "--proof", str(proof)]) == 0
-    assert capsys.readouterr().out.endswith("complete: yes (proven)\n")
-    assert f"enumsol verify {tmp_path / 'node.npz'} {proof}" in Reader(page.read_text()).text
-    assert main([*command, "--jobs", "2"]) == 2
-    assert "--jobs is 2 for a problem in 3D; expected 1" in capsys.readouterr().err
+    command = ("report", tmp_path / "node.npz", "--from", 0, "--to", "1/4", "-o", page)
+    assert printed(capsys, *command, "--proof", proof).endswith("complete: yes (proven)\n")
+    assert f"enumsol verify {tmp_path / 'node.npz'} {proof}" in text_of(page)
+    assert_refused(*run(capsys, *command, "--jobs", 2), "--jobs is 2 for a problem in 3D; expected 1")
     enumsol.write_problem(SLIDING, tmp_path / "node.npz")
-    assert main([*command, "--to", "3", "--max-nodes", "1"]) == 3
-    capsys.readouterr()
-    assert "This graph is not complete" in Reader(page.read_text()).text
+    printed(capsys, *command, "--to", 3, "--max-nodes", 1, status=3)
+    assert "This graph is not complete" in text_of(page)
 
 
 # -- in a browser -----------------------------------------------------------------------------------------------------
@@ -142,14 +138,12 @@ def test_the_command_takes_a_problem_in_3d(tmp_path, capsys):
 
 @in_a_browser
 def test_a_node_has_bars_and_lengths_of_tangential_vectors(browser, node_page, turning):
-    browser.size(400, 900)
-    browser.open(node_page)
+    browser.show(node_page, 400)
     assert browser.evaluate("document.documentElement.scrollWidth") <= 400
     assert browser.evaluate("document.querySelectorAll('#cards svg.bars rect').length") == 6
     arc = turning.arcs[0]
     for name in ("sum_t", "lambda_t", "u_t", "lambda_n"):
-        browser.evaluate(f"byId('quantity').value = '{name}'; byId('quantity').dispatchEvent(new Event('change'))")
-        browser.settle()
+        browser.choose("quantity", name)
         trace = f"byId('diagram').data.find((t) => t.meta === {arc.number})"
         x, y = (browser.evaluate(f"{trace}.{part}[3]") for part in ("x", "customdata"))
         n, t = arc.values(x)
@@ -157,19 +151,15 @@ def test_a_node_has_bars_and_lengths_of_tangential_vectors(browser, node_page, t
         expected = {"lambda_n": n[0], "u_t": np.linalg.norm(slip)}.get(name, np.linalg.norm(t))
         assert y == pytest.approx(expected, rel=1e-8)
     heads = "[...document.querySelectorAll('#cards th')].map((h) => h.textContent)"
-    browser.evaluate("document.querySelectorAll('#cards details').forEach((d) => { d.open = true; })")
-    browser.settle()
-    assert browser.evaluate(heads)[:8] == [
-        "node", "status", "lambda_n", "lambda_t1", "lambda_t2", "u_n", "u_t1", "u_t2"
-    ]  # fmt: skip
+    browser.open_details()
+    assert " ".join(browser.evaluate(heads)[:8]) == "node status lambda_n lambda_t1 lambda_t2 u_n u_t1 u_t2"
     assert browser.complaints() == []
 
 
 @pytest.mark.long
 @in_a_browser
 def test_bodies_follow_the_slider(browser, wedge_page, wedge):
-    browser.size(1000, 500)
-    browser.open(wedge_page)
+    browser.show(wedge_page, 1000, 500)
     everywhere = "scenes.length === 3 && scenes.every((s) => s.dataset.drawn)"
     browser.wait_for(everywhere)
     browser.evaluate("window.first = [...scenes]; showAlpha(1.02)")
@@ -195,11 +185,10 @@ def test_a_graph_without_arcs_says_that_none_was_found(browser, folder):
     graph = branch_graph(TURNING, (0.0, 0.5), max_nodes=1, time_limit=1e-9)
     assert not graph.arcs
     write_report(graph, folder / "none.html")
-    text = Reader((folder / "none.html").read_text()).text
+    text = text_of(folder / "none.html")
     assert text.count("None was found.") == 2
     assert "no status changes" not in text
-    browser.size(1000, 500)
-    browser.open(folder / "none.html")
+    browser.show(folder / "none.html", 1000, 500)
     assert browser.evaluate("byId('count').textContent") == "0 solutions found; there may be more at alpha = 0.25"
     assert browser.complaints() == []
 
@@ -214,8 +203,7 @@ def test_no_arc_is_drawn_beyond_its_ends(browser, folder, monkeypatch):
     late = max((arc for arc in graph.arcs if arc.tail == gap.number), key=lambda arc: arc.lo)
     assert gap.alpha < late.lo
     write_report(graph, folder / "gap.html")
-    browser.size(1000, 500)
-    browser.open(folder / "gap.html")
+    browser.show(folder / "gap.html", 1000, 500)
     for alpha in (0.5 * (gap.alpha + late.lo), 3.05):
         browser.evaluate(f"showAlpha({alpha!r})")
         held = [f"arc {arc.number}" for arc in graph.arcs if arc.lo < alpha < arc.hi and gap.number != arc.head]
