@@ -21,5 +21,10 @@ def assert_close(one, two, *names, order=slice(None), **tolerances):
 def assert_same(one, two, *names):
     """Attributes of these names are equal, arrays to the last bit."""
     for name, ours, theirs in _pairs(one, two, names):
-        same = np.array_equal(ours, theirs) if isinstance(ours, np.ndarray) else ours == theirs
-        assert same, (name, ours, theirs)
+        assert _equal(ours, theirs), (name, ours, theirs)
+
+
+def _equal(ours, theirs):
+    if isinstance(ours, tuple) and isinstance(theirs, tuple):
+        return len(ours) == len(theirs) and all(map(_equal, ours, theirs))
+    return np.array_equal(ours, theirs) if isinstance(ours, np.ndarray) else ours == theirs

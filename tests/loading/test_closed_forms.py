@@ -33,8 +33,7 @@ def test_one_node_under_a_cyclic_load_is_the_play_operator(arithmetic):
     history = histories(pressed_node(4.0), loads, arithmetic=arithmetic)
     assert history.complete == (arithmetic != "fast")
     assert history.counts == (1,) * len(loads)
-    work = 0.0
-    previous = 0.0
+    work = previous = 0.0
     for step, (position, force) in enumerate(play_operator(loads, 4.0, FRICTION * PRESS), 1):
         root = history.root((step, 0))
         stage = history.stages(step)[0]

@@ -6,20 +6,19 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
-from complete import all_roots
+from alike import assert_close, assert_same
+from complete import all_roots, read_back
 from interruptions import CtrlC, interrupted
 from refusals import bad_argument
 
 import enumsol
-from enumsol import ContactProblem, History, InvalidArgumentError, LoadStep, enumerate_roots, histories
+from enumsol import ContactProblem, History, LoadStep, enumerate_roots, histories
 from enumsol.model.restart import SlipStart, restarted
 
 
 def test_the_wedge_ends_jammed_or_free_by_the_branch_alone(out_again):
     history = out_again
-    assert history.complete
-    assert history.unique_until == 2
-    assert history.counts == (1, 1, 3, 5)
+    assert (history.complete, history.unique_until, history.counts) == (True, 2, (1, 1, 3, 5))
     assert history.branchings == ((2, 0), (3, 2))
     last = [{status.value for status in history.root(node).statuses} for node in history.ends]
     assert last == [{"open"}, {"open"}, {"open"}, {"slip+"}, {"stick"}]
@@ -43,11 +42,8 @@ def test_every_step_is_what_enumerate_roots_finds(out_again, pulled_wedge):
         roots = enumerate_roots(by_hand, alpha)
         assert [root.statuses for root in roots] == [root.statuses for root in stage.roots]
         for one, other in zip(roots, stage.roots, strict=True):
-            assert np.allclose(one.lambda_n, other.lambda_n, rtol=0, atol=1e-12)
-        if stage.start.radius is None:
-            assert by_hand.fingerprint == stage.problem.fingerprint
-        else:
-            assert by_hand.fingerprint != stage.problem.fingerprint
+            assert_close(one, other, "lambda_n", rtol=0, atol=1e-12)
+        assert (by_hand.fingerprint == stage.problem.fingerprint) == (stage.start.radius is None)
 
 
 def test_steps_in_space_by_hand():
@@ -92,8 +88,7 @@ def test_the_radius_is_named_where_it_is_the_reason(pulled_wedge):
     (reason,) = history.reasons
     assert reason.startswith("step 4 from root 3.1: ")
     assert "because its start is known within" in reason
-    assert not history.complete
-    assert history.unique_until == 1
+    assert (history.complete, history.unique_until) == (False, 1)
 
 
 def test_a_wide_ball_is_not_decided_in_rationals(pulled_wedge):
@@ -109,20 +104,15 @@ def test_the_slip_offset_moves_no_more_than_it_has_to():
     other = restarted(block, SlipStart(np.linspace(0, 1e-3, 8)), load=2.0 * block.f)
     again = dataclasses.replace(block, slip_offset=np.linspace(0, 1e-3, 8), f=2.0 * block.f, load_slope=None)
     assert other.factorization is block.factorization
-    assert other.fingerprint == again.fingerprint
-    assert np.array_equal(other.enclosure.S, again.enclosure.S)
-    assert np.array_equal(other.enclosure.g0, again.enclosure.g0)
-    assert np.array_equal(other.enclosure.g0_rad, again.enclosure.g0_rad)
-    assert np.array_equal(other.condensed.g0, again.condensed.g0)
+    assert_same(other, again, "fingerprint", "condensed.g0")
+    assert_same(other.enclosure, again.enclosure, "S", "g0", "g0_rad")
 
 
 @pytest.mark.parametrize("arithmetic", ["verified", "exact"])
 def test_a_continuum_is_listed_and_not_followed(arithmetic):
     history = histories(enumsol.gallery.one_node_triangle(f=(1, -2)), [2, 3], arithmetic=arithmetic)
-    assert history.counts == (0, 0)
     assert history.reasons == ("step 1: 1 family of solutions, which are not followed",)
-    assert not history.complete
-    assert history.unique_until == 0
+    assert (history.counts, history.complete, history.unique_until) == ((0, 0), False, 0)
     assert "none reaches the last step" in repr(history)
 
 
@@ -150,8 +140,8 @@ def test_a_callable_chooses(pulled_wedge):
     assert [count for _, count in asked] == [1, 1, 3]
     assert asked[0][0] is None
     assert asked[1][0] is history.root((1, 0))
-    with pytest.raises(InvalidArgumentError, match="follow returned 7; expected roots of the RootSet"):
-        histories(pulled_wedge, [-1, 0], follow=lambda before, roots: 7)
+    message = "follow returned 7; expected roots of the RootSet"
+    bad_argument(message, histories, pulled_wedge, [-1, 0], follow=lambda before, roots: 7)
 
 
 def test_limits_keep_what_was_found(pulled_wedge):
@@ -159,8 +149,7 @@ def test_limits_keep_what_was_found(pulled_wedge):
     assert few.reasons == ("step 3: max_branches = 2 of 3 different ends are followed",)
     assert few.counts == (1, 1, 3, 2)
     short = histories(pulled_wedge, [-1, 0, 0.5, 1], max_nodes=3)
-    assert not short.complete
-    assert short.unique_until < 4
+    assert (short.complete, short.unique_until < 4) == (False, True)
     assert "stopped after max_nodes = " in short.reasons[-1]
     none = histories(pulled_wedge, [-1, 0, 0.5, 1], time_limit=1e-9)
     assert none.counts[-1] == 0
@@ -170,9 +159,7 @@ def test_limits_keep_what_was_found(pulled_wedge):
 def test_an_interruption_keeps_the_steps_before(pulled_wedge):
     said, stop = "histories was interrupted in step 3; 5 roots so far", CtrlC(lambda state: state.step == 3)
     partial = interrupted(said, histories, pulled_wedge, [-1, 0, 0.5, 1], progress=stop)
-    assert partial.counts == (1, 1, 3, 0)
-    assert partial.unique_until == 2
-    assert not partial.complete
+    assert (partial.counts, partial.unique_until, partial.complete) == ((1, 1, 3, 0), 2, False)
 
 
 def test_equal_ends_start_one_stage():
@@ -244,9 +231,8 @@ def test_the_first_step_is_halved_from_no_load():
 
 def test_increments_that_matter_are_told():
     # one step over a turn of the load misses the slip on the way
-    problem = ContactProblem(
-        [[1.0, 0.3], [0.3, 1.0]], [[1, 0]], [[0, 1]], [0.0, 0.0], friction=(0.5, 0.0), load_slope=[1.0, 0.0]
-    )
+    A, options = [[1.0, 0.3], [0.3, 1.0]], {"friction": (0.5, 0.0), "load_slope": [1.0, 0.0]}
+    problem = ContactProblem(A, [[1, 0]], [[0, 1]], [0.0, 0.0], **options)
     steps = [np.array([1.0, 0.0]), np.array([1.0, 0.4]), np.array([4.0, 3.0]), np.array([0.1, 0.0])]
     history = histories(problem, steps, refine=True, max_halvings=2)
     assert history.refinement.halvings >= 1
@@ -296,20 +282,16 @@ def test_tables_and_arrays_are_steps():
 def test_a_history_is_read_back_to_the_last_bit(arithmetic, tmp_path):
     problem = enumsol.gallery.one_node_triangle(f=(1.5, -4.0))
     history = histories(problem, ["5", "8/3", 3.0], arithmetic=arithmetic, refine=arithmetic == "fast")
-    history.save(tmp_path / "h.json")
-    again = History.load(tmp_path / "h.json", problem)
+    again = read_back(history, tmp_path / "h.json", problem)
     assert repr(again) == repr(history)
     assert again.to_frame().equals(history.to_frame())
     assert again.refinement == history.refinement
     for one, other in zip(again.data.stages, history.data.stages, strict=True):
-        assert one.start.key == other.start.key
-        assert one.roots.alpha == other.roots.alpha
+        assert_same(one, other, "start.key", "roots.alpha")
         for a, b in zip(one.roots, other.roots, strict=True):
-            assert np.array_equal(a.lambda_t, b.lambda_t)
-            assert a.exact_slips == b.exact_slips
-            assert np.array_equal(a.u, b.u)
-    with pytest.raises(InvalidArgumentError, match="holds a history of another problem"):
-        History.load(tmp_path / "h.json", enumsol.gallery.one_node_triangle(f=(1, -4)))
+            assert_same(a, b, "lambda_t", "exact_slips", "u")
+    another = enumsol.gallery.one_node_triangle(f=(1, -4))
+    bad_argument("holds a history of another problem", History.load, tmp_path / "h.json", another)
 
 
 @pytest.mark.slow
@@ -320,8 +302,7 @@ def test_a_history_in_space_with_families_and_open_parts_is_read_back(tmp_path, 
         (pulled_wedge, [0, 1, 0, 1]),
     ):
         history = histories(problem, steps)
-        history.save(tmp_path / "h.json")
-        again = History.load(tmp_path / "h.json", problem)
+        again = read_back(history, tmp_path / "h.json", problem)
         assert repr(again) == repr(history)
         assert len(again.stages(1)[0].roots.families) == len(history.stages(1)[0].roots.families)
 

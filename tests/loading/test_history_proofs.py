@@ -5,7 +5,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from complete import accepted_report
+from complete import accepted_report, complete_report
 from proof_tools import of_kind, proof_of, records_of
 
 import enumsol
@@ -13,11 +13,9 @@ from enumsol import histories, verify
 
 
 def test_a_branching_history_is_verified(out_again, pulled_wedge):
-    report = accepted_report(pulled_wedge, out_again.proof)
-    assert report.complete
+    report = complete_report(pulled_wedge, out_again.proof)
     assert report.unique_until == out_again.unique_until == 2
-    assert report.roots == (1, 1, 3, 5)
-    assert report.stages == (1, 1, 1, 3)
+    assert (report.roots, report.stages) == ((1, 1, 3, 5), (1, 1, 1, 3))
 
 
 def test_a_history_in_space_is_verified():
@@ -25,35 +23,28 @@ def test_a_history_in_space_is_verified():
     given = {"friction": tuple(wedge.friction_at(1).T), "friction_slope": 0.0, "f": 0 * wedge.f, "load_slope": wedge.f}
     wedge = dataclasses.replace(wedge, **given)
     history = histories(wedge, [-1, 0, 0.5, 1])
-    report = verify(wedge, history.proof)
     assert history.complete
-    assert report.complete
-    assert report.roots == (1, 1, 3, 5)
+    assert complete_report(wedge, history.proof).roots == (1, 1, 3, 5)
 
 
 def test_loads_and_friction_of_steps_are_part_of_the_proof():
     problem = enumsol.ContactProblem(np.eye(2), [[1, 0]], [[0, 1]], [2, 0], friction=0.5)
     steps = [enumsol.LoadStep(load=[2, 0.5], friction=0.25), enumsol.LoadStep(load=[2, 3]), [1, -3]]
     history = histories(problem, steps)
-    assert verify(problem, history.proof).complete
-    other = dataclasses.replace(problem, friction=0.25)
-    assert not verify(other, history.proof).ok
-    records = records_of(history.proof)
-    records[0]["steps"][1][1] = [2.0, 3.5]
-    assert not verify(problem, proof_of(records)).ok
-    records = records_of(history.proof)
-    records[0]["steps"][0][2] = [-0.25]
-    assert not verify(problem, proof_of(records)).ok
+    complete_report(problem, history.proof)
+    assert not verify(dataclasses.replace(problem, friction=0.25), history.proof).ok
+    for step, part, value in ((1, 1, [2.0, 3.5]), (0, 2, [-0.25])):
+        records = records_of(history.proof)
+        records[0]["steps"][step][part] = value
+        assert not verify(problem, proof_of(records)).ok
 
 
 def test_an_incomplete_history_is_verified_and_not_complete(pulled_wedge):
     history = histories(pulled_wedge, [0, 1, 0, 1])
     report = accepted_report(pulled_wedge, history.proof)
-    assert not report.complete
-    assert report.unique_until == 1
+    assert (report.complete, report.unique_until) == (False, 1)
     followed = histories(pulled_wedge, [-1, 0, 0.5, 1], follow="nearest")
-    report = accepted_report(pulled_wedge, followed.proof)
-    assert not report.complete
+    assert not accepted_report(pulled_wedge, followed.proof).complete
 
 
 def test_only_verified_arithmetic_proves(pulled_wedge):
@@ -142,16 +133,8 @@ _LESS = (no_follower, a_search_left_out)
     "change",
     [
         *(no_follower, narrow_start, other_start, exact_start, negative_radius, first_from_elsewhere, skips_a_step),
-        *(
-            follows_itself,
-            other_alpha,
-            fewer_steps,
-            a_search_left_out,
-            breaks_off,
-            more_behind,
-            one_more_name,
-            leaf_gone,
-        ),
+        *(follows_itself, other_alpha, fewer_steps, a_search_left_out, breaks_off, more_behind, one_more_name),
+        leaf_gone,
     ],
 )
 def test_a_changed_proof_is_not_complete(change, out_again, pulled_wedge):
@@ -173,8 +156,7 @@ def test_a_start_that_is_proven_and_too_narrow_is_not_believed(pulled_wedge):
     assert records[places[1]][3] is not None
     records[places[1]][3] = None
     records[places[1] + 1 : places[2]] = honest
-    report = accepted_report(pulled_wedge, proof_of(records))
-    assert not report.complete
+    assert not accepted_report(pulled_wedge, proof_of(records)).complete
 
 
 def test_a_wide_start_may_not_be_decided_in_rationals(pulled_wedge):

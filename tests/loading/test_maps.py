@@ -5,29 +5,31 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from complete import all_roots
-from helpers.floating_oracle import Oracle, block_on_table
+from complete import only_root
+from helpers.floating_bodies import pushed_block
+from helpers.floating_oracle import Oracle
 from interruptions import CtrlC, interrupted
+from refusals import bad_argument, refusal
 
 import enumsol
-from enumsol import InvalidArgumentError, MultiplicityMap, enumerate_roots, multiplicity_map
+from enumsol import MultiplicityMap, enumerate_roots, multiplicity_map
 from enumsol.loading import strips
+from enumsol.loading.maps import _Replaced
 from enumsol.search.data_boxes import Box
+
+SQUARE = enumsol.gallery.two_node_square()
 
 
 @pytest.fixture(scope="module")
 def over_gap():
-    return multiplicity_map(enumsol.gallery.two_node_square(), (0, 5), {"gap": [0.0, 0.05, 0.1]})
+    return multiplicity_map(SQUARE, (0, 5), {"gap": [0.0, 0.05, 0.1]})
 
 
 @pytest.mark.slow
 def test_every_value_is_what_enumerate_roots_counts(over_gap):
-    import dataclasses
-
-    square = enumsol.gallery.two_node_square()
     assert over_gap.complete
     for value in over_gap.values:
-        problem = dataclasses.replace(square, gap=value)
+        problem = SQUARE.replace(gap=value)
         for alpha in (0.5, 2.9, 3.3, 3.7, 4.5, 5):
             roots = enumerate_roots(problem, alpha)
             assert over_gap.multiplicity_at(value, alpha) == len(roots) + len(roots.families)
@@ -43,9 +45,7 @@ def test_every_value_is_what_enumerate_roots_counts(over_gap):
 @pytest.mark.slow
 def test_uniqueness_between_values_is_proven_or_said_not_to_be(over_gap):
     """Where strips claim it, enumerate_roots finds one root at random values between; folds are not claimed."""
-    import dataclasses
-
-    square, rng = enumsol.gallery.two_node_square(), np.random.default_rng(0)
+    rng = np.random.default_rng(0)
     assert [(strip.low, strip.high) for strip in over_gap.strips] == [(0.0, 0.05), (0.05, 0.1)]
     for strip, row in zip(over_gap.strips, over_gap.rows, strict=False):
         assert strip.unique
@@ -53,9 +53,8 @@ def test_uniqueness_between_values_is_proven_or_said_not_to_be(over_gap):
         assert strip.unique[-1][1] < row.limit
         for first, last in strip.unique:
             for alpha, share in ((first, 0.0), (last, 1.0), *rng.uniform(0, 1, size=(3, 2))):
-                problem = dataclasses.replace(square, gap=strip.low + share * (strip.high - strip.low))
-                roots = all_roots(problem, min(max(alpha, first), last))
-                assert len(roots) == 1
+                problem = SQUARE.replace(gap=strip.low + share * (strip.high - strip.low))
+                only_root(problem, min(max(alpha, first), last))
     frame = over_gap.to_frame()
     assert np.all(frame["to_next"][frame["solutions"] > 1] == 0)
     assert np.all(frame["to_next"][frame["value"] == 0.1] == 0)
@@ -72,7 +71,7 @@ def test_a_block_is_unique_between_all_values():
         assert [strip.unique for strip in found.strips] == [((0.5, 3.0),)] * len(found.strips)
         assert found.unique_between == 1
         assert "100 %" in repr(found)
-    constant = enumsol.ContactProblem(block.A, block.Bn, block.Bt, block.f, friction=0.5, load_slope=shear)
+    constant = block.replace(friction=0.5, load_slope=shear)
     by_friction = multiplicity_map(constant, (0.0, 0.25), {"friction": [0.5, 0.55]})
     assert by_friction.strips[0].unique == ((0.0, 0.25),)
     assert by_friction.to_frame()["to_next"].tolist() == [1.0, 0.0]
@@ -80,19 +79,18 @@ def test_a_block_is_unique_between_all_values():
 
 @pytest.mark.slow
 def test_strips_are_left_out_on_request_and_where_nothing_can_be_proven(over_gap):
-    square = enumsol.gallery.two_node_square()
-    none = multiplicity_map(square, (0, 2), {"gap": [0.0, 0.05]}, max_boxes=0)
+    over = {"gap": [0.0, 0.05]}
+    none = multiplicity_map(SQUARE, (0, 2), over, max_boxes=0)
     assert none.strips == ()
     assert repr(none).endswith("(proven at these values; says nothing about those between)")
-    assert multiplicity_map(square, (0, 2), {"gap": [0.0, 0.05]}, arithmetic="fast").strips == ()
-    assert multiplicity_map(None, (0, 2), (_with_gap, [0.0, 0.05])).strips == ()
-    few = multiplicity_map(square, (0, 5), {"gap": [0.0, 0.05]}, max_boxes=1)
-    assert few.strips[0].tried == 1
-    assert few.strips[0].unique == ()
-    with pytest.raises(InvalidArgumentError, match="max_boxes is -1; expected an integer that is not negative"):
-        multiplicity_map(square, (0, 5), {"gap": [0.0, 0.05]}, max_boxes=-1)
+    assert multiplicity_map(SQUARE, (0, 2), over, arithmetic="fast").strips == ()
+    assert multiplicity_map(None, (0, 2), (_with_gap, over["gap"])).strips == ()
+    few = multiplicity_map(SQUARE, (0, 5), over, max_boxes=1)
+    assert (few.strips[0].tried, few.strips[0].unique) == (1, ())
+    message = "max_boxes is -1; expected an integer that is not negative"
+    bad_argument(message, multiplicity_map, SQUARE, (0, 5), over, max_boxes=-1)
     with ThreadPoolExecutor(2) as pool:
-        spread = multiplicity_map(square, (0, 5), {"gap": [0.0, 0.05, 0.1]}, executor=pool)
+        spread = multiplicity_map(SQUARE, (0, 5), {"gap": [0.0, 0.05, 0.1]}, executor=pool)
     assert [strip.boxes for strip in spread.strips] == [strip.boxes for strip in over_gap.strips]
 
 
@@ -101,8 +99,6 @@ def _with_gap(value):
 
 
 def test_problems_of_a_map_share_their_factors_and_their_data_are_those_replaced():
-    from enumsol.loading.maps import _Replaced
-
     block = enumsol.gallery.get("clamped-block-8").build()
     block = enumsol.ContactProblem(block.A, block.Bn, block.Bt, block.f, friction=(0.1, 1.0), load_slope=-block.f)
     for name, value in (("friction", 0.5), ("gap", 1e-3), ("load", 0.25)):
@@ -113,13 +109,10 @@ def test_problems_of_a_map_share_their_factors_and_their_data_are_those_replaced
         )
         assert made.fingerprint == again.fingerprint
         assert made.factorization is block.factorization
-        balls = [problem.enclosure.at(0.5, *_ones(problem)).balls for problem in (made, again)]
+        ones = np.ones((2, 2 * block.p))
+        balls = [problem.enclosure.at(0.5, *ones).balls for problem in (made, again)]
         for mine, other in zip(*balls, strict=True):
             assert np.all(np.abs(mine.mid - other.mid) <= mine.rad + other.rad)
-
-
-def _ones(problem):
-    return np.ones(2 * problem.p), np.ones(2 * problem.p)
 
 
 def test_folds_are_linked_between_neighbours(over_gap):
@@ -136,7 +129,7 @@ def test_folds_are_linked_between_neighbours(over_gap):
 @pytest.mark.slow
 def test_other_parameters_and_an_executor():
     node = enumsol.gallery.one_node_triangle(f=(1.5, -4.0))
-    path = enumsol.ContactProblem(node.A, node.Bn, node.Bt, 0 * node.f, friction=5.0, load_slope=node.f)
+    path = node.replace(f=0 * node.f, friction=5.0, load_slope=node.f)
     by_friction = multiplicity_map(path, (0.1, 1), {"friction": [1, 5]})
     assert [row.between for row in by_friction.rows] == [(1,), (3,)]
     by_load = multiplicity_map(node, (1, 5), {"load": (node.f, [0, 1.0])})
@@ -148,18 +141,14 @@ def test_other_parameters_and_an_executor():
 
 
 def test_what_is_not_done_is_said(over_gap):
-    square = enumsol.gallery.two_node_square()
-    short = multiplicity_map(square, (0, 5), {"gap": [0.0, 0.1]}, max_nodes=1)
-    assert not short.complete
-    assert not short.rows[0].exact
+    call = (SQUARE, (0, 5), {"gap": [0.0, 0.1]})
+    short = multiplicity_map(*call, max_nodes=1)
+    assert (short.complete, short.rows[0].exact) == (False, False)
     assert "not proven at 2 of 2 values" in repr(short)
-    none = multiplicity_map(square, (0, 5), {"gap": [0.0, 0.1]}, time_limit=1e-9)
-    assert not none.complete
-    over = {"gap": [0.0, 0.1]}
-    partial = interrupted("after 1 of 2 values", multiplicity_map, square, (0, 5), over, progress=CtrlC())
+    assert not multiplicity_map(*call, time_limit=1e-9).complete
+    partial = interrupted("after 1 of 2 values", multiplicity_map, *call, progress=CtrlC())
     assert isinstance(partial, MultiplicityMap)
-    assert partial.values == (0.0,)
-    assert not partial.complete
+    assert (partial.values, partial.complete) == ((0.0,), False)
 
 
 def test_the_picture_has_a_line_for_every_range(over_gap, tmp_path):
@@ -189,8 +178,7 @@ def test_the_picture_has_a_line_for_every_range(over_gap, tmp_path):
     ],
 )
 def test_parameters_that_cannot_be_used(over, message):
-    with pytest.raises((InvalidArgumentError, enumsol.InvalidProblemError), match=message):
-        multiplicity_map(enumsol.gallery.one_node_triangle(), (1, 5), over)
+    refusal(enumsol.EnumsolError, message, multiplicity_map, enumsol.gallery.one_node_triangle(), (1, 5), over)
 
 
 @pytest.mark.parametrize("ends", [(0.1, 0.7), (-1e3, 1.0), (1.0, 1.0 + 1e-9)], ids=str)
@@ -215,8 +203,7 @@ def test_boxes_are_rounded_inward(ends, monkeypatch):
 
 
 def test_a_map_of_a_body_that_nothing_holds_against_rationals():
-    rest, push = (block_on_table(1, push=value, max_rigid_displacement=4.0) for value in (0.0, 1.0))
-    problem = rest.replace(load_slope=push.f - rest.f)
+    problem = pushed_block(1, max_rigid_displacement=4.0)
     found = enumsol.multiplicity_map(problem, (0, 3), {"friction": [0.125, 0.5]})
     assert found.complete
     assert not found.strips

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from plain_arrays import BN, BT, A, F, free_bar, problem
 from refusals import bad_argument, bad_problem
 
-from enumsol import ContactProblem, InvalidProblemError, enumerate_roots, fem, gallery
+from enumsol import ContactProblem, InvalidProblemError, enumerate_roots, fem
 from enumsol.condensation.factorization import Factorization
 
 
@@ -23,10 +23,7 @@ BAD = {
     "A empty": ({"A": np.zeros((0, 0))}, r"A has shape \(0, 0\)"),
     "A complex": ({"A": A + 0j}, "A is not an array of real numbers"),
     "A unsymmetric": ({"A": with_entry(A, (0, 1), -0.4)}, r"A is not symmetric: max\|A - A'\| = 0.1 .*; expected"),
-    "A negative diagonal": (
-        {"A": with_entry(A, (3, 3), -2.0)},
-        "A is not positive definite: its diagonal entry 3 is -2",
-    ),
+    "A negative": ({"A": with_entry(A, (3, 3), -2.0)}, "A is not positive definite: its diagonal entry 3 is -2"),
     "A indefinite": ({"A": A - 1.7 * np.eye(4)}, "A is not positive definite"),
     "A zero": ({"A": np.zeros((4, 4))}, "A is not positive definite: its diagonal entry 0 is 0"),
     "A rigid": ({"A": free_bar(4)}, "the body is free to move as a rigid body"),
@@ -53,10 +50,7 @@ BAD = {
     "friction shape": ({"friction": ([0.1, 0.2, 0.3], 0.0)}, r"friction F0 has shape \(3,\); expected \(2,\)"),
     "friction NaN": ({"friction": (0.0, np.nan)}, "friction F1 has the value nan"),
     "friction negative": ({"friction": -0.3}, "friction is -0.3 at contact node 0; expected F >= 0"),
-    "coordinates NaN": (
-        {"coordinates": [[0.0, np.nan], [1.0, 0.0]]},
-        r"coordinates has the value nan at index \(0, 1\)",
-    ),
+    "coordinates NaN": ({"coordinates": [[0, np.nan], [1, 0]]}, r"coordinates has the value nan at index \(0, 1\)"),
 }
 
 
@@ -67,11 +61,8 @@ def test_bad_data_get_one_sentence(case):
 
 
 def test_a_body_held_in_one_direction_only_is_named_as_free():
-    # a plane block without any support: three rigid motions
-    block = gallery.clamped_block(3, 2)
     free = np.kron(free_bar(3).toarray(), np.eye(2))
     bad_problem("free to move as a rigid body", ContactProblem, free, np.eye(6)[:1], np.eye(6)[1:2], np.ones(6))
-    assert block.p == 3
 
 
 def test_a_singular_matrix_is_not_called_indefinite():
@@ -90,8 +81,8 @@ def test_a_singular_matrix_is_not_called_indefinite():
     assert found["indefinite"] < 6
     assert found["rigid"] > 280
     box = fem.box(2, 2, 1)
-    with pytest.raises(InvalidProblemError, match="free to move as a rigid body"):
-        Factorization(fem.solid_stiffness(box.points, box.cells, (1, 1))).check_positive_definite()
+    free = Factorization(fem.solid_stiffness(box.points, box.cells, (1, 1)))
+    bad_problem("free to move as a rigid body", free.check_positive_definite)
 
 
 def test_negative_friction_at_alpha_names_the_node():
@@ -116,9 +107,7 @@ def test_fields_and_defaults():
     assert np.array_equal(p.gap, [0.25, 0.25])
     assert np.array_equal(p.slip_offset, [0.0, 1.0])
     assert np.array_equal(p.friction, [[0.0, 0.0], [1.0, 1.0]])
-    assert p.node_ids == (0, 1)
-    assert p.load_slope is None
-    assert p.coordinates is None
+    assert (p.node_ids, p.load_slope, p.coordinates) == ((0, 1), None, None)
     assert "2 contact nodes" in repr(p)
     assert "degrees of freedom  4" in repr(p)
     assert problem(gap=-0.1).gap[0] == -0.1  # a press fit

@@ -8,19 +8,17 @@ import networkx as nx
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from complete import proven_roots
+from alike import assert_same
+from complete import proven_roots, read_back
+from plain_arrays import DENSE, A
 from read_only import assert_locked, reachable
 
 import enumsol
 from enumsol import ContactProblem, gallery
 from enumsol.support.immutable import SealedMatrix, sealed
 
-A = np.array([[2.0, -0.5, 0.0, 0.0], [-0.5, 2.0, -0.5, 0.0], [0.0, -0.5, 2.0, -0.5], [0.0, 0.0, -0.5, 2.0]])
 DATA = {
-    "A": A,
-    "Bn": np.eye(4)[[0, 2]],
-    "Bt": np.eye(4)[[1, 3]],
-    "f": np.array([1.0, -2.0, 0.5, 1.0]),
+    **DENSE,
     "gap": np.array([0.0, 0.125]),
     "friction": (np.array([0.25, 0.5]), np.array([0.5, 0.0])),
     "load_slope": np.array([0.5, 0.25, 0.0, -0.5]),
@@ -55,10 +53,19 @@ def forces(body):
     return enumsol.successive_approximations(body, 0).forces.tolist()
 
 
-def unchangeable(owner, name):
-    for change in (lambda: setattr(owner, name, None), lambda: delattr(owner, name)):
-        with pytest.raises(AttributeError):
-            change()
+def unchangeable(owner, *names):
+    for name in names:
+        for change in (lambda name=name: setattr(owner, name, None), lambda name=name: delattr(owner, name)):
+            with pytest.raises(AttributeError):
+                change()
+
+
+def locked_parts(value, name="copy"):
+    """The arrays that can be reached, by their names; none can be written to."""
+    found = dict(reachable(value, name))
+    for array in found.values():
+        assert_locked(array)
+    return found
 
 
 def answers(problem):
@@ -68,9 +75,7 @@ def answers(problem):
         **{name: getattr(problem, name) for name in ("gap", "friction", "load_slope", "slip_offset")},
     )
     # what is cached belongs to what is there
-    assert problem.fingerprint == fresh.fingerprint
-    assert np.array_equal(problem.condensed.S, fresh.condensed.S)
-    assert np.array_equal(problem.enclosure.S, fresh.enclosure.S)
+    assert_same(problem, fresh, "fingerprint", "condensed.S", "enclosure.S")
     return [(root.statuses, root.lambda_n.tolist(), root.lambda_t.tolist(), root.u.tolist()) for root in roots]
 
 
@@ -136,45 +141,34 @@ def test_matrices_are_made_without_copying_and_work_as_any(problem):
 
 def test_no_array_of_a_problem_can_be_written(problem):
     assert len(problem.factorization._pivots) == 4
-    found = dict(reachable(problem, "problem"))
-    for name in ("._A.data", ".f", ".friction[0]", ".coordinates", ".factorization._scale", ".factorization._pivots"):
-        assert f"problem{name}" in found
-    for name in ("S", "g0", "g1"):
-        assert f"problem.condensed.{name}" in found
-    for name in ("S", "S_rad", "g0", "g0_rad", "g1", "g1_rad"):
-        assert f"problem.enclosure.{name}" in found
-    for array in found.values():
-        assert_locked(array)
+    parts = ["_A.data", "f", "friction[0]", "coordinates", "factorization._scale", "factorization._pivots"]
+    parts += [f"condensed.{name}" for name in ("S", "g0", "g1")]
+    parts += [f"enclosure.{name}{end}" for name in ("S", "g0", "g1") for end in ("", "_rad")]
+    assert {f"problem.{part}" for part in parts} <= locked_parts(problem, "problem").keys()
 
 
 def test_no_array_of_a_problem_in_3d_can_be_written(body):
-    found = dict(reachable(body, "problem"))
-    for name in (".f", ".areas", ".law.F1", ".mesh.points", ".mesh.rows", ".slip_mean.offset", ".condensed.S"):
-        assert f"problem{name}" in found
-    for part in ("_A.data", "_rows[Bt1].data", "slip_mean._parts[weights].data"):
-        assert f"problem.{part}" in found
-    for array in found.values():
-        assert_locked(array)
+    parts = ["f", "areas", "law.F1", "mesh.points", "mesh.rows", "slip_mean.offset", "condensed.S"]
+    parts += ["_A.data", "_rows[Bt1].data", "slip_mean._parts[weights].data"]
+    assert {f"problem.{part}" for part in parts} <= locked_parts(body, "problem").keys()
 
 
 def test_no_attribute_of_a_problem_can_be_set(problem, body):
-    for name in ("A", "_A", "f", "node_ids", "fingerprint", "condensed", "new"):
-        unchangeable(problem, name)
+    unchangeable(problem, "A", "_A", "f", "node_ids", "fingerprint", "condensed", "new")
     for part in (problem.condensed, problem.enclosure, body.condensed):
         unchangeable(part, "S")
-    for owner, name in ((problem.factorization, "_scale"), (problem.factorization, "_lu"), (problem._A, "data")):
-        unchangeable(owner, name)
-    assert isinstance(problem.node_ids, tuple)
-    assert isinstance(problem.friction, tuple)
+    unchangeable(problem.factorization, "_scale", "_lu")
+    unchangeable(problem._A, "data")
+    assert {type(problem.node_ids), type(problem.friction)} == {tuple}
 
 
 def test_no_attribute_of_a_problem_in_3d_can_be_set(body):
     before = forces(body)
-    for name in ("law", "areas", "slip_mean", "mesh"):
-        unchangeable(body, name)
-    friction, mean = body.friction, body.slip_mean
-    for owner, name in ((friction, "F1"), (friction, "new"), (body.mesh, "rows"), (mean, "weights"), (mean, "offset")):
-        unchangeable(owner, name)
+    mean = body.slip_mean
+    unchangeable(body, "law", "areas", "slip_mean", "mesh")
+    unchangeable(body.friction, "F1", "new")
+    unchangeable(body.mesh, "rows")
+    unchangeable(mean, "weights", "offset")
     for name in ("T1", "T2", "weights"):
         matrix = getattr(mean, name)
         matrix.data = np.zeros_like(matrix.data)
@@ -219,8 +213,7 @@ def test_the_callers_arrays_are_copied_in_3d():
     table = enumsol.FrictionTable(slips, slips)
     for array in (*given.values(), weights, rows, offset, slips):
         array[...] = 7
-    assert np.array_equal(made.points, mesh.points)
-    assert np.array_equal(made.cells, mesh.cells)
+    assert_same(made, mesh, "points", "cells")
     assert mean([1.0, 3.0, 0.0, 0.0]) == pytest.approx([2.0 * np.sqrt(2.0)])
     assert table.slip.tolist() == table.F1.tolist() == [0.0, 1.0, 2.0]
 
@@ -229,8 +222,7 @@ def test_the_callers_arrays_are_copied_in_3d():
 def test_copies_are_as_locked_and_as_right(problem, again):
     other = again(problem)
     assert answers(other) == answers(problem)
-    for array in dict(reachable(other, "copy")).values():
-        assert_locked(array)
+    locked_parts(other)
     with pytest.raises(AttributeError, match="ContactProblem is immutable: f cannot be set; build a new problem"):
         other.f = other.f
     with pytest.raises(AttributeError, match="ContactProblem is immutable: f cannot be deleted"):
@@ -241,8 +233,7 @@ def test_copies_are_as_locked_and_as_right(problem, again):
 def test_copies_in_3d_are_as_locked_and_as_right(body, again):
     other = again(body)
     assert forces(other) == forces(body)
-    for array in dict(reachable(other, "copy")).values():
-        assert_locked(array)
+    locked_parts(other)
     for owner, name in ((other, "f"), (other.friction, "F1"), (other.slip_mean, "offset")):
         with pytest.raises(AttributeError, match=f"is immutable: {name} cannot be set"):
             setattr(owner, name, None)
@@ -278,56 +269,39 @@ def results():
 
 @pytest.mark.parametrize("name", ["roots", "exact", "family", "vertices", "components", "path", "point", "tangents"])
 def test_no_array_of_a_result_can_be_written(results, name):
-    found = dict(reachable(results[name], name))
-    assert found
-    for array in found.values():
-        assert_locked(array)
-    # nor of a copy
-    for array in dict(reachable(copy.deepcopy(results[name]), name)).values() if name in ("roots", "path") else ():
-        assert_locked(array)
+    assert locked_parts(results[name])
+    if name in ("roots", "path"):
+        assert locked_parts(copy.deepcopy(results[name]))
 
 
 def test_no_attribute_of_a_result_can_be_set(results):
     """``roots.stopped = None`` made a search that was cut short print "complete: yes (proven)"."""
     cut = enumsol.enumerate_roots(gallery.get("wedge-8-5").build(), 3.0, max_nodes=20)
-    for owner, name in (
-        (cut, "stopped"),
-        (cut, "undecided"),
-        (cut, "arithmetic"),
-        (results["graph"], "reasons"),
-        (results["graph"], "arithmetic"),
-        (results["graph"], "arcs"),
-        (results["graph"].vertices[0], "kind"),
-        (results["graph"].arcs[0], "index"),
-        (results["roots"][0], "index"),
-        (results["path"], "alpha"),
-    ):
-        with pytest.raises(AttributeError):
-            setattr(owner, name, ())
+    graph = results["graph"]
+    unchangeable(cut, "stopped", "undecided", "arithmetic")
+    unchangeable(graph, "reasons", "arithmetic", "arcs")
+    unchangeable(graph.vertices[0], "kind")
+    for part in (graph.arcs[0], results["roots"][0]):
+        unchangeable(part, "index")
+    unchangeable(results["path"], "alpha")
     assert not cut.complete
 
 
 @pytest.mark.parametrize("again", [lambda x: x, *COPIES[1:]])
 def test_no_array_or_attribute_of_a_fixed_point_can_be_changed(body, again, tmp_path):
     limit = enumsol.successive_approximations(body, 0)
-    limit.save(tmp_path / "limit.npz")
-    solved = enumsol.solve_tresca(body, 1.0, 0)
-    for result in (limit, solved, enumsol.FixedPoint.load(tmp_path / "limit.npz", body)):
+    loaded = read_back(limit, tmp_path / "limit.npz", body)
+    for result in (limit, enumsol.solve_tresca(body, 1.0, 0), loaded):
         assert result.u.size
         assert result.statuses
         assert result.residuals
         kept = again(result)
-        for array in dict(reachable(kept, "result")).values():
-            assert_locked(array)
-        for name in ("lambda_n", "u", "statuses", "residuals", "new"):
-            with pytest.raises(AttributeError):
-                setattr(kept, name, None)
+        locked_parts(kept)
+        unchangeable(kept, "lambda_n", "u", "statuses", "residuals", "new")
         with pytest.raises(TypeError, match="does not support item assignment"):
             result.residuals["cone"] = 0.0
-    with pytest.raises(AttributeError):
-        limit.outcome = enumsol.fixed_points.Outcome.CONVERGED
-    with pytest.raises(AttributeError):
-        enumsol.lipschitz_estimate(body, 0).sampled = False
+    unchangeable(limit, "outcome")
+    unchangeable(enumsol.lipschitz_estimate(body, 0), "sampled")
 
 
 def test_the_network_of_a_graph_is_frozen(results):
