@@ -90,8 +90,8 @@ def test_given_starts_and_their_errors():
     for starts, message in (([1.0], "starts has shape"), (0, "starts is 0"), ([[1.0, 2.0]], r"expected \(k, p\)")):
         bad_argument(message, enumsol.basin_table, problem, roots, starts)
     bad_argument("roots has 0 roots", enumsol.basin_table, problem, [], 5)
-    with pytest.raises(enumsol.InvalidArgumentError, match="all at the same alpha"):
-        enumsol.basin_table(problem, [roots[0], enumsol.enumerate_roots(problem, 4.0)[0]])
+    other = enumsol.enumerate_roots(problem, 4.0)[0]
+    bad_argument("all at the same alpha", enumsol.basin_table, problem, [roots[0], other])
     bad_argument("table lacks", plot_basins, table[["start"]])
 
 

@@ -1,11 +1,15 @@
 """Fixed points of bodies that nothing holds: against enumeration in rationals, and the conditions as they are."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
-from complete import limit_of
+from alike import assert_close, assert_same
+from complete import limit_of, read_back
 from helpers.floating_bodies import violation
 from helpers.floating_oracle import Oracle, block_on_table, random_body
 from helpers.floating_space import known_body, on_weak_springs
+from refusals import bad_argument, refusal
 from scipy.optimize import linprog
 
 import enumsol
@@ -24,11 +28,14 @@ def checked(problem, alpha, found):
         assert violation(problem, alpha, moved, *data) < 1e-8 * size**2
 
 
+@dataclass
 class Known:
     """A solution known otherwise."""
 
-    def __init__(self, alpha, lambda_n, lambda_t, u_t):
-        self.alpha, self.lambda_n, self.lambda_t, self.u_t = alpha, lambda_n, lambda_t, u_t
+    alpha: float
+    lambda_n: np.ndarray
+    lambda_t: np.ndarray
+    u_t: np.ndarray
 
 
 def kept_of(seed):
@@ -125,10 +132,8 @@ def test_a_block_on_a_table(push):
     (root,) = enumsol.enumerate_roots(problem, 0)
     found = limit_of(problem, 0)
     assert found.free_motion is None
-    np.testing.assert_allclose(found.u, root.u, atol=1e-9)
-    np.testing.assert_allclose(found.lambda_t, root.lambda_t, atol=1e-9)
-    assert enumsol.is_fixed_point(problem, root)
-    assert enumsol.is_fixed_point(problem, found)
+    assert_close(found, root, "u", "lambda_t", rtol=1e-7, atol=1e-9)
+    assert all(enumsol.is_fixed_point(problem, state) for state in (root, found))
 
 
 def test_a_block_that_slides_or_is_lifted():
@@ -140,9 +145,8 @@ def test_a_block_that_slides_or_is_lifted():
     assert (gone.outcome, gone.converged) == (Outcome.NOT_FEASIBLE, False)
     assert gone.free_motion == pytest.approx([1.0, 0.0, 0.0], abs=1e-6)
     # 3 nodes with 1 each, pushed at all of them by 1.1 times what friction can hold
-    assert "rigid mode 0 the load drives it with 0.825, and friction within these bounds resists with at most 0.75" in (
-        " ".join(gone.why.split())
-    )
+    told = "rigid mode 0 the load drives it with 0.825, and friction within these bounds resists with at most 0.75"
+    assert told in " ".join(gone.why.split())
     problem = block_on_table()
     lifted = enumsol.successive_approximations(problem.replace(f=-problem.f), 0)
     assert lifted.outcome is Outcome.NOT_HELD
@@ -183,22 +187,19 @@ def test_three_solvers_agree(make):
         enumsol.solve_tresca(problem, bound, 0, solver=solver) for solver in ("newton", "clarabel", "cvxpy")
     )
     for other in (two, three):
-        np.testing.assert_allclose(other.forces, one.forces, atol=1e-6)
-        np.testing.assert_allclose(other.u, one.u, atol=1e-6)
-        np.testing.assert_allclose(other.rigid_coordinates, one.rigid_coordinates, atol=1e-6)
+        assert_close(other, one, "forces", "u", "rigid_coordinates", rtol=1e-7, atol=1e-6)
 
 
 def test_the_reference_finds_nothing_where_there_is_nothing():
-    with pytest.raises(enumsol.fixed_points.TrescaNotSolved, match="CVXPY found no solution"):
-        enumsol.solve_tresca(block_on_table(push=0.5), 0.0, 0, solver="cvxpy")
+    call = (enumsol.solve_tresca, block_on_table(push=0.5), 0.0, 0)
+    refusal(enumsol.fixed_points.TrescaNotSolved, "CVXPY found no solution", *call, solver="cvxpy")
 
 
 def test_the_basis_of_the_modes_and_units_do_not_matter():
     problem = block_on_table(push=0.5)
     N = problem.rigid_modes @ np.array([[1, 2, 0], [0, 1, -1], [1, 0, 4]])
-    one = enumsol.successive_approximations(problem, 0)
-    two = enumsol.successive_approximations(problem.replace(rigid_modes=N), 0)
-    three = enumsol.successive_approximations(problem.replace(f=1e-9 * problem.f), 0)
+    bodies = problem, problem.replace(rigid_modes=N), problem.replace(f=1e-9 * problem.f)
+    one, two, three = (enumsol.successive_approximations(body, 0) for body in bodies)
     np.testing.assert_allclose(two.u, one.u, atol=1e-10)
     np.testing.assert_allclose(1e9 * three.u, one.u, atol=1e-10)
 
@@ -206,10 +207,8 @@ def test_the_basis_of_the_modes_and_units_do_not_matter():
 def test_weak_springs_tend_to_it():
     problem = known_body(5).problem
     free = enumsol.successive_approximations(problem, 0)
-    far = [
-        np.max(np.abs(enumsol.successive_approximations(on_weak_springs(problem, k), 0, free).u - free.u))
-        for k in (1e-3, 1e-5)
-    ]
+    held = [enumsol.successive_approximations(on_weak_springs(problem, k), 0, free) for k in (1e-3, 1e-5)]
+    far = [np.max(np.abs(weak.u - free.u)) for weak in held]
     assert far[0] < 0.1
     assert far[1] < 0.02 * far[0]
 
@@ -234,18 +233,11 @@ def test_which_starts_reach_the_root():
 def test_saved_and_loaded(tmp_path, push):
     problem = block_on_table(push=push)
     found = enumsol.successive_approximations(problem, 0)
-    found.save(tmp_path / "found.npz")
-    again = FixedPoint.load(tmp_path / "found.npz", problem)
+    again = read_back(found, tmp_path / "found.npz", problem)
     assert repr(again) == repr(found)
-    assert np.array_equal(again.u, found.u)
+    assert_same(again, found, "u")
     held = enumsol.ContactProblem(np.eye(12), problem.Bn, problem.Bt, problem.f)
     assert FixedPoint.load(tmp_path / "found.npz", held).rigid_coordinates is None
-    other = problem.replace(rigid_modes=problem.rigid_modes)
-    with pytest.raises(enumsol.InvalidArgumentError, match="rigid_coordinates of shape"):
-        enumsol.successive_approximations(other, 0, _with(found, rigid_coordinates=np.zeros(2)))
-
-
-def _with(found, **values):
-    copy = Known(found.alpha, found.lambda_n, found.lambda_t, found.u_t)
-    copy.__dict__.update(values)
-    return copy
+    wrong = Known(found.alpha, found.lambda_n, found.lambda_t, found.u_t)
+    wrong.rigid_coordinates = np.zeros(2)
+    bad_argument("rigid_coordinates of shape", enumsol.successive_approximations, problem, 0, wrong)

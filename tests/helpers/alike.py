@@ -12,7 +12,7 @@ def _pairs(one, two, names):
         yield name, *(value.toarray() if sp.issparse(value) else value for value in values)
 
 
-def assert_close(one, two, *names, order=slice(None), **tolerances):
+def assert_close(one, two, *names, order=..., **tolerances):
     """Attributes of these names agree within the tolerances of numpy.allclose; those of one are taken in an order."""
     for name, ours, theirs in _pairs(one, two, names):
         assert np.allclose(np.asarray(ours)[order], theirs, **tolerances), name
