@@ -1,16 +1,18 @@
 """Gallery problems: closed forms, geometry, root counts by brute force where p is small, the registry."""
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
+from alike import assert_close, assert_same
 from complete import all_roots
 from effort import some
 from oracles import brute_force, condense
 from refusals import bad_argument
 
 import enumsol
-from enumsol import gallery
+from enumsol import fem, gallery
 
 OPEN, STICK, SLIP_PLUS, SLIP_MINUS = range(4)
 
@@ -51,17 +53,14 @@ def test_one_node_criterion():
 
 
 def test_two_node_square_agrees_with_scikit_fem():
-    from enumsol import fem
-
     lame = (1.3, 0.7)
     square = gallery.two_node_square(lame=lame)
     assembled = fem.contact_problem(
         [[0, 0], [1, 0], [0, 1], [1, 1]], [[0, 1, 2], [1, 3, 2]], lame, contact=[0, 1], normals=[[0, -1], [1, 0]],
         held=[2, 3], forces=[[-3, -1], [1, -1], [0, 0], [0, 0]],
     )  # fmt: skip
-    assert np.allclose(square.condensed.S, assembled.condensed.S, rtol=1e-13, atol=1e-13)
-    assert np.allclose(square.condensed.g0, assembled.condensed.g0, rtol=1e-13, atol=1e-13)
-    assert np.array_equal(square.coordinates, assembled.coordinates)
+    assert_close(square, assembled, "condensed.S", "condensed.g0", rtol=1e-13, atol=1e-13)
+    assert_same(square, assembled, "coordinates")
 
 
 def test_two_node_square_is_exact_for_simple_coefficients():
@@ -172,8 +171,7 @@ def test_registry_builds(name):
     if entry.dimension == 3:
         assert name in {"one-node-3d", "one-node-3d-3", f"block3d-{problem.p}", f"wedge3d-{problem.p}-{entry.roots}"}
         if problem.p < 16 and "wedge" not in name:  # those in tests/roots
-            found = all_roots(problem, entry.alpha)
-            assert len(found) == entry.roots
+            assert len(all_roots(problem, entry.alpha)) == entry.roots
     elif problem.p <= 4 and entry.roots is not None:
         roots = roots_of(problem, entry.alpha)
         assert len(roots) == entry.roots
@@ -283,6 +281,9 @@ def test_wedge3d_geometry_and_load(multipliers, p):
     assert np.array_equal(problem.friction_at(2.0), np.tile([2.0, 1.2], (p, 1)))
 
 
+wedge3d = partial(gallery.wedge3d, 1, 1, 2)
+
+
 @pytest.mark.parametrize(
     ("build", "message"),
     [
@@ -294,14 +295,11 @@ def test_wedge3d_geometry_and_load(multipliers, p):
         (lambda: gallery.block3d(1, 1, 1, pull=(0, 1)), r"pull is \(0, 1\); expected three finite numbers"),
         (lambda: gallery.block3d(1, 1, 1, gap="wide"), "gap is 'wide'; expected a finite number"),
         (lambda: gallery.wedge3d(1, 1, 1), "nz is 1; expected an integer of at least 2"),
-        (
-            lambda: gallery.wedge3d(1, 1, 2, springs=(1, 1, 0)),
-            r"springs is \(1, 1, 0\); expected three stiffnesses > 0",
-        ),
-        (lambda: gallery.wedge3d(1, 1, 2, half_angle=81), "half_angle is 81; expected degrees between 0 and 80"),
-        (lambda: gallery.wedge3d(1, 1, 2, pull=(0, 1)), r"pull is \(0, 1\); expected three finite numbers"),
-        (lambda: gallery.wedge3d(1, 1, 2, press=math.nan), "press is nan; expected a finite number"),
-        (lambda: gallery.wedge3d(1, 1, 2, multipliers="facets"), "multipliers is 'facets'; expected"),
+        (lambda: wedge3d(springs=(1, 1, 0)), r"springs is \(1, 1, 0\); expected three stiffnesses > 0"),
+        (lambda: wedge3d(half_angle=81), "half_angle is 81; expected degrees between 0 and 80"),
+        (lambda: wedge3d(pull=(0, 1)), r"pull is \(0, 1\); expected three finite numbers"),
+        (lambda: wedge3d(press=math.nan), "press is nan; expected a finite number"),
+        (lambda: wedge3d(multipliers="facets"), "multipliers is 'facets'; expected"),
     ],
 )
 def test_bad_arguments_of_problems_in_3d_are_named(build, message):

@@ -7,8 +7,9 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 import pytest
+from parted_meshes import constant_stress
 from parted_solids import held_in_part, on_bottom
-from refusals import bad_argument, refusal
+from refusals import bad_argument, bad_problem, refusal
 
 import enumsol
 from enumsol import BodyMesh, ContactProblem3D, MissingDependencyError, OutputError, fem, gallery, write_vtu
@@ -108,16 +109,13 @@ def test_directions_that_the_rows_do_not_tell_are_left_out(tmp_path):
     assert "contact_force" not in data
 
 
-def no_mesh(problem):
-    names = ("A", "Bn", "Bt1", "Bt2", "f")
-    return ContactProblem3D(*(getattr(problem, name) for name in names))
+def no_mesh(problem, **more):
+    return ContactProblem3D(*(getattr(problem, name) for name in ("A", "Bn", "Bt1", "Bt2", "f")), **more)
 
 
 def no_facets(problem):
-    names, mesh = ("A", "Bn", "Bt1", "Bt2", "f"), problem.mesh
-    return ContactProblem3D(
-        *(getattr(problem, name) for name in names), mesh=BodyMesh.of_dofs(mesh.points, mesh.cells, mesh.dofs)
-    )
+    mesh = problem.mesh
+    return no_mesh(problem, mesh=BodyMesh.of_dofs(mesh.points, mesh.cells, mesh.dofs))
 
 
 PATCHES = gallery.block3d(4, 2, 1, multipliers="elements", ratio=2)
@@ -160,8 +158,8 @@ def test_a_full_disk_is_named(tmp_path):
 
 def test_meshio_is_an_extra(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "meshio", None)
-    with pytest.raises(MissingDependencyError, match=r'VTU files need the package meshio, .* "enumsol\[meshes\]"'):
-        write_vtu(PATCHES, some_state(PATCHES), tmp_path / "p.vtu")
+    message = r'VTU files need the package meshio, .* "enumsol\[meshes\]"'
+    refusal(MissingDependencyError, message, write_vtu, PATCHES, some_state(PATCHES), tmp_path / "p.vtu")
 
 
 # -- stresses, and several states --------------------------------------------------------------------------------------
@@ -173,9 +171,7 @@ def strained(dimension, **options):
     mesh = fem.rectangle(3, 2).parted() if dimension == 2 else fem.box(2, 2, 1, **options)
     where = {"contact": "bottom", "spring": {"top": (1.0, 1.0)}}
     problem = fem.mesh_problem(mesh, young=2.5, poisson=0.25, friction=0.5, **where)
-    strain = 0.5 * (gradient + gradient.T)
-    lam, mu = fem.lame(2.5, 0.25)
-    stress = lam * np.trace(strain) * np.eye(dimension) + 2 * mu * strain
+    stress = constant_stress(gradient, fem.lame(2.5, 0.25))
     return problem, (mesh.points @ gradient.T).ravel()[problem.mesh.dofs], stress
 
 
@@ -184,9 +180,9 @@ def test_a_homogeneous_strain_has_one_stress_everywhere(tmp_path, dimension, opt
     problem, u, stress = strained(dimension, **options)
     found = fem.cell_stresses(problem, u)
     np.testing.assert_allclose(found, np.broadcast_to(stress, found.shape), atol=1e-12)
-    p, tangents = problem.p, (problem.p,) if dimension == 2 else (problem.p, 2)
-    state = SimpleNamespace(u=u, lambda_n=np.zeros(p), lambda_t=np.zeros(tangents), u_n=np.zeros(p))
-    state.u_t = np.zeros(tangents)
+    normal = np.zeros(problem.p)
+    tangential = normal if dimension == 2 else np.zeros((problem.p, 2))
+    state = SimpleNamespace(u=u, lambda_n=normal, lambda_t=tangential, u_n=normal, u_t=tangential)
     write_vtu(problem, state, tmp_path / "p.vtu")
     back = meshio.read(tmp_path / "p.vtu")
     full = np.zeros((3, 3))
@@ -211,8 +207,8 @@ def test_without_lame_coefficients_there_are_no_stresses(tmp_path):
     bad_argument("no mesh with Lame coefficients", fem.cell_stresses, problem, np.zeros(problem.n))
     write_vtu(problem, enumsol.enumerate_roots(problem, 3.5)[0], tmp_path / "p.vtu")
     assert "stress" not in meshio.read(tmp_path / "p.vtu").cell_data
-    with pytest.raises(enumsol.InvalidProblemError, match=r"mesh_lame has shape \(3,\)"):
-        BodyMesh(problem.mesh.points, problem.mesh.cells, problem.mesh.motion, lame=[1, 2, 3])
+    mesh = problem.mesh
+    bad_problem(r"mesh_lame has shape \(3,\)", BodyMesh, mesh.points, mesh.cells, mesh.motion, lame=[1, 2, 3])
 
 
 @pytest.mark.few(0, 1)
