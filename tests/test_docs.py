@@ -97,7 +97,10 @@ def test_references_in_sources(room):
     assert [(path, c) for path, text in texts.items() for block in prose(text) for c in unresolved(block)] == []
 
 
-@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+of_documents = pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+
+
+@of_documents
 def test_references_in_documents(path):
     text = path.read_text(encoding="utf-8")
     # a title is no reference, and no more is what the table of the paper's items is about
@@ -105,7 +108,7 @@ def test_references_in_documents(path):
     assert unresolved(joined(body), own=set(headings(text))) == []
 
 
-@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+@of_documents
 def test_equations_referred_to_inside_documents(path):
     text = path.read_text(encoding="utf-8")
     blocks = r"^    [^\n]*$|^```.*?^```|^\$\$$.*?^\$\$$"
@@ -119,7 +122,7 @@ def test_numbers_of_equations_are_read_from_both_kinds_of_blocks():
     assert labels(text) == ["5.1", "5.2"]
 
 
-@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+@of_documents
 def test_formulas_of_their_own_stand_between_lines(path):
     """Dollars in pairs; a formula's number ends it."""
     text = re.sub(r"^```.*?^```|^    [^\n]*$|`[^`\n]*`", "", path.read_text(encoding="utf-8"), flags=re.M | re.S)
@@ -146,7 +149,7 @@ def test_numbering_of_the_theory():
         assert all(part.startswith(label.split(".")[0] + ".") for label in labels(part))
 
 
-@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+@of_documents
 def test_files_named_in_documents_exist(path):
     named = re.findall(r"`((?:enumsol|tests|studies|docs)/[\w./-]*)`", path.read_text(encoding="utf-8"))
     assert [name for name in named if not (ROOT / name).exists()] == []
@@ -198,10 +201,8 @@ def test_references_that_do_not(text):
 
 def test_a_broken_reference_in_a_source_is_found():
     source = '"""Title (theory,\nsection 99)."""\n\n#: A number that\n#: theory, (5.99) explains.\nx = "theory"\n'
-    assert [c for block in prose(source) for c in unresolved(block)] == [
-        "theory has no section 99",
-        "theory has no equation (5.99)",
-    ]
+    complaints = [c for block in prose(source) for c in unresolved(block)]
+    assert complaints == ["theory has no section 99", "theory has no equation (5.99)"]
 
 
 def test_names_in_the_table_of_changes_are_in_the_files_beside_them():

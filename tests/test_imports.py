@@ -14,20 +14,8 @@ from enumsol.condensation.factorization import Factorization
 #: Modules that are reached as attributes.
 MODULES = [name for name in enumsol.__all__ if type(getattr(enumsol, name)) is type(enumsol)]
 #: Libraries that only some problems, results or commands need.
-RARE = {
-    "flint",
-    "networkx",
-    "pandas",
-    "matplotlib",
-    "plotly",
-    "cvxpy",
-    "skfem",
-    "typer",
-    "rich",
-    "scipy.optimize",
-    "h5py",
-    "meshio",
-}
+RARE = {"flint", "networkx", "pandas", "matplotlib", "plotly", "cvxpy", "skfem", "typer", "rich", "scipy.optimize"}
+RARE |= {"h5py", "meshio"}
 GENERIC = "import enumsol; problem = enumsol.gallery.{problem}; roots = enumsol.enumerate_roots(problem, {alpha}); "
 
 

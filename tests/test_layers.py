@@ -126,12 +126,9 @@ def test_an_import_of_a_stranger_is_found(tmp_path):
 
 
 def test_a_circle_inside_a_room_is_found(tmp_path):
-    imports = written(
-        tmp_path,
-        high__use="def later():\n    from house.high import other\n    return other",
-        high__other="from house.high.third import name",
-        high__third="from house.high.use import name",
-    )
+    files = {"high__other": "from house.high.third import name", "high__third": "from house.high.use import name"}
+    later = "def later():\n    from house.high import other\n    return other"
+    imports = written(tmp_path, high__use=later, **files)
     assert broken_layers(imports, TABLE, {}) == []
     found = circles((item.importer, item.imported) for item in imports)
     assert found == [["house.high.other", "house.high.third", "house.high.use"]]

@@ -60,19 +60,15 @@ def test_tutorial(tutorial):
 @pytest.mark.slow
 def test_the_wedge_of_the_tutorial_is_that_of_its_study(tutorial):
     mesh = fem.trapezoid(6, 4, bottom=1.0, top=1.8, height=1.0).parted()
-    wedge = fem.mesh_problem(
-        mesh, young=2.5, poisson=0.25, contact=["left", "right"], gap=-5e-4, friction=(0.0, 1.0),
-        spring={"top": (0.02, 0.02)}, load={"top": (1e-4, 1e-3)},
-    )  # fmt: skip
+    acting = {"spring": {"top": (0.02, 0.02)}, "load": {"top": (1e-4, 1e-3)}, "gap": -5e-4, "friction": (0.0, 1.0)}
+    wedge = fem.mesh_problem(mesh, young=2.5, poisson=0.25, contact=["left", "right"], **acting)
     roots = enumsol.enumerate_roots(wedge, 4)
     assert [root.statuses for root in roots] == [root.statuses for root in tutorial["roots"]]
 
 
 def test_branches_and_continuation(branches):
     graph, path = branches["graph"], branches["path"]
-    assert graph.complete
-    assert graph.multiplicity_at(3.5) == 5
-    assert graph.uniqueness_limit == 3
+    assert (graph.complete, graph.multiplicity_at(3.5), graph.uniqueness_limit) == (True, 5, 3)
     assert "of them 3 folds" in str(path)
     assert not branches["report"].complete
     assert branches["everything"].complete
@@ -109,14 +105,8 @@ def test_results(results):
 
 @pytest.mark.slow
 def test_reports(command_line):
-    assert {path.name for path in command_line["folder"].iterdir()} == {
-        "FILE",
-        "FOLDER",
-        "node.proof",
-        "roots.html",
-        "wedge.html",
-        "wedge.proof",
-    }
+    files = {"FILE", "FOLDER", "node.proof", "roots.html", "wedge.html", "wedge.proof"}
+    assert {path.name for path in command_line["folder"].iterdir()} == files
 
 
 @pytest.mark.slow
@@ -128,19 +118,16 @@ def test_a_cluster(command_line):
 @pytest.mark.slow
 def test_histories(histories):
     assert {path.name for path in histories["folder"].iterdir()} >= {"loop.png", "node.html", "wedge.html", "map.png"}
-    assert histories["history"].complete
+    assert (histories["history"].complete, histories["found"].complete) == (True, True)
     assert histories["history"].counts == (1, 1, 3, 5)
-    assert histories["found"].complete
 
 
 @pytest.mark.slow
 def test_gallery(gallery):
     counts = {"taper": 3, "clip": 3, "off": 1, "rough": 1, "rests": 1, "slides": 0, "wedge": 5, "solid": 3}
-    for name, count in counts.items():
-        assert gallery[name].complete
-        assert len(gallery[name]) == count
+    assert all(gallery[name].complete for name in (*counts, "locking"))
+    assert {name: len(gallery[name]) for name in counts} == counts
     assert gallery["safe"] == pytest.approx(0.347, abs=5e-4)
-    assert gallery["locking"].complete
     assert gallery["locking"].multiplicity_at(0.4) == 3
     assert gallery["relief"] == pytest.approx(1 / 1.2, rel=1e-4)
     assert {str(status) for status in gallery["joint"].statuses} == {"stick"}

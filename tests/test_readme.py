@@ -47,9 +47,7 @@ def test_your_matrices(seen):
 
 def test_branches(seen):
     graph = seen["graph"]
-    assert graph.complete
-    assert graph.multiplicity_at(3.5) == 5
-    assert graph.uniqueness_limit == 3
+    assert (graph.complete, graph.multiplicity_at(3.5), graph.uniqueness_limit) == (True, 5, 3)
 
 
 def test_links_lead_somewhere():

@@ -1,19 +1,11 @@
 """The parts of the study of peers that no peer has: one problem put in another form, and deflated Newton."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 import enumsol
 
-STUDIES = Path(__file__).parents[2] / "studies"
 NAMES = ("two-node-6.4", "wedge-8-5")
-
-
-@pytest.fixture(autouse=True)
-def studies(monkeypatch):
-    monkeypatch.syspath_prepend(STUDIES)
 
 
 def system_and_forces(name):

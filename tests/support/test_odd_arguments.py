@@ -55,6 +55,7 @@ LIMIT = enumsol.successive_approximations(SOLID, 0)
 TABLE = enumsol.basin_table(PROBLEM, ROOTS, 3)
 BLOCK = gallery.block3d(2, 2, 1, multipliers="elements", ratio=2)
 BOX = fem.box(2, 2, 1, cells="tetrahedra")  # assembled four times as fast as hexahedra
+BODY, BOTTOM = {"points": BOX.points, "cells": BOX.cells, "lame": (1, 1)}, {"contact": "bottom", "clamp": "top"}
 
 
 def by_function(value):
@@ -178,14 +179,7 @@ CALLS = [
     (fem.lame, {"young": 2.5, "poisson": 0.25}, "young poisson plane"),
     (
         fem.mesh_problem,
-        {
-            "mesh": fem.rectangle(2, 1).parted(),
-            "young": 2.5,
-            "poisson": 0.25,
-            "contact": "bottom",
-            "clamp": "top",
-            "pressure": {"left": 1},
-        },
+        {"mesh": fem.rectangle(2, 1).parted(), "young": 2.5, "poisson": 0.25, **BOTTOM, "pressure": {"left": 1}},
         "mesh young poisson contact plane friction friction2 axis clamp symmetry displacement spring load load_slope "
         "pressure pressure_slope body_force gap obstacle",
     ),
@@ -267,7 +261,7 @@ CALLS = [
     (fem.blocks, {"points": BOX.points, "facets": BOX.facets["bottom"], "ratio": 2}, "points facets ratio"),
     (fem.read_mesh, {"source": "a.vtu"}, "source groups"),
     (fem.read_solid, {"source": "a.vtu"}, "source groups"),
-    (fem.solid_stiffness, {"points": BOX.points, "cells": BOX.cells, "lame": (1, 1)}, "points cells lame"),
+    (fem.solid_stiffness, BODY, "points cells lame"),
     (fem.solid_body_forces, {"points": BOX.points, "cells": BOX.cells, "density": (0, 0, 1)}, "points cells density"),
     (
         fem.facet_forces,
@@ -277,15 +271,7 @@ CALLS = [
     (fem.h1_norms, {"problem": BLOCK}, "problem"),
     (
         fem.solid_contact_problem,
-        {
-            "points": BOX.points,
-            "cells": BOX.cells,
-            "lame": (1, 1),
-            "contact": BOX.facets["bottom"],
-            "held": BOX.nodes("left"),
-            "multipliers": "elements",
-            "ratio": 2,
-        },
+        {**BODY, "contact": BOX.facets["bottom"], "held": BOX.nodes("left"), "multipliers": "elements", "ratio": 2},
         "points cells lame contact normals axes held springs forces forces_slope gap friction friction_slope "
         "slip_offset node_ids multipliers ratio patches",
     ),
