@@ -254,7 +254,10 @@ MATERIAL = "--poisson 0 --friction 0 --clamp roof --clamp floor --pair upper:low
         ("PAIR --pair upper", "--pair is upper; expected NAME:NAME, or NAME:NAME:GAP"),
         ("PAIR --pair upper:lower:x", "--pair is upper:lower:x; expected numbers such as 0.5"),
         ("PAIR --pair upper:low", "the mesh has no facets named 'low'; expected one of"),
-        ("PAIR --pair roof:floor", "pair roof:floor has no node that faces a facet of floor along its normal"),
+        (
+            "PAIR --pair roof:floor",
+            "roof of the pair roof:floor has no node that faces a facet of floor along its normal",
+        ),
     ],
 )
 def test_bad_materials_and_pairs_on_the_command_line(two_bodies, capsys, options, part):

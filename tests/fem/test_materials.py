@@ -187,7 +187,8 @@ def test_values_by_part_that_do_not_fit(changes, message):
 
 
 def test_a_mesh_without_names_of_bodies_says_what_is_missing():
-    held, message = {"contact": "bottom", "clamp": "top"}, r"one of none \(in gmsh, physical groups of surfaces"
+    held = {"contact": "bottom", "clamp": "top"}
+    message = r"expected one of none \(in gmsh, physical groups of surfaces"
     bad_argument(message, fem.mesh_problem, grid(2, 2, 4), young={"pad": 1}, poisson=0, **held)
     message = "thickness is given for a body in 3D"
     bad_argument(message, fem.mesh_problem, fem.box(1, 1, 1), **STEEL, **held, thickness=2)

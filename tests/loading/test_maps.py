@@ -178,7 +178,8 @@ def test_the_picture_has_a_line_for_every_range(over_gap, tmp_path):
     ],
 )
 def test_parameters_that_cannot_be_used(over, message):
-    refusal(enumsol.EnumsolError, message, multiplicity_map, enumsol.gallery.one_node_triangle(), (1, 5), over)
+    kinds = (enumsol.InvalidArgumentError, enumsol.InvalidProblemError)
+    refusal(kinds, message, multiplicity_map, enumsol.gallery.one_node_triangle(), (1, 5), over)
 
 
 @pytest.mark.parametrize("ends", [(0.1, 0.7), (-1e3, 1.0), (1.0, 1.0 + 1e-9)], ids=str)
