@@ -24,7 +24,7 @@ from problems3d import (
     random_plane_over_alpha,
     sliding_node,
 )
-from refusals import bad_argument
+from refusals import bad_argument, refusal
 
 import enumsol
 from enumsol.arithmetic.balls import Ball
@@ -163,8 +163,7 @@ def test_a_search_that_is_cut_short_is_not_complete():
     assert not graph.complete
     assert "max_nodes = 1" in graph.reasons[0] or graph.reasons[0].startswith("stopped")
     assert graph.proof is None
-    with pytest.raises(enumsol.IncompleteGraphError):
-        graph.multiplicity_at(1.8)
+    refusal(enumsol.IncompleteGraphError, "not complete", graph.multiplicity_at, 1.8)
 
 
 def test_what_was_found_is_kept_when_the_time_is_over_or_somebody_interrupts():
@@ -185,8 +184,7 @@ def test_what_is_refused():
     with ThreadPoolExecutor(1) as workers:
         bad_argument("executor is given for a problem in 3D", enumsol.branch_graph, SLIDING, (1, 2), executor=workers)
     bad_argument("expected F >= 0", enumsol.branch_graph, SLIDING, (-1, 2))
-    with pytest.raises(enumsol.NotHeldError):
-        enumsol.branch_graph(enumsol.gallery.block_on_table3d(), (0, 1))
+    refusal(enumsol.NotHeldError, "3D", enumsol.branch_graph, enumsol.gallery.block_on_table3d(), (0, 1))
 
 
 # -- what happens along a curve ----------------------------------------------------------------------------------------

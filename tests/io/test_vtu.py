@@ -29,6 +29,12 @@ def some_state(problem, seed=0):
     )  # fmt: skip
 
 
+def written(problem, state, folder):
+    """What meshio reads of a state that was written."""
+    write_vtu(problem, state, folder / "p.vtu")
+    return meshio.read(folder / "p.vtu")
+
+
 @pytest.mark.parametrize("cells", ["hexahedra", "tetrahedra"])
 def test_a_body_with_forces_on_nodes(tmp_path, cells):
     def spiral(x):
@@ -39,9 +45,8 @@ def test_a_body_with_forces_on_nodes(tmp_path, cells):
     loads = fem.facet_forces(mesh.points, mesh.facets["top"], (0.3, 0.2, -1.0))
     problem = on_bottom(mesh, forces=loads, axes=spiral)
     state = some_state(problem)
-    write_vtu(problem, state, tmp_path / "p.vtu")
+    picture = written(problem, state, tmp_path)
     assert ElementTree.parse(tmp_path / "p.vtu").getroot().attrib["type"] == "UnstructuredGrid"
-    picture = meshio.read(tmp_path / "p.vtu")
     assert np.array_equal(picture.points, mesh.points)
     (body, surface), kinds = picture.cells, {"hexahedra": ["hexahedron", "quad"], "tetrahedra": ["tetra", "triangle"]}
     assert [body.type, surface.type] == kinds[cells]
@@ -74,9 +79,7 @@ def test_patches_are_data_of_facets(tmp_path):
         mesh.points, mesh.cells, (1, 1), contact=facets, held=held, multipliers="elements", patches=labels
     )
     assert np.array_equal(problem.mesh.rows == -1, labels == 100)
-    state = some_state(problem)
-    write_vtu(problem, state, tmp_path / "p.vtu")
-    picture = meshio.read(tmp_path / "p.vtu")
+    picture = written(problem, state := some_state(problem), tmp_path)
     inside, surface = picture.cell_data["lambda_n"]
     assert np.all(np.isnan(inside))
     row_of = {label: row for row, label in enumerate(problem.node_ids)}
@@ -91,9 +94,7 @@ def test_patches_are_data_of_facets(tmp_path):
 
 def test_contact_nodes_alone(tmp_path):
     problem = gallery.one_node_3d()
-    state = some_state(problem)
-    write_vtu(problem, state, tmp_path / "p.vtu")
-    picture = meshio.read(tmp_path / "p.vtu")
+    picture = written(problem, state := some_state(problem), tmp_path)
     assert picture.cells[0].type == "vertex"
     assert np.array_equal(picture.points, problem.coordinates)
     assert picture.point_data["lambda_n"] == state.lambda_n
@@ -103,8 +104,7 @@ def test_contact_nodes_alone(tmp_path):
 def test_directions_that_the_rows_do_not_tell_are_left_out(tmp_path):
     mesh = fem.box(2, 2, 1)
     problem = on_bottom(mesh, held=held_in_part(mesh), multipliers="elements", axes=(0.6, 0.8, 0))
-    write_vtu(problem, some_state(problem), tmp_path / "p.vtu")
-    data = meshio.read(tmp_path / "p.vtu").cell_data
+    data = written(problem, some_state(problem), tmp_path).cell_data
     assert "pressure" in data
     assert "contact_force" not in data
 
@@ -123,8 +123,7 @@ PATCHES = gallery.block3d(4, 2, 1, multipliers="elements", ratio=2)
 
 def test_a_mesh_without_facets_will_do_for_nodes(tmp_path):
     problem = gallery.block3d(2, 1, 1)
-    write_vtu(no_facets(problem), some_state(problem), tmp_path / "p.vtu")
-    picture = meshio.read(tmp_path / "p.vtu")
+    picture = written(no_facets(problem), some_state(problem), tmp_path)
     assert len(picture.cells) == 1
     assert np.array_equal(np.flatnonzero(~np.isnan(picture.point_data["lambda_n"])), problem.node_ids)
 
@@ -183,8 +182,7 @@ def test_a_homogeneous_strain_has_one_stress_everywhere(tmp_path, dimension, opt
     normal = np.zeros(problem.p)
     tangential = normal if dimension == 2 else np.zeros((problem.p, 2))
     state = SimpleNamespace(u=u, lambda_n=normal, lambda_t=tangential, u_n=normal, u_t=tangential)
-    write_vtu(problem, state, tmp_path / "p.vtu")
-    back = meshio.read(tmp_path / "p.vtu")
+    back = written(problem, state, tmp_path)
     full = np.zeros((3, 3))
     full[:dimension, :dimension] = stress
     np.testing.assert_allclose(back.cell_data["stress"][0], np.broadcast_to(full.ravel(), (len(found), 9)), atol=1e-12)
@@ -205,8 +203,7 @@ def test_files_keep_the_lame_coefficients(tmp_path):
 def test_without_lame_coefficients_there_are_no_stresses(tmp_path):
     problem = gallery.two_node_square()
     bad_argument("no mesh with Lame coefficients", fem.cell_stresses, problem, np.zeros(problem.n))
-    write_vtu(problem, enumsol.enumerate_roots(problem, 3.5)[0], tmp_path / "p.vtu")
-    assert "stress" not in meshio.read(tmp_path / "p.vtu").cell_data
+    assert "stress" not in written(problem, enumsol.enumerate_roots(problem, 3.5)[0], tmp_path).cell_data
     mesh = problem.mesh
     bad_problem(r"mesh_lame has shape \(3,\)", BodyMesh, mesh.points, mesh.cells, mesh.motion, lame=[1, 2, 3])
 

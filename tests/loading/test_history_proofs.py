@@ -52,76 +52,72 @@ def test_only_verified_arithmetic_proves(pulled_wedge):
         assert histories(pulled_wedge, [-1, 0], arithmetic=arithmetic).proof is None
 
 
-def no_follower(records):
-    places = of_kind(records, "s")
-    records[places[2]][4] = records[places[2]][4][:-1]
+def no_follower(records, starts):
+    records[starts[2]][4] = records[starts[2]][4][:-1]
 
 
-def narrow_start(records):
+def narrow_start(records, starts):
     """The start after a root that moved is a thousandth as wide as it has to be."""
-    for k in of_kind(records, "s"):
+    for k in starts:
         if records[k][3] is not None:
             records[k][3] = [1e-3 * radius for radius in records[k][3]]
 
 
-def other_start(records):
-    places = of_kind(records, "s")
-    records[places[3]][2] = [x + 1e-9 for x in records[places[3]][2]]
+def other_start(records, starts):
+    records[starts[3]][2] = [x + 1e-9 for x in records[starts[3]][2]]
 
 
-def exact_start(records):
-    for k in of_kind(records, "s"):
+def exact_start(records, starts):
+    for k in starts:
         records[k][3] = None
 
 
-def negative_radius(records):
-    k = next(k for k in of_kind(records, "s") if records[k][3] is not None)
+def negative_radius(records, starts):
+    k = next(k for k in starts if records[k][3] is not None)
     records[k][3] = [-radius for radius in records[k][3]]
 
 
-def first_from_elsewhere(records):
-    records[of_kind(records, "s")[0]][2][0] = 1e-12
+def first_from_elsewhere(records, starts):
+    records[starts[0]][2][0] = 1e-12
 
 
-def skips_a_step(records):
-    records[of_kind(records, "s")[1]][1] = 3
+def skips_a_step(records, starts):
+    records[starts[1]][1] = 3
 
 
-def follows_itself(records):
-    places = of_kind(records, "s")
-    records[places[1]][4] = [1]
+def follows_itself(records, starts):
+    records[starts[1]][4] = [1]
 
 
-def other_alpha(records):
+def other_alpha(records, starts):
     records[0]["steps"][1][0] = "1/3"
 
 
-def fewer_steps(records):
+def fewer_steps(records, starts):
     records[0]["steps"] = records[0]["steps"][:-1]
 
 
-def a_search_left_out(records):
-    places = of_kind(records, "s")
-    del records[places[-1] : -1]
+def a_search_left_out(records, starts):
+    del records[starts[-1] : -1]
     records[0]["stages"] -= 1
     records[-1]["stages"] -= 1
-    for k in of_kind(records, "s"):
+    for k in starts[:-1]:
         records[k][4] = [n for n in records[k][4] if n < records[0]["stages"]]
 
 
-def breaks_off(records):
+def breaks_off(records, starts):
     del records[-4:-1]
 
 
-def more_behind(records):
+def more_behind(records, starts):
     records.append({"stages": 1})
 
 
-def one_more_name(records):
+def one_more_name(records, starts):
     records[0]["complete"] = True
 
 
-def leaf_gone(records):
+def leaf_gone(records, starts):
     records[of_kind(records, "r")[0]] = ["n"]
 
 
@@ -139,7 +135,7 @@ _LESS = (no_follower, a_search_left_out)
 )
 def test_a_changed_proof_is_not_complete(change, out_again, pulled_wedge):
     records = copy.deepcopy(records_of(out_again.proof))
-    change(records)
+    change(records, of_kind(records, "s"))
     report = verify(pulled_wedge, proof_of(records))
     assert not report.complete
     assert report.ok == (change in _LESS), report

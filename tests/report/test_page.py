@@ -13,16 +13,7 @@ from path_problems import sheet_of_one_node
 from refusals import bad_argument, refusal
 
 import enumsol
-from enumsol import (
-    ContactProblem,
-    MissingDependencyError,
-    branch_graph,
-    enumerate_roots,
-    fem,
-    gallery,
-    histories,
-    write_report,
-)
+from enumsol import MissingDependencyError, branch_graph, enumerate_roots, fem, gallery, histories, write_report
 from enumsol.model.shapes import body_shape
 from enumsol.report import body as bodies, content, history_page
 from enumsol.report.body import body_record
@@ -131,7 +122,7 @@ def test_large_meshes_are_drawn_by_their_boundary_or_not_at_all():
 
 def test_what_is_said_of_a_body_that_is_not_drawn(monkeypatch):
     square = gallery.two_node_square()
-    bare, meshed = (branch_graph(one, (0, 1)) for one in (ContactProblem(*matrices(square)), square))
+    bare, meshed = (branch_graph(one, (0, 1)) for one in (enumsol.ContactProblem(*matrices(square)), square))
     made = content.report_content(bare)
     assert (made["body"], made["no_body"]) == (None, "The problem has no mesh, so no body is drawn")
     monkeypatch.setattr(bodies, "_MOST_NUMBERS", 10)
@@ -192,7 +183,7 @@ def test_the_page_is_small_and_asks_the_network_for_nothing(wedge_page):
 
 def test_names_are_escaped(tmp_path):
     square = gallery.two_node_square()
-    problem = ContactProblem(*matrices(square), node_ids=[HOSTILE, "<b>&amp;"])
+    problem = enumsol.ContactProblem(*matrices(square), node_ids=[HOSTILE, "<b>&amp;"])
     page = page_of(branch_graph(problem, (0, 10)), tmp_path, title=HOSTILE, units=(HOSTILE, "<i>"), commands=[HOSTILE])
     plain = page_of(branch_graph(square, (0, 10)), tmp_path, commands=["enumsol"])
     names = [[tag for tag, _ in Reader(text).tags] for text in (page, plain)]
