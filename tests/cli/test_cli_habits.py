@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from cli.test_cli_solve import BODY, TOML
+from cli.test_outputs_that_fail import PRINTING
 from command_line import assert_refused, call, printed, run
 
 from enumsol import gallery
@@ -18,6 +19,7 @@ from enumsol.cli.options import problem_names
 from enumsol.cli.progress import Display, remaining
 from enumsol.support.deadlines import tell
 
+ROOT = Path(__file__).parents[2]
 SQUARE = "gallery:two-node-6.4"
 #: A call of every verb, in a folder with the files that it reads.
 VERBS = {
@@ -49,17 +51,31 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.slow
-def test_every_verb_can_be_quiet_and_writes_json(here, capsys):
-    pytest.importorskip("plotly")
-    assert main(f"follow --csv points.csv --quiet {VERBS['follow']}".split()) == 0
+def registered():
+    """The names of all verbs."""
     names = [item.name for item in app.registered_commands]
-    names += [
+    return names + [
         f"{group.name} {item.name or item.callback.__name__.strip('_')}"
         for group in app.registered_groups
         for item in group.typer_instance.registered_commands
     ]
-    assert sorted(VERBS) == sorted(names)
+
+
+def test_every_verb_is_tried_and_shown_in_the_documents():
+    """The tests that want a command of each are slow."""
+    assert sorted(VERBS) == sorted(registered())
+    tried = [[*map(str, command)] for command in PRINTING.values()]
+    pages = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs").glob("*.md"))
+    for name in registered():
+        words = name.split()
+        assert any(command[: len(words)] == words for command in tried), f"PRINTING has no {name}"
+        assert re.search(rf"enumsol {name}\b", pages), f"no page of docs/ shows enumsol {name}"
+
+
+@pytest.mark.slow
+def test_every_verb_can_be_quiet_and_writes_json(here, capsys):
+    pytest.importorskip("plotly")
+    assert main(f"follow --csv points.csv --quiet {VERBS['follow']}".split()) == 0
     for name, options in VERBS.items():
         command = f"{name} {options}".split()
         status = main([*command, "--json", "result.json"])
