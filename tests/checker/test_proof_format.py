@@ -4,6 +4,7 @@ import ast
 import dataclasses
 import functools
 import json
+import re
 from fractions import Fraction
 from itertools import product
 from pathlib import Path
@@ -40,6 +41,7 @@ from rational_forms import Refused, fingerprint
 from touching import beside_a_loaded_node
 
 from enumsol import enumerate_roots, gallery, verify
+from enumsol.proof import records, space_records
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "proof_format.md"
 
@@ -94,6 +96,26 @@ def test_the_document_names_what_the_proofs_hold():
     for record in seen:
         words = record if isinstance(record, dict) else record[:1]
         assert all(f'"{word}"' in text or f'["{word}"' in text for word in words), words
+
+
+def section(number):
+    """The text of a section of the document."""
+    return re.search(rf"^### {re.escape(number)} .*?(?=^##)", DOCUMENT.read_text(encoding="utf-8"), re.M | re.S).group()
+
+
+@pytest.mark.parametrize(
+    ("number", "kinds"), [("5.3", records.LEAVES), ("7.5", space_records.LEAVES), ("7.8", space_records.PIECE_LEAVES)]
+)
+def test_the_document_has_a_row_for_every_kind_of_leaf(number, kinds):
+    assert set(re.findall(r'^\| `\["(\w)"', section(number), re.M)) == set(kinds)
+
+
+@pytest.mark.parametrize(
+    ("number", "kinds"), [("5.6", records.FLOATING_LEAVES), ("7.7", space_records.FLOATING_LEAVES)]
+)
+def test_the_document_names_the_leaves_of_bodies_that_nothing_holds(number, kinds):
+    named = re.search(r"The only leaves are ([\w, ]+) and\s+\[\"(\w)\"", section(number)).groups()
+    assert {*named[0].replace(" and", ",").replace(" ", "").split(","), named[1]} - {""} == set(kinds)
 
 
 # -- accepted ----------------------------------------------------------------------------------------------------------

@@ -16,16 +16,17 @@ import numpy as np
 import pytest
 import space_proofs
 from complete import proven_roots
-from generators import fe_compliance, from_condensed, integer_problem, through_the_unloaded_state
+from generators import fe_compliance, from_condensed, integer_problem, random_problem, through_the_unloaded_state
 from graph_proofs import cut_in_two, forms_at_once, triangle
 from proof_tools import MAGIC, bytes_of, of_kind, proof_of, put, records_of, sealed
 from rational_checker import check
 from rational_forms import Refused
 from refusals import bad_argument
 from touching import beside_a_loaded_node
-from trees import by_the_tree
+from trees import above_known_roots, by_the_tree
 
 from enumsol import Proof, ProofFormatError, branch_graph, enumerate_roots, gallery, verify
+from enumsol.proof.records import LEAVES
 from enumsol.search import form_policy as forms
 
 POINTS = {
@@ -40,6 +41,7 @@ POINTS = {
     "forms": lambda: (slipping(), 0.0),
     "cut short": lambda: (gallery.chain(2), 5.0),
     "one certificate": lambda: (slipping(), 0.0),
+    "alone": lambda: (random_problem(np.random.default_rng(32), 2), 0.0),
 }
 GRAPHS = {
     "graph": lambda: (triangle(), (0.0, 5.0)),
@@ -74,6 +76,9 @@ def case(name):
             records = records_of(branch_graph(problem, interval).proof)
         return problem, cut_in_two(records) if name == "halves" else records
     problem, alpha = POINTS[name]()
+    if name == "alone":
+        with above_known_roots():
+            return problem, records_of(enumerate_roots(problem, alpha).proof)
     early = mock.patch.multiple(forms, NODES=0, MORE=-2.0) if name == "forms" else nullcontext()
     with early, nullcontext() if name in ("one certificate", "touching") else by_the_tree():
         roots = enumerate_roots(problem, alpha, max_nodes=4 if name == "cut short" else None)
@@ -215,7 +220,7 @@ def test_values_of_other_types_and_texts_are_refused(name):
 @pytest.mark.slow
 def test_every_kind_of_record_is_among_them():
     kinds = {record[0] for name in CASES for record in case(name)[1] if isinstance(record, list)}
-    assert kinds == set("bqxXfnNrDmMzusct")
+    assert kinds == {*LEAVES, "b", "q", "s", "c", "t"}
 
 
 def test_multipliers_have_one_text():
