@@ -217,6 +217,28 @@ def test_names_in_the_table_of_changes_are_in_the_files_beside_them():
         assert [name for name in names if not re.search(made.format(name), sources, re.MULTILINE)] == [], row
 
 
+def recipes():
+    """The recipes of docs/architecture.md and those of CONTRIBUTING.md, by their titles."""
+    found = {}
+    for place, mark in (("docs/architecture.md", "### "), ("CONTRIBUTING.md", "## Add ")):
+        text = (ROOT / place).read_text(encoding="utf-8")
+        found |= dict(re.findall(rf"^{mark}(.+)\n((?:(?!#).*\n)*)", text, re.MULTILINE))
+    return found
+
+
+@pytest.mark.parametrize("title", recipes())
+def test_names_in_recipes_are_in_the_files_that_these_name(title):
+    text = recipes()[title]
+    places = [ROOT / name for name in re.findall(r"`((?:enumsol|studies|tests|tools)/[\w./]*)`", text)]
+    files = [file for place in places for file in ([place] if place.is_file() else place.rglob("*.py"))]
+    sources = "".join(file.read_text(encoding="utf-8") for file in files)
+    assert [name for name in re.findall(r"`(\w+)`", text) if not re.search(rf"\b{name}\b", sources)] == []
+
+
+def test_the_recipes_are_found():
+    assert {"A new command", "A new friction law", "a status", "a file format"} <= recipes().keys()
+
+
 def test_the_citation_names_this_software_and_its_paper():
     citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]

@@ -108,7 +108,10 @@ class Record:
 
 def table_of(*records: type[Record]) -> dict[str, type[Any]]:
     """The table of some kinds of records."""
-    return {record.kind: record for record in records}
+    table = {record.kind: record for record in records}
+    if len(table) < len(records):
+        raise AssertionError(f"two of the kinds {', '.join(record.kind for record in records)} begin alike")
+    return table
 
 
 def kind_of(record: list[Any], kinds: dict[str, type[Any]]) -> type[Any] | None:
