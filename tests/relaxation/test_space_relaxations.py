@@ -7,6 +7,7 @@ from space_proofs import arc_of_sector
 
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.statuses import CONTACT, UNDECIDED
+from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.relaxation.space_convex_forms import SpaceFormAscent
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.space.space_setup import SpaceSolvers
@@ -27,12 +28,19 @@ def children_left(engine, codes, node):
     return [child for child in children if not fresh(engine, child).pruned]
 
 
+def promise(engine, codes, relaxation, node):
+    """What branching on a node is worth that has several children left (theory, section 12.2)."""
+    bounds = np.array([fresh(engine, child).bound for child in children_left(engine, codes, node)])
+    gains = np.clip((bounds - relaxation.bound) / (PRUNE_MARGIN - relaxation.bound), 0, 1)
+    return relaxation.violations(codes)[node] ** 0.3 / np.sum(np.exp(-4 * gains))
+
+
 def with_code(codes, node, code):
     return (*codes[:node], code, *codes[node + 1 :])
 
 
-def test_branching_takes_a_node_of_which_all_children_but_one_are_excluded():
-    forced = free = given = 0
+def test_branching_takes_a_node_of_which_all_children_but_one_are_excluded_or_the_most_promising_one():
+    forced = free = several = given = 0
     for seed in range(8):
         S, g, F = random_coupled(np.random.default_rng(seed), 3)
         engine = SpaceEngine(SpaceSystem.scaled(S, g, F))
@@ -50,6 +58,10 @@ def test_branching_takes_a_node_of_which_all_children_but_one_are_excluded():
             left = [children_left(engine, codes, other) for other in range(3)]
             if len(left[node]) > 1:
                 free += 1
+                violated = np.flatnonzero(relaxation.violations(codes) > 0)
+                worth = {other: promise(engine, codes, relaxation, other) for other in violated.tolist()}
+                assert worth[node] > max(worth.values()) * (1 - 1e-6)
+                several += len(worth) > 1
                 assert all(len(left[other]) > 1 for other in range(3) if codes[other] in (CONTACT, UNDECIDED))
             forced += len(left[node]) <= 1
             # what was solved for the choice is handed out, with multipliers that prove what is excluded
@@ -65,6 +77,7 @@ def test_branching_takes_a_node_of_which_all_children_but_one_are_excluded():
             stack += left[node]
     assert forced > 20
     assert free > 5
+    assert several > 3
     assert given > 20
 
 
