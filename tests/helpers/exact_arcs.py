@@ -16,6 +16,7 @@ from enumsol.trusted.arcs.many_digits import precision
 from enumsol.trusted.arcs.precise import PreciseSystem
 from enumsol.trusted.arcs.selection_balls import ArcSystem
 from enumsol.trusted.selection import Selection
+from enumsol.trusted.status_rows import FRICTIONLESS
 
 
 def random_data(rng, p, *, integers=False, scale=0, ill=0):
@@ -37,6 +38,17 @@ def random_data(rng, p, *, integers=False, scale=0, ill=0):
         F1 = np.zeros(p)
     up = 2.0**scale
     return S * up, g0 * up, g1 * up, F0, F1
+
+
+def random_cases(seeds, *, integers, scales, ills):
+    """Random data, a share of them whole numbers, in units and with condition numbers of these; and a selection."""
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        p, scale = int(rng.integers(1, 4)), int(rng.choice(scales))
+        data = random_data(rng, p, integers=rng.random() < integers, scale=scale, ill=int(rng.choice(ills)))
+        codes = rng.integers(0, 4, size=p)
+        codes[rng.random(p) < 0.1] = FRICTIONLESS
+        yield rng, data, tuple(codes.tolist())
 
 
 def arc_system(data):

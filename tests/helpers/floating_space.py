@@ -62,14 +62,8 @@ def known_body(seed, p=None, r=None, frictions=(0.3, 1.0), plane=False):
             lambda_t[i] = F[i] * tau
         offset[i] = [Bt1[i] @ u, Bt2[i] @ u] - slip
     f = A @ u + Bn.T @ lambda_n + Bt1.T @ lambda_t[:, 0] + Bt2.T @ lambda_t[:, 1]
-    problem = enumsol.ContactProblem3D(
-        *(0.5 * (A + A.T), Bn, Bt1, Bt2, f),
-        gap=gap,
-        friction=(F[:, 0], F[:, 1]),
-        slip_offset=offset,
-        rigid_modes=N,
-        max_rigid_displacement=30.0,
-    )
+    data = {"gap": gap, "friction": (F[:, 0], F[:, 1]), "slip_offset": offset, "max_rigid_displacement": 30.0}
+    problem = enumsol.ContactProblem3D(0.5 * (A + A.T), Bn, Bt1, Bt2, f, rigid_modes=N, **data)
     return KnownBody(problem, u, lambda_n, lambda_t)
 
 
@@ -77,9 +71,4 @@ def on_weak_springs(problem, stiffness):
     """The same body held by springs at all degrees of freedom, which act on its rigid displacements alone."""
     N = problem.rigid_modes
     A = problem.A.toarray() + stiffness * N @ N.T
-    return enumsol.ContactProblem3D(
-        *(sp.csc_array(0.5 * (A + A.T)), problem.Bn, problem.Bt1, problem.Bt2, problem.f),
-        gap=problem.gap,
-        friction=problem.friction,
-        slip_offset=problem.slip_offset,
-    )
+    return problem.replace(A=sp.csc_array(0.5 * (A + A.T)), rigid_modes=None, max_rigid_displacement=None)

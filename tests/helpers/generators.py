@@ -9,6 +9,12 @@ from enumsol import ContactProblem, gallery
 FRICTION = (0.05, 50.0)
 
 
+def named(name):
+    """A problem of the gallery, and the alpha of interest."""
+    entry = gallery.get(name)
+    return entry.build(), entry.alpha
+
+
 def from_condensed(S, g, F):
     """A problem whose condensed data are S, g and F (constant friction)."""
     A = np.linalg.inv(S)

@@ -7,7 +7,7 @@ from unittest import mock
 
 import numpy as np
 from generators import through_the_unloaded_state
-from proof_tools import proof_of, records_of
+from proof_tools import of_kind, proof_of, records_of
 from rational_checker import check_records
 from rational_forms import Refused
 
@@ -66,6 +66,16 @@ def refused(problem, records):
     """Both checkers refuse."""
     assert not verify(problem, proof_of(records)).ok
     return not accepted(problem, records)
+
+
+def parts_of(records, *kinds):
+    """Box, place in it, beginning and part of every part of these kinds."""
+    for k in of_kind(records, "b"):
+        begin = records[k][1]
+        for i, part in enumerate(records[k][4]):
+            if part[0] in kinds:
+                yield k, i, begin, part
+            begin = part[1]
 
 
 def without_arcs(records):

@@ -128,10 +128,24 @@ def forces(root):
     return np.concatenate([root.lambda_n, root.lambda_t[:, 0], root.lambda_t[:, 1]])
 
 
+def scaled(system, lam):
+    """Forces in the problem's units, (p, 3) or as those of a root, as a system has them."""
+    y, occurs = np.zeros(len(system.g)), system.tau >= 0
+    lam = lam if lam.ndim == 2 else lam.reshape(3, -1).T
+    y[: system.p] = lam[:, 0] / system.force
+    y[system.tau[occurs]] = (lam[:, 1:] / np.where(occurs, system.F * system.force[:, None], 1.0))[occurs]
+    return y
+
+
 def bounds(root):
     """Lower and upper ends of the enclosed forces, (3p,) each."""
     box = np.concatenate([root.enclosure.lambda_n, root.enclosure.lambda_t[:, 0], root.enclosure.lambda_t[:, 1]])
     return box[:, 0], box[:, 1]
+
+
+def within(values, box):
+    """Whether all values lie in their bounds."""
+    return bool(np.all((box[..., 0] <= values) & (values <= box[..., 1])))
 
 
 def unmatched(roots, wanted, rtol=1e-6):

@@ -24,6 +24,11 @@ def records_of(proof):
     return [json.loads(line) for line in zlib.decompress(data[len(MAGIC) : -32]).splitlines()]
 
 
+def kinds_of(proof):
+    """The kinds of the records between the header and the counts at the end, one by one."""
+    return [record[0] for record in records_of(proof)[1:-1]]
+
+
 def bytes_of(proof):
     """The content of a proof file."""
     with proof._open() as file:
