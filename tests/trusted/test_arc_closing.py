@@ -55,13 +55,10 @@ class Body:
 
     def solved(self, alpha, side):
         """Solutions at an alpha by selection; the codes are those of nodes with friction also where F = 0."""
-        forms, found = self.forms(alpha, side), {}
+        forms = self.forms(alpha, side)
         ever = [a != 0 or b != 0 for a, b in zip(self.data.F0, self.data.F1, strict=True)]
-        for codes in product(*((0, 1, 2, 3) if rubs else (0, 4) for rubs in ever)):
-            points = forms.hull(codes)
-            if points:
-                found[codes] = points
-        return found
+        selections = product(*((0, 1, 2, 3) if rubs else (0, 4) for rubs in ever))
+        return {codes: points for codes in selections if (points := forms.hull(codes))}
 
     def form_is_definite(self, codes, side, numbers, alpha):
         """Q at one alpha, with any theta that serves."""
@@ -201,19 +198,15 @@ def planned(rng, p):
     return problem, tuple(codes.tolist())
 
 
-def moved_to_the_border(seeds, bisections):
-    counts = np.zeros(3, dtype=int)
-    for seed in seeds:
-        rng = np.random.default_rng([42, seed])
-        problem, codes = planned(rng, int(rng.integers(1, 3)))
-        body = Body(problem, 1.0)
-        counts += at_the_border(rng, body, (codes, 0, 0.0, 1.0), spread(0.0, 1.0, 16), bisections)
-    return counts
-
-
 @pytest.mark.slow
 def test_theta_follows_many_solutions():
-    yes, bordered, judged = moved_to_the_border(range(100, some(110, of=140)), 50)
+    counts = np.zeros(3, dtype=int)
+    for seed in range(100, some(110, of=140)):
+        rng = np.random.default_rng([42, seed])
+        problem, codes = planned(rng, int(rng.integers(1, 3)))
+        asked = codes, 0, 0.0, 1.0
+        counts += at_the_border(rng, Body(problem, 1.0), asked, spread(0.0, 1.0, 16), 50)
+    yes, bordered, judged = counts
     assert yes > some(2, of=8)
     assert bordered > some(1, of=6)
     assert judged > some(40, of=200)
@@ -231,6 +224,4 @@ def test_theta_that_bulges_between_its_ends(share, alone):
     numbers = PieceNumbers(np.ones(2), np.ones(2), np.zeros(2))
     assert only_roots([(body.traced.selection((1, 1), 0.0), 0.0, 1.0)], numbers) == [alone]
     definite = [body.form_is_definite((1, 1), 0, numbers, alpha) for alpha in spread(0.0, 1.0, 16)]
-    assert definite[0]
-    assert definite[-1]
-    assert all(definite) == alone
+    assert (definite[0], definite[-1], all(definite)) == (True, True, alone)

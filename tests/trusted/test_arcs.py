@@ -6,29 +6,23 @@ from itertools import product
 import numpy as np
 import pytest
 from effort import some
-from exact_arcs import Truth, arc_system, beside, check_slopes, exact_of, interval_at, random_data, two_zeros, widened
+from exact_arcs import Truth, arc_system, beside, check_slopes, exact_of, interval_at, random_cases, two_zeros, widened
 
 from enumsol.arithmetic.rationals import rational
 from enumsol.trusted.arcs.over_parts import expansions, over_parts
 from enumsol.trusted.arcs.selection_balls import ArcSelection
 from enumsol.trusted.arcs.series import bernstein_values, signs_beyond, to_bernstein
-from enumsol.trusted.status_rows import FRICTIONLESS
 
 
-def selections(count, start=0):
+def selections(count):
     """Random selections in balls, and the truth about them."""
-    for seed in range(start, start + count):
-        rng = np.random.default_rng(seed)
-        p = int(rng.integers(1, 4))
-        scale = int(rng.choice((0, 0, 0, -200, 200)))
-        data = random_data(rng, p, integers=rng.random() < 0.3, scale=scale, ill=int(rng.choice((0, 0, 4, 9))))
-        codes = rng.integers(0, 4, size=p)
-        codes[rng.random(p) < 0.1] = FRICTIONLESS
+    options = {"integers": 0.3, "scales": (0, 0, 0, -200, 200), "ills": (0, 0, 4, 9)}
+    for rng, data, codes in random_cases(range(count), **options):
         if rng.random() < 0.4:
             system, exact = widened(rng, data, 10.0 ** -int(rng.integers(2, 14)))
         else:
             system, exact = arc_system(data), exact_of(data)
-        yield rng, ArcSelection(system, codes.tolist()), Truth(exact, tuple(codes.tolist()))
+        yield rng, ArcSelection(system, list(codes)), Truth(exact, codes)
 
 
 def expansion_of(selection, low, high):
@@ -51,10 +45,10 @@ def index_at(truth, alpha):
     return index
 
 
-def check_claims(count, start=0):
-    """Numbers of claims of every kind that were made; all are true."""
+@pytest.mark.slow
+def test_claims_over_parts_are_true():
     made = dict.fromkeys(("conditions", "regular", "none", "slopes", "index", "ends", "zeros"), 0)
-    for rng, selection, truth in selections(count, start):
+    for rng, selection, truth in selections(some(60, of=150)):
         low, high = interval_at(rng, truth)
         expansion = expansion_of(selection, low, high)
         if expansion is None:
@@ -76,19 +70,13 @@ def check_claims(count, start=0):
                 alpha = (a, b)[end]
                 assert not sign or truth.signs(truth.conditions[k], alpha, alpha) == {sign * index_at(truth, alpha)}
             check_slopes(truth, expansion, known, a, b, made)
-    return made
-
-
-@pytest.mark.slow
-def test_claims_over_parts_are_true():
-    made = check_claims(some(60, of=150))
     assert min(made.values()) > some(2, of=10), made
 
 
-def check_errors(count):
-    """Number of series whose errors lie within their bounds."""
+@pytest.mark.slow
+def test_series_and_their_slopes_lie_within_their_errors():
     compared = 0
-    for rng, selection, truth in selections(count):
+    for rng, selection, truth in selections(some(100, of=600)):
         low, high = interval_at(rng, truth)
         expansion = expansion_of(selection, low, high)
         if expansion is None:
@@ -107,7 +95,7 @@ def check_errors(count):
                 rise = sum(j * c * tau ** (j - 1) for j, c in enumerate(polynomial) if j)
                 assert abs(near - values[k]) <= Fraction(float(series.error[k]))
                 assert abs(rise - slopes[k] * radius) <= Fraction(float(series.slope_error[k]))
-    return compared
+    assert compared > some(130, of=800)
 
 
 @pytest.mark.slow
@@ -130,11 +118,6 @@ def test_a_stack_says_of_each_what_it_says_alone():
         for ours, theirs in ((known.conditions, other.conditions), (known.slopes, other.slopes)):
             assert np.array_equal(ours, theirs)
         assert all(np.array_equal(*ends) for ends in zip(known.ends, other.ends, strict=True))
-
-
-@pytest.mark.slow
-def test_series_and_their_slopes_lie_within_their_errors():
-    assert check_errors(some(100, of=600)) > some(130, of=800)
 
 
 @pytest.mark.slow
@@ -172,7 +155,7 @@ def test_single_alphas():
         if found is None:
             continue
         regular += 1
-        (index,) = truth.signs(truth.det, alpha, alpha)
+        index = index_at(truth, alpha)
         assert index != 0
         for k in range(len(truth.conditions)):
             sign = selection.sign_at(alpha, k)

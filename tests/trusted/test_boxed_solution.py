@@ -6,7 +6,7 @@ import numpy as np
 import oracles3d
 import pytest
 from effort import some
-from problems3d import degenerate_integers, exactly, from_compliance, random_coupled
+from problems3d import degenerate_integers, exactly, forces, from_compliance, random_coupled, scaled
 from space_proofs import RANDOM, random_problem
 
 from enumsol import enumerate_roots
@@ -26,19 +26,11 @@ from enumsol.trusted.space.boxed_solution import (
 STATUSES = {"open": (1, 0, 0), "stick": (0, 1, 0), "slip": (0, 0, 1), "graze": (1, 0, 1), "limit": (0, 1, 1)}
 
 
-def scaled(system, lam, F):
-    """Forces (p, 3) in the problem's units as a system has them."""
-    y, occurs = np.zeros(len(system.g)), system.tau >= 0
-    y[: system.p] = lam[:, 0] / system.force
-    y[system.tau[occurs]] = (lam[:, 1:] / np.where(occurs, system.F * system.force[:, None], 1.0))[occurs]
-    return y
-
-
 def boxed(seed):
     """System, known forces and what is proven of a box around them, or None; what the nodes do, and F."""
     problem, lam, _, F, kinds = degenerate_integers(seed)
     solvers = SpaceSolvers(problem, 0.0, "verified")
-    y = scaled(solvers.system, lam, F)
+    y = scaled(solvers.system, lam)
     box = box_around(solvers.enclosed, y)
     return solvers, y, None if box is None else solution_in_box(solvers.enclosed, box, 2.0), kinds, F
 
@@ -120,8 +112,7 @@ def test_no_box_holds_two_solutions(part):
             S, g, F = random_coupled(rng, int(rng.integers(1, 4)))
         problem = from_compliance(S, g, tuple(F.T))
         solvers = SpaceSolvers(problem, 0.0, "verified")
-        all_forces = [lam.reshape(3, len(F)).T for lam in oracles3d.newton_set(S, g, F, 25, rng)]
-        points = [scaled(solvers.system, lam, F) for lam in all_forces]
+        points = [scaled(solvers.system, lam) for lam in oracles3d.newton_set(S, g, F, 25, rng)]
         for y in points:
             box = box_around(solvers.enclosed, y)
             if box is None:
@@ -145,10 +136,10 @@ def test_no_box_holds_two_solutions(part):
 def test_indices_are_those_of_regular_roots():
     for name in ((1, 22), (2, 0), (2, 20), (3, 4)):
         problem = random_problem(*name)
-        solvers, F = SpaceSolvers(problem, 0.0, "verified"), problem.friction_at(0)
-        roots, indices = enumerate_roots(problem, 0), []
-        for root in roots:
-            y = scaled(solvers.system, np.column_stack([root.lambda_n, root.lambda_t]), F)
+        solvers = SpaceSolvers(problem, 0.0, "verified")
+        indices = []
+        for root in enumerate_roots(problem, 0):
+            y = scaled(solvers.system, forces(root))
             one = solution_in_box(solvers.enclosed, box_around(solvers.enclosed, y))
             assert one.index == root.index
             indices.append(one.index)
@@ -157,7 +148,7 @@ def test_indices_are_those_of_regular_roots():
 
 
 def soft_body(seed):
-    """A problem on springs that are 1e4 times as soft as the body, the forces of a degenerate solution, and F."""
+    """A problem on springs that are 1e4 times as soft as the body, and the forces of a degenerate solution."""
     rng, p = np.random.default_rng(seed), 3
     X, e = rng.normal(size=(3 * p, 3 * p)), rng.choice([-0.6, 0.6], (p, 2)) + np.array([0.0, 0.2])
     e /= np.linalg.norm(e, axis=1, keepdims=True)
@@ -167,21 +158,20 @@ def soft_body(seed):
     lam[0], lam[1], lam[2] = (2.0, *(2.0 * e[0])), (1.0, *e[1]), (0.0, 0.0, 0.0)  # limit, slip and open
     w[1, 1:], w[2] = e[1] / 4, (-1.0, *e[2])
     g = w.ravel(order="F") + S @ lam.ravel(order="F")
-    return from_compliance(S, g, (1.0, 1.0)), lam, np.ones((p, 2))
+    return from_compliance(S, g, (1.0, 1.0)), lam
 
 
 @pytest.mark.parametrize("seed", [0, 1, 5, 7])
 def test_boxes_of_bodies_on_weak_springs(seed):
     """The data are off by their rounding: the known solution is near to the one in the box."""
-    problem, lam, F = soft_body(seed)
+    problem, lam = soft_body(seed)
     solvers = SpaceSolvers(problem, 0.0, "verified")
-    y = scaled(solvers.system, lam, F)
+    y = scaled(solvers.system, lam)
     box = box_around(solvers.enclosed, y)
     one = solution_in_box(solvers.enclosed, box, 2.0)
     assert np.max(np.abs(y - one.y.mid) - one.y.rad) < 1e-8
     assert one.y.rad.max() < 1e-6
-    assert list(one.stick) == [True, False, False]
-    assert list(one.slip) == [True, True, False]
+    assert (list(one.stick), list(one.slip)) == ([True, False, False], [True, True, False])
     # P is too curved over a box of forces, whatever their displacements are
     forces = Box.of(solvers.enclosed, box.centre, box.radius, 1e-9 * box.rho)
     assert solution_in_box(solvers.enclosed, forces) is None
@@ -191,17 +181,9 @@ def test_boxes_that_are_none():
     solvers, _, one, _, _ = boxed(1)
     system, box = solvers.enclosed, one.box
     c, r, rho = box.numbers
-    for numbers in (
-        (c + 3.0, r, rho),
-        (c, 0.0 * r, rho),
-        (c, -r, rho),
-        (c, np.nan * r, rho),
-        (np.inf * np.ones_like(c), r, rho),
-        (c, 1e300 * r, rho),
-        (c, r, 0.0 * rho),
-        (c, r, -rho),
-        (c, r, np.inf * rho),
-    ):
+    centres = [(other, r, rho) for other in (c + 3.0, np.inf * np.ones_like(c))]
+    radii = [(c, factor * r, rho) for factor in (0.0, -1.0, np.nan, 1e300)]
+    for numbers in (*centres, *radii, *((c, r, factor * rho) for factor in (0.0, -1.0, np.inf))):
         with np.errstate(all="ignore"):
             assert solution_in_box(system, Box.of(system, *numbers)) is None
     assert box_around(system, np.full(len(c), np.nan)) is None
@@ -210,13 +192,12 @@ def test_boxes_that_are_none():
 def test_which_solutions_are_the_same():
     problem = exactly([[0, 0, 0], [2, 1, 0]], [[0, 0.375, -0.5], [0, 0, 0]])
     solvers = SpaceSolvers(problem, 0.0, "verified")
-    y = scaled(solvers.system, np.array([[0, 0, 0], [2.0, 1, 0]]), np.ones((2, 2)))
+    y = scaled(solvers.system, np.array([[0, 0, 0], [2.0, 1, 0]]))
     one = solution_in_box(solvers.enclosed, box_around(solvers.enclosed, y))
     half = solution_in_box(solvers.enclosed, replace(one.box, radius=0.5 * one.box.radius))
     elsewhere = Box.of(solvers.enclosed, one.box.centre + 1.0, one.box.radius * 0.1, one.box.rho)
     kept, doubtful = apart_in_boxes([], [((1, 1), one), ((0, 1), half)])
-    assert [codes for codes, _ in kept] == [(0, 1)]
-    assert doubtful == []
+    assert ([codes for codes, _ in kept], doubtful) == ([(0, 1)], [])
     moved = Ball(one.y.mid + 1.0, one.y.rad)
     other = BoxedSolution(moved, one.w, one.open, one.stick, one.slip, 1, elsewhere)
     assert len(apart_in_boxes([], [((1, 1), one), ((0, 1), other)])[0]) == 2

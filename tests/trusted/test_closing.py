@@ -8,14 +8,15 @@ from rational_closings import Closings, Reduced
 from rational_forms import Data, Forms, Refused, _value, exact
 from touching import touching_problem
 
-from enumsol import ContactProblem
 from enumsol.condensation.enclosure import CondensedEnclosure
 from enumsol.trusted.uniqueness import closed_solution, only_solution, same_solution
 
 
 def system_of(problem):
-    scaled = problem.condensed.at(0.0).scaled
-    return CondensedEnclosure.from_problem(problem).at(0.0, scaled.force, scaled.length), scaled
+    """In balls, in floats, and in rationals."""
+    scaled, data = problem.condensed.at(0.0).scaled, Data(problem)
+    forms = Forms(data.S, data.load(0), data.friction(0))
+    return CondensedEnclosure.from_problem(problem).at(0.0, scaled.force, scaled.length), scaled, forms
 
 
 @pytest.mark.few(7, 7)
@@ -25,9 +26,8 @@ def test_what_is_proven_is_so(seed):
     proven = 0
     for _ in range(6):
         problem = touching_problem(rng, int(rng.integers(1, 4)))
-        system, scaled = system_of(problem)
-        data = Data(problem)
-        forms, friction = Forms(data.S, data.load(0), data.friction(0)), [F > 0 for F in problem.friction[0]]
+        system, scaled, forms = system_of(problem)
+        friction = [F > 0 for F in problem.friction[0]]
         selection = tuple(int(rng.integers(4)) if positive else int(rng.choice([0, 4])) for positive in friction)
         free = tuple(i for i in range(problem.p) if rng.random() < 0.7)
         # units of lambda are powers of two: forces of size one
@@ -84,12 +84,9 @@ def test_an_exact_solution_that_is_the_only_one():
         rng = np.random.default_rng(seed)
         problem = touching_problem(rng, int(rng.integers(1, 4)))
         if seed % 2:
-            matrices = problem.A, problem.Bn, problem.Bt, problem.f
-            problem = ContactProblem(*matrices, friction=(8.0 * problem.friction[0], 0.0))
-        system, _ = system_of(problem)
-        data = Data(problem)
-        forms, friction = Forms(data.S, data.load(0), data.friction(0)), [F > 0 for F in problem.friction[0]]
-        free = tuple(range(problem.p))
+            problem = problem.replace(friction=(8.0 * problem.friction[0], 0.0))
+        system, _, forms = system_of(problem)
+        friction, free = [F > 0 for F in problem.friction[0]], tuple(range(problem.p))
         reduced = Reduced(forms, (6,) * problem.p, friction)
         points, rubbing = reduced.solutions(), [i for i in free if friction[i]]
         for point in points:
@@ -122,7 +119,7 @@ def status(friction, point, w, i, p):
 
 def test_bad_numbers_prove_nothing():
     problem = touching_problem(np.random.default_rng(3), 3)
-    system, _ = system_of(problem)
+    system, *_ = system_of(problem)
     assert np.all(system.F > 0)
     near, none = np.zeros(6), np.zeros(0)
     assert closed_solution(system, (1, 1, 1), (), none, near).sign == 1

@@ -1,6 +1,7 @@
 """The table of the statuses that the search reads, and the checkers' own copy of it in enumsol.trusted.selection."""
 
 from fractions import Fraction
+from itertools import product
 
 import numpy as np
 import pytest
@@ -15,14 +16,6 @@ NAMES = ("OPEN", "STICK", "SLIP_PLUS", "SLIP_MINUS", "FRICTIONLESS", "CONTACT", 
 FINAL = range(5)
 #: Rows of the kernel's table: a code, or STILL for an undecided node without friction.
 TABLE = rows.row_table()
-
-
-def table_row(code, friction):
-    return rows.STILL if code == rows.UNDECIDED and not friction else code
-
-
-def cases():
-    return [(code, friction) for code in range(9) for friction in (True, False) if friction or code in (0, 4, 6)]
 
 
 def test_both_sides_use_the_same_codes():
@@ -45,20 +38,18 @@ def test_the_multipliers_fit_the_conditions(code):
     assert all(TABLE[code, kind] >= rows.NONNEGATIVE for kind in inequalities)
 
 
-@pytest.mark.parametrize(("code", "friction"), cases())
+@pytest.mark.parametrize(("code", "friction"), [*product(range(9), [True]), *product((0, 4, 6), [False])])
 def test_the_search_believes_no_row_that_a_proof_may_not_use(code, friction):
-    allowed = TABLE[table_row(code, friction)]
+    allowed = TABLE[rows.STILL if code == rows.UNDECIDED and not friction else code]
     assert dict(status_rows(code, friction=friction)).items() <= imposed_rows(code, friction=friction).items()
-    for kind, mode in imposed_rows(code, friction=friction).items():
-        assert mode <= allowed[kind]
+    assert all(mode <= allowed[kind] for kind, mode in imposed_rows(code, friction=friction).items())
 
 
 @pytest.mark.parametrize("code", range(7))
 def test_the_same_over_an_interval(code):
     allowed = interval._VARYING[code]
     found = with_implied(code, interval_rows(code, friction=True, constant=False))
-    for kind, mode in found.items():
-        assert mode <= allowed[kind]
+    assert all(mode <= allowed[kind] for kind, mode in found.items())
     slips = code in (rows.SLIP_PLUS, rows.SLIP_MINUS)
     assert (max(found) >= rows.ROW_KINDS) == slips
 

@@ -39,7 +39,7 @@ class Pair:
             F[1] = F[0] + short(rng.uniform(0, 1), 64)
         elif seed % 3 == 1:
             # of the size of a displacement, on the other side of contact at some nodes
-            gap[1] = short(rng.normal(size=p) / 8, 256) * float(np.max(np.abs(exact_floats(body))))
+            gap[1] = short(rng.normal(size=p) / 8, 256) * max(abs(float(x)) for x in exact_condense(body, 0)[1])
         else:
             loads[1] = load + short(rng.normal(size=body.n) / 4, 1024) * np.max(np.abs(load))
         turn = short(rng.uniform(0, 1, size=p), 64) * (seed % 2 or seed % 4 == 2)
@@ -52,13 +52,9 @@ class Pair:
 
     def data(self, alpha, share):
         """S, g, F on the line between the problems."""
-        pairs = [exact_condense(problem, alpha) for problem in self.problems]
-        (S, *first), (_, *second) = pairs
-        g, F = (
-            [(1 - share) * a + share * b for a, b in zip(*part, strict=True)]
-            for part in zip(first, second, strict=True)
-        )
-        return S, g, F
+        (S, *first), (_, *second) = (exact_condense(problem, alpha) for problem in self.problems)
+        parts = zip(first, second, strict=True)
+        return S, *([(1 - share) * a + share * b for a, b in zip(*part, strict=True)] for part in parts)
 
     def solutions(self, alpha, share):
         """All of them, as connected components."""
@@ -71,13 +67,8 @@ class Pair:
         return tuple(Fraction(low) + Fraction(x) * (Fraction(high) - Fraction(low)) for (low, high), x in pairs)
 
 
-def _area(box):
-    return (box.alphas[1] - box.alphas[0]) * (box.shares[1] - box.shares[0])
-
-
-def exact_floats(problem):
-    """g of a problem."""
-    return np.array([float(x) for x in exact_condense(problem, 0)[1]])
+def largest(boxes, count):
+    return sorted(boxes, key=lambda box: np.prod(np.ptp((box.alphas, box.shares), axis=1)))[-count:]
 
 
 @pytest.mark.few(5, 0)
@@ -86,7 +77,7 @@ def test_every_point_of_a_box_has_one_solution(seed):
     pair = Pair(seed)
     search = BoxSearch(pair.problems)
     search.run([ALPHAS], 24)
-    for box in sorted(search.found, key=_area)[-4:]:
+    for box in largest(search.found, 4):
         for _ in range(2):
             (only,) = pair.solutions(*pair.point(box))
             assert only.dimension == 0
@@ -102,7 +93,7 @@ def test_the_cases_are_worth_it():
         search.run([ALPHAS], 16)
         found += len(search.found)
         several += any(len(pair.solutions(alpha, share)) > 1 for alpha in (0, 2) for share in (0, 1))
-        for box in sorted(search.found, key=_area)[-2:]:
+        for box in largest(search.found, 2):
             ends = [pair.solutions(alpha, share)[0].active(pair.p) for alpha in box.alphas for share in box.shares]
             changes += ends.count(ends[0]) < len(ends)
     assert found >= 4
@@ -135,6 +126,10 @@ def solutions_at(pair, point, unit):
             yield [x * y for x, y in zip(force, length, strict=True)], w, F
 
 
+def held(expansion, exact):
+    return holds(expansion.ball.mid, expansion.ball.rad, exact)
+
+
 @pytest.mark.few(6)
 @pytest.mark.parametrize("seed", range(16))
 def test_a_solution_is_enclosed_and_served(seed):
@@ -146,16 +141,11 @@ def test_a_solution_is_enclosed_and_served(seed):
         plain = PieceNumbers(np.ones(pair.p), np.ones(pair.p), np.zeros(pair.p))
         for _ in range(2):
             point = pair.point(box)
-            inside = [
-                (force, w, F)
-                for force, w, F in solutions_at(pair, point, system.force)
-                if holds(found.force.ball.mid, found.force.ball.rad, force)
-                and holds(
-                    found.w.ball.mid,
-                    found.w.ball.rad,
-                    [x / Fraction(float(unit)) for x, unit in zip(w, system.length, strict=True)],
-                )
-            ]
+            inside = []
+            for force, w, F in solutions_at(pair, point, system.force):
+                scaled = [x / Fraction(float(unit)) for x, unit in zip(w, system.length, strict=True)]
+                if held(found.force, force) and held(found.w, scaled):
+                    inside.append((force, w, F))
             assert inside
             for numbers in (plain, PieceNumbers(mu, kappa, nu)):
                 theta, off = slopes(data, found, numbers)
@@ -177,10 +167,8 @@ def test_the_form_is_definite_for_every_theta_within_reach(seed):
     assert not only_throughout(data, Throughout(unknown, unknown, (0,)), numbers)
     theta, off = slopes(data, found, numbers)
     assert np.all(off >= F)
-    signs = np.array(list(product((-1.0, 1.0), repeat=2)))
-    S = system.S
-    least = np.inf
-    for ends in theta + signs * off:
+    S, least = system.S, np.inf
+    for ends in theta + np.array(list(product((-1.0, 1.0), repeat=2))) * off:
         D = np.block([[np.eye(2), np.zeros((2, 2))], [np.diag(-ends), np.eye(2)]])
         least = min(least, np.linalg.eigvalsh(D.T @ S + S @ D)[0])
     assert least > 0 or not only_throughout(data, found, numbers)
@@ -258,33 +246,27 @@ def test_what_is_not_the_only_solution_is_not_claimed():
     S = np.array([[1.0, 0.9], [0.9, 1.0]])
     rows, A = np.eye(2), np.linalg.inv(S)
     problems = [ContactProblem(A, rows[:1], rows[1:], A @ [-0.1, load], friction=3.0) for load in (-1.0, -1.1)]
-    S_exact, g, F = exact_condense(problems[0], 0)
-    several = solutions_of(S_exact, g, F)
+    several = solutions_of(*exact_condense(problems[0], 0))
     assert len(several) > 1
-    search = BoxSearch(tuple(problems))
-    box = Box((0.0, 0.0), (0.0, 1.0))
-    data, _ = search._data(box)
-    claimed = 0
-    rng = np.random.default_rng(0)
+    search, rng = BoxSearch(tuple(problems)), np.random.default_rng(0)
+    data, _ = search._data(Box((0.0, 0.0), (0.0, 1.0)))
     for component in several:
-        codes = component.parts[0][0]
-        found = solution_throughout(data, codes, (), np.zeros(0), np.zeros(2))
-        assert found is not None
+        found = solution_throughout(data, component.parts[0][0], (), np.zeros(0), np.zeros(2))
         assert not found.broken
         for _ in range(200):
             mu, kappa = np.exp(rng.normal(size=(2, 1)))
             nu = rng.uniform(-1, 1, size=1) * mu / 3.0
-            claimed += only_throughout(data, found, PieceNumbers(mu, kappa, nu))
-    assert not claimed
+            assert not only_throughout(data, found, PieceNumbers(mu, kappa, nu))
     search.run([(0.0, 1.0)], 50)
     assert not search.found
 
 
 def test_all_data_of_a_box_are_held_in_any_units():
     pair, none = Pair(1), np.zeros(2)
+    matrices = np.eye(4), np.eye(4)[:2], np.eye(4)[2:]
     pair.problems = (
-        ContactProblem(np.eye(4), np.eye(4)[:2], np.eye(4)[2:], [1, 2, 3, 4], [0, 1], ([1, 2], [1, 0]), [1, 2, 0, -1]),
-        ContactProblem(np.eye(4), np.eye(4)[:2], np.eye(4)[2:], [2, 1, 0, 4], none, ([1, 0], [0, 3]), [-3, 0, 0, 2]),
+        ContactProblem(*matrices, [1, 2, 3, 4], [0, 1], ([1, 2], [1, 0]), [1, 2, 0, -1]),
+        ContactProblem(*matrices, [2, 1, 0, 4], none, ([1, 0], [0, 3]), [-3, 0, 0, 2]),
     )
     enclosures = tuple(problem.enclosure for problem in pair.problems)
     box = (0.25, 0.5), (0.25, 0.5)
@@ -295,11 +277,10 @@ def test_all_data_of_a_box_are_held_in_any_units():
     for alpha in box[0]:
         for share in box[1]:
             _, g, F = pair.data(Fraction(alpha), Fraction(share))
-            assert holds(one.g.ball.mid, one.g.ball.rad, g)
-            assert holds(one.F.ball.mid, one.F.ball.rad, F)
             s, t = (8 * Fraction(x) - 3 for x in (alpha, share))
-            assert expands_to(one.g, s, t, g)
-            assert expands_to(one.F, s, t, F)
+            for expansion, exact in ((one.g, g), (one.F, F)):
+                assert held(expansion, exact)
+                assert expands_to(expansion, s, t, exact)
 
 
 def test_ranges_that_boxes_cover():

@@ -38,9 +38,8 @@ class Case:
         data = Data(problem)
         self.forms = Forms(data.S, data.load(0), data.friction(0))
         self.friction = [F > 0 for F in self.forms.F]
-        unit = [[exact(float(x)) for x in part[: self.p]] for part in (self.scaled.length, self.scaled.force)]
-        self.judge = Closings(self.forms, self.friction, unit)
-        self.units = unit
+        self.units = [[exact(float(x)) for x in part[: self.p]] for part in (self.scaled.length, self.scaled.force)]
+        self.judge = Closings(self.forms, self.friction, self.units)
         self.engine = make_engine(self.scaled)
         self.rows = ImposedRows(PlaneSplitting(self.scaled.F), self.p)
         self.roots = []
@@ -58,15 +57,16 @@ class Case:
         proposal = Proposed(self.scaled, codes, known, relaxation).proposal()
         return None if proposal is None else [proposal.weights, proposal.strengths, *relaxation.multipliers()]
 
+    def terms(self, rows, values):
+        """Rows with multipliers in units, in rationals."""
+        units = [self.units[int(row // self.p >= 4)][row % self.p] for row in rows]
+        return [(int(row), exact(float(value)) * unit) for row, value, unit in zip(rows, values, units, strict=True)]
+
     def judged(self, codes, selection, weights, strengths, rows, values):
         """Whether the judge in rationals finds the same."""
-        kinds = rows // self.p
-        terms = [
-            (int(row), exact(float(value)) * self.units[0 if kind < 4 else 1][row % self.p])
-            for row, kind, value in zip(rows, kinds, values, strict=True)
-        ]
+        numbers = weights.tolist(), strengths.ravel().tolist()
         try:
-            self.judge.alone(codes, selection, weights.tolist(), strengths.ravel().tolist(), terms)
+            self.judge.alone(codes, selection, *numbers, self.terms(rows, values))
         except Refused as refused:
             return str(refused)
         return None
@@ -95,8 +95,7 @@ def test_what_is_proven_is_so(seeds):
         if root is None:
             continue
         proven += 1
-        loose = [i for i in range(case.p) if given[1][0, i] > 0 and codes[i] > 5]
-        squares += bool(loose)
+        squares += any(given[1][0, i] > 0 and codes[i] > 5 for i in range(case.p))
         several += len(case.roots) > 1
         assert case.judged(codes, selection, *given) is None
     assert proven > len(seeds) // 3
@@ -155,8 +154,7 @@ def test_a_wrong_test_is_seen(wrong, monkeypatch):
         strengths[0, free] = 1e3 if wrong != "narrow gaps" else 50.0 * strengths[0, free]
         given[1] = strengths
         if lone_root(case.system, codes, selection, *given) is not None:
-            reason = case.judged(codes, selection, *given)
-            false += reason is not None
+            false += case.judged(codes, selection, *given) is not None
     assert false > some(0, of=2)
 
 
@@ -167,11 +165,7 @@ def test_gaps_hold_at_all_roots(count):
         for other, root in case.roots:
             if KnownRoot(other, root.force.mid, root.w.mid).below(codes):
                 assert np.all(-root.w.mid[: case.p] <= bounds + 1e-12)
-        terms = [
-            (int(row), exact(float(value)) * case.units[0 if row // case.p < 4 else 1][row % case.p])
-            for row, value in zip(rows, values, strict=True)
-        ]
-        exactly = Lone(case.forms, codes, case.friction)
+        exactly, terms = Lone(case.forms, codes, case.friction), case.terms(rows, values)
         for i in range(case.p):
             middle, square = exactly.gap(terms, i)
             assert bounds[i] * case.scaled.length[i] >= float(middle) + float(square) ** 0.5 - 1e-12

@@ -9,6 +9,7 @@ from enumsol.trusted.space.natural_map import Discs
 #: Nodes with two tangents, and with one of either direction.
 TAU = np.array([[4, 8], [5, 9], [6, -1], [-1, 7]])
 M = 12
+_STEPS = 1e-6 * np.eye(M + 1), -1e-6 * np.eye(M + 1)
 
 
 def projected(z, F):
@@ -24,12 +25,8 @@ def projected(z, F):
 
 def derivative(z, alpha, F0, F1):
     """Central differences, (M, M + 1)."""
-    step, x = 1e-6, np.append(z, alpha)
-    ways = [
-        projected((y := x + step * e)[:M], F0 + y[M] * F1) - projected((y := x - step * e)[:M], F0 + y[M] * F1)
-        for e in np.eye(M + 1)
-    ]
-    return np.column_stack(ways) / (2 * step)
+    sides = [[projected(y[:M], F0 + y[M] * F1) for y in np.append(z, alpha) + step] for step in _STEPS]
+    return np.transpose(np.subtract(*sides)) / 2e-6
 
 
 def is_smooth(z, F, by=1e-4):

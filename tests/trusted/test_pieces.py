@@ -25,9 +25,8 @@ def changing_problem(p, seed, isotropic=False):
     F1 = 2.0 ** rng.integers(-1, 3, p) if isotropic else rng.uniform(0.5, 3.0, p)
     F2 = F1 if isotropic else 2.0 * F1
     slope = rng.choice([-1.0, 0.5, 1.0])
-    return problem.replace(
-        friction=(F1, F2), friction_slope=(slope * F1, slope * F2), load_slope=rng.standard_normal(problem.n)
-    )
+    friction = {"friction": (F1, F2), "friction_slope": (slope * F1, slope * F2)}
+    return problem.replace(**friction, load_slope=rng.standard_normal(problem.n))
 
 
 def piece_of(problem, low=LOW, high=HIGH):
@@ -45,12 +44,9 @@ def sector_at(tau, level):
 
 def codes_at(root, F, level):
     """Those of the leaf of a level that holds a root."""
-    names = [status.value for status in root.statuses]
-    final = {"open": OPEN, "stick": STICK}
-    return [
-        final[name] if name in final else SECTORS + sector_at(root.lambda_t[i] / F[i], level)
-        for i, name in enumerate(names)
-    ]
+    sectors = [SECTORS + sector_at(tau, level) if np.any(tau) else None for tau in root.lambda_t / F]
+    codes = [{"open": OPEN, "stick": STICK}.get(status.value) for status in root.statuses]
+    return [sector if code is None else code for code, sector in zip(codes, sectors, strict=True)]
 
 
 def rows_of(codes, rng):
@@ -138,7 +134,7 @@ def test_no_root_over_a_piece_is_missed(p, seed):
     """Leaves that hold a root at some alpha of a piece are not empty, and bounds of their forces hold it."""
     problem = changing_problem(p, seed)
     settled = 0
-    for alpha in (Fraction(1, 4), Fraction(13, 32), Fraction(1, 2)):
+    for alpha in (LOW, Fraction(13, 32), HIGH):
         F = problem.friction_at(alpha)
         for root in enumerate_roots(problem, alpha):
             for level, width in ((4, Fraction(1, 16)), (9, Fraction(1, 256)), (12, Fraction(1, 4096))):
@@ -182,9 +178,8 @@ def test_a_root_over_a_piece_is_one_at_every_alpha(seed):
 
 def test_displacements_of_nodes_without_friction_follow_from_the_forces():
     problem = changing_problem(2, 1)
-    none = np.array([0.0, 1.0])
-    coefficients = (tuple(np.array(pair) * none) for pair in (problem.friction, problem.friction_slope))
-    problem = problem.replace(**dict(zip(("friction", "friction_slope"), coefficients, strict=True)))
+    F, slope = (tuple(np.array(pair) * [0.0, 1.0]) for pair in (problem.friction, problem.friction_slope))
+    problem = problem.replace(friction=F, friction_slope=slope)
     piece = piece_of(problem, Fraction(3, 8), Fraction(3, 8) + Fraction(1, 1024))
     rng = np.random.default_rng(3)
     y = rng.standard_normal(4)
@@ -199,7 +194,5 @@ def test_displacements_of_nodes_without_friction_follow_from_the_forces():
 
 def test_what_is_not_proven_over_a_piece_is_left_open():
     """A wide piece of a problem whose solution changes its status holds no regular root in any leaf of it."""
-    problem = changing_problem(1, 22)
-    piece = piece_of(problem, Fraction(0), Fraction(64))
-    codes = (SECTORS + 4,)
-    assert isinstance(piece.held(codes), Open | None)
+    piece = piece_of(changing_problem(1, 22), Fraction(0), Fraction(64))
+    assert isinstance(piece.held((SECTORS + 4,)), Open | None)

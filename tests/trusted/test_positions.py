@@ -21,10 +21,8 @@ def body(seed):
     """Three nodes on a body that hardly anything holds, of which some stick and some slip."""
     rng = np.random.default_rng([7, seed])
     B = rng.integers(-8, 9, (6, 6)) / 4.0
-    A = B.T @ B
+    A, rows = B.T @ B + SPRINGS * np.eye(6), np.eye(6)
     A[:2, :2] += 2 * np.eye(2)
-    A += SPRINGS * np.eye(6)
-    rows = np.eye(6)
     return enumsol.ContactProblem(A, rows[:3], rows[3:], rng.integers(-20, 20, 6) / 4.0, friction=(0.25, 0.0))
 
 
@@ -53,8 +51,7 @@ def test_every_offset_in_a_ball_leads_into_the_ball_of_positions():
         codes = [CODES[str(status)] for status in root.statuses]
         centre, radius = problem.slip_offset, np.full(3, 2.0**-24)
         found = PreciseSelection(PreciseSystem.of(problem), codes).positions(Fraction(0), Ball(centre, radius))
-        moving = [k for k, code in enumerate(codes) if code != STICK]
-        farthest = np.zeros(3)
+        moving, farthest = [k for k, code in enumerate(codes) if code != STICK], np.zeros(3)
         for _ in range(8):
             exact = positions(problem, root, centre + radius * rng.choice([-1.0, 1.0], 3))
             if exact is None:
@@ -64,7 +61,7 @@ def test_every_offset_in_a_ball_leads_into_the_ball_of_positions():
                 far = abs(exact[k] - Fraction(float(found.mid[k])))
                 assert far <= Fraction(float(found.rad[k]))
                 farthest[k] = max(farthest[k], float(far))
-        if len([code for code in codes if code == STICK]) == 1 and farthest.any():
+        if codes.count(STICK) == 1 and farthest.any():
             # one sticking node: a corner of the ball of offsets is a worst case
             assert np.all(found.rad[moving] <= 1.01 * farthest[moving] + 1e-15 * (1 + np.abs(found.mid[moving])))
     assert tried > 8
@@ -93,8 +90,6 @@ def test_a_history_on_weak_springs_starts_every_step_from_what_is_known_to_many_
     """By balls of double arithmetic the second step's start was known to 1e-5 of 1e-3, and its search did not end."""
     problem = dovetail(friction=0.3)
     history = enumsol.histories(problem, [0.5 * problem.f, problem.f, 0.9 * problem.f], max_nodes=3000)
-    assert history.complete
-    assert history.unique_until == 3
+    assert (history.complete, history.unique_until) == (True, 3)
     assert max(stage.largest_radius for stage in history.data.stages) < 1e-15
-    report = accepted_report(problem, history.proof)
-    assert report.unique_until == 3
+    assert accepted_report(problem, history.proof).unique_until == 3

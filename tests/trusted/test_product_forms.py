@@ -6,7 +6,7 @@ import numpy as np
 import oracles3d
 import pytest
 from complete import accepted_report, proven_roots
-from problems3d import from_compliance, soft_or_coupled, unmatched
+from problems3d import from_compliance, scaled, soft_or_coupled, unmatched
 from proof_tools import records_of
 from trees import products_at_once
 
@@ -20,22 +20,11 @@ from enumsol.trusted.space.product_forms import CONE, FREE, Ellipsoid, Frame, no
 
 
 def known(seed, p):
-    """Solvers, and solutions that Newton's method finds: scaled forces and codes, with sectors of a level."""
+    """Solvers, and the solutions that Newton's method finds, in the units of their system."""
     S, g, F = soft_or_coupled(seed, p)
     solvers = SpaceSolvers(from_compliance(S, g, (F[:, 0], F[:, 1])), 0.0, "verified")
     found = oracles3d.newton_set(S, g, F, 30, np.random.default_rng(seed))
-    return solvers, [lam for lam in found if oracles3d.slack(S, g, F, lam) > 1e-6], (S, g, F)
-
-
-def scaled(system, lam):
-    """Forces in the problem's units as a system has them."""
-    y, p = lam.reshape(3, -1).T, system.p
-    out = np.zeros(len(system.g))
-    out[:p] = y[:, 0] / system.force
-    for k in range(2):
-        has = system.tau[:, k] >= 0
-        out[system.tau[has, k]] = (y[:, 1 + k] / (system.F[:, k] * system.force))[has]
-    return out
+    return solvers, [scaled(solvers.system, lam) for lam in found if oracles3d.slack(S, g, F, lam) > 1e-6]
 
 
 def codes_of(solvers, y, level):
@@ -73,8 +62,8 @@ def parts(solvers, y):
 @pytest.mark.parametrize("seed", range(20))
 def test_products_are_not_negative_at_solutions(seed):
     rng = np.random.default_rng(seed)
-    solvers, solutions, _ = known(seed, 1 + seed % 3)
-    for y in (scaled(solvers.system, lam) for lam in solutions):
+    solvers, solutions = known(seed, 1 + seed % 3)
+    for y in solutions:
         for level in (2, 4, 9):
             codes = codes_of(solvers, y, level)
             for code, x in zip(codes, parts(solvers, y), strict=True):
@@ -94,18 +83,17 @@ def sound(ellipsoid, solvers, y):
     """Whether a solution lies in an ellipsoid."""
     if ellipsoid.empty:
         return False
-    return (
-        np.linalg.norm(np.linalg.solve(ellipsoid.T, y - ellipsoid.frame.centre)) <= ellipsoid.reach * (1 + 1e-6) + 1e-9
-    )
+    away = np.linalg.norm(np.linalg.solve(ellipsoid.T, y - ellipsoid.frame.centre))
+    return away <= ellipsoid.reach * (1 + 1e-6) + 1e-9
 
 
 @pytest.mark.few(2, 6)
 @pytest.mark.parametrize("seed", range(30))
 def test_ellipsoids_hold_all_solutions_of_their_assignments(seed):
     """Forms that a program finds, and forms of random multipliers besides."""
-    solvers, solutions, _ = known(seed, 1 + seed % 3)
+    solvers, solutions = known(seed, 1 + seed % 3)
     search, rng, made = ProductSearch(solvers.enclosed), np.random.default_rng(seed), 0
-    for y in (scaled(solvers.system, lam) for lam in solutions):
+    for y in solutions:
         for level in (0, 2, 4, 8):
             fine = codes_of(solvers, y, max(level, 2))
             codes = fine if level else tuple(CONTACT if code > SECTORS else code for code in fine)
@@ -125,9 +113,7 @@ def test_ellipsoids_hold_all_solutions_of_their_assignments(seed):
             for i, code in enumerate(codes):
                 if code > SECTORS or code == CONTACT:
                     assert not one.node_misses(i, codes_of(solvers, y, 12)[i])
-    assert made or not any(
-        code > SECTORS for y in solutions for code in codes_of(solvers, scaled(solvers.system, y), 2)
-    )
+    assert made or not any(code > SECTORS for y in solutions for code in codes_of(solvers, y, 2))
 
 
 def leaves_of(codes, tree):
@@ -147,9 +133,9 @@ def leaves_of(codes, tree):
 @pytest.mark.few(1, 4)
 @pytest.mark.parametrize("seed", range(24))
 def test_trees_below_assignments_hold_what_newton_finds(seed):
-    solvers, solutions, _ = known(seed, 1 + seed % 2)
+    solvers, solutions = known(seed, 1 + seed % 2)
     search = ProductSearch(solvers.enclosed)
-    for y in (scaled(solvers.system, lam) for lam in solutions):
+    for y in solutions:
         codes = codes_of(solvers, y, 2)
         tree = search.closed(codes, 40)
         if tree is None or not any(code > SECTORS for code in codes):
@@ -159,12 +145,12 @@ def test_trees_below_assignments_hold_what_newton_finds(seed):
             assert refines(below, leaf.ellipsoid.codes)
             assert isinstance(leaf, Missed) == leaf.ellipsoid.misses(below) or isinstance(leaf, Enclosed)
         boxes = [leaf.found for _, leaf in leaves if isinstance(leaf, Enclosed)]
-        for other in (scaled(solvers.system, lam) for lam in solutions):
+        for other in solutions:
             inside = [one for one in boxes if np.all(np.abs(one.y.mid - other) <= one.y.rad + 1e-7)]
             assert inside or not refines(codes_of(solvers, other, 12), codes)
         for one in boxes:
             assert is_inside(one.y, one.w, one.box)
-            assert any(np.all(np.abs(one.y.mid - scaled(solvers.system, lam)) <= one.y.rad + 1e-6) for lam in solutions)
+            assert any(np.all(np.abs(one.y.mid - other) <= one.y.rad + 1e-6) for other in solutions)
 
 
 @pytest.mark.few(1, 4)
@@ -188,14 +174,13 @@ def test_searches_find_the_same_roots(seed):
 
 def test_a_search_resumes_from_such_a_proof(tmp_path):
     S, g, F = soft_or_coupled(8, 2)
-    problem, path = from_compliance(S, g, (F[:, 0], F[:, 1])), tmp_path / "a.proof"
+    problem, path = from_compliance(S, g, tuple(F.T)), tmp_path / "a.proof"
     with products_at_once():
         roots = enumerate_roots(problem, 0, proof_path=path)
         kinds = [record[0] for record in records_of(roots.proof)[1:-1]]
         again = enumerate_roots(problem, 0, proof_path=path, resume=True)
     assert {"q", "e", "j"} <= set(kinds)
-    assert again.complete
-    assert len(again) == len(roots)
+    assert (again.complete, len(again)) == (True, len(roots))
     # all leaves of ellipsoids are taken over, none is searched
     assert again.stats.resumed >= kinds.count("e") + kinds.count("j")
     assert verify(problem, again.proof).complete
@@ -212,12 +197,11 @@ def test_the_angle_plate_on_weak_springs_is_complete(friction, monkeypatch):
 
     problem = foot("angle-14", SPRINGS[0], friction)
     roots = proven_roots(problem, 0, max_nodes=10_000)
-    assert len(roots) == 1
-    assert roots.index_sum == 1
+    assert (len(roots), roots.index_sum) == (1, 1)
 
 
 def test_what_is_no_assignment_of_statuses_is_refused():
-    solvers, _, _ = known(0, 2)
+    solvers, _ = known(0, 2)
     m = len(solvers.enclosed.g)
     with pytest.raises(ValueError, match="undecided"):
         Frame.of(solvers.enclosed, (UNDECIDED, OPEN), np.zeros(m))

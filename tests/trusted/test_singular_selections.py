@@ -70,15 +70,14 @@ def test_false_roots_are_refused(seed, load):
     problem, planted = hunted(seed, load)
     S, g, F = exact_condense(problem, 0)
     assert det_sign(S, F, planted) == 0
-    floats = np.array(S, dtype=float), np.array(g, dtype=float), np.array(F, dtype=float)
+    floats = (np.array(part, dtype=float) for part in (S, g, F))
     exact = enumerate_roots(problem, 0.0, "exact", "exhaustive")
     # the trap: LU succeeds where the determinant is zero, and the count comes out wrong
     assert len(float_roots(*floats)) != len(exact) + len(exact.families)
     one = np.ones(2 * P)
     assert solve_selection(problem.enclosure.at(0.0, one, one), planted) is None
     roots = all_roots(problem, 0.0)
-    assert (len(roots), len(roots.families)) == (len(exact), len(exact.families))
-    assert roots.index_sum == 1
+    assert (len(roots), len(roots.families), roots.index_sum) == (len(exact), len(exact.families), 1)
     report = complete_report(problem, roots.proof)
     assert (report.roots, report.families) == (len(exact), len(exact.families))
 
@@ -87,10 +86,9 @@ def test_false_roots_are_refused(seed, load):
 @pytest.mark.parametrize(("seed", "load"), HUNTED[1:4])
 def test_exact_count_by_an_oracle_in_fractions(seed, load):
     problem, _ = hunted(seed, load)
-    components = exact_solutions(problem, Fraction(0))
+    isolated = [component.dimension == 0 for component in exact_solutions(problem, Fraction(0))]
     roots = enumerate_roots(problem, 0.0)
-    assert len(roots) == sum(c.dimension == 0 for c in components)
-    assert len(roots.families) == sum(c.dimension > 0 for c in components)
+    assert (len(roots), len(roots.families)) == (isolated.count(True), isolated.count(False))
 
 
 @pytest.mark.few(0, 1)
@@ -104,8 +102,7 @@ def test_a_selection_that_holds_a_root_is_never_contradicted(seed):
         S, g, F = exact_condense(problem, 0.0)
         if not any(g):
             continue
-        one = np.ones(2 * p)
-        system = problem.enclosure.at(0.0, one, one)
+        system = problem.enclosure.at(0.0, np.ones(2 * p), np.ones(2 * p))
         held = {codes for c in exact_solutions(problem, 0.0) for codes, *_ in c.parts}
         for codes in product(*(range(4) if f > 0 else (0, 4) for f in F)):
             verdict = contradicts(system, codes)
@@ -132,9 +129,8 @@ def test_equations_that_contradict_each_other_need_no_rationals(exponent, side):
     # 253 degrees of freedom: no rational arithmetic to fall back on
     alpha = 1 + side * Fraction(1, 10**exponent)
     roots = proven_roots(beside_a_continuum(251), alpha)
-    assert [root.statuses for root in roots] == [
-        root.statuses for root in enumerate_roots(beside_a_continuum(0), alpha, "exact")
-    ]
+    exact = enumerate_roots(beside_a_continuum(0), alpha, "exact")
+    assert [root.statuses for root in roots] == [root.statuses for root in exact]
     assert roots.stats.escalations.rationals == 0
 
 

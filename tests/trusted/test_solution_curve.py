@@ -18,14 +18,26 @@ from enumsol.trusted.space.solution_curve import (
     parameter_in,
 )
 
+GIVEN = AlphaProblem.of(SLIDING.enclosure)
 
-def box_of(given, x, half, roomy=True):
+
+def box_of(given, x, half):
     x = given.placed(x)
-    border = np.eye(len(x))[-1]
-    point = curve_point(given, x, border)
+    point = curve_point(given, x, np.eye(len(x))[-1])
     border = point.direction / (point.direction @ point.direction)
-    curve = curve_around(given, point.x, point.direction, border, half, roomy=roomy)
+    curve = curve_around(given, point.x, point.direction, border, half, roomy=True)
     return None if curve is None else curve.box
+
+
+def sliding(alpha):
+    """The point of the curve of the sliding node."""
+    return GIVEN.placed(np.append(sliding_node(alpha), alpha))
+
+
+@pytest.fixture(scope="module")
+def box():
+    """One around alpha = 1/2 on that curve."""
+    return box_of(GIVEN, np.append(sliding_node(0.5), 0.5), 0.02)
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -52,48 +64,42 @@ def test_coordinates_are_those_of_forces_and_displacements(seed):
 def test_what_is_past_the_limit_of_stick_is_bounded_along_a_direction():
     """|z_t| - F z_n at points of a tube lies in its bounds, which no product of intervals reaches."""
     rng = np.random.default_rng(2)
-    given = AlphaProblem.of(SLIDING.enclosure)
     z, along, half, side = np.array([1.0, 0.3, 0.4, 0.5]), np.array([2.0, 0.6, 0.8, 0.0]), 0.05, np.full(4, 1e-3)
-    bounds = given.past(Ball.exact(z), Ball.exact(along), half, side)
+    bounds = GIVEN.past(Ball.exact(z), Ball.exact(along), half, side)
     seen = []
     for t, s in zip(rng.uniform(-half, half, 500), rng.uniform(-1, 1, (500, 4)) * side, strict=True):
         n, *tangent, alpha = z + t * along + s
-        seen.append(np.hypot(*tangent) - (given.F0[0] + alpha * given.F1[0]) * n)
+        seen.append(np.hypot(*tangent) - (GIVEN.F0[0] + alpha * GIVEN.F1[0]) * n)
     low, high = bounds.mid[0] - bounds.rad[0], bounds.mid[0] + bounds.rad[0]
     assert low <= min(seen)
     assert max(seen) <= high
     # |z_t| alone changes by 0.1
     assert high - low < 0.02
-    assert np.isinf(given.past(Ball.exact(np.array([1.0, 0.0, 0.0, 0.5])), Ball.exact(along), half, side).rad[0])
+    assert np.isinf(GIVEN.past(Ball.exact(np.array([1.0, 0.0, 0.0, 0.5])), Ball.exact(along), half, side).rad[0])
 
 
-def test_the_curve_is_that_of_the_closed_form():
-    given = AlphaProblem.of(SLIDING.enclosure)
-    box = box_of(given, np.append(sliding_node(0.5), 0.5), 0.02)
-    curve = only_curve(given, box)
+def test_the_curve_is_that_of_the_closed_form(box):
+    curve = only_curve(GIVEN, box)
     assert (curve.index, curve.rises, len(curve.statuses)) == (1, 1, 1)
     for alpha in np.linspace(0.49, 0.51, 9):
-        x = Ball.exact(given.placed(np.append(sliding_node(alpha), alpha)))
+        x = Ball.exact(sliding(alpha))
         assert lies_in(box, x)
         at = curve.at(parameter_in(box, x))
         assert np.all(np.abs(at.mid - x.mid) <= at.rad + 1e-12)
 
 
-def test_slopes_are_those_between_points_of_the_curve():
-    given = AlphaProblem.of(SLIDING.enclosure)
-    curve = only_curve(given, box_of(given, np.append(sliding_node(0.5), 0.5), 0.02))
-    one, other = (given.placed(np.append(sliding_node(alpha), alpha)) for alpha in (0.495, 0.505))
-    change = other - one
+def test_slopes_are_those_between_points_of_the_curve(box):
+    curve, change = only_curve(GIVEN, box), sliding(0.505) - sliding(0.495)
     slope = change / (curve.box.border @ change)
     assert np.all(np.abs(slope - curve.slope.mid) <= curve.slope.rad + 1e-9)
 
 
 def test_friction_may_be_negative_beside_the_interval():
-    given = AlphaProblem.of(SLIDING.enclosure)
-    curve = only_curve(given, box_of(given, np.array([1.0, 0.0, 0.0, 0.0]), 0.01))
+    start = np.array([1.0, 0.0, 0.0, 0.0])
+    curve = only_curve(GIVEN, box_of(GIVEN, start, 0.01))
     assert curve.alphas[0] < 0 < curve.alphas[1]
     at = curve.at(0.0)
-    assert np.all(np.abs(at.mid - given.placed(np.array([1.0, 0.0, 0.0, 0.0]))) <= at.rad + 1e-14)
+    assert np.all(np.abs(at.mid - GIVEN.placed(start)) <= at.rad + 1e-14)
 
 
 @pytest.mark.slow
@@ -105,9 +111,8 @@ def test_solutions_in_a_box_are_those_of_its_curve(seed):
     problem = from_compliance(S, g, 0.0, friction_slope=1.0)
     given = AlphaProblem.of(problem.enclosure)
     root = enumsol.enumerate_roots(problem, 0.75)[0]
-    box = next(
-        found for half in 0.1 ** np.arange(1, 6) if (found := box_of(given, np.append(forces(root), 0.75), half))
-    )
+    boxes = (box_of(given, np.append(forces(root), 0.75), half) for half in 0.1 ** np.arange(1, 6))
+    box = next(filter(None, boxes))
     curve = only_curve(given, box)
     low, high = (float(end) for end in curve.alphas)
     seen = 0
@@ -121,22 +126,17 @@ def test_solutions_in_a_box_are_those_of_its_curve(seed):
     assert seen >= 5
 
 
-def test_no_curve_is_seen_where_there_may_be_two_or_none():
-    given = AlphaProblem.of(SLIDING.enclosure)
-    x = np.append(sliding_node(0.5), 0.5)
-    box = box_of(given, x, 0.02)
+def test_no_curve_is_seen_where_there_may_be_two_or_none(box):
     wide = replace(box, half=2.0, radius=np.full(4, 5.0))
     away = replace(box, centre=box.centre + np.array([0.5, 0.0, 0.0, 0.0]))
     thin = replace(box, radius=1e-9 * box.radius)
-    assert [only_curve(given, other) for other in (wide, away, thin)] == [None] * 3
+    assert [only_curve(GIVEN, other) for other in (wide, away, thin)] == [None] * 3
 
 
-def test_what_is_no_box_is_refused():
-    given = AlphaProblem.of(SLIDING.enclosure)
-    box = box_of(given, np.append(sliding_node(0.5), 0.5), 0.02)
+def test_what_is_no_box_is_refused(box):
     others = {"half": -1.0}, {"half": np.nan}, {"radius": 0 * box.radius}, {"rho": -box.rho}, {"centre": box.centre[1:]}
     for wrong in others:
-        assert only_curve(given, replace(box, **wrong)) is None
+        assert only_curve(GIVEN, replace(box, **wrong)) is None
 
 
 def test_a_fold_lies_in_a_box():
@@ -147,8 +147,7 @@ def test_a_fold_lies_in_a_box():
     path = enumsol.follow(problem, jammed, -jammed.index, (0.5, 6))
     (fold,) = path.folds
     k = fold.point
-    line = np.column_stack([path.lambda_n, path.lambda_t[:, :, 0], path.lambda_t[:, :, 1], path.alpha])
-    line = given.placed(line)
+    line = given.placed(np.column_stack([path.lambda_n, *np.moveaxis(path.lambda_t, 2, 0), path.alpha]))
     before, after = (line[k] + 1e-3 * (line[n] - line[k]) for n in (k - 1, k + 1))
     ahead, behind = (one / np.linalg.norm(one) for one in (line[k] - before, after - line[k]))
     border = (ahead + behind) / np.linalg.norm(ahead + behind)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from effort import some
 from problems3d import block_on_springs
+from proof_tools import leaves_of, records_of
 from space_proofs import arc_of_sector, on_the_end_of_a_sector, random_problem
 
 from enumsol import enumerate_roots
@@ -69,23 +70,18 @@ def test_boxes_of_angles_cover_their_sectors():
     for number in sectors():
         leaf = _Leaf(enclosed, (SECTORS + number,))
         (c,), (half,) = leaf.centre, leaf.half
+        assert half < 4 * (1 + number // RUN) / (1 << ((number % RUN).bit_length() - 1)) * 1.2
         for end in (start_of(number), start_of(end_number(number))):
             x, y = (float(z) for z in end)
-            assert (
-                abs(math.atan2(c[0] * y - c[1] * x, c[0] * x + c[1] * y))
-                < half
-                < 4 * (1 + number // RUN) / (1 << ((number % RUN).bit_length() - 1)) * 1.2
-            )
+            assert abs(math.atan2(c[0] * y - c[1] * x, c[0] * x + c[1] * y)) < half
 
 
 def test_halves_of_sectors_are_those_that_they_hold():
     for number in (4, 7, 9, 100):
         first, second = sr.sector_children(SECTORS + number, 2)
-        assert start_of(first - SECTORS) == start_of(number)
-        assert start_of(second - SECTORS) == start_of(end_number(first - SECTORS))
-        assert start_of(end_number(second - SECTORS)) == start_of(end_number(number))
-        assert contains(number, first - SECTORS)
-        assert not contains(first - SECTORS, number)
+        starts = [start_of(n) for n in (number, end_number(first - SECTORS), end_number(number))]
+        assert starts == [start_of(n) for n in (first - SECTORS, second - SECTORS, end_number(second - SECTORS))]
+        assert (contains(number, first - SECTORS), contains(first - SECTORS, number)) == (True, False)
 
 
 def test_slices_and_what_is_left_make_up_the_sector():
@@ -103,8 +99,7 @@ def test_slices_and_what_is_left_make_up_the_sector():
             assert parts[-end] == arc_of_sector(part)
             assert parts[-end][1] - parts[-end][0] <= (b - a) / 2**halvings
             for inner in (part, rest):
-                assert contains(number, inner)
-                assert not contains(inner, number)
+                assert (contains(number, inner), contains(inner, number)) == (True, False)
 
 
 def test_coverings_of_sectors():
@@ -187,10 +182,7 @@ ROWS = [
 @pytest.mark.parametrize(
     "code",
     [
-        sr.OPEN,
-        sr.STICK,
-        sr.CONTACT,
-        sr.UNDECIDED,
+        *(sr.OPEN, sr.STICK, sr.CONTACT, sr.UNDECIDED),
         *(SECTORS + n for n in (4, 9, 19, run_of(33, 3), run_of(67, 3), run_of(17, 3))),
     ],
 )
@@ -243,10 +235,8 @@ def test_margins_are_below_the_energy():
         S = X @ X.T + 0.2 * np.eye(3)
         # the energy at a sampled point of the status: g is what makes w = g - S y
         y, w = sampled(rng, code)
-        g = w + S @ y
-        system = EnclosedSpace.of_floats(
-            SpaceSystem(S, g, np.ones((1, 2)), TAU_ONE, np.ones(3), np.ones(1), np.ones(1))
-        )
+        g, one = w + S @ y, np.ones(1)
+        system = EnclosedSpace.of_floats(SpaceSystem(S, g, np.ones((1, 2)), TAU_ONE, np.ones(3), one, one))
         rows = [row for row in ROWS if sr.row_sign(code, row) != sr.FORBIDDEN]
         values = np.array([rng.normal() if sr.row_sign(code, row) == sr.FREE else rng.random() for row in rows])
         values *= 10.0 ** rng.integers(-4, 1)
@@ -275,15 +265,16 @@ def test_rows_that_a_status_lacks_or_of_the_wrong_sign():
 # -- leaves ------------------------------------------------------------------------------------------------------------
 
 
+def system_of(problem):
+    condensed = problem.condensed
+    return SpaceSystem.scaled(condensed.S, condensed.free_displacements(0.0), problem.friction_at(0.0))
+
+
 def leaves_with_roots(p, seed):
     """A system and the codes of the leaves of its roots."""
-    from proof_tools import leaves_of, records_of
-
     problem = random_problem(p, seed)
     records = records_of(enumerate_roots(problem, 0.0).proof)
-    condensed = problem.condensed
-    system = SpaceSystem.scaled(condensed.S, condensed.free_displacements(0.0), problem.friction_at(0.0))
-    return system, [codes for k, codes in leaves_of(records) if records[k][0] == "r"]
+    return system_of(problem), [codes for k, codes in leaves_of(records) if records[k][0] == "r"]
 
 
 def jacobian_sign(system, y):
@@ -320,10 +311,9 @@ def test_indices_are_those_of_the_normal_map(p, seed):
 @pytest.mark.parametrize(("p", "seed"), [(1, 22), (2, 0), (3, 4)])
 def test_a_root_of_a_ball_of_data_holds_that_of_every_data(p, seed):
     system, leaves = leaves_with_roots(p, seed)
-    rng = np.random.default_rng(1)
-    checked = 0
+    rng, checked = np.random.default_rng(1), 0
+    exact, size = EnclosedSpace.of_floats(system), 1e-7
     for codes in leaves:
-        exact, size = EnclosedSpace.of_floats(system), 1e-7
         wide = replace(exact, S_rad=size * np.abs(exact.S), g_rad=size * np.abs(exact.g))
         root = settle(wide, codes)
         if not isinstance(root, SpaceRoot):
@@ -353,11 +343,7 @@ def test_a_root_is_one_where_rounding_ends_its_refinement():
 
 
 def test_roots_of_two_leaves_are_told_apart():
-    problem = on_the_end_of_a_sector()
-    condensed = problem.condensed
-    enclosed = EnclosedSpace.of_floats(
-        SpaceSystem.scaled(condensed.S, condensed.free_displacements(0.0), problem.friction_at(0.0))
-    )
+    enclosed = EnclosedSpace.of_floats(system_of(on_the_end_of_a_sector()))
     roots = [((SECTORS + n,), settle(enclosed, (SECTORS + n,))) for n in (16, 31, 63, 32)]
     assert all(isinstance(root, SpaceRoot) for _, root in roots)
     assert all(same_root(one, other) for _, one in roots for _, other in roots)
@@ -379,8 +365,7 @@ def test_cut_boxes_hold_what_both_hold():
         low = max(Fraction(move.mid[0]) - Fraction(move.rad[0]), -Fraction(radius[0]))
         high = min(Fraction(move.mid[0]) + Fraction(move.rad[0]), Fraction(radius[0]))
         if low <= high:
-            new, new_radius = _cut(angle, radius, reach, move)
-            middle, half = Fraction(new[0]), Fraction(new_radius[0])
+            middle, half = (Fraction(part[0]) for part in _cut(angle, radius, reach, move))
             assert middle - half <= Fraction(angle[0]) + low
             assert Fraction(angle[0]) + high <= middle + half
 

@@ -28,11 +28,6 @@ def rational_system(rng, spread):
     return SpaceSystem.scaled(S, 10.0 ** rng.integers(0, 3) * rng.normal(size=3 * p), F)
 
 
-def codes_of(rng, p):
-    sectors = SECTORS + 4, SECTORS + 7, SECTORS + int(rng.integers(16, 32)), SECTORS + int(rng.integers(1024, 2048))
-    return tuple(int(rng.choice([OPEN, STICK, *sectors])) for _ in range(p))
-
-
 class Exactly:
     """y, w, G and dG/dpsi in rationals, at directions with rational coordinates."""
 
@@ -57,8 +52,7 @@ class Exactly:
         self.w = g - S * self.y
         self.dw = []
         for k, column in enumerate(leaf.column):
-            push = fmpq_mat(self.m, 1)
-            turned = -self.d[k][1], self.d[k][0]
+            push, turned = fmpq_mat(self.m, 1), (-self.d[k][1], self.d[k][0])
             for t, d, unit in zip(leaf.t[k], turned, self.unit[k], strict=True):
                 push[int(t), 0] = d / unit * x[column, 0]
             pushed = S * push
@@ -107,7 +101,9 @@ def test_values_and_slopes_lie_in_their_balls(seed):
     rng, regular, turning = np.random.default_rng([51, seed]), 0, 0
     for k in range(50):
         system = rational_system(rng, spread=k % 7)
-        leaf = _Leaf(EnclosedSpace.of_floats(system), codes_of(rng, system.p))
+        sectors = [SECTORS + n for n in (4, 7, int(rng.integers(16, 32)), int(rng.integers(1024, 2048)))]
+        codes = tuple(int(rng.choice([OPEN, STICK, *sectors])) for _ in range(system.p))
+        leaf = _Leaf(EnclosedSpace.of_floats(system), codes)
         size = len(leaf.turning)
         radius = leaf.half * 10.0 ** -rng.uniform(0, 6, size=size)
         angle = leaf.half * rng.uniform(-0.5, 0.5, size=size)
@@ -119,10 +115,8 @@ def test_values_and_slopes_lie_in_their_balls(seed):
             there = Exactly(leaf, system, angle + 0.999 * radius * rng.choice([-1, 1, rng.uniform(-1, 1)], size=size))
             w = [fmpq(0) if row in leaf.rows else there.w[row, 0] for row in range(len(system.g))]
             assert all(there.w[row, 0] == 0 for row in leaf.rows)
-            assert holds(state[0].mid, state[0].rad, [there.y[row, 0] for row in range(len(system.g))])
-            assert holds(state[1].mid, state[1].rad, w)
-            assert holds(state[2].mid, state[2].rad, there.G())
-            assert holds(state[3].mid, state[3].rad, there.slopes())
+            exactly = [there.y[row, 0] for row in range(len(system.g))], w, there.G(), there.slopes()
+            assert all(holds(ball.mid, ball.rad, x) for ball, x in zip(state[:4], exactly, strict=True))
             assert last is None or bends_hold(bends, last, there)
             last = there
         regular += 1

@@ -20,8 +20,10 @@ from enumsol.trusted.exclusion import exclusion_margin
 from enumsol.trusted.status_rows import row_signs
 
 
-def fractions(array):
-    return [fractions(row) if np.ndim(row) else Fraction(float(row)) for row in array]
+def moved(mid, rad, sign):
+    """Ends of balls."""
+    ends = zip(mid.tolist(), rad.tolist(), sign.tolist(), strict=True)
+    return [Fraction(x) + side * Fraction(r) for x, r, side in ends]
 
 
 def wide_system(rng, p, width):
@@ -29,24 +31,17 @@ def wide_system(rng, p, width):
     S = dense_compliance(rng, p)
     g, F = rng.normal(size=2 * p), rng.uniform(0.3, 2.0, size=p)
     S_rad = width * rng.uniform(size=S.shape) * np.sqrt(np.outer(np.diagonal(S), np.diagonal(S)))
-    return EnclosedSystem(
-        S, np.maximum(S_rad, S_rad.T), g, width * rng.uniform(size=2 * p), F, width * rng.uniform(size=p)
-    )
+    g_rad, F_rad = width * rng.uniform(size=2 * p), width * rng.uniform(size=p)
+    return EnclosedSystem(S, np.maximum(S_rad, S_rad.T), g, g_rad, F, F_rad)
 
 
 def corner(rng, system):
     """Exact data in a corner of the balls."""
-    S, S_rad, g, g_rad, F, F_rad = map(
-        fractions, (system.S, system.S_rad, system.g, system.g_rad, system.F, system.F_rad)
-    )
     sign = np.triu(rng.choice([-1, 1], size=system.S.shape))
-    sign = sign + np.triu(sign, 1).T
-    m = 2 * system.p
-    return (
-        [[S[i][j] + int(sign[i, j]) * S_rad[i][j] for j in range(m)] for i in range(m)],
-        [x + int(s) * r for x, r, s in zip(g, g_rad, rng.choice([-1, 1], size=m), strict=True)],
-        [x + int(s) * r for x, r, s in zip(F, F_rad, rng.choice([-1, 1], size=system.p), strict=True)],
-    )
+    sign, m = sign + np.triu(sign, 1).T, 2 * system.p
+    g_sign, F_sign = rng.choice([-1, 1], size=m), rng.choice([-1, 1], size=system.p)
+    S = [moved(*row) for row in zip(system.S, system.S_rad, sign, strict=True)]
+    return S, moved(system.g, system.g_rad, g_sign), moved(system.F, system.F_rad, F_sign)
 
 
 @pytest.mark.few(2)
@@ -88,11 +83,9 @@ def test_selections_hold_for_every_corner(width):
         system = wide_system(rng, p, width)
         for codes in product(range(4), repeat=p):
             ball = solve_selection(system, codes)
-            if ball is None:
-                continue
-            regular += 1
-            S, g, F = corner(rng, system)
-            agrees_with_exact(ball, S, g, F, codes)
+            if ball is not None:
+                regular += 1
+                agrees_with_exact(ball, *corner(rng, system), codes)
     assert regular >= 60
 
 
@@ -128,7 +121,5 @@ def test_friction_balls_count_for_cones():
     wide = replace(system, F_rad=np.array([0.25]))
     rows, values = np.array([2, 4], dtype=np.intp), np.array([1.0, 0.5])
     assert exclusion_margin(wide, (2,), rows, values) < exclusion_margin(system, (2,), rows, values) - 1e-3
-    assert (
-        Margins((wide,), wide.F, wide.F).margin((2,), rows, values)
-        < Margins((system,), system.F, system.F).margin((2,), rows, values) - 1e-3
-    )
+    less, more = (Margins((one,), one.F, one.F).margin((2,), rows, values) for one in (wide, system))
+    assert less < more - 1e-3
