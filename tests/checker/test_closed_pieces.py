@@ -1,6 +1,7 @@
 """Pieces of graph proofs closed by their arcs (docs/proof_format.md, under Pieces without a tree), in both checkers."""
 
 import functools
+from contextlib import nullcontext
 from fractions import Fraction
 from itertools import combinations, pairwise, takewhile
 
@@ -8,11 +9,11 @@ import numpy as np
 import pytest
 from arc_oracle import counted
 from branches.test_lower_bounds import case, padded
-from complete import accepted_report, complete_report
+from complete import accepted_report, complete_report, whole_graph
 from effort import some
 from flint import fmpq
 from generators import through_the_unloaded_state
-from graph_proofs import accepted, refused, three_with_everything, without_arcs
+from graph_proofs import GRAPHS, accepted, parts_of, refused, without_arcs
 from proof_tools import bytes_of, copied, of_kind, proof_of, put, records_of, replaced
 from rational_arcs import Selection
 from rational_checker import check
@@ -20,7 +21,7 @@ from rational_forms import Data
 from rational_pieces import ClosedPiece, _Along
 from trees import by_the_tree
 
-from enumsol import ContactProblem, branch_graph, gallery, verify
+from enumsol import ContactProblem, branch_graph, verify
 from enumsol.proof.proof_file import ProofFormatError
 
 SIZE = 25
@@ -40,13 +41,7 @@ def vanishing():
     return ContactProblem(body.A, body.Bn, body.Bt, [0.0, 0.0], load_slope=[1.5, -4.0], friction=0.5), interval
 
 
-BODIES = {
-    "friction": lambda: (gallery.get("two-node-6.4").build(), (0.0, 6.0)),
-    "load": lambda: (gallery.get("two-node-6.7-minus").build(), (-3.0, 3.0)),
-    "unloaded": through_the_unloaded_state,
-    "vanishing": vanishing,
-    "everything": lambda: (three_with_everything(), (0.0, 3.0)),
-}
+BODIES = {name: GRAPHS[name] for name in ("friction", "load", "unloaded", "everything")} | {"vanishing": vanishing}
 SEVERAL = ("friction", "load", "unloaded")
 EVENTFUL = ("load", "everything")
 
@@ -56,13 +51,8 @@ def proven(name, *, tree=False):
     """A problem and the records of its graph's proof."""
     problem, interval = BODIES[name]()
     body = padded(problem, SIZE)
-    if tree:
-        with by_the_tree():
-            graph = branch_graph(body, interval)
-    else:
-        graph = branch_graph(body, interval)
-    assert graph.complete
-    records = records_of(graph.proof)
+    with by_the_tree() if tree else nullcontext():
+        records = records_of(whole_graph(body, interval).proof)
     assert bool(of_kind(records, "m")) != tree
     return body, records
 
@@ -82,10 +72,6 @@ def end_of(records, head):
     return next(k for k in range(head + 1, len(records)) if not isinstance(records[k], list))
 
 
-def plain(p):
-    return ["m", [1.0] * p, [1.0] * p, [0.0] * p]
-
-
 @pytest.mark.parametrize("name", BODIES)
 def test_both_checkers_take_them(name):
     body, records = proven(name)
@@ -95,27 +81,21 @@ def test_both_checkers_take_them(name):
     assert counted(records) == records
 
 
-def agree(seeds, **options):
-    """Whether both checkers take the proofs of random graphs, and how many have closed pieces."""
+@pytest.mark.slow
+def test_both_checkers_agree_on_random_graphs():
+    """Integer data, mirror symmetry and several conditions that vanish together among them."""
     closed = 0
-    for seed in seeds:
+    for seed in [302, 304, 309, 311, 317, 328, 330, 339, *range(600, 615)][: some(4, of=23)]:
         problem, interval = case(seed)
         body = padded(problem, SIZE)
-        graph = branch_graph(body, interval, **options)
+        graph = branch_graph(body, interval)
         if graph.proof is None:
             continue
         report = accepted_report(body, graph.proof)
         if "arcs" in records_of(graph.proof)[-1]:
             assert check(body, bytes_of(graph.proof)) == report.selections, seed
             closed += report.closed > 0
-    return closed
-
-
-@pytest.mark.slow
-def test_both_checkers_agree_on_random_graphs():
-    """Integer data, mirror symmetry and several conditions that vanish together among them."""
-    seeds = [302, 304, 309, 311, 317, 328, 330, 339, *range(600, 615)]
-    assert agree(seeds[: some(4, of=23)]) > some(2, of=11)
+    assert closed > some(2, of=11)
 
 
 # -- forgeries: the record ---------------------------------------------------------------------------------------------
@@ -200,9 +180,9 @@ def test_what_stands_beside_the_record(name):
     true = [whole[j] for j in of_kind(whole, "x")]
     for record in beside + true[:1]:
         for place in (k, k + 1):
-            for forged in ([*records[:place], record, *records[place:]],):
-                assert refused(body, forged), record
-                assert refused(body, counted(forged)), record
+            forged = [*records[:place], record, *records[place:]]
+            assert refused(body, forged), record
+            assert refused(body, counted(forged)), record
 
 
 @pytest.mark.parametrize("name", BODIES)
@@ -265,20 +245,16 @@ def test_parts_left_open(name):
     body, records = proven(name)
     pieces = [tuple(map(Fraction, records[k]["piece"])) for k in closed_heads(records)]
     opened = 0
-    for k in of_kind(records, "b"):
-        begin = records[k][1]
-        for i, part in enumerate(records[k][4]):
-            low, high = Fraction(begin), Fraction(part[1])
-            begin = part[1]
-            changed = counted(put(records, (k, 4, i), ["u", part[1]]))
-            met = any(low < b and a < high for a, b in pieces)
-            if part[0] in "he" and met and not elsewhere(body, records, k, (low, high)):
-                assert refused(body, changed), part
-                opened += 1
+    for k, i, begin, part in parts_of(records, "h", "e"):
+        low, high = Fraction(begin), Fraction(part[1])
+        met = any(low < b and a < high for a, b in pieces)
+        if met and not elsewhere(records, k, (low, high)):
+            assert refused(body, counted(put(records, (k, 4, i), ["u", part[1]]))), part
+            opened += 1
     assert opened
 
 
-def elsewhere(body, records, k, ends):
+def elsewhere(records, k, ends):
     """Whether a part of a box lies in no closed piece with its selection."""
     codes = records[max(j for j in of_kind(records, "t") if j < k)][1]
     for head in closed_heads(records):
@@ -295,10 +271,8 @@ def test_a_selection_removed(name):
     body, records = proven(name)
     for head in closed_heads(records):
         a, b = map(Fraction, records[head]["piece"])
-        for k in range(head + 1, end_of(records, head)):
-            if records[k][0] != "s":
-                continue
-            removed = records[:k] + records[k + 1 :]
+        for k in [k for k in of_kind(records, "s") if head < k < end_of(records, head)]:
+            removed = replaced(records, k)
             assert refused(body, removed)
             assert refused(body, counted(removed))
             assert refused(body, counted(without_trace(removed, records[k][1], a, b)))
@@ -328,13 +302,11 @@ def test_events_without_partners(name):
     """One of two partners given up: arcs end at the other, which alone shows nothing beyond its zero."""
     body, records = proven(name)
     given = 0
-    for k in of_kind(records, "b"):
-        for i, part in enumerate(records[k][4]):
-            if part[0] == "e":
-                changed = counted(put(records, (k, 4, i), ["u", part[1]]))
-                report = verify(body, proof_of(changed))
-                assert report.ok <= accepted(body, changed)
-                given += not report.ok
+    for k, i, _, part in parts_of(records, "e"):
+        changed = counted(put(records, (k, 4, i), ["u", part[1]]))
+        ok = verify(body, proof_of(changed)).ok
+        assert ok <= accepted(body, changed)
+        given += not ok
     assert given
 
 
@@ -424,12 +396,10 @@ def only(records, chosen, numbers):
 @functools.cache
 def whole(name):
     """The proof by trees, of pieces that are not cut: every selection has a trace over all of them."""
-    problem, interval = BODIES[name]()
-    body, p = padded(problem, SIZE), problem.p
-    body_records = proven(name, tree=True)[1]
-    if len(heads(body_records)) > 1 and name != "unloaded":
+    body, records = proven(name, tree=True)
+    if len(heads(records)) > 1 and name != "unloaded":
         pytest.skip("the interval is cut")
-    return body, p, body_records, interval
+    return body, records
 
 
 @pytest.mark.few(0, 1)
@@ -439,9 +409,9 @@ def test_several_solutions(name, believing, monkeypatch):
     """Selections of one branch or of several, with all kinds of numbers; also if no other selections are tried."""
     if believing:
         monkeypatch.setattr(ClosedPiece, "_tried", lambda *_: None)
-    body, p, records, _ = whole(name)
-    codes = sorted({records[k][1] for k in of_kind(records, "s")})
-    rng, forms = np.random.default_rng(3), [plain(p)[1:]]
+    body, records = whole(name)
+    codes, p = sorted({records[k][1] for k in of_kind(records, "s")}), body.p
+    rng, forms = np.random.default_rng(3), [[[1.0] * p, [1.0] * p, [0.0] * p]]
     for _ in range(2):
         mu, kappa = np.exp(rng.normal(size=(2, p)) * 2).tolist()
         forms.append([mu, kappa, (0.1 * rng.normal(size=p)).tolist()])
@@ -454,6 +424,6 @@ def test_several_solutions(name, believing, monkeypatch):
 def test_the_same_with_one_solution_is_no_forgery():
     body, records = proven("vanishing", tree=True)
     codes = {records[k][1] for k in of_kind(records, "s")}
-    forged = only(records, codes, plain(1)[1:])
+    forged = only(records, codes, [[1.0], [1.0], [0.0]])
     assert verify(body, proof_of(forged)).complete
     assert accepted(body, forged)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from effort import some
 from generators import integer_problem, random_problem
-from proof_tools import copied, proof_of, records_of
+from proof_tools import copied, proof_of, put, records_of, replaced
 from rational_checker import check_records
 from rational_forms import Refused
 from touching import beside_a_loaded_node, row_of_discs, touching_problem
@@ -23,70 +23,37 @@ MUTANTS = some(30, of=75)
 @functools.cache
 def cases(kind):
     """Problems with records of proofs that have such leaves."""
-    if kind in ("slides", "sides"):
-        return cases_with_sides(kind)
-    if kind == "any theta":
-        return cases_with_any_theta()
-    if kind == "a":
-        return cases_with_lone_roots()
-    found = []
-    with pytest.MonkeyPatch.context() as patch, every_subtree():
-        if kind == "m":
-            patch.setattr(solvers, "EXACT_DOF_LIMIT", 0)
-        for seed in range(some(30, of=60)):
-            rng = np.random.default_rng(seed)
-            problem = touching_problem(rng, int(rng.integers(2, 4)))
+    found, most = [], {"m": some(2, of=5), "M": some(2, of=5), "a": some(5, of=15)}.get(kind, 5)
+    with pytest.MonkeyPatch.context() as patch:
+        for problem in problems(kind, patch):
             roots = enumerate_roots(problem, 0)
             records = records_of(roots.proof)
             if roots.certified_data == "problem" and roots.complete and leaves(records, kind):
                 found.append((problem, records))
-    assert len(found) > some(2, of=5)
+    assert len(found) > most
     return found
 
 
-def cases_with_sides(kind):
-    """Proofs in which undecided nodes are split by sides."""
-    found = []
-    with pytest.MonkeyPatch.context() as patch:
+def problems(kind, patch):
+    """Problems whose proofs are likely to have such leaves, each with rationals or without."""
+    if kind in ("slides", "sides"):
         patch.setattr(closing, "_MANY", 1)
         unequal = (2.0, 3.0), (2.0, 3.0, 2.5), (2.0, 2.0, 3.0)
         for limit, weights, stiffness in product((0, 250), unequal, (64.0, 256.0)):
             patch.setattr(solvers, "EXACT_DOF_LIMIT", limit)
-            problem = row_of_discs(5, weights=weights, friction=0.9, stiffness=stiffness)
-            records = records_of(enumerate_roots(problem, 0).proof)
-            if leaves(records, kind):
-                found.append((problem, records))
-    assert len(found) > 5
-    return found
-
-
-def cases_with_any_theta():
-    """Proofs with nodes that touch without load, at rest, without rationals."""
-    found = []
-    with pytest.MonkeyPatch.context() as patch:
+            yield row_of_discs(5, weights=weights, friction=0.9, stiffness=stiffness)
+        return
+    if kind in ("m", "any theta"):
         patch.setattr(solvers, "EXACT_DOF_LIMIT", 0)
+    if kind == "any theta":
         for slides, friction, k in product((False, True), (0.25, 0.5, 0.75), (2, 3)):
-            problem = beside_a_loaded_node(k, slides=slides, grazing=False, friction=friction)
-            records = records_of(enumerate_roots(problem, 0).proof)
-            if leaves(records, "any theta"):
-                found.append((problem, records))
-    assert len(found) > 5
-    return found
-
-
-def cases_with_lone_roots():
-    """Proofs with roots that are alone below an assignment."""
-    found = []
-    with above_known_roots():
-        for seed in range(some(24, of=60)):
-            rng = np.random.default_rng([6, seed])
-            problem = [random_problem, integer_problem, touching_problem][seed % 3](rng, int(rng.integers(2, 4)))
-            roots = enumerate_roots(problem, 0)
-            records = records_of(roots.proof)
-            if roots.certified_data == "problem" and roots.complete and leaves(records, "a"):
-                found.append((problem, records))
-    assert len(found) > some(5, of=15)
-    return found
+            yield beside_a_loaded_node(k, slides=slides, grazing=False, friction=friction)
+        return
+    makers = (random_problem, integer_problem, touching_problem) if kind == "a" else (touching_problem,)
+    with above_known_roots() if kind == "a" else every_subtree():
+        for seed in range(some(24, of=60) if kind == "a" else some(30, of=60)):
+            rng = np.random.default_rng([6, seed] if kind == "a" else seed)
+            yield makers[seed % len(makers)](rng, int(rng.integers(2, 4)))
 
 
 def numbers_in(record):
@@ -172,7 +139,7 @@ def test_forged_roots_are_refused():
             if len(record) == 7:
                 forgeries += [[*record[:6], -record[6]], [*record[:5], [-1.0] * (2 * problem.p), record[6]]]
             for forged in forgeries:
-                assert not accepted(problem, [*records[:k], forged, *records[k + 1 :]])
+                assert not accepted(problem, replaced(records, k, forged))
 
 
 @pytest.mark.few(0, 1)
@@ -180,8 +147,7 @@ def test_forged_roots_are_refused():
 def test_forged_numbers_are_refused(kind):
     for problem, records in cases(kind):
         for k in leaves(records, kind):
-            mu, rows = numbers_in(records[k])
-            kappa, nu, share, tau = rows
+            mu, (kappa, nu, share, tau) = numbers_in(records[k])
             numbers = records[k][3]
             forgeries = [numbers[:-1], [*numbers, 1.0]]
             for x in (0.0, -1.0, 1e200, 1e-200, True, "1", None):
@@ -192,35 +158,25 @@ def test_forged_numbers_are_refused(kind):
                 forgeries += [[*mu, *kappa, *nu, *([1.5] * len(nu)), *tau]]
             # theta does not serve nodes that may have any
             if any(tau):
-                forgeries += [
-                    [*mu, *kappa, *nu, *share, *([0.0] * len(nu))],
-                    [*mu, *kappa, *nu, *([0.5] * len(nu)), *tau],
-                ]
+                for last in ((*share, *[0.0] * len(nu)), (*[0.5] * len(nu), *tau)):
+                    forgeries.append([*mu, *kappa, *nu, *last])
             for forged in forgeries:
-                record = [*records[k][:3], forged, *records[k][4:]]
-                assert not verify(problem, proof_of([*records[:k], record, *records[k + 1 :]])).ok, (forged, numbers)
+                assert not verify(problem, proof_of(put(records, (k, 3), forged))).ok, (forged, numbers)
 
 
 @pytest.mark.slow
 def test_a_lone_root_is_no_other_and_no_wider():
     for problem, records in cases("a"):
         for k in leaves(records, "a"):
-            record, p = records[k], problem.p
-            forgeries = [
-                record[:-1],
-                [*record, 1],
-                [*record[:8], -record[8]],
-                [*record[:7], [-1.0] * (2 * p), record[8]],
-            ]
-            forgeries += [[*record[:3], wrong, *record[4:]] for wrong in ([-1.0] * (2 * p), [1.0] * p, [1e3] * (2 * p))]
+            record, p, rubbing = records[k], problem.p, int(np.count_nonzero(problem.friction[0]))
+            forgeries = [record[:-1], [*record, 1], put(record, (8,), -record[8]), put(record, (7,), [-1.0] * (2 * p))]
+            forgeries += [put(record, (3,), wrong) for wrong in ([-1.0] * (2 * p), [1.0] * p, [1e3] * (2 * p))]
             for forged in forgeries:
-                others = [*records[:k], forged, *records[k + 1 :]]
+                others = replaced(records, k, forged)
                 assert not accepted(problem, others) or check_records(problem, others)
             # the whole problem in its place, whatever the numbers
             footer = {"roots": 1, "families": 0, "undecided": 0, "leaves": 1}
-            numbers = [1.0] * (p + int(np.count_nonzero(problem.friction[0]))) + [0.0] * (
-                2 * int(np.count_nonzero(problem.friction[0]))
-            )
+            numbers = [1.0] * (p + rubbing) + [0.0] * (2 * rubbing)
             for strength in (0.0, 1.0, 1e3):
                 whole = [records[0], ["a", record[1], numbers, [strength] * p + [0.0] * p, *record[4:]], footer]
                 assert not accepted(problem, whole) or check_records(problem, whole)
@@ -231,15 +187,13 @@ def test_forged_counts_are_refused():
     """By the independent checker as well."""
     for problem, records in cases("M"):
         for k in leaves(records, "M"):
-            forged = [*records[:k], [*records[k][:3], 1 - records[k][3]], *records[k + 1 :]]
-            footer = {**records[-1], "roots": records[-1]["roots"] + 1 - 2 * records[k][3]}
-            for others in (forged, [*forged[:-1], footer]):
+            forged = put(records, (k, 3), 1 - records[k][3])
+            for others in (forged, put(forged, (-1, "roots"), records[-1]["roots"] + 1 - 2 * records[k][3])):
                 assert not accepted(problem, others)
                 with pytest.raises(Refused):
                     check_records(problem, others)
     for problem, records in cases("m"):
-        footer = {**records[-1], "roots": records[-1]["roots"] + 1}
-        assert not accepted(problem, [*records[:-1], footer])
+        assert not accepted(problem, put(records, (-1, "roots"), records[-1]["roots"] + 1))
 
 
 def test_a_smaller_core_needs_its_own_proof():
@@ -251,7 +205,7 @@ def test_a_smaller_core_needs_its_own_proof():
         for part in (slice(0), slice(1, None), slice(-1)):
             numbers = mu[part] + [x for row in rows for x in row[part]]
             forged = ["m", records[k][1], records[k][2][part], numbers, *records[k][4:]]
-            assert not accepted(problem, [*records[:k], forged, *records[k + 1 :]])
+            assert not accepted(problem, replaced(records, k, forged))
 
 
 @pytest.mark.long

@@ -10,14 +10,13 @@ import pytest
 from arc_oracle import recount
 from complete import accepted_report
 from effort import some
-from generators import through_the_unloaded_state
-from graph_proofs import forms_at_once, without_arcs
+from graph_proofs import GRAPHS, forms_at_once, without_arcs
 from oracles import exact_solutions
-from proof_fuzz import mutant, read
+from proof_fuzz import mutant
 from proof_tools import copied, of_kind, proof_of, records_of
 from rational_checker import check_records
 
-from enumsol import ContactProblem, ProofFormatError, branch_graph, gallery, verify
+from enumsol import ProofFormatError, branch_graph, gallery, verify
 
 SAMPLES = 25
 
@@ -26,18 +25,10 @@ def two_loads():
     """Two nodes, load and friction vary, in several pieces."""
     problem = gallery.two_node_square((1.0, -3.0), (1.0, -1.0))
     slope = np.array([0.1, -0.3, 0.2, 0.1])
-    data = {"friction": (0.5, 0.8), "load_slope": slope}
-    return ContactProblem(problem.A, problem.Bn, problem.Bt, problem.f, **data), (0.0, 6.0)
+    return problem.replace(friction=(0.5, 0.8), load_slope=slope), (0.0, 6.0)
 
 
-PATHS = {
-    "friction": lambda: (gallery.get("two-node-6.4").build(), (0.0, 6.0)),
-    "loading": lambda: (gallery.get("two-node-6.7-minus").build(), (-3.0, 3.0)),
-    "unloaded": through_the_unloaded_state,
-    "both": two_loads,
-}
-
-
+PATHS = {"friction": GRAPHS["friction"], "loading": GRAPHS["load"], "unloaded": GRAPHS["unloaded"], "both": two_loads}
 #: The same with forms in place of the energy.
 BY_FORMS = {
     "forms, friction": lambda: (PATHS["friction"]()[0], (0.5, 6.0)),
@@ -55,11 +46,8 @@ def case(name):
     a, b = (Fraction(end) for end in interval)
     alphas = {a + (b - a) * Fraction(k, SAMPLES) for k in range(SAMPLES + 1)}
     alphas |= {Fraction(float(v.alpha)) for v in graph.vertices} | {Fraction(0)}
-    holding = {
-        alpha: {codes for c in exact_solutions(problem, alpha) for codes, *_ in c.parts}
-        for alpha in sorted(alphas)
-        if a <= alpha <= b
-    }
+    inside = sorted(alpha for alpha in alphas if a <= alpha <= b)
+    holding = {alpha: {codes for c in exact_solutions(problem, alpha) for codes, *_ in c.parts} for alpha in inside}
     return problem, without_arcs(records_of(graph.proof)), holding  # arcs are forged in test_rational_arcs
 
 
@@ -72,7 +60,7 @@ def test_accepted_mutants_name_every_selection_that_holds(name):
         records = copied(original)
         for _ in range(int(rng.integers(1, 4))):
             with suppress(ValueError, TypeError, struct.error):  # it does not apply to what is left
-                records = read(mutant(rng, records, None, ("nudge", "nudge", "nudge", "order", "numbers"))[0])
+                records = records_of(mutant(rng, records, None, ("nudge", "nudge", "nudge", "order", "numbers"))[0])
         if rng.random() < 0.5:
             recount(records)
         try:
@@ -97,5 +85,4 @@ def test_the_originals_name_every_selection_that_holds(name):
     assert set().union(*holding.values()) <= report.selections
     # and there is something to lose: selections that hold at some alphas only
     assert len({frozenset(codes) for codes in holding.values()}) > 1
-    by_forms = len(of_kind(records, "f"))
-    assert (by_forms > 0) == (name in BY_FORMS)
+    assert bool(of_kind(records, "f")) == (name in BY_FORMS)

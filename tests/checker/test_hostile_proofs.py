@@ -14,20 +14,10 @@ import numpy as np
 import pytest
 from complete import accepted_report
 from effort import some
+from generators import named
 from oracles import exact_solutions
-from proof_fuzz import mutant, read
-from proof_tools import (
-    Judge,
-    bytes_of,
-    copied,
-    multipliers,
-    of_kind,
-    proof_of,
-    put,
-    records_of,
-    sealed,
-    with_multipliers,
-)
+from proof_fuzz import mutant
+from proof_tools import Judge, bytes_of, multipliers, of_kind, proof_of, put, records_of, sealed, with_multipliers
 from refusals import bad_argument, refusal
 
 import enumsol
@@ -52,9 +42,7 @@ def before(name):
 def changed(name, k, **fields):
     """The problem, and its proof with fields of record k replaced."""
     problem, proof = before(name)
-    records = copied(records_of(proof))
-    records[k] = records[k] | fields
-    return problem, proof_of(records)
+    return problem, proof_of(put(records_of(proof), (k,), lambda record: record | fields))
 
 
 class Effort:
@@ -101,11 +89,28 @@ class Effort:
 def refused(problem, proof):
     """The report, which refuses and says why."""
     report = verify(problem, proof)
-    assert not report.ok
-    assert not report.complete
+    assert (report.ok, report.complete) == (False, False)
     assert report.failures
     assert "REFUSED" in repr(report)
     return report
+
+
+def header_of(problem, alpha):
+    """The header of a proof in units of one."""
+    header = {"format": "enumsol-proof", "version": 1, "problem": problem.fingerprint, "alpha": alpha, "p": problem.p}
+    return header | {"data": "problem", "force": [0] * 2 * problem.p, "length": [0] * 2 * problem.p}
+
+
+def whole_tree(p, leaf):
+    """A tree of all selections whose leaves prove nothing."""
+    tree, waiting = [], [(6,) * p]
+    while waiting:
+        codes = waiting.pop()
+        node = next((i for i, code in enumerate(codes) if code >= 5), None)
+        children = () if node is None else (0, 5) if codes[node] == 6 else (1, 2, 3)
+        tree.append(["b", node, list(children)] if children else leaf)
+        waiting += [(*codes[:node], child, *codes[node + 1 :]) for child in reversed(children)]
+    return tree
 
 
 def bomb(first, line, megabytes):
@@ -145,10 +150,9 @@ def test_those_proofs_hold_records_of_every_kind():
 @pytest.mark.parametrize("line", ["[]", "null", '["u",""]', '["s","000"]', "{}"])
 def test_a_small_file_of_very_many_records(name, line, monkeypatch):
     # the report of this defect: 58 KB, 94 s, 2.5 GB
-    problem, proof = before(name)
+    (problem, proof), effort = before(name), Effort(monkeypatch)
     proof = bomb(records_of(proof)[:2], line, 60)
     assert proof.size < 500_000
-    effort = Effort(monkeypatch)
     outcome = effort.of(problem, proof)
     assert isinstance(outcome, ProofFormatError) or not outcome.ok
     assert effort.characters < 500_000
@@ -159,12 +163,10 @@ def test_a_small_file_of_very_many_records(name, line, monkeypatch):
 @pytest.mark.parametrize("name", ["stopped", "graph in several pieces"])
 @pytest.mark.parametrize("part", ["[],", '"",', "0,", '["0/1"],', "[" * 1000])
 def test_a_small_file_of_one_long_record(name, part, monkeypatch):
-    problem, proof = before(name)
+    (problem, proof), effort = before(name), Effort(monkeypatch)
     text = json.dumps(records_of(proof)[0]) + "\n[" + part * (60_000_000 // len(part)) + "0]\n"
     proof = sealed(zlib.compress(text.encode(), 9))
-    effort = Effort(monkeypatch)
-    outcome = effort.of(problem, proof)
-    assert isinstance(outcome, ProofFormatError)
+    assert isinstance(effort.of(problem, proof), ProofFormatError)
     assert effort.characters < 2 * (proof_module.RECORD_SHARE * proof.size + proof_module.SMALL)
     assert effort.memory < 20e6
 
@@ -172,19 +174,7 @@ def test_a_small_file_of_one_long_record(name, part, monkeypatch):
 @pytest.mark.long
 def test_no_file_is_expanded_beyond_its_size(monkeypatch):
     problem = gallery.chain(8)
-    header = {"format": "enumsol-proof", "version": 1, "problem": problem.fingerprint, "alpha": "5", "p": 8}
-    header |= {"data": "problem", "force": [0] * 16, "length": [0] * 16}
-    tree, waiting = [], [(6,) * 8]
-    while waiting:
-        codes = waiting.pop()
-        node = next((i for i, code in enumerate(codes) if code >= 5), None)
-        if node is None:
-            tree.append('["u",""]')
-            continue
-        children = [0, 5] if codes[node] == 6 else [1, 2, 3]
-        tree.append(f'["b",{node},{children}]')
-        waiting += [(*codes[:node], child, *codes[node + 1 :]) for child in reversed(children)]
-    text = json.dumps(header) + "\n" + "\n".join(tree) + "\n"
+    text = "".join(json.dumps(record) + "\n" for record in (header_of(problem, "5"), *whole_tree(8, ["u", ""])))
     proof = sealed(zlib.compress(text.encode(), 9))
     effort = Effort(monkeypatch)
     outcome = effort.of(problem, proof)
@@ -238,12 +228,7 @@ def test_a_tree_is_walked_to_its_end_before_anything_is_computed(monkeypatch):
     fresh.factorization  # noqa: B018 (made here, so that only solves with it are counted)
     with monkeypatch.context() as watched:
         watched.setattr(Factorization, "solve", lambda *_, **__: solves.append(1))
-        for tampered in (
-            records[:-2],
-            records[:-1],
-            [*records, records[-1]],
-            [*records[:-1], records[-1] | {"leaves": 3}],
-        ):
+        for tampered in (records[:-2], records[:-1], [*records, records[-1]], put(records, (-1, "leaves"), 3)):
             refused(fresh, proof_of(tampered))
             assert not solves
     assert verify(fresh, proof).ok
@@ -254,35 +239,19 @@ def test_the_check_ends_after_some_failures():
     alike = [["x", "", ""] if record[0] in "Dn" else record for record in records_of(proof)[1:-1]]
     records = [records_of(proof)[0], *alike, records_of(proof)[-1]]
     assert 1 < len(refused(problem, proof_of(records)).failures) <= 21
-    wide = gallery.chain(4)
-    tree = _whole_tree(4)
-    header = {"format": "enumsol-proof", "version": 1, "problem": wide.fingerprint, "alpha": "5", "p": 4}
-    header |= {"data": "problem", "force": [0] * 8, "length": [0] * 8}
-    leaves = sum(record[0] == "x" for record in tree)
-    footer = {"roots": 0, "families": 0, "undecided": 0, "leaves": leaves}
-    report = refused(wide, proof_of([header, *tree, footer]))
+    wide, tree = gallery.chain(4), whole_tree(4, ["x", "", ""])
+    footer = {"roots": 0, "families": 0, "undecided": 0, "leaves": len(of_kind(tree, "x"))}
+    report = refused(wide, proof_of([header_of(wide, "5"), *tree, footer]))
     assert len(report.failures) == 21
     assert "the check ends after 20 failures" in report.failures
     # leaves are checked in batches
     assert report.leaves <= 256 + 20
 
 
-def _whole_tree(p):
-    """A tree of all selections whose leaves prove nothing."""
-    tree, waiting = [], [(6,) * p]
-    while waiting:
-        codes = waiting.pop()
-        node = next((i for i, code in enumerate(codes) if code >= 5), None)
-        children = () if node is None else (0, 5) if codes[node] == 6 else (1, 2, 3)
-        tree.append(["b", node, list(children)] if children else ["x", "", ""])
-        waiting += [(*codes[:node], child, *codes[node + 1 :]) for child in reversed(children)]
-    return tree
-
-
 def test_a_leaf_with_more_multipliers_than_there_are_rows():
     for name in ("stopped", "graph in several pieces"):
         problem, proof = before(name)
-        records = copied(records_of(proof))
+        records = records_of(proof)
         k = of_kind(records, "x")[0]
         rows, values = multipliers(["x", *records[k][-2:]])
         records[k][-2:] = with_multipliers(["x", "", ""], rows * 100, [v / 100 for v in values * 100])[1:]
@@ -295,18 +264,15 @@ def test_rational_leaves_of_a_large_problem_are_not_tried(monkeypatch):
     problem = gallery.clamped_block(10, 20, contact=1)
     assert problem.n > 250
     monkeypatch.setattr(rational, "fmpq_mat", None)
-    header = {"format": "enumsol-proof", "version": 1, "problem": problem.fingerprint, "alpha": "1", "p": 1}
-    header |= {"data": "problem", "force": [0, 0], "length": [0, 0]}
-    tree = [["b", 0, [0, 5]], ["N"], ["b", 0, [1, 2, 3]], ["N"], ["N"], ["N"]]
     footer = {"roots": 0, "families": 0, "undecided": 0, "leaves": 4}
-    report = refused(problem, proof_of([header, *tree, footer]))
+    report = refused(problem, proof_of([header_of(problem, "1"), *whole_tree(1, ["N"]), footer]))
     assert f"n = {problem.n} degrees of freedom; expected at most 250" in report.failures[0]
 
 
 def test_long_fractions_of_points_are_compared_and_not_computed():
     problem, proof = before("degenerate")
     records = records_of(proof)
-    k = next(k for k, record in enumerate(records[1:], start=1) if record[0] == "D")
+    k = of_kind(records, "D")[0]
     point = records[k][1][0]
     digits = np.random.default_rng(1).bytes(200_000).hex()
     for text in (f"{digits}/1{digits}", "0/0", "-0/1", "0/2", "00/1", "1", "1/1/1", "1e9/1", " 0/1", ""):
@@ -405,7 +371,7 @@ def original(name):
     """Problem and proof."""
     if name in BEFORE:
         return before(name)
-    problem, alpha = gallery.get(name).build(), gallery.get(name).alpha
+    problem, alpha = named(name)
     return problem, sealed(bytes_of(enumerate_roots(problem, alpha).proof)[16:-32])
 
 
@@ -449,7 +415,7 @@ def test_mutants(name, monkeypatch):
         else:
             assert repr(report)
             assert report.ok == (not report.failures)
-            assert not report.ok or is_true(name, report, read(candidate)), how
+            assert not report.ok or is_true(name, report, records_of(candidate)), how
             outcomes["true" if report.ok else "refused"] += 1
         # twice: the tree alone, then its leaves
         assert effort.characters <= 2 * (proof_module.EXPANSION * candidate.size + proof_module.SMALL) + 2**17
@@ -462,15 +428,12 @@ def test_some_changes_are_accepted(name):
     """Or else the test above would say nothing: multipliers in another order, and wider balls."""
     problem, proof = original(name)
     records = records_of(proof)
-    for k, record in enumerate(records[1:-1], start=1):
-        changed = copied(records)
-        if record[0] == "r" and any(record[2]):
-            changed[k][2] = [2 * r for r in record[2]]
-        elif record[0] == "x":
-            rows, values = multipliers(record)
-            changed[k] = with_multipliers(record, rows[::-1], values[::-1])
+    for k in of_kind(records, "r", "x"):
+        if records[k][0] == "r":
+            changed = put(records, (k, 2), [2 * r for r in records[k][2]])
         else:
-            continue
+            rows, values = multipliers(records[k])
+            changed = put(records, (k,), with_multipliers(records[k], rows[::-1], values[::-1]))
         assert verify(problem, proof_of(changed)).complete
         assert Judge(problem).valid(changed)
 
@@ -479,8 +442,7 @@ def test_some_changes_are_accepted(name):
 def test_any_flipped_bit_is_refused(name):
     problem, proof = original(name)
     data = proof._source
-    bits = np.random.default_rng(1).choice(8 * len(data), size=some(400, of=1500))
-    for bit in bits.tolist():
+    for bit in np.random.default_rng(1).choice(8 * len(data), size=some(400, of=1500)).tolist():
         flipped = bytearray(data)
         flipped[bit // 8] ^= 1 << bit % 8
         with pytest.raises(ProofFormatError):
@@ -493,6 +455,6 @@ def test_any_flipped_bit_is_refused(name):
 def test_extreme_units(exponent, other):
     for name in ("one-node-6.1", "one-node-6.3"):
         problem, proof = original(name)
-        changed = records_of(proof)
-        changed[0]["force"], changed[0]["length"] = [exponent] * 2, [other] * 2
+        header, *records = records_of(proof)
+        changed = [header | {"force": [exponent] * 2, "length": [other] * 2}, *records]
         assert not verify(problem, proof_of(changed)).ok or Judge(problem).valid(changed)

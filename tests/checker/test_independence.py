@@ -15,41 +15,23 @@ import enumsol
 from enumsol import branch_graph, checker, enumerate_roots, write_problem
 
 ROOT = Path(enumsol.__file__).parent
-CHECKERS = (
-    "enumsol.checker.verify",
-    "enumsol.checker.plane_checker",
-    "enumsol.checker.floating",
-    "enumsol.checker.graph_checker",
-    "enumsol.checker.history_checker",
-    "enumsol.checker.space_graph",
-)
+
+
+def inside(room, *modules):
+    return [f"enumsol.{room}.{module}" for module in modules]
+
+
+CHECKERS = inside("checker", "verify", "plane_checker", "floating", "graph_checker", "history_checker", "space_graph")
 IN_SPACE = {
-    "enumsol.checker.space_checker",
-    "enumsol.trusted.space.resultants",
-    "enumsol.trusted.space.sector_rows",
-    "enumsol.trusted.space.slip_forms",
-    "enumsol.trusted.space.leaves",
-    "enumsol.trusted.space.boxed_solution",
-    "enumsol.trusted.space.product_forms",
-    "enumsol.trusted.space.natural_map",
-    "enumsol.trusted.space.space_uniqueness",
-    "enumsol.trusted.space.turning",
-    "enumsol.condensation.space_condensed",
-    "enumsol.model.sectors",
+    *("enumsol.checker.space_checker", "enumsol.condensation.space_condensed", "enumsol.model.sectors"),
+    *inside("trusted.space", "resultants", "sector_rows", "slip_forms", "leaves", "boxed_solution"),
+    *inside("trusted.space", "product_forms", "natural_map", "space_uniqueness", "turning"),
 }
 #: The search: its rooms, and what it alone uses of rooms that it shares with the checkers.
 SEARCH = (
-    "enumsol.arithmetic.algebraic",
-    "enumsol.branches",
-    "enumsol.condensation.exact",
-    "enumsol.continuation",
-    "enumsol.loading",
-    "enumsol.support.workers",
-    "enumsol.relaxation",
-    "enumsol.roots",
-    "enumsol.search",
-    "enumsol.selections",
-    "enumsol.model.statuses",
+    *("enumsol.arithmetic.algebraic", "enumsol.condensation.exact", "enumsol.model.statuses"),
+    *("enumsol.branches", "enumsol.continuation", "enumsol.loading", "enumsol.relaxation", "enumsol.roots"),
+    *("enumsol.search", "enumsol.selections", "enumsol.support.workers"),
 )
 #: What may write a false proof and accept it: of these modules the search uses no more than these names; None: all.
 SHARED = {
@@ -97,15 +79,8 @@ SHARED = {
     "trusted.space.piece_forms": {"PieceWeights", "how_far_off"},
     "trusted.space.pieces": {"AlphaPiece", "lies_in"},
     "trusted.space.space_uniqueness": {
-        *(
-            "LARGEST_UNIT",
-            "LooseSolution",
-            "OnlySolution",
-            "equations",
-            "lone_root",
-            "only_root",
-            "only_solution_in_space",
-        )
+        *("LARGEST_UNIT", "LooseSolution", "OnlySolution"),
+        *("equations", "lone_root", "only_root", "only_solution_in_space"),
     },
     "proof.begun": None,
     "proof.proof_file": {"Proof", "fraction_text", "packed", "coarse"},
@@ -117,11 +92,7 @@ SHARED = {
 }
 #: Rooms of such modules, and the checkers' own, of which the search uses nothing.
 TRUSTED = (
-    "enumsol.arithmetic.",
-    "enumsol.checker.",
-    "enumsol.condensation.",
-    "enumsol.trusted.",
-    "enumsol.proof.",
+    *("enumsol.arithmetic.", "enumsol.checker.", "enumsol.condensation.", "enumsol.trusted.", "enumsol.proof."),
     "enumsol.model.sectors",
 )
 #: Of these rooms what proves nothing: the data, and S and g as computed.
@@ -156,9 +127,8 @@ def imports_of(module):
             assert node.level == 0, f"{module} imports relatively"
             for alias in node.names:
                 inner = f"{node.module}.{alias.name}"
-                found.add(
-                    (inner, None) if inner.startswith("enumsol.") and path_of(inner) else (node.module, alias.name)
-                )
+                is_module = inner.startswith("enumsol.") and path_of(inner)
+                found.add((inner, None) if is_module else (node.module, alias.name))
     return {(name, what) for name, what in found if name == "enumsol" or name.startswith("enumsol.")}
 
 
@@ -185,12 +155,9 @@ def test_no_module_of_the_search_is_imported_however_indirectly():
 
 
 def test_the_guard_sees_the_search_where_it_is():
-    assert any(is_search(module) for module in closure_of(["enumsol.branches.construction"]))
-    assert any(
-        is_search(module) for module in closure_of(["enumsol.gallery", "enumsol.cli.verify", "enumsol.roots.root_set"])
-    )
-    for name in SEARCH:
-        assert path_of(name)
+    users = (["enumsol.branches.construction"], ["enumsol.gallery", "enumsol.cli.verify", "enumsol.roots.root_set"])
+    assert all(any(map(is_search, closure_of(modules))) for modules in users)
+    assert all(map(path_of, SEARCH))
 
 
 def test_what_the_checkers_load_is_listed():
@@ -218,6 +185,22 @@ def test_what_the_search_uses_of_what_is_trusted_is_listed():
     assert set(used) == set(SHARED)
 
 
+def loaded_for(proofs, folder):
+    """The modules that a process has loaded that checked the proofs of these results, each of a problem."""
+    for k, (problem, found) in enumerate(proofs):
+        write_problem(problem, folder / f"{k}.npz")
+        found.proof.save(folder / f"{k}.proof")
+    code = (
+        "import sys, json, enumsol; from enumsol.checker.verify import verify; "
+        "from enumsol.proof.proof_file import Proof; "
+        f"reports = [verify(enumsol.read_problem(f'{folder}/{{k}}.npz'), Proof.load(f'{folder}/{{k}}.proof')) "
+        f"for k in range({len(proofs)})]; assert all(report.complete for report in reports); "
+        "print(json.dumps(sorted(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
+    return set(json.loads(done.stdout.splitlines()[-1]))
+
+
 def test_no_module_of_the_search_is_loaded_by_a_verification(tmp_path):
     """Point proofs with and without rational leaves, and a graph's, checked in a process of their own."""
     degenerate = integer_problem(np.random.default_rng(34), 2)
@@ -227,36 +210,15 @@ def test_no_module_of_the_search_is_loaded_by_a_verification(tmp_path):
     proofs += [(moving, branch_graph(moving, interval)), (plain, enumsol.histories(plain, [5, 4]))]
     sliding = enumsol.gallery.block_on_table(1, 1, push=1.0)
     proofs.append((sliding, enumerate_roots(sliding, 0)))
-    for k, (problem, found) in enumerate(proofs):
-        write_problem(problem, tmp_path / f"{k}.npz")
-        found.proof.save(tmp_path / f"{k}.proof")
-    code = (
-        "import sys, json, enumsol; from enumsol.checker.verify import verify; "
-        "from enumsol.proof.proof_file import Proof; "
-        f"reports = [verify(enumsol.read_problem(f'{tmp_path}/{{k}}.npz'), Proof.load(f'{tmp_path}/{{k}}.proof')) "
-        f"for k in range({len(proofs)})]; assert all(report.complete for report in reports); "
-        "print(json.dumps(sorted(sys.modules)))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
-    modules = set(json.loads(done.stdout.splitlines()[-1]))
+    modules = loaded_for(proofs, tmp_path)
     assert modules >= {*CHECKERS, "enumsol.checker.rational"} - {"enumsol.checker.space_graph"}
     assert not {module for module in modules if is_search(module)}
     assert not modules & IN_SPACE
 
 
 def test_a_proof_in_space_loads_no_more_than_the_checker(tmp_path):
-    for k, problem in enumerate((enumsol.gallery.block3d(2, 1, 2), known_body(105).problem)):
-        write_problem(problem, tmp_path / f"{k}.npz")
-        enumerate_roots(problem, 1.0).proof.save(tmp_path / f"{k}.proof")
-    code = (
-        "import sys, json, enumsol; from enumsol.checker.verify import verify; "
-        "from enumsol.proof.proof_file import Proof; "
-        f"reports = [verify(enumsol.read_problem(f'{tmp_path}/{{k}}.npz'), Proof.load(f'{tmp_path}/{{k}}.proof')) "
-        "for k in range(2)]; assert all(report.complete for report in reports); "
-        "print(json.dumps(sorted(sys.modules)))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)
-    modules = set(json.loads(done.stdout.splitlines()[-1]))
+    problems = enumsol.gallery.block3d(2, 1, 2), known_body(105).problem
+    modules = loaded_for([(problem, enumerate_roots(problem, 1.0)) for problem in problems], tmp_path)
     assert modules >= IN_SPACE
     assert not {module for module in modules if is_search(module)}
 

@@ -8,7 +8,7 @@ import pytest
 from compare import differences
 from complete import accepted_report, all_roots, complete_report, proven_roots
 from effort import some
-from generators import integer_problem
+from generators import integer_problem, named
 from interruptions import CtrlC, interrupted
 from proof_tools import bytes_of, records_of
 from refusals import bad_argument
@@ -55,9 +55,7 @@ def check_cut_short(problem, roots):
     assert roots.stopped
     assert roots.undecided
     report = accepted_report(problem, roots.proof)
-    assert not report.complete
-    assert report.undecided == len(roots.undecided)
-    assert report.roots == len(roots)
+    assert (report.complete, report.undecided, report.roots) == (False, len(roots.undecided), len(roots))
 
 
 @pytest.mark.parametrize(
@@ -104,8 +102,7 @@ def test_interruption_keeps_the_roots_and_no_proof(wedge, tmp_path):
     problem, alpha = wedge
     path, stop = tmp_path / "interrupted.proof", CtrlC(lambda progress: progress.nodes >= 192)
     partial = interrupted("interrupted", enumerate_roots, problem, alpha, progress=stop, proof_path=path)
-    assert not partial.complete
-    assert partial.proof is None
+    assert (partial.complete, partial.proof) == (False, None)
     assert "interrupted" in partial.stopped
     # what is left on disk is no proof of anything
     report = verify(problem, Proof.load(path))
@@ -114,8 +111,7 @@ def test_interruption_keeps_the_roots_and_no_proof(wedge, tmp_path):
 
 
 def test_progress_of_the_checker():
-    entry = gallery.get("wedge-14-5")
-    problem, alpha = entry.build(), entry.alpha
+    problem, alpha = named("wedge-14-5")
     proof = enumerate_roots(problem, alpha).proof
     seen = []
     report = verify(problem, proof, progress=seen.append)
@@ -141,16 +137,8 @@ def test_a_report_prints_its_counts(wedge):
     report = verify(problem, enumerate_roots(problem, alpha).proof)
     assert report.alpha == Fraction(alpha)
     text = repr(report)
-    for part in (
-        "at alpha = 3.0\n",
-        "proof: verified",
-        "5 isolated roots",
-        "0 families",
-        "0 of them undecided",
-        "as given",
-        "complete: yes",
-    ):
-        assert part in text
+    said = "at alpha = 3.0\n", "proof: verified", "5 isolated roots", "0 families", "0 of them undecided", "as given"
+    assert all(part in text for part in (*said, "complete: yes")), text
 
 
 def test_rational_leaves_may_be_long(monkeypatch):
@@ -158,18 +146,15 @@ def test_rational_leaves_may_be_long(monkeypatch):
     # many digits would decide it
     monkeypatch.setattr("enumsol.search.solvers.Solvers._solved_precisely", lambda *_: None)
     # a gap that is closed to within rounding, in a body whose entries are full floats: fractions of many digits
-    rng = np.random.default_rng(3)
-    n = 60
+    rng, n = np.random.default_rng(3), 60
     X = rng.normal(size=(n, n + 5))
-    rows, f = np.eye(n), rng.normal(size=n)
-    A = X @ X.T
-    free = ContactProblem(0.5 * (A + A.T), rows[:1], rows[1:2], f, friction=0.5)
+    rows, A = np.eye(n), X @ X.T
+    free = ContactProblem(0.5 * (A + A.T), rows[:1], rows[1:2], rng.normal(size=n), friction=0.5)
     exact = ExactSystem.from_problem(free, 0).g[0]
     nearest = int(exact.p) / int(exact.q)
     longest = rationals = 0
     for gap in (nearest, np.nextafter(nearest, -np.inf)):
-        problem = ContactProblem(free.A, rows[:1], rows[1:2], f, friction=0.5, gap=float(gap))
-        roots = proven_roots(problem, 0.0)
+        roots = proven_roots(free.replace(gap=float(gap)), 0.0)
         rationals += roots.stats.escalations.rationals
         points = [p for record in records_of(roots.proof)[1:-1] if record[0] == "D" for p in record[1]]
         longest = max([longest, *(len(part) for point in points for x in point for part in x.split("/"))])

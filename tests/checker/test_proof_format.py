@@ -31,6 +31,7 @@ from proof_tools import (
     of_kind,
     proof_of,
     put,
+    put_in_all,
     records_of,
     replaced,
     sealed,
@@ -93,8 +94,7 @@ def test_the_checker_imports_nothing_of_the_package():
 def test_the_document_names_what_the_proofs_hold():
     text = DOCUMENT.read_text(encoding="utf-8")
     seen = [record for name in POINTS for record in point(name)[1]] + [r for name in GRAPHS for r in graph(name)[1]]
-    for record in seen:
-        words = record if isinstance(record, dict) else record[:1]
+    for words in (record if isinstance(record, dict) else record[:1] for record in seen):
         assert all(f'"{word}"' in text or f'["{word}"' in text for word in words), words
 
 
@@ -121,11 +121,16 @@ def test_the_document_names_the_leaves_of_bodies_that_nothing_holds(number, kind
 # -- accepted ----------------------------------------------------------------------------------------------------------
 
 
+def assert_counted(problem, roots):
+    """The proof is accepted, and has these roots."""
+    counts = check(problem, bytes_of(roots.proof))
+    assert (counts["roots"], counts["families"], counts["undecided"]) == (len(roots), len(roots.families), 0)
+
+
 @pytest.mark.parametrize("name", POINTS)
 def test_point_proofs_are_accepted(name):
     problem, _, roots = point(name)
-    counts = check(problem, bytes_of(roots.proof))
-    assert (counts["roots"], counts["families"], counts["undecided"]) == (len(roots), len(roots.families), 0)
+    assert_counted(problem, roots)
 
 
 def test_every_kind_of_leaf_is_among_them():
@@ -140,9 +145,7 @@ def test_point_proofs_of_random_problems_are_accepted(make, p):
     for seed in range(some(3, of=6)):
         problem = make(np.random.default_rng([seed, p]), p)
         roots = enumerate_roots(problem, 0.0)
-        counts = check(problem, bytes_of(roots.proof))
-        assert (counts["roots"], counts["families"]) == (len(roots), len(roots.families))
-        assert counts["undecided"] == 0
+        assert_counted(problem, roots)
 
 
 def test_a_search_cut_short_counts_what_is_undecided():
@@ -154,8 +157,7 @@ def test_a_search_cut_short_counts_what_is_undecided():
 @pytest.mark.parametrize("name", ["near a fold", "five roots", "everything"])
 def test_leaves_that_ask_for_rationals(name):
     problem, records, _ = point(name)
-    changed = [[record[0].upper(), *record[1:]] if record[0] in ("x", "n") else record for record in records[1:-1]]
-    changed = [records[0], *changed, records[-1]]
+    changed = put_in_all(records, of_kind(records, "x", "n"), 0, str.upper)
     assert changed != records
     assert accepted(problem, changed)
     assert verify(problem, proof_of(changed)).complete
@@ -177,11 +179,8 @@ def test_graph_proofs_in_halves_are_accepted(name):
 
 
 def test_fingerprints():
-    for name in POINTS:
-        problem = point(name)[0]
+    for problem in (*(point(name)[0] for name in POINTS), gallery.wedge(3, 7)):
         assert fingerprint(problem) == problem.fingerprint
-    wedge = gallery.wedge(3, 7)
-    assert fingerprint(wedge) == wedge.fingerprint
 
 
 def test_solutions_at_samples_are_among_the_selections_of_a_graph_proof():
@@ -212,6 +211,11 @@ def test_the_example_of_the_document_is_a_proof():
 # -- refused -----------------------------------------------------------------------------------------------------------
 
 
+def counted(records, more):
+    """The records with so many roots more in the footer."""
+    return put(records, (-1, "roots"), lambda roots: roots + more)
+
+
 @pytest.mark.parametrize("name", ["one-node-6.1", "five roots", "everything"])
 def test_forged_exclusions(name):
     problem, records, _ = point(name)
@@ -226,9 +230,7 @@ def test_forged_exclusions(name):
             ([*rows, 7 * problem.p], [*values, 0.0]),
         ):
             assert refused(problem, replaced(records, k, with_multipliers(records[k], *forged)))
-        changed = replaced(records, roots[0], records[k])
-        changed[-1]["roots"] -= 1
-        assert refused(problem, changed)
+        assert refused(problem, counted(replaced(records, roots[0], records[k]), -1))
 
 
 @pytest.mark.parametrize("name", ["one-node-6.1", "near a fold", "five roots", "everything"])
@@ -236,25 +238,15 @@ def test_forged_roots(name):
     problem, records, _ = point(name)
     for k in of_kind(records, "r"):
         _, mid, rad, index = records[k]
-        moved = [m + 3 * r * (r == max(rad)) for m, r in zip(mid, rad, strict=True)]
-        for other in (
-            ["r", [m + 1.0 for m in mid], rad, index],
-            ["r", mid, rad, -index],
-            ["r", mid, [-1.0, *rad[1:]], index],
-            # where all nodes are open the root is the point zero, to the last bit
-            *([["r", moved, rad, index]] if any(rad) else []),
-            ["r", mid[1:], rad[1:], index],
-            ["n"],
-            ["N"],
-            ["D", [[f"{Fraction(m).numerator:x}/{Fraction(m).denominator:x}".replace("0x", "") for m in mid]], 1],
-        ):
-            changed = replaced(records, k, other)
-            changed[-1]["roots"] -= other[0] in "nN"
-            assert refused(problem, changed)
+        others = [["r", [m + 1.0 for m in mid], rad, index], ["r", mid, rad, -index], ["r", mid[1:], rad[1:], index]]
+        if any(rad):  # where all nodes are open the root is the point zero, to the last bit
+            others.append(["r", [m + 3 * r * (r == max(rad)) for m, r in zip(mid, rad, strict=True)], rad, index])
+        vertex = [f"{Fraction(m).numerator:x}/{Fraction(m).denominator:x}".replace("0x", "") for m in mid]
+        for other in (*others, ["r", mid, [-1.0, *rad[1:]], index], ["n"], ["N"], ["D", [vertex], 1]):
+            assert refused(problem, counted(replaced(records, k, other), -(other[0] in "nN")))
     for k in of_kind(records, "n", "N"):
-        changed = replaced(records, k, ["r", [0.0] * (2 * problem.p), [10.0] * (2 * problem.p), 1])
-        changed[-1]["roots"] += 1
-        assert refused(problem, changed)
+        root = ["r", [0.0] * (2 * problem.p), [10.0] * (2 * problem.p), 1]
+        assert refused(problem, counted(replaced(records, k, root), 1))
 
 
 @pytest.mark.parametrize("name", ["family", "all statuses"])
@@ -263,14 +255,8 @@ def test_forged_polytopes(name):
     for k in of_kind(records, "D"):
         _, points, dimension = records[k]
         moved = [["1/3", *points[0][1:]], *points[1:]]
-        for other in (
-            ["D", moved, dimension],
-            ["D", [*points, points[0]], dimension],
-            ["D", points[1:], dimension],
-            ["D", points, dimension + 1],
-            ["N"],
-            ["n"],
-        ):
+        others = [["D", other, dimension] for other in (moved, [*points, points[0]], points[1:])]
+        for other in (*others, ["D", points, dimension + 1], ["N"], ["n"]):
             assert refused(problem, replaced(records, k, other))
 
 
@@ -281,20 +267,13 @@ def test_forged_trees_and_counts(name):
         assert refused(problem, replaced(put(records, (-1, "leaves"), lambda leaves: leaves - 1), k))
     for k in of_kind(records, "b")[:6]:
         _, node, children = records[k]
-        for other in (
-            children[:-1],
-            [*children[:-1], children[0]],
-            [0, 5, 4],
-            [1, 2],
-            [6],
-            [c + 1 for c in children],
-            [],
-        ):
-            assert refused(problem, replaced(records, k, ["b", node, other]))
-        assert refused(problem, replaced(records, k, ["b", -1, children]))
-        assert refused(problem, replaced(records, k, ["b", node + problem.p, children]))
+        others = [children[:-1], [*children[:-1], children[0]], [0, 5, 4], [1, 2], [6], [c + 1 for c in children], []]
+        for other in others:
+            assert refused(problem, put(records, (k, 2), other))
+        for other in (-1, node + problem.p):
+            assert refused(problem, put(records, (k, 1), other))
     for key, change in product(records[-1], (1, -1)):
-        assert refused(problem, replaced(records, -1, {**records[-1], key: records[-1][key] + change}))
+        assert refused(problem, put(records, (-1, key), records[-1][key] + change))
     assert refused(problem, [*records, records[-1]])
     for count in (0, 1, len(records) // 2, len(records) - 1):
         assert refused(problem, records[:count])
@@ -345,25 +324,13 @@ def test_a_loaded_body_is_not_unloaded():
 @pytest.mark.parametrize("name", ["one-node-6.1", "five roots"])
 def test_forged_headers(name):
     problem, records, _ = point(name)
-    header = records[0]
-    for change in (
-        {"version": 2},
-        {"format": "another"},
-        {"problem": "0" * 64},
-        {"p": header["p"] + 1},
-        {"data": "other"},
-        {"alpha": "-1"},
-        {"alpha": "1/0"},
-        {"alpha": 5},
-        {"force": [header["force"][0] + 1, *header["force"][1:]]},
-        {"force": [901] * len(header["force"])},
+    p, force = problem.p, records[0]["force"]
+    for key, value in (
+        *(("version", 2), ("format", "another"), ("problem", "0" * 64), ("p", p + 1), ("data", "other")),
+        *(("alpha", "-1"), ("alpha", "1/0"), ("alpha", 5), ("alpha", "9/2")),
+        *(("force", [force[0] + 1, *force[1:]]), ("force", [901] * len(force))),
     ):
-        assert refused(problem, [{**header, **change}, *records[1:]]), change
-
-
-def test_another_alpha_makes_other_roots():
-    problem, records, _ = point("five roots")
-    assert refused(problem, [{**records[0], "alpha": "9/2"}, *records[1:]])
+        assert refused(problem, put(records, (0, key), value)), (key, value)
 
 
 @pytest.mark.few(0, 1)
@@ -375,11 +342,9 @@ def test_forged_graph_proofs(name, arcs):
         records = without_arcs(records)
         assert accepted(problem, records)
         assert verify(problem, proof_of(records)).ok
-    a, b = records[0]["interval"]
-    assert refused(problem, [{**records[0], "interval": [a, str(Fraction(b) + 1)]}, *records[1:]])
-    pieces = [k for k, record in enumerate(records) if isinstance(record, dict) and "piece" in record]
+    assert refused(problem, put(records, (0, "interval", 1), lambda end: str(Fraction(end) + 1)))
     for k in of_kind(records, "x", "s"):
-        assert refused(problem, records[:k] + records[k + 1 :])
+        assert refused(problem, replaced(records, k))
     for k in of_kind(records, "x"):
         rows, values = multipliers(["x", *records[k][2:]])
         for others in ((rows, [0.0] * len(rows)), (rows, [-value for value in values])):
@@ -391,26 +356,24 @@ def test_forged_graph_proofs(name, arcs):
         changed[-1]["leaves"] += 1
         changed[-1]["selections"] -= 1
         assert refused(problem, changed)
-    for k in pieces:
-        x, y = records[k]["piece"]
-        assert refused(problem, replaced(records, k, {**records[k], "piece": [x, str(Fraction(y) - 1)]}))
-        assert refused(problem, replaced(records, k, {**records[k], "roots": ["0" * problem.p]}))
+    for k in pieces(records):
+        assert refused(problem, put(records, (k, "piece", 1), lambda end: str(Fraction(end) - 1)))
+        assert refused(problem, put(records, (k, "roots"), ["0" * problem.p]))
     for key in records[-1]:
-        assert refused(problem, replaced(records, -1, {**records[-1], key: records[-1][key] + 1}))
+        assert refused(problem, put(records, (-1, key), records[-1][key] + 1))
+
+
+def pieces(records):
+    return [k for k, record in enumerate(records) if "piece" in record]
 
 
 def test_halves_out_of_order_or_missing():
     problem, records, _ = graph("friction")
     halves = cut_in_two(records)
-    _, second, third = [k for k, record in enumerate(halves) if isinstance(record, dict) and "piece" in record]
+    _, second, third = pieces(halves)
     last = next(k for k, record in enumerate(halves) if "traces" in record)
-    head, left, right, arcs, footer = (
-        halves[:second],
-        halves[second:third],
-        halves[third:last],
-        halves[last:-1],
-        halves[-1],
-    )
+    head, left, right, arcs = halves[:second], halves[second:third], halves[third:last], halves[last:-1]
+    footer = halves[-1]
     for kept in ([], arcs):
         counts = footer if kept else without_arcs(halves)[-1]
         assert accepted(problem, [*head, *left, *right, *kept, counts])
@@ -423,15 +386,10 @@ def test_containers():
     problem, records, roots = point("one-node-6.1")
     data = bytes_of(roots.proof)
     body = data[len(MAGIC) : -32]
-    for forged in (
-        data[:-1],
-        data[:-32] + bytes(32),
-        bytes([data[0] ^ 1]) + data[1:],
-        bytes_of(sealed(body + b"more")),
-        bytes_of(sealed(body[:-3])),
-        bytes_of(proof_of([*records[:-1], json.dumps(records[-1]) + " "], magic=b"enumsol-proof 2\n")),
-        bytes_of(proof_of([records[0], '["r",[NaN,0.0],[Infinity,1.0],1]', *records[2:]])),
-    ):
+    proofs = [sealed(body + b"more"), sealed(body[:-3])]
+    proofs.append(proof_of([*records[:-1], json.dumps(records[-1]) + " "], magic=b"enumsol-proof 2\n"))
+    proofs.append(proof_of([records[0], '["r",[NaN,0.0],[Infinity,1.0],1]', *records[2:]]))
+    for forged in (data[:-1], data[:-32] + bytes(32), bytes([data[0] ^ 1]) + data[1:], *map(bytes_of, proofs)):
         with pytest.raises(Refused):
             check(problem, forged)
     assert check(problem, data) == records[-1]

@@ -9,8 +9,8 @@ from complete import accepted_report
 from effort import some
 from flint import fmpq, fmpq_poly
 from generators import integer_problem, random_problem, singular_problem
-from graph_proofs import GRAPHS, accepted, graph, refused
-from proof_tools import bytes_of, copied, of_kind, proof_of, records_of, replaced
+from graph_proofs import GRAPHS, accepted, graph, parts_of, refused
+from proof_tools import bytes_of, of_kind, proof_of, put, records_of, replaced
 from rational_arcs import Selection, alpha_of
 from rational_checker import check
 from rational_forms import Data, Forms, Refused
@@ -20,23 +20,6 @@ from enumsol import ContactProblem, branch_graph, verify
 
 #: The long proofs of "friction" and "everything", checked twice for every forgery, take most of the time.
 EVENTFUL = ["load", "both", *(pytest.param(name, marks=pytest.mark.slow) for name in ("friction", "everything"))]
-
-
-def parts_of(records, *kinds):
-    """Box, place in it, beginning and part of every part of these kinds."""
-    for k in of_kind(records, "b"):
-        begin = records[k][1]
-        for i, part in enumerate(records[k][4]):
-            if part[0] in kinds:
-                yield k, i, begin, part
-            begin = part[1]
-
-
-def with_part(records, k, i, *parts):
-    """The records with these parts in place of one."""
-    changed = copied(records)
-    changed[k][4][i : i + 1] = parts
-    return changed
 
 
 def spread(found, most=7):
@@ -54,7 +37,7 @@ def test_forged_parts_that_hold(name):
     problem, records, _ = graph(name)
     for k, i, _, (_, end, index) in spread(parts_of(records, "h")):
         for other in (["h", end, -index], ["n", end], ["h", end, 0], ["h", end], ["h", end, index, 1], ["x", end]):
-            assert refused(problem, with_part(records, k, i, other)), other
+            assert refused(problem, put(records, (k, 4, i), other)), other
 
 
 @pytest.mark.few(0, 1)
@@ -65,7 +48,7 @@ def test_forged_parts_that_hold_nothing(name):
         event = [0, 1, *np.linspace(float(Fraction(begin)), float(Fraction(end)), 4)[1:3].tolist()]
         others = [["h", end, index] for index in (1, -1)] + [["e", end, index, *event] for index in (1, -1)]
         for other in (*others, ["n", end, 1]):
-            assert refused(problem, with_part(records, k, i, other)), other
+            assert refused(problem, put(records, (k, 4, i), other)), other
 
 
 @pytest.mark.few(0, 1)
@@ -74,26 +57,14 @@ def test_forged_events(name):
     problem, records, _ = graph(name)
     found = spread(parts_of(records, "e"), some(3, of=10))
     assert found
-    conditions = 3 * problem.p
     for k, i, begin, part in found:
         _, end, index, condition, rising, first, last = part
-        others = [["e", end, index, other, rising, first, last] for other in range(conditions) if other != condition]
-        others += [["h", end, index], ["h", end, -index], ["n", end]]
-        for change in (
-            {2: -index},
-            {2: 0},
-            {3: -1},
-            {4: 1 - rising},
-            {4: 2},
-            {5: last, 6: end},
-            {5: begin, 6: first},
-            {5: last, 6: first},
-            {6: float(Fraction(end)) + 1.0},
-            {5: float(Fraction(begin)) - 1.0},
-        ):
-            others.append([change.get(place, value) for place, value in enumerate(part)])
-        for other in others:
-            assert refused(problem, with_part(records, k, i, other)), other
+        changes = [{3: other} for other in range(-1, 3 * problem.p) if other != condition]
+        changes += [{2: -index}, {2: 0}, {4: 1 - rising}, {4: 2}, {6: float(Fraction(end)) + 1.0}]
+        changes += [{5: last, 6: end}, {5: begin, 6: first}, {5: last, 6: first}, {5: float(Fraction(begin)) - 1.0}]
+        others = [[change.get(place, value) for place, value in enumerate(part)] for change in changes]
+        for other in (*others, ["h", end, index], ["h", end, -index], ["n", end]):
+            assert refused(problem, put(records, (k, 4, i), other)), other
 
 
 @pytest.mark.few(0, 1)
@@ -117,7 +88,7 @@ def standing(selection, x, y, index, bounds):
     """All claims about a part that the checker in rationals accepts."""
     events = [("e", *named) for named in product(range(len(selection.conditions)), (0, 1))]
     found = []
-    for claim in [("h",), ("n",), *events]:
+    for claim in (("h",), ("n",), *events):
         try:
             if claim == ("h",):
                 selection.holds(x, y, index)
@@ -141,11 +112,10 @@ def test_shifted_ends(name):
         parts, first, last = records[k][4], Fraction(part[5]), Fraction(part[6])
         if i:
             far = (last + Fraction(part[1])) / 2
-            before = [parts[i - 1][0], str(far), *parts[i - 1][2:]]
-            assert refused(problem, with_part(records, k, i - 1, before))
+            assert refused(problem, put(records, (k, 4, i - 1, 1), str(far)))
         if i + 1 < len(parts):
             near = (first + Fraction(begin)) / 2
-            assert refused(problem, with_part(records, k, i, ["e", str(near), *part[2:]]))
+            assert refused(problem, put(records, (k, 4, i, 1), str(near)))
             moved += 1
     assert moved
 
@@ -156,13 +126,10 @@ def test_a_removed_event_makes_arcs_begin_and_end_for_no_reason(name):
     """Beside an event whose part is given up to "u" the counts change; with right counts its partner stands alone."""
     problem, records, _ = graph(name)
     for k, i, _, part in parts_of(records, "e"):
-        neighbours = [records[k][4][j] for j in (i - 1, i + 1) if 0 <= j < len(records[k][4])]
-        for other in neighbours:
-            assert refused(problem, with_part(records, k, i, [other[0], part[1], *other[2:]]))
-        merged = copied(records)
-        if i + 1 < len(merged[k][4]):
-            del merged[k][4][i]
-            assert refused(problem, merged)
+        parts = records[k][4]
+        for other in parts[max(i - 1, 0) : i] + parts[i + 1 : i + 2]:
+            assert refused(problem, put(records, (k, 4, i), [other[0], part[1], *other[2:]]))
+        assert i + 1 == len(parts) or refused(problem, put(records, (k, 4), parts[:i] + parts[i + 1 :]))
 
 
 @pytest.mark.few(0, 1)
@@ -171,7 +138,7 @@ def test_parts_left_open(name):
     """What a proof says less it may say; arcs that end there count."""
     problem, records, made = graph(name)
     for k, i, _, part in spread(parts_of(records, "h", "n"), 6):
-        changed = with_part(records, k, i, ["u", part[1]])
+        changed = put(records, (k, 4, i), ["u", part[1]])
         counts = [{**records[-1], "arcs": records[-1]["arcs"] + more} for more in (-1, 0, 1)]
         judged = [accepted(problem, [*changed[:-1], footer]) for footer in counts]
         assert judged == [verify(problem, proof_of([*changed[:-1], footer])).ok for footer in counts]
@@ -190,26 +157,17 @@ def test_forged_traces_and_boxes(name):
         inside = (float(Fraction(low)) + float(Fraction(high))) / 2
         assert refused(problem, records[:k] + records[end:])
         assert refused(problem, records[:end] + records[k:end] + records[end:])
-        for other in (
-            ["t", codes, inside, high, side],
-            ["t", codes, low, inside, side],
-            ["t", codes, low, high, side + 1],
-            ["t", codes[:-1] + ("1" if codes[-1] != "1" else "0"), low, high, side],
-            ["t", codes + "0", low, high, side],
-            ["t", codes, low, high],
+        _, low, _, _, parts = records[k + 1]
+        for place, entry, value in (
+            *((k, 1, codes + "0"), (k, 1, codes[:-1] + ("1" if codes[-1] != "1" else "0"))),
+            *((k, 2, inside), (k, 3, inside), (k, 4, side + 1)),
+            *((k + 1, 1, inside), (k + 1, 2, low), (k + 1, 3, 2)),
+            *((k + 1, 4, parts[:-1]), (k + 1, 4, [*parts, parts[-1]])),
         ):
-            assert refused(problem, replaced(records, k, other)), other
-        assert refused(problem, records[: k + 1] + records[k + 2 :])
-        assert refused(problem, [*records[: k + 1], [*records[k + 1][:4], []], *records[k + 1 :]])
-        _, low, high, precise, parts = records[k + 1]
-        for other in (
-            ["b", inside, high, precise, parts],
-            ["b", low, low, precise, parts],
-            ["b", low, high, 2, parts],
-            ["b", low, high, precise, parts[:-1]],
-            ["b", low, high, precise, [*parts, parts[-1]]],
-        ):
-            assert refused(problem, replaced(records, k + 1, other)), other
+            assert refused(problem, put(records, (place, entry), value)), (place - k, entry, value)
+        empty = put(records[k + 1], (4,), [])
+        for place, others in ((k, [records[k][:4]]), (k + 1, []), (k + 1, [empty, records[k + 1]])):
+            assert refused(problem, replaced(records, place, *others)), (place - k, others)
 
 
 @pytest.mark.parametrize("name", GRAPHS)
@@ -255,7 +213,7 @@ def test_both_checkers_agree_on_random_graphs(make, p, seed):
     found = accepted_report(problem, made.proof)
     assert check(problem, bytes_of(made.proof)) == found.selections
     for k, i, _, part in spread(parts_of(records, "h", "e"), 2):
-        assert refused(problem, with_part(records, k, i, [*part[:2], -part[2], *part[3:]]))
+        assert refused(problem, put(records, (k, 4, i, 2), -part[2]))
 
 
 @pytest.mark.long
@@ -271,8 +229,8 @@ def test_boxes_left_open_may_have_fractions_for_ends():
         assert accepted(problem, replaced(records, k, box))
         assert verify(problem, proof_of(replaced(records, k, box))).ok
     for k, _, _, part in list(parts_of(records, "h", "n"))[:3]:
-        box = [*records[k][:3], 0, [part]]
-        assert refused(problem, replaced(records, k, [box[0], *(str(Fraction(end)) for end in box[1:3]), *box[3:]]))
+        kind, low, high, *_ = records[k]
+        assert refused(problem, replaced(records, k, [kind, str(Fraction(low)), str(Fraction(high)), 0, [part]]))
 
 
 # -- the rational checker's own means ----------------------------------------------------------------------------------
@@ -313,19 +271,14 @@ def test_empty_selections_at_single_alphas_and_between(seed):
     problem = singular_problem(rng, 2)
     F1 = rng.integers(0, 2, size=2).astype(float)
     load = rng.integers(-1, 2, size=4).astype(float)
-    data = Data(
-        ContactProblem(
-            problem.A, problem.Bn, problem.Bt, problem.f, friction=(problem.friction[0], F1), load_slope=load
-        )
-    )
-    samples = [fmpq(k, 2) for k in range(-1, 3)]
-    seen = set()
+    data = Data(problem.replace(friction=(problem.friction[0], F1), load_slope=load))
+    samples, seen = [fmpq(k, 2) for k in range(-1, 3)], set()
     for codes in product(range(4), repeat=2):
         selection = Selection(data, codes, 0)
         holding = [bool(Forms(data.S, data.load(x), data.friction(x)).hull(codes)) for x in samples]
         for x, holds in zip(samples, holding, strict=True):
             assert said_empty(selection, x, x) != holds
-            seen.add((holds, said_singular(data, codes, x)))
+            seen.add((holds, Selection(data, codes, 0).own.determinant(x) == 0))
         if any(holding):
             assert not said_empty(selection, samples[0], samples[-1])
     assert {holds for holds, _ in seen} == {True, False}
@@ -334,7 +287,3 @@ def test_empty_selections_at_single_alphas_and_between(seed):
 
 def said_empty(selection, x, y):
     return ("n",) in standing(selection, x, y, 1, (x, y))
-
-
-def said_singular(data, codes, x):
-    return Selection(data, codes, 0).own.determinant(x) == 0

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from proof_tools import of_kind, proof_of, records_of
+from proof_tools import of_kind, proof_of, put, records_of
 
 from enumsol import Proof, branch_graph, enumerate_roots, gallery, verify, write_problem
 from enumsol.cli import main
@@ -22,10 +22,9 @@ def proofs():
 def tampered(proof):
     """Refused at the header, at a leaf, and at the end."""
     records = records_of(proof)
-    k = of_kind(records, "x")[0]
-    yield "another problem", [records[0] | {"problem": "0" * 64}, *records[1:]]
-    yield "do not exclude it", [*records[:k], [*records[k][:-2], "", ""], *records[k + 1 :]]
-    yield "counts at the end", [*records[:-1], records[-1] | {"leaves": 10**6}]
+    yield "another problem", put(records, (0, "problem"), "0" * 64)
+    yield "do not exclude it", put(records, (of_kind(records, "x")[0],), lambda record: [*record[:-2], "", ""])
+    yield "counts at the end", put(records, (-1, "leaves"), 10**6)
 
 
 def test_what_is_printed(proofs):
@@ -61,8 +60,8 @@ def test_what_the_command_line_prints(proofs, tmp_path, capsys):
 
 
 def test_the_counts_of_a_verified_proof_agree_with_their_nouns():
-    unloaded = enumerate_roots(gallery.one_node_triangle((0.0, 0.0)), 1.0)
-    text = repr(verify(gallery.one_node_triangle((0.0, 0.0)), unloaded.proof))
+    unloaded = gallery.one_node_triangle((0.0, 0.0))
+    text = repr(verify(unloaded, enumerate_roots(unloaded, 1.0).proof))
     assert "1 leaf covers all selections" in text
     assert "1 isolated root, 0 families" in text
     many = repr(verify(PROBLEM, Proof(enumerate_roots(PROBLEM, np.float64(5.0)).proof._source)))

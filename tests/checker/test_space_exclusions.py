@@ -46,24 +46,17 @@ class Space:
         slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
         f = [Fraction(x) + a * Fraction(y) for x, y in zip(problem.f.tolist(), slope.tolist(), strict=True)]
         offset = [Fraction(x) for x in [*problem.gap.tolist(), *problem.slip_offset.T.ravel().tolist()]]
-        X = solved(
-            fractions(problem.A.toarray()), [[*column, x] for column, x in zip(zip(*B, strict=True), f, strict=True)]
-        )
-        product = [
-            [sum(b * x for b, x in zip(row, column, strict=True)) for column in zip(*X, strict=True)] for row in B
-        ]
+        right = [[*column, x] for column, x in zip(zip(*B, strict=True), f, strict=True)]
+        columns = [*zip(*solved(fractions(problem.A.toarray()), right), strict=True)]
+        product = [[sum(b * x for b, x in zip(row, column, strict=True)) for column in columns] for row in B]
         self.F = [
             [Fraction(x) + a * Fraction(y) for x, y in zip(F.tolist(), slope.tolist(), strict=True)]
             for F, slope in zip(problem.friction, problem.friction_slope, strict=True)
         ]
         # places in (lambda_n, lambda_t1, lambda_t2) and factors D of the components of y
-        self.y = [(i, Fraction(1)) for i in range(p)]
-        self.tau = {}
-        for i in range(p):
-            for k in range(2):
-                if self.F[k][i] > 0:
-                    self.tau[i, k] = len(self.y)
-                    self.y.append(((1 + k) * p + i, self.F[k][i]))
+        rubbing = [(i, k) for i in range(p) for k in range(2) if self.F[k][i] > 0]
+        self.tau = {place: p + j for j, place in enumerate(rubbing)}
+        self.y = [(i, Fraction(1)) for i in range(p)] + [((1 + k) * p + i, self.F[k][i]) for i, k in rubbing]
         self.S = [[product[i][j] * c * d for j, d in self.y] for i, c in self.y]
         self.g = [c * (product[i][-1] - offset[i]) for i, c in self.y]
 
@@ -90,10 +83,8 @@ class Space:
         """The table for space proofs."""
         table = {0: "+EE.+.+", 1: "E+.E+.+", 4: "E+.....", 5: "E+..+.+", 6: "++..+.+"}
         if code in (2, 3):
-            forward = 1 if code == 2 else -1
-            return {0: "E", 1: "+", 4: "E" if number == forward else "+", 5: "+" if number == forward else "."}.get(
-                kind, "."
-            )
+            along = number == (1 if code == 2 else -1)
+            return {0: "E", 1: "+", 4: "E" if along else "+", 5: "+" if along else "."}.get(kind, ".")
         if kind > 6:
             if code < 9:
                 return "."
@@ -164,16 +155,10 @@ def following(number):
     return count + (first - count + length + 1) % count
 
 
-def split(code, tangents):
-    """The codes into which the document splits one that is not that of a sector."""
-    if code == 6:
-        return [0, 5] if tangents else [0, 4]
-    return {1: [1, 2, 3], 2: [1, 12, 13, 14, 15]}[tangents]
-
-
 def covers(problem, records):
     """Whether every split is one of the document's; gives the number of those that do not halve a sector."""
     tangents, unequal = (np.transpose(problem.friction) > 0).sum(axis=1), 0
+    ways = {(6, 0): [0, 4], (6, 1): [0, 5], (6, 2): [0, 5], (5, 1): [1, 2, 3], (5, 2): [1, 12, 13, 14, 15]}
     stack = [[6] * problem.p]
     for record in records[1:-1]:
         codes = stack.pop()
@@ -181,7 +166,7 @@ def covers(problem, records):
             continue
         _, node, children = record
         if codes[node] <= 8:
-            assert sorted(children) == sorted(split(codes[node], tangents[node]))
+            assert sorted(children) == ways[codes[node], tangents[node]]
         else:
             parts = sorted(arc_of_sector(code - 8) for code in children)
             begin, end = arc_of_sector(codes[node] - 8)
@@ -196,13 +181,16 @@ def covers(problem, records):
 
 def excluded(problem, records, alpha=0):
     """Whether all exclusions of a proof hold in rationals."""
-    space, header = Space(problem, alpha), records[0]
-    for k, codes in leaves_of(records):
-        if records[k][0] == "x":
-            bound = space.bound(codes, records[k][1], values_of(records[k]), header["force"], header["length"])
-            if bound is None or not bound > 0:
-                return False
-    return True
+    space, codes, units = Space(problem, alpha), dict(leaves_of(records)), (records[0]["force"], records[0]["length"])
+    bounds = [space.bound(codes[k], records[k][1], values_of(records[k]), *units) for k in of_kind(records, "x")]
+    return all(bound is not None and bound > 0 for bound in bounds)
+
+
+def begun(problem, records):
+    """A checker that has read the header, and its units."""
+    checker = SpaceChecker(problem, None)
+    checker._read_header(records[0])
+    return checker, [records[0][key] for key in ("force", "length")]
 
 
 @pytest.mark.parametrize("name", [(1, 22), (1, 0), (2, 0), "end", "one tangent", "small friction"], ids=str)
@@ -220,10 +208,7 @@ def test_exclusions_by_a_form_hold_in_rationals_and_no_others_are_accepted():
     with by_the_tree(), forms_at_once():
         records = records_of(enumerate_roots(problem, 0).proof)
     (declared, *_), places = of_kind(records, "q"), of_kind(records, "f")
-    space, header, codes = Space(problem), records[0], dict(leaves_of(records))
-    checker = SpaceChecker(problem, None)
-    checker._read_header(header)
-    counts = [0, 0]
+    space, codes, (checker, units), counts = Space(problem), dict(leaves_of(records)), begun(problem, records), [0, 0]
     for factor in (1.0, 0.8, 1.05, 0.0):
         numbers = [x if k < 2 * problem.p else factor * x for k, x in enumerate(records[declared][1])]
         form = space.form(numbers)
@@ -235,13 +220,12 @@ def test_exclusions_by_a_form_hold_in_rationals_and_no_others_are_accepted():
         for k in places:
             rows = records[k][1]
             if factor == 1.0:
-                bound = space.bound(codes[k], rows, values_of(records[k]), header["force"], header["length"], form)
-                assert bound > 0
+                assert space.bound(codes[k], rows, values_of(records[k]), *units, form) > 0
             for _ in range(6):
                 values = values_of(records[k])
                 values[int(rng.integers(len(values)))] *= float(rng.choice((0.0, 0.5, 1.01, 2.0, -1.0)))
                 accepted = checker._leaf(codes[k], with_values(records[k], values)) is None
-                bound = form and space.bound(codes[k], rows, values, header["force"], header["length"], form)
+                bound = form and space.bound(codes[k], rows, values, *units, form)
                 assert accepted == (bound is not None and bound > 0)
                 counts[accepted] += 1
     assert min(counts) > 5
@@ -257,10 +241,7 @@ def test_what_is_accepted_of_changed_multipliers_holds_in_rationals():
     counts = [0, 0]
     for name in ((1, 22), (2, 0), "one tangent"):
         problem, _, records, _ = case(name)
-        space, header = Space(problem), records[0]
-        codes = dict(leaves_of(records))
-        checker = SpaceChecker(problem, None)
-        checker._read_header(header)
+        space, codes, (checker, units) = Space(problem), dict(leaves_of(records)), begun(problem, records)
         for k in of_kind(records, "x"):
             for _ in range(15):
                 rows, values = copied(records[k][1]), values_of(records[k])
@@ -272,7 +253,7 @@ def test_what_is_accepted_of_changed_multipliers_holds_in_rationals():
                     a, b = arc_of_sector(number)
                     rows[j][2] = number if floor(4 * a) == ceil(4 * b) - 1 else rows[j][2]
                 accepted = checker._leaf(codes[k], with_values(["x", rows, ""], values)) is None
-                bound = space.bound(codes[k], rows, values, header["force"], header["length"])
+                bound = space.bound(codes[k], rows, values, *units)
                 assert accepted == (bound is not None and bound > 0)
                 counts[accepted] += 1
     assert min(counts) > 20
@@ -287,9 +268,8 @@ def test_the_fingerprint_is_that_of_the_document():
         [[0.1, 0.2]],
     )  # fmt: skip
     digest = hashlib.sha256(b"enumsol problem in 3D, 1")
-    matrices = [
-        part for M in (A, *(sp.csc_array(eye[k : k + 1]) for k in range(3))) for part in (M.indptr, M.indices, M.data)
-    ]
+    columns = A, *(sp.csc_array(eye[k : k + 1]) for k in range(3))
+    matrices = [part for M in columns for part in (M.indptr, M.indices, M.data)]
     vectors = (problem.f, [0.25], [0.5], [0.75], [1.0], [2.0], problem.load_slope, [0.1, 0.2])
     for part in ([3, 1], *matrices, *vectors):
         kind = "q" if np.asarray(part).dtype.kind == "i" else "d"
@@ -302,10 +282,8 @@ def test_balls_hold_the_exact_system():
     S = np.array([[4.0, 1.0, 0.5], [1.0, 3.0, -1.0], [0.5, -1.0, 2.0]])
     more = {"gap": 0.1, "slip_offset": [[0.3, -0.7]], "load_slope": np.array([0.1, 0.7, -0.3])}
     problem = from_compliance(S, np.array([1.0, 2.0, 0.5]), (0.3, 0.7), friction_slope=(0.1, 0.9), **more)
-    header = copied(case((1, 0))[2][0])
-    header |= {"problem": problem.fingerprint, "alpha": "1/3"}
-    checker = SpaceChecker(problem, None)
-    checker._read_header(header)
+    header = case((1, 0))[2][0] | {"problem": problem.fingerprint, "alpha": "1/3"}
+    checker, _ = begun(problem, [header])
     found, exact = checker.system, Space(problem, Fraction(1, 3))
     force, length = (Fraction(2) ** header[key][0] for key in ("force", "length"))
     assert holds(found.g, found.g_rad, [x / length for x in exact.g])

@@ -1,6 +1,5 @@
 """Proofs of all solutions in 3D over an interval, against solutions at sampled alphas, and mutants of them."""
 
-import copy
 import functools
 from fractions import Fraction
 
@@ -8,7 +7,7 @@ import numpy as np
 import pytest
 from complete import accepted_report, all_roots, complete_report
 from problems3d import random_over_alpha
-from proof_tools import of_kind, proof_of, records_of
+from proof_tools import copied, of_kind, proof_of, put, records_of, replaced
 
 from enumsol import enumerate_roots, gallery, verify
 from enumsol.arithmetic.balls import Ball
@@ -68,48 +67,42 @@ def test_forged_certificates_over_a_piece_are_refused(way):
     cover = block_by_certificates()
     records = records_of(cover.proof())
     k = of_kind(records, "m")[0]
-    first = records[k]
-    if way == "numbers":
-        first[1][0] *= -1.0
-    elif way == "theta":
-        first[1][8:] = [number + 30.0 for number in first[1][8:]]
-    elif way == "run":
-        first[3] = first[2]
-    elif way == "backwards":
-        first[2:] = [first[3], first[2]]
-    elif way == "no box":
-        first[3] = len(cover.chains[0].links)
-    elif way == "piece":
+    _, numbers, first, last = records[k]
+    forged = {
+        "numbers": put(records, (k, 1, 0), -numbers[0]),
+        "theta": put(records, (k, 1), numbers[:8] + [number + 30.0 for number in numbers[8:]]),
+        "run": put(records, (k, 3), first),
+        "backwards": put(records, (k,), ["m", numbers, last, first]),
+        "no box": put(records, (k, 3), len(cover.chains[0].links)),
         # the same said of more than the curve passes
-        records[0]["interval"] = ["1/1000", "50"]
-    else:
-        del records[k]
-    assert not verify(cover.problem, proof_of(records)).ok
+        "piece": put(records, (0, "interval"), ["1/1000", "50"]),
+        "none": replaced(records, k),
+    }
+    assert not verify(cover.problem, proof_of(forged[way])).ok
 
 
 def test_a_certificate_below_an_assignment_speaks_of_its_statuses_only():
     """A curve without these statuses proves nothing about them."""
     cover = block_by_certificates()
     records = records_of(cover.proof())
-    k, first = next((k, record) for k, record in enumerate(records) if isinstance(record, list) and record[0] == "m")
-    p = cover.problem.p
+    k = of_kind(records, "m")[0]
     roots = [root for alpha in (0.5, 0.75, 1) for root in enumerate_roots(cover.problem, alpha)]
     assert all(root.statuses[0].value != "open" for root in roots)
-    below = [["b", 0, [5, 0]], first, first]
-    assert p == len(cover.problem.friction[0])
-    assert not verify(cover.problem, proof_of([*records[:k], *below, *records[k + 1 :]])).ok
+    below = [["b", 0, [5, 0]], records[k], records[k]]
+    assert cover.problem.p == len(cover.problem.friction[0])
+    assert not verify(cover.problem, proof_of(replaced(records, k, *below))).ok
 
 
 def mutants(records, rng, count):
     """Records that were changed in one place."""
     for _ in range(count):
-        found = copy.deepcopy(records)
+        found = copied(records)
         k = int(rng.integers(1, len(found)))
         way = int(rng.integers(5))
         if way == 0:
             del found[k]
         elif way == 1:
-            found.insert(k, copy.deepcopy(found[int(rng.integers(1, len(found)))]))
+            found.insert(k, copied(found[int(rng.integers(1, len(found)))]))
         elif way == 2:
             other = int(rng.integers(1, len(found)))
             found[k], found[other] = found[other], found[k]
@@ -121,22 +114,19 @@ def mutants(records, rng, count):
             found[k] = [str(rng.choice(["a", "r", "k", "n", "u"])), found[k][1]]
             found[k] = found[k][:1] if found[k][0] == "n" else found[k]
         elif isinstance(found[k], list) and found[k][0] == "m":
+            numbers = found[k][1]
             if rng.random() < 0.3:
                 found[k][int(rng.integers(2, 4))] += int(rng.integers(-3, 4))
             else:
-                i = int(rng.integers(len(found[k][1])))
-                found[k][1][i] = float(
-                    found[k][1][i] * 10 ** rng.uniform(-2, 2) * rng.choice([-1, 1]) + rng.choice([0, 0.1])
-                )
+                i, factor = int(rng.integers(len(numbers))), 10 ** rng.uniform(-2, 2) * rng.choice([-1, 1])
+                numbers[i] = float(numbers[i] * factor + rng.choice([0, 0.1]))
         elif isinstance(found[k], list) and found[k][0] == "b":
             found[k][2] = [code + int(rng.integers(-1, 2)) for code in found[k][2]]
         elif rng.random() < 0.5:
             found[0]["steps"][int(rng.integers(len(found[0]["steps"])))] *= float(10 ** rng.uniform(-2, 2))
         else:
-            found[0]["interval"] = [
-                str(Fraction(int(rng.integers(-3, 1)), 2)),
-                str(Fraction(int(rng.integers(1, 4)), 2)),
-            ]
+            ends = rng.integers(-3, 1), rng.integers(1, 4)
+            found[0]["interval"] = [str(Fraction(int(end), 2)) for end in ends]
         yield found
 
 

@@ -20,11 +20,10 @@ SEEDS = (2, 7, 47, 26)
 
 @functools.cache
 def proven(seed):
-    """Problem, the forces of its degenerate solution as records have them, and records of a proof with such leaves."""
-    problem, _, _, _, _ = degenerate_integers(seed)
+    """Problem, records of a proof with such leaves, and their places."""
+    problem, *_ = degenerate_integers(seed)
     with by_the_tree():
-        roots = all_roots(problem, 0)
-    records = records_of(roots.proof)
+        records = records_of(all_roots(problem, 0).proof)
     return problem, records, of_kind(records, "l")
 
 
@@ -36,36 +35,31 @@ def shifted(step):
     return lambda values: [value + step for value in values]
 
 
+def shorter(values):
+    return values[:-1]
+
+
+def longer(values):
+    return [*values, 1.0]
+
+
 @pytest.mark.few(0, 1)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_changed_leaves_are_refused(seed):
     problem, records, places = proven(seed)
     assert places
     assert verify(problem, proof_of(records)).complete
-    changes = (
-        (_INDEX, lambda index: -index),
-        (_INDEX, float),
-        (_INDEX, lambda index: 0),
-        (_MID, shifted(1e-3)),
-        (_RAD, times(0.0)),
-        (_RAD, times(-1.0)),
-        (_BOX, shifted(1.0)),
-        (_BOX_RAD, times(0.0)),
-        (_BOX_RAD, times(-1.0)),
-        (_BOX_RAD, times(1e6)),
-        (_BOX_RAD, times(1e-300)),
-        (_RHO, times(0.0)),
-        (_RHO, times(-1.0)),
-        (_RHO, times(1e300)),
-        (_RHO, lambda values: [*values, 1.0]),
-        (_BOX, lambda values: values[:-1]),
-        (_BOX_RAD, lambda values: [*values, 1.0]),
-        (_BOX, lambda values: "box"),
-        (_MID, lambda values: None),
-        (_BOX_RAD, lambda values: [True] * len(values)),
-    )
-    for number, (entry, function) in enumerate(changes):
-        assert refused(problem, put_in_all(records, places, entry, function)), number
+    changes = {
+        _INDEX: (lambda index: -index, float, 0),
+        _MID: (shifted(1e-3), None),
+        _RAD: (times(0.0), times(-1.0)),
+        _BOX: (shifted(1.0), shorter, "box"),
+        _BOX_RAD: (*map(times, (0.0, -1.0, 1e6, 1e-300)), longer, lambda values: [True] * len(values)),
+        _RHO: (*map(times, (0.0, -1.0, 1e300)), longer),
+    }
+    for entry, values in changes.items():
+        for number, value in enumerate(values):
+            assert refused(problem, put_in_all(records, places, entry, value)), (entry, number)
 
 
 @pytest.mark.few(0, 1)
@@ -113,8 +107,7 @@ def test_random_changes(part):
         report = verify(problem, proof_of(changed))
         if report.ok:
             accepted += 1
-            assert report.complete
-            assert report.roots == changed[-1]["roots"]
+            assert (report.complete, report.roots) == (True, changed[-1]["roots"])
             mid, rad = np.array(record[_MID]), np.array(record[_RAD])
             assert np.all(np.abs(mid - known[_MID]) <= rad + np.array(known[_RAD]))
             # zeta = (I + rho S) (y - c) of the known root, and what its radius adds
@@ -137,8 +130,7 @@ def proven_by_products():
     S, g, F = soft_or_coupled(8, 2)
     problem = from_compliance(S, g, (F[:, 0], F[:, 1]))
     with products_at_once():
-        roots = all_roots(problem, 0)
-    return problem, records_of(roots.proof)
+        return problem, records_of(all_roots(problem, 0).proof)
 
 
 def products(records):
@@ -157,19 +149,9 @@ def test_the_proof_has_all_of_them_and_is_accepted():
 @pytest.mark.parametrize(
     ("entry", "function"),
     [
-        (_NUMBERS, lambda values: [-value for value in values]),
-        (_NUMBERS, lambda values: values[:-1]),
-        (_NUMBERS, lambda values: [*values, 1.0]),
-        (_NUMBERS, lambda values: [0.0] * len(values)),
-        (_NUMBERS, lambda values: None),
-        (_NUMBERS, lambda values: [1e300 * value for value in values]),
-        (_CENTRE, lambda values: [value + 10.0 for value in values]),
-        (_CENTRE, lambda values: values[:-1]),
-        (_CENTRE, lambda values: "centre"),
-        (_CODES, lambda codes: [6, *codes[1:]]),
-        (_CODES, lambda codes: [0] * len(codes)),
-        (_CODES, lambda codes: [float(code) for code in codes]),
-        (_CODES, lambda codes: codes[:-1]),
+        *((_NUMBERS, change) for change in (times(-1.0), times(0.0), times(1e300), shorter, longer, None)),
+        *((_CENTRE, change) for change in (shifted(10.0), shorter, "centre")),
+        *((_CODES, change) for change in (lambda codes: [6, *codes[1:]], times(0), times(1.0), shorter)),
         (_CODES, lambda codes: [code + 4 if code > SECTORS else code for code in codes]),
         (_CODES, lambda codes: [SECTORS + 1 if code > SECTORS else code for code in codes]),
     ],
@@ -182,13 +164,8 @@ def test_changed_forms_are_refused(entry, function):
 @pytest.mark.parametrize(
     ("entry", "function"),
     [
-        (1, lambda values: [value + 1.0 for value in values]),
-        (2, lambda values: [0.5 * value for value in values]),
-        (2, lambda values: [1e6 * value for value in values]),
-        (3, lambda values: [-value for value in values]),
-        (4, lambda values: [value + 1e-3 for value in values]),
-        (5, lambda values: [0.0 for _ in values]),
-        (6, lambda index: -index),
+        *((_BOX, shifted(1.0)), (_BOX_RAD, times(0.5)), (_BOX_RAD, times(1e6)), (_RHO, times(-1.0))),
+        *((_MID, shifted(1e-3)), (_RAD, times(0.0)), (_INDEX, lambda index: -index)),
     ],
 )
 def test_changed_boxes_are_refused(entry, function):
@@ -199,10 +176,9 @@ def test_changed_boxes_are_refused(entry, function):
 def test_a_form_that_is_left_out_or_stands_elsewhere():
     problem, records = proven_by_products()
     forms = products(records)
-    without = [record for k, record in enumerate(records) if k not in forms]
-    first_for_all = [record for k, record in enumerate(records) if k not in forms[1:]]
-    assert refused(problem, without)
-    assert refused(problem, first_for_all)
+    # without any, and with the first one for all leaves
+    for missing in (forms, forms[1:]):
+        assert refused(problem, [record for k, record in enumerate(records) if k not in missing])
 
 
 def test_leaves_that_say_something_else():

@@ -5,7 +5,7 @@ import pytest
 from complete import accepted_report, complete_report
 from effort import some
 from problems3d import from_compliance
-from proof_tools import copied, leaves_of, of_kind, proof_of, put, records_of, replaced, why_refused
+from proof_tools import leaves_of, of_kind, proof_of, put, records_of, replaced, why_refused
 from refusals import bad_argument
 from space_proofs import RANDOM, Truth, case, mutant, random_problem, values_of, with_values
 
@@ -23,6 +23,11 @@ SEVERAL = (2, 0)
 def refused(name, records):
     """The reasons why tampered records are refused."""
     return why_refused(case(name)[0], records)
+
+
+def changed(path, value):
+    """The reasons why those of the problem with several roots are refused with another value at a path."""
+    return refused(SEVERAL, put(case(SEVERAL)[2], path, value))
 
 
 @pytest.mark.few(5, 3)
@@ -99,17 +104,14 @@ def test_friction_beyond_floats_negative_or_a_function_is_refused():
     S, g = np.eye(3), np.array([1.0, 2.0, 0.5])
     problem = from_compliance(S, g, (0.5, 0.5), friction_slope=(1e300, 1.0))
     records = records_of(enumerate_roots(problem, 0.0).proof)
-    assert "underflows float64" in why_refused(problem, put(records, (0, "alpha"), "1" + "0" * 20))
-    records = put(records, (0, "alpha"), "-1")
-    assert "negative" in why_refused(problem, records)
+    for alpha, reason in (("1" + "0" * 20, "underflows float64"), ("-1", "negative")):
+        assert reason in why_refused(problem, put(records, (0, "alpha"), alpha))
     by_slip = from_compliance(S, g, lambda node, slip: 0.5 + 0.1 * node / (1 + slip))
     assert "depends on the solution" in why_refused(by_slip, records)
 
 
 def test_units_need_one_product():
-    assert "common scaling" in refused(
-        SEVERAL, put(case(SEVERAL)[2], (0, "force", 0), case(SEVERAL)[2][0]["force"][0] + 1)
-    )
+    assert "common scaling" in changed((0, "force", 0), lambda exponent: exponent + 1)
 
 
 # -- the tree ----------------------------------------------------------------------------------------------------------
@@ -125,17 +127,12 @@ def test_gaps_between_sectors():
     places = sectors_at(records)
     assert places
     for k in places:
-        for change in ("drop", "neighbour", "twice", "wider"):
-            changed = copied(records)
-            codes = changed[k][2]
-            j = codes.index(max(codes))
-            if change == "drop":
-                del codes[j]
-            else:
-                codes[j] = {"neighbour": codes[j] + 1, "twice": codes[j - 1], "wider": (codes[j] + SECTORS) // 2}[
-                    change
-                ]
-            assert "does not cover" in refused(SEVERAL, changed)
+        codes = records[k][2]
+        j = codes.index(max(codes))
+        assert "does not cover" in changed((k, 2), codes[:j] + codes[j + 1 :])
+        # its neighbour, another one twice, a wider one
+        for code in (codes[j] + 1, codes[j - 1], (codes[j] + SECTORS) // 2):
+            assert "does not cover" in changed((k, 2, j), code)
 
 
 def test_branchings_of_the_wrong_kind():
@@ -147,15 +144,9 @@ def test_branchings_of_the_wrong_kind():
 
 def test_sectors_end_at_a_depth():
     _, _, records, _ = case((1, 22))
-    code, changed = (
-        4,
-        [copied(records[0]), ["b", 0, [0, 5]], ["u", ""], ["b", 0, [1, *(SECTORS + k for k in range(4, 8))]]],
-    )
-    changed.append(["u", ""])
-    for _ in range(DEEPEST):
-        code *= 2
-        changed.append(["b", 0, [SECTORS + code, SECTORS + code + 1]])
-    assert "does not cover" in refused((1, 22), changed)
+    deep = [records[0], ["b", 0, [0, 5]], ["u", ""], ["b", 0, [1, *(SECTORS + k for k in range(4, 8))]], ["u", ""]]
+    deep += [["b", 0, [SECTORS + code, SECTORS + code + 1]] for code in (8 << k for k in range(DEEPEST))]
+    assert "does not cover" in refused((1, 22), deep)
 
 
 def test_leaves_merged_and_doubled():
@@ -171,9 +162,7 @@ def test_leaves_merged_and_doubled():
 @pytest.mark.parametrize("key", ["roots", "undecided", "leaves"])
 def test_wrong_counts(key):
     for step in (-1, 1):
-        assert "the counts at the end" in refused(
-            SEVERAL, put(case(SEVERAL)[2], (-1, key), case(SEVERAL)[2][-1][key] + step)
-        )
+        assert "the counts at the end" in changed((-1, key), case(SEVERAL)[2][-1][key] + step)
 
 
 # -- leaves ------------------------------------------------------------------------------------------------------------
@@ -183,63 +172,57 @@ def test_wrong_claims_about_leaves():
     _, _, records, _ = case(SEVERAL)
     codes = dict(leaves_of(records))
     for k in of_kind(records, "r", "n"):
-        other, expected = records[of_kind(records, "r")[0]], "it holds no root"
         if records[k][0] == "r":
-            other, expected = ["n"], "it holds a root"
-        assert expected in refused(SEVERAL, replaced(records, k, other)), codes[k]
+            assert "it holds a root" in changed((k,), ["n"]), codes[k]
+        else:
+            assert "it holds no root" in changed((k,), records[of_kind(records, "r")[0]]), codes[k]
     for k in of_kind(records, "x"):
-        if {5, 6} & set(codes[k]):
-            assert "still open" in refused(SEVERAL, replaced(records, k, ["n"]))
+        assert not {5, 6} & set(codes[k]) or "still open" in changed((k,), ["n"])
 
 
 @pytest.mark.slow
 def test_roots_moved_and_turned():
     _, _, records, _ = case(SEVERAL)
     for k in of_kind(records, "r"):
-        for index in (-records[k][3], 0, 1.0 * records[k][3], str(records[k][3])):
-            assert "its index is wrong" in refused(SEVERAL, put(records, (k, 3), index))
-        for j in range(len(records[k][1])):
-            if records[k][2][j] > 1e-200:
-                assert "its enclosure does not hold" in refused(
-                    SEVERAL, put(records, (k, 1, j), records[k][1][j] + 8 * records[k][2][j])
-                )
-        none = [0.0] * len(records[k][2])
-        assert "its enclosure does not hold" in refused(SEVERAL, put(records, (k, 2), none))
-        assert "expected 6 numbers" in refused(SEVERAL, put(records, (k, 2), none[1:]))
+        _, mid, rad, index = records[k]
+        for other in (-index, 0, 1.0 * index, str(index)):
+            assert "its index is wrong" in changed((k, 3), other)
+        for j in np.flatnonzero(np.array(rad) > 1e-200).tolist():
+            assert "its enclosure does not hold" in changed((k, 1, j), mid[j] + 8 * rad[j])
+        assert "its enclosure does not hold" in changed((k, 2), [0.0] * len(rad))
+        assert "expected 6 numbers" in changed((k, 2), [0.0] * (len(rad) - 1))
 
 
 @pytest.mark.slow
 def test_multipliers_of_the_wrong_sign_and_rows_of_others():
     _, _, records, _ = case(SEVERAL)
     for k in of_kind(records, "x"):
-        assert "do not exclude" in refused(
-            SEVERAL, replaced(records, k, with_values(records[k], [-v for v in values_of(records[k])]))
-        )
-        refused(SEVERAL, put(records, (k, 1), [[kind, 1 - node, number] for kind, node, number in records[k][1]]))
+        assert "do not exclude" in changed((k,), with_values(records[k], [-v for v in values_of(records[k])]))
+        changed((k, 1), [[kind, 1 - node, number] for kind, node, number in records[k][1]])
 
 
 #: No such node, kind, number or type of number.
-NO_ROWS = ([0, 2, 0], [0, -1, 0], [10, 0, 4], [-1, 0, 4], [6, 0, 2**40], [6, 0, 3], [8, 0, 0], [0, 0, 1], [2, 0, 2])
+NO_ROWS = [
+    *([0, 2, 0], [0, -1, 0], [10, 0, 4], [-1, 0, 4], [6, 0, 2**40], [6, 0, 3], [8, 0, 0], [0, 0, 1], [2, 0, 2]),
+    *([2, 0, -1], [4, 0, 1], [6, 0, 4.0], [6, True, 4], [6, 0], "x", None),
+]
 
 
-@pytest.mark.parametrize(
-    "row", [*NO_ROWS, [2, 0, -1], [4, 0, 1], [6, 0, 4.0], [6, True, 4], [6, 0], "x", None], ids=str
-)
+@pytest.mark.parametrize("row", NO_ROWS, ids=str)
 def test_rows_that_do_not_exist(row):
     _, _, records, _ = case(SEVERAL)
     k = of_kind(records, "x")[0]
-    changed = with_values(["x", [*records[k][1], row], ""], [*values_of(records[k]), 0.0])
     # a row that there is but not in this status is refused by its sign
-    assert "leaf" in refused(SEVERAL, replaced(records, k, changed))
+    leaf = with_values(["x", [*records[k][1], row], ""], [*values_of(records[k]), 0.0])
+    assert "leaf" in changed((k,), leaf)
 
 
 def test_multipliers_have_to_be_finite():
     _, _, records, _ = case(SEVERAL)
     k = of_kind(records, "x")[0]
     for value in (np.nan, np.inf, 1e308):
-        for times in (1, 3):
-            changed = with_values(["x", records[k][1] * times, ""], [value] * len(records[k][1]) * times)
-            assert "do not exclude" in refused(SEVERAL, replaced(records, k, changed))
+        for rows in (records[k][1], records[k][1] * 3):
+            assert "do not exclude" in changed((k,), with_values(["x", rows, ""], [value] * len(rows)))
 
 
 # -- mutants -----------------------------------------------------------------------------------------------------------

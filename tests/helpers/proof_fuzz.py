@@ -4,22 +4,14 @@ import base64
 import json
 import struct
 import zlib
+from functools import reduce
+from operator import getitem
 
-from proof_tools import MAGIC, bytes_of, copied, multipliers, sealed, with_multipliers
+from proof_tools import MAGIC, copied, multipliers, put, sealed, with_multipliers
 
 HUGE = (
-    "1e4000000",
-    "1e400",
-    "-1e400",
-    "9" * 5000,
-    "9" * 3999,
-    "1/0",
-    "0/0",
-    "1/" + "3" * 4001,
-    "nan",
-    "inf",
-    " 1",
-    "1_0",
+    *("1e4000000", "1e400", "-1e400", "9" * 5000, "9" * 3999, "1/0", "0/0", "1/" + "3" * 4001),
+    *("nan", "inf", " 1", "1_0"),
 )
 TEXTS = (
     *HUGE, "", "0", "-1", "6" * 9, "\ud800", "\u0663", "AAAA", "AAAAAA==", "x", "s", "c", "graph", "problem",
@@ -31,15 +23,8 @@ NUMBERS = (
 )  # fmt: skip
 #: What JSON takes and a proof does not.
 LITERALS = (
-    "NaN",
-    "Infinity",
-    "-Infinity",
-    "1e999",
-    "-1e999",
-    "[" * 3000 + "]" * 3000,
-    "[" * 100_000,
-    '{"a":1,"a":1}',
-    "1E400",
+    *("NaN", "Infinity", "-Infinity", "1e999", "-1e999", "1E400"),
+    *("[" * 3000 + "]" * 3000, "[" * 100_000, '{"a":1,"a":1}'),
 )
 FLOATS = (1e300, -1e300, 1.7e308, float("inf"), float("-inf"), float("nan"), 0.0, -0.0, 5e-324, 1e-300)
 _HOLE = "\u0001hole"
@@ -153,29 +138,12 @@ def _places(value, path=()):
             yield from _places(value[key], (*path, key))
 
 
-def _put(record, path, value):
-    if not path:
-        return value
-    inner = record
-    for key in path[:-1]:
-        inner = inner[key]
-    inner[path[-1]] = value
-    return record
-
-
-def _get(record, path):
-    for key in path:
-        record = record[key]
-    return record
-
-
 def _field(rng, records, _):
     """One value anywhere in a record, by another of the same or of another kind."""
-    changed = copied(records)
     # the header, the end and the records between them alike
-    at = _pick(rng, (0, -1, int(rng.integers(len(changed))), int(rng.integers(len(changed)))))
-    path = _pick(rng, list(_places(changed[at])))
-    old = _get(changed[at], path)
+    at = _pick(rng, (0, -1, int(rng.integers(len(records))), int(rng.integers(len(records)))))
+    path = _pick(rng, list(_places(records[at])))
+    old = copied(reduce(getitem, path, records[at]))
     how = int(rng.integers(6))
     if how == 0:
         new = _pick(rng, NUMBERS)
@@ -186,23 +154,19 @@ def _field(rng, records, _):
     elif how == 3:
         new = _nudged(rng, old)
     elif how == 4:
-        new = copied(_get(records[at], _pick(rng, list(_places(records[at])))))
+        new = copied(reduce(getitem, _pick(rng, list(_places(records[at]))), records[at]))
     else:
-        changed[at] = _put(changed[at], path, _HOLE)
-        lines = _lines(changed)
+        lines = _lines(put(records, (at, *path), _HOLE))
         lines[at] = lines[at].replace(json.dumps(_HOLE), _pick(rng, LITERALS))
         return _sealed_lines(lines)
-    changed[at] = _put(changed[at], path, new)
-    return _sealed_lines(_lines(changed))
+    return _sealed_lines(_lines(put(records, (at, *path), new)))
 
 
 def _nudge(rng, records, _):
     """One number, text or list slightly otherwise."""
-    changed = copied(records)
-    at = int(rng.integers(len(changed)))
-    path = _pick(rng, list(_places(changed[at])))
-    changed[at] = _put(changed[at], path, _nudged(rng, _get(changed[at], path)))
-    return _sealed_lines(_lines(changed))
+    at = int(rng.integers(len(records)))
+    path = _pick(rng, list(_places(records[at])))
+    return _sealed_lines(_lines(put(records, (at, *path), lambda old: _nudged(rng, old))))
 
 
 def _nudged(rng, old):
@@ -214,9 +178,8 @@ def _nudged(rng, old):
         return _pick(rng, (-old, 2 * old, old * 1e300, old / 2, 0.0, old * (1 + 1e-9), 1e308))
     if isinstance(old, str):
         at = int(rng.integers(len(old) + 1))
-        return _pick(
-            rng, (old[:at] + old[at + 1 :], old[:at] + "5" + old[at:], old + old, old[:at] + "0" + old[at + 1 :])
-        )
+        head, tail = old[:at], old[at + 1 :]
+        return _pick(rng, (head + tail, head + "5" + old[at:], old + old, head + "0" + tail))
     if isinstance(old, list):
         at = int(rng.integers(len(old) + 1))
         return _pick(rng, (old[:at], old + old, old[::-1], old[:at] + old[at + 1 :], old * 50))
@@ -271,9 +234,8 @@ def _bomb(rng, records, _):
     if how == 0:
         lines[at:at] = [lines[int(rng.integers(len(lines)))]] * count
     elif how == 1:
-        lines[at:at] = [
-            _pick(rng, ("[]", "{}", '["u",""]', '["n"]', '["c","6"]', '["b",0,[0,5]]', "null", "", " "))
-        ] * count
+        short = "[]", "{}", '["u",""]', '["n"]', '["c","6"]', '["b",0,[0,5]]', "null", "", " "
+        lines[at:at] = [_pick(rng, short)] * count
     elif how == 2:
         lines[at] = "[" + ",".join([_pick(rng, ("0", "[]", '""', "{}", '"0/1"'))] * count) + "]"
     elif how == 3:
@@ -286,18 +248,6 @@ def _bomb(rng, records, _):
 
 
 _MUTATIONS = {
-    "file": _file,
-    "stream": _stream,
-    "characters": _characters,
-    "order": _order,
-    "field": _field,
-    "field again": _field,
-    "nudge": _nudge,
-    "numbers": _numbers,
-    "bomb": _bomb,
+    **{"file": _file, "stream": _stream, "characters": _characters, "order": _order},
+    **{"field": _field, "field again": _field, "nudge": _nudge, "numbers": _numbers, "bomb": _bomb},
 }
-
-
-def read(proof):
-    """The records of a mutant that was accepted."""
-    return [json.loads(line) for line in zlib.decompress(bytes_of(proof)[len(MAGIC) : -32]).splitlines()]

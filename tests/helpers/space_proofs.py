@@ -7,7 +7,9 @@ from fractions import Fraction
 
 import numpy as np
 import proof_fuzz
+from complete import all_roots
 from problems3d import from_compliance
+from proof_fuzz import _pick
 from proof_tools import bytes_of, copied, of_kind, proof_of, records_of
 from trees import by_the_tree
 
@@ -33,18 +35,14 @@ def on_the_end_of_a_sector():
 
 def with_one_tangent():
     """Two nodes: one without friction along t2, one without friction."""
-    rng = np.random.default_rng(5)
-    X = rng.standard_normal((6, 6))
+    X = np.random.default_rng(5).standard_normal((6, 6))
     friction = (np.array([2.0, 0.0]), np.array([0.0, 0.0]))
     return from_compliance(X @ X.T + 0.5 * np.eye(6), np.array([1.0, 1.0, 0.5, -2.0, 1.0, 1.0]), friction)
 
 
 def with_small_friction():
-    """Two nodes with coefficients far below one along one or both axes."""
-    rng = np.random.default_rng(5)
-    X = rng.standard_normal((6, 6))
-    friction = (np.array([2.0, 1e-9]), np.array([1e-12, 1e-9]))
-    return from_compliance(X @ X.T + 0.5 * np.eye(6), np.array([1.0, 1.0, 0.5, -2.0, 1.0, 1.0]), friction)
+    """The same with coefficients far below one along one or both axes."""
+    return with_one_tangent().replace(friction=(np.array([2.0, 1e-9]), np.array([1e-12, 1e-9])))
 
 
 @functools.cache
@@ -87,18 +85,13 @@ def arc_of_sector(number):
 # -- mutants -----------------------------------------------------------------------------------------------------------
 
 
-def _pick(rng, items):
-    return items[int(rng.integers(len(items)))]
-
-
 def _row(rng, records):
     places = [k for k in of_kind(records, "x") if records[k][1]]
     if places:
         row = _pick(rng, records[_pick(rng, places)][1])
         j = int(rng.integers(3))
-        row[j] = int(
-            _pick(rng, (row[j] + 1, row[j] - 1, 2 * row[j], row[j] // 2, 0, 1, 2**24, 2**31, row[j] + 2**31, 2**40, -1))
-        )
+        n = row[j]
+        row[j] = int(_pick(rng, (n + 1, n - 1, 2 * n, n // 2, 0, 1, 2**24, 2**31, n + 2**31, 2**40, -1)))
 
 
 def _value(rng, records):
@@ -194,16 +187,13 @@ class Truth:
 
     def roots(self, alpha):
         if alpha not in self._known:
-            found = enumerate_roots(self.problem, alpha)
-            assert found.complete
-            self._known[alpha] = [
-                (np.concatenate([root.lambda_n[:, None], root.lambda_t], axis=1), root.index) for root in found
-            ]
+            roots = all_roots(self.problem, alpha)
+            self._known[alpha] = [(np.column_stack([root.lambda_n, root.lambda_t]), root.index) for root in roots]
         return self._known[alpha]
 
     def agrees(self, report, proof):
         """Whether everything that an accepted mutant claims is true."""
-        records = proof_fuzz.read(proof)
+        records = records_of(proof)
         header, footer = records[0], records[-1]
         alpha = Fraction(header["alpha"])
         roots = self.roots(alpha)
