@@ -4,9 +4,9 @@ import ast
 from pathlib import Path
 
 import pytest
+from generators import named
 
 import enumsol
-from enumsol import gallery
 from enumsol.search.certifiers.protocol import Certified, Escalations
 from enumsol.search.solvers import Solvers
 from enumsol.search.tree import TreeSearch
@@ -14,14 +14,12 @@ from enumsol.selections.float_selections import SIGN_TOLERANCE
 
 
 class Records(list):
-    def write(self, record):
-        self.append(record)
+    write = list.append
 
 
 def searched(arithmetic):
     """The certifier after a search, and the records that it wrote."""
-    entry = gallery.get("two-node-6.4")
-    solvers, records = Solvers(entry.build(), entry.alpha, arithmetic, SIGN_TOLERANCE), Records()
+    solvers, records = Solvers(*named("two-node-6.4"), arithmetic, SIGN_TOLERANCE), Records()
     certifier = solvers.certifier(records)
     outcome = TreeSearch(solvers.scaled, certifier).run()
     assert len(outcome.solutions) == 5
@@ -36,8 +34,7 @@ def test_without_a_proof_every_answer_is_neutral(arithmetic):
     certifier.unloaded()
     certifier.recorder.write(["x"])
     certifier.add(Certified({}, Escalations(balls=3), leaves=2))
-    assert certifier.certified == Certified()
-    assert records == []
+    assert (certifier.certified, records) == (Certified(), [])
 
 
 def test_a_proof_counts_what_subtrees_proved_and_writes_to_the_recorder_of_the_moment():
@@ -49,8 +46,7 @@ def test_a_proof_counts_what_subtrees_proved_and_writes_to_the_recorder_of_the_m
     written, certifier.recorder = len(records), (later := Records())
     certifier.add(Certified({(9, 9): before.verified[next(iter(before.verified))]}, Escalations(balls=2), leaves=4))
     certifier.skipped((4, 4), "a reason")
-    assert later == [["u", "a reason"]]
-    assert len(records) == written
+    assert (later, len(records)) == ([["u", "a reason"]], written)
     after = certifier.certified
     assert (after.leaves, after.escalations.balls, len(after.verified)) == (leaves + 5, balls + 2, 6)
 

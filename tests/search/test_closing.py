@@ -11,7 +11,7 @@ from rational_checker import check_records
 from touching import beside_a_loaded_node, row_of_discs, touching_problem
 from trees import every_subtree
 
-from enumsol import ContactProblem, enumerate_roots, verify
+from enumsol import enumerate_roots, verify
 from enumsol.model.statuses import BACKWARD, FORWARD
 from enumsol.search import fathoming as closing, solvers
 
@@ -87,17 +87,13 @@ def test_a_row_of_discs():
     assert sum(len(held) == 4 for held in only_root(row_of_discs(20), 40).active) == 18
 
 
-@pytest.fixture
-def every_node():
-    """Every subtree is tried."""
-    with every_subtree():
-        yield
+def actives(roots):
+    return [root.active for root in roots]
 
 
 def alike(problem, exact, roots):
     """Whether roots are those found in rationals, within their enclosures, with all statuses that hold."""
-    assert roots.complete
-    assert verify(problem, roots.proof).complete
+    assert (roots.complete, verify(problem, roots.proof).complete) == (True, True)
     assert [len(roots), len(roots.families)] == [len(exact), len(exact.families)]
 
     def ordered(found):
@@ -129,31 +125,31 @@ def any_side(monkeypatch):
 @pytest.mark.parametrize("seed", range(30))
 def test_splits_by_sides_find_the_same(any_side, tree_only, seed):
     rng = np.random.default_rng(seed)
-    p = int(rng.integers(1, 5))
-    problem = touching_problem(rng, p) if seed % 3 else integer_problem(rng, p)
+    make = touching_problem if seed % 3 else integer_problem
+    problem = make(rng, int(rng.integers(1, 5)))
     exact = enumerate_roots(problem, 0, "exact", "exhaustive")
     roots = enumerate_roots(problem, 0)
     alike(problem, exact, roots)
     assert check_records(problem, records_of(roots.proof)) == records_of(roots.proof)[-1]
-    assert [root.active for root in enumerate_roots(problem, 0, "fast")] == [root.active for root in exact]
-    assert [root.active for root in enumerate_roots(problem, 0, "exact")] == [root.active for root in exact]
+    for arithmetic in ("fast", "exact"):
+        assert actives(enumerate_roots(problem, 0, arithmetic)) == actives(exact)
 
 
 @pytest.mark.few(10, 4)
 @pytest.mark.parametrize("seed", range(40))
-def test_the_roots_are_those_of_all_selections(every_node, seed):
+@every_subtree()
+def test_the_roots_are_those_of_all_selections(seed):
     rng = np.random.default_rng(seed)
     problem = touching_problem(rng, int(rng.integers(1, 5)))
     exact = enumerate_roots(problem, 0, "exact", "exhaustive")
     roots = enumerate_roots(problem, 0)
     alike(problem, exact, roots)
-    assert [root.active for root in roots] == [root.active for root in exact]
-    tree = enumerate_roots(problem, 0, "exact")
-    assert [root.active for root in tree] == [root.active for root in exact]
+    assert actives(roots) == actives(enumerate_roots(problem, 0, "exact")) == actives(exact)
 
 
 @pytest.mark.long
-def test_the_roots_without_rationals(monkeypatch, every_node):
+@every_subtree()
+def test_the_roots_without_rationals(monkeypatch):
     complete = degenerate = 0
     for seed in range(60):
         rng = np.random.default_rng(seed)
@@ -172,8 +168,7 @@ def test_the_roots_without_rationals(monkeypatch, every_node):
 
 
 def test_a_body_too_large_for_rationals():
-    problem = touching_problem(np.random.default_rng(3), 3, inner=300)
-    small = touching_problem(np.random.default_rng(3), 3)
+    problem, small = (touching_problem(np.random.default_rng(3), 3, inner=inner) for inner in (300, 0))
     assert problem.n > 250
     roots = enumerate_roots(problem, 0)
     assert any(not root.regular for root in roots)
@@ -181,10 +176,8 @@ def test_a_body_too_large_for_rationals():
 
 
 def test_searches_without_degenerate_roots_try_nothing(monkeypatch):
-    def never(*_):
-        raise AssertionError("a try")
-
-    monkeypatch.setattr("enumsol.search.certifiers.verified.VerifiedCertifier.closed", never)
+    # a try would fail
+    monkeypatch.setattr("enumsol.search.certifiers.verified.VerifiedCertifier.closed", None)
     rng = np.random.default_rng(1)
     for p in (2, 4, 6):
         assert enumerate_roots(random_problem(rng, p), 0).complete
@@ -193,12 +186,10 @@ def test_searches_without_degenerate_roots_try_nothing(monkeypatch):
 @pytest.mark.parametrize("slides", [False, True])
 def test_nearly_grazing_nodes(slides):
     # data off by rounding: a regular root whose margin is far below what balls see
-    problem = beside_a_loaded_node(4, slides=slides, grazing=True)
-    rng = np.random.default_rng(4)
+    problem, rng = beside_a_loaded_node(4, slides=slides, grazing=True), np.random.default_rng(4)
     A = problem.A.toarray() * (1 + 1e-16 * rng.normal(size=(problem.n, problem.n)))
     f = problem.f + 1e-17 * rng.normal(size=problem.n)
-    problem = ContactProblem((A + A.T) / 6, problem.Bn, problem.Bt, f / 3, friction=0.5)
-    roots = proven_roots(problem, 0, max_nodes=60)
+    roots = proven_roots(problem.replace(A=(A + A.T) / 6, f=f / 3), 0, max_nodes=60)
     assert roots.index_sum == len(roots) == 1
     assert roots.stats.closed
     assert roots[0].regular
@@ -210,7 +201,7 @@ def test_executors_find_the_same():
     alone = enumerate_roots(problem, 0)
     with ProcessPoolExecutor(2) as executor:
         together = all_roots(problem, 0, executor=executor)
-    assert [root.active for root in together] == [root.active for root in alone]
+    assert actives(together) == actives(alone)
     assert verify(problem, together.proof).complete
 
 
@@ -231,7 +222,7 @@ def test_sides_are_told_to_workers(workers, monkeypatch):
     monkeypatch.setattr("enumsol.search.parallel.NODES", 16)
     with ThreadPoolExecutor(workers) as executor:
         together = all_roots(problem, 0, executor=executor, max_nodes=600)
-    assert [root.active for root in together] == [root.active for root in alone]
+    assert actives(together) == actives(alone)
     assert any(record[0] == "b" and max(record[2]) > 6 for record in records_of(together.proof)[1:-1])
     assert verify(problem, together.proof).complete
 
@@ -239,7 +230,6 @@ def test_sides_are_told_to_workers(workers, monkeypatch):
 @pytest.mark.parametrize("nodes", [30, 50, 70])
 def test_a_proof_with_sides_is_resumed(nodes, tmp_path):
     problem = row_of_discs(12, weights=(2.0, 3.0), friction=0.9)
-    stopped = enumerate_roots(problem, 0, max_nodes=nodes, proof_path=tmp_path / "a.proof")
-    assert not stopped.complete
-    roots = proven_roots(problem, 0, max_nodes=3000, proof_path=tmp_path / "a.proof", resume=True)
-    assert len(roots) == 1
+    path = tmp_path / "a.proof"
+    assert not enumerate_roots(problem, 0, max_nodes=nodes, proof_path=path).complete
+    assert len(proven_roots(problem, 0, max_nodes=3000, proof_path=path, resume=True)) == 1

@@ -1,10 +1,11 @@
 """Forms other than the energy over pieces of the interval: the same graphs, and proofs that both checkers accept."""
 
+from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 
 import numpy as np
 import pytest
-from complete import accepted_report, proven_graph
+from complete import complete_report, proven_graph
 from generators import through_the_unloaded_state
 from graph_proofs import forms_at_once, refused, without_arcs
 from oracles import exact_solutions
@@ -42,8 +43,7 @@ def test_graphs_and_both_checkers_agree(kind):
         assert graph.complete
         assert shape(graph) == shape(plain)
         records = records_of(graph.proof)
-        report = accepted_report(problem, graph.proof)
-        assert report.complete
+        report = complete_report(problem, graph.proof)
         if problem.p < 3:
             assert check_records(problem, without_arcs(records)) == report.selections
         by_forms += len(of_kind(records, "f"))
@@ -59,9 +59,8 @@ def test_beside_the_unloaded_state():
 
 
 def test_where_friction_vanishes_the_energy_is_kept():
-    problem = gallery.get("wedge-8-3").build()
-    system = IntervalSystem.from_problem(problem.condensed, 0.0, 2.0, None)
-    assert better_form(system) is None
+    condensed = gallery.get("wedge-8-3").build().condensed
+    assert better_form(IntervalSystem.from_problem(condensed, 0.0, 2.0, None)) is None
 
 
 @pytest.mark.slow
@@ -120,17 +119,9 @@ def test_forms_that_make_no_sense_are_refused():
     records = without_arcs(records_of(with_forms(problem, (0.5, 4.0)).proof))
     (k, *_) = of_kind(records, "q")
     form = records[k]
-    for changed in (
-        form[:4],
-        [*form, 0.0],
-        [*form[:3], [-1.0, 0.5], form[4]],
-        [*form[:4], form[4][:1]],
-        ["q", None, *form[2:]],
-        ["q", ["x", 1.0], *form[2:]],
-        ["q", [1e308, 1e308], *form[2:]],
-        ["q", [0.0, 0.0], *form[2:]],
-        ["q", [-1.0, -1.0], *form[2:]],
-    ):
+    others = [["q", mu, *form[2:]] for mu in (None, ["x", 1.0], [1e308] * 2, [0.0] * 2, [-1.0] * 2)]
+    others += [form[:4], [*form, 0.0], [*form[:3], [-1.0, 0.5], form[4]], [*form[:4], form[4][:1]]]
+    for changed in others:
         assert refused(problem, replaced(records, k, changed))
     assert not verify(problem, proof_of(replaced(records, k))).ok
     # a form that no leaf needs changes nothing
@@ -138,12 +129,9 @@ def test_forms_that_make_no_sense_are_refused():
 
 
 def test_the_proof_does_not_depend_on_the_workers():
-    from concurrent.futures import ThreadPoolExecutor
-
     problem = generic_problem(np.random.default_rng(5), 3, "both")
     with forms_at_once(), ThreadPoolExecutor(2) as executor:
-        parallel = branch_graph(problem, (0.5, 4.0), executor=executor)
-        alone = branch_graph(problem, (0.5, 4.0))
+        alone, parallel = (branch_graph(problem, (0.5, 4.0), executor=one) for one in (None, executor))
         assert records_of(parallel.proof) == records_of(alone.proof)
 
 

@@ -8,17 +8,29 @@ import textwrap
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
 from functools import cache
+from unittest import mock
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
 from compare import differences
 from complete import accepted_report, all_roots, proven_roots
-from generators import from_condensed, integer_problem
+from generators import from_condensed, integer_problem, named
 from hypothesis import HealthCheck, given, settings, strategies as st
 from problems3d import forces
 from proof_fuzz import mutant
-from proof_tools import bytes_of, copied, multipliers, of_kind, proof_of, records_of, with_multipliers
+from proof_tools import (
+    bytes_of,
+    copied,
+    kinds_of,
+    multipliers,
+    of_kind,
+    proof_of,
+    put,
+    put_in_all,
+    records_of,
+    with_multipliers,
+)
 from refusals import bad_argument
 from touching import touching_problem
 from trees import above_known_roots, by_the_tree
@@ -35,11 +47,6 @@ from enumsol.search.resume import Replay
 QUICK = settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 
 
-def wedge():
-    entry = gallery.get("wedge-8-5")
-    return entry.build(), entry.alpha
-
-
 def beyond_rationals():
     """A degenerate problem with so many degrees of freedom that it stays undecided."""
     small, m = integer_problem(np.random.default_rng(34), 2), EXACT_DOF_LIMIT
@@ -54,7 +61,7 @@ def nearly_singular():
 
 
 PROBLEMS = {
-    "wedge": wedge,
+    "wedge": lambda: named("wedge-8-5"),
     "one node": lambda: (gallery.one_node_triangle(), 5.0),
     "closed": lambda: (touching_problem(np.random.default_rng(1), 3), 0.0),
     "closed in balls": lambda: (touching_problem(np.random.default_rng(4), 3, inner=EXACT_DOF_LIMIT), 0.0),
@@ -67,7 +74,7 @@ PROBLEMS = {
     "unloaded": lambda: (from_condensed(np.eye(4), np.zeros(4), np.full(2, 0.5)), 0.0),
     "forms": lambda: (gallery.clamped_block(12, 6), 0.3),
     "one certificate": lambda: (gallery.clamped_block(4, 2), 0.3),
-    "alone": wedge,
+    "alone": lambda: named("wedge-8-5"),
     "in space": lambda: (gallery.get("one-node-3d-3").build(), 0),
     "block in space": lambda: (gallery.get("block3d-4").build(), 0.5),
     "closed in space": lambda: (gallery.get("block3d-9").build(), 0.5),
@@ -87,14 +94,9 @@ def searched(name):
 def known(name):
     """The problem, alpha, and what an uninterrupted search found; with forms as early as possible where named so."""
     problem, alpha = PROBLEMS[name]()
-    before = policy.NODES, policy.MORE
-    if name == "forms":
-        policy.NODES, policy.MORE = 0, -2.0
-    try:
-        with searched(name):
-            return problem, alpha, enumerate_roots(problem, alpha)
-    finally:
-        policy.NODES, policy.MORE = before
+    early = mock.patch.multiple(policy, NODES=0, MORE=-2.0) if name == "forms" else nullcontext()
+    with early, searched(name):
+        return problem, alpha, enumerate_roots(problem, alpha)
 
 
 def check(name, found):
@@ -107,8 +109,7 @@ def check(name, found):
     else:
         assert not differences(found, whole, rtol=1e-9)
     report = accepted_report(problem, found.proof)
-    assert report.complete == whole.complete
-    assert (report.roots, report.families) == (len(found), len(found.families))
+    assert (report.complete, report.roots, report.families) == (whole.complete, len(found), len(found.families))
 
 
 def resumed(name, data, path, **options):
@@ -123,7 +124,7 @@ def resumed(name, data, path, **options):
 
 @pytest.mark.slow
 def test_the_problems_have_all_kinds_of_records():
-    kinds = {record[0] for name in PROBLEMS for record in records_of(known(name)[2].proof)[1:-1]}
+    kinds = {kind for name in PROBLEMS for kind in kinds_of(known(name)[2].proof)}
     assert kinds == {*LEAVES, "b", "q"} - {"X"}  # "X": below
 
 
@@ -132,7 +133,7 @@ def test_exclusions_in_rationals(tmp_path, monkeypatch):
     problem, alpha = PROBLEMS["border"]()
     whole = enumerate_roots(problem, alpha)
     records, data = records_of(whole.proof), bytes_of(whole.proof)
-    assert any(record[0] == "X" for record in records[1:-1])
+    assert of_kind(records, "X")
     path = tmp_path / "x.proof"
     for size in (len(data) // 2, len(data)):
         path.write_bytes(data[:size])
@@ -141,17 +142,21 @@ def test_exclusions_in_rationals(tmp_path, monkeypatch):
     assert found.stats.resumed == len(records) - 2
 
 
+def taken_over(kinds):
+    """How many of the records of a proof a search takes over."""
+    return sum(kind not in ("q", "z", "u") for kind in kinds)
+
+
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_a_whole_proof_leaves_nothing_to_search(name, tmp_path):
     _, _, whole = known(name)
     found = resumed(name, bytes_of(whole.proof), tmp_path / "x.proof")
     check(name, found)
-    undecided = any(record[0] == "u" for record in records_of(whole.proof)[1:-1])
-    assert (found.stats.nodes == 0) is not undecided
-    tree = [record for record in records_of(whole.proof)[1:-1] if record[0] not in ("q", "z", "u")]
-    assert found.stats.resumed == len(tree)
+    kinds = kinds_of(whole.proof)
+    assert (found.stats.nodes == 0) is ("u" not in kinds)
+    assert found.stats.resumed == taken_over(kinds)
     assert records_of(found.proof) == records_of(whole.proof)
-    if tree and not undecided:
+    if taken_over(kinds) and "u" not in kinds:
         assert "in the file, nothing was left to search" in repr(found)
 
 
@@ -168,16 +173,13 @@ def test_a_file_cut_anywhere(data, tmp_path_factory):
 @pytest.mark.few(0, 2)
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_as_much_is_taken_as_the_file_holds(name, tmp_path):
-    whole = bytes_of(known(name)[2].proof)
-    records = [record for record in records_of(whole)[1:-1] if record[0] not in ("q", "z", "u")]
-    taken = []
+    whole, taken = bytes_of(known(name)[2].proof), []
     for size in np.linspace(0, len(whole), 9).astype(int):
-        path = tmp_path / "x.proof"
-        found = resumed(name, whole[:size], path)
+        found = resumed(name, whole[:size], tmp_path / "x.proof")
         taken.append(found.stats.resumed)
         check(name, found)
     assert taken == sorted(taken)
-    assert taken[-1] == len(records)
+    assert taken[-1] == taken_over(kinds_of(whole))
 
 
 @pytest.mark.long
@@ -186,15 +188,13 @@ def test_as_much_is_taken_as_the_file_holds(name, tmp_path):
 def test_a_forged_file_never_gives_a_wrong_answer(seed, name, tmp_path_factory):
     _, _, whole = known(name)
     data = bytes_of(whole.proof)
-    forged, _ = mutant(np.random.default_rng(seed), records_of(data), data)
-    forged = bytes_of(forged)
+    forged = bytes_of(mutant(np.random.default_rng(seed), records_of(data), data)[0])
     path = tmp_path_factory.mktemp("forged") / "x.proof"
-    refusal = None
     try:
         found = resumed(name, forged, path)
     except InvalidArgumentError as error:
-        refusal = str(error)
-    if refusal is None:
+        found, refusal = None, str(error)
+    if found is not None:
         check(name, found)
     else:
         assert "expected the proof of this search" in refusal
@@ -214,24 +214,19 @@ def without_subtree(records):
 
 
 def altered_multipliers(records):
-    changed = copied(records)
-    for k, record in enumerate(changed):
-        if record[0] == "x" if isinstance(record, list) else False:
-            rows, values = multipliers(record)
-            changed[k] = with_multipliers(record, rows, [-value for value in values])
-    return changed
+    for k in of_kind(records, "x"):
+        rows, values = multipliers(records[k])
+        records = put(records, (k,), with_multipliers(records[k], rows, [-value for value in values]))
+    return records
 
 
 def moved_roots(records):
-    changed = copied(records)
-    for record in changed:
-        if isinstance(record, list) and record[0] == "r":
-            record[1] = [value + 1.0 for value in record[1]]
-    return changed
+    return put_in_all(records, of_kind(records, "r"), 1, lambda mid: [value + 1.0 for value in mid])
 
 
 def no_root_left(records):
-    return [["n"] if isinstance(record, list) and record[0] == "r" else record for record in records]
+    roots = of_kind(records, "r")
+    return [["n"] if k in roots else record for k, record in enumerate(records)]
 
 
 @pytest.mark.parametrize("forge", [without_subtree, altered_multipliers, moved_roots, no_root_left])
@@ -243,15 +238,13 @@ def test_forgeries(forge, tmp_path):
     found = resumed("wedge", bytes_of(proof_of(forged)), tmp_path / "x.proof")
     check("wedge", found)
     assert found.stats.resumed > 0
-    searched = forge in (without_subtree, altered_multipliers)
-    assert (found.stats.nodes > 0) is searched
+    assert (found.stats.nodes > 0) is (forge in (without_subtree, altered_multipliers))
 
 
 def test_rows_that_do_not_exist_in_space(tmp_path):
-    records = copied(records_of(known("block in space")[2].proof))
-    excluded = [records[k] for k in of_kind(records, "x")]
-    for record in excluded[:4]:
-        record[1][0] = [3, 0, 5]  # v has no such component
+    records = records_of(known("block in space")[2].proof)
+    for k in of_kind(records, "x")[:4]:
+        records[k][1][0] = [3, 0, 5]  # v has no such component
     found = resumed("block in space", bytes_of(proof_of(records)), tmp_path / "x.proof")
     check("block in space", found)
     assert found.stats.nodes > 0
@@ -292,8 +285,7 @@ def test_what_the_file_holds_is_taken_whatever_the_limits(tmp_path):
         check("wedge", found)
     # undecided leaves in the middle of the file, and a limit that is reached among them: all that follows is kept
     records = records_of(whole.proof)
-    roots = of_kind(records, "x")
-    for k in roots[2:40:3]:
+    for k in of_kind(records, "x")[2:40:3]:
         records[k] = ["u", "left for later"]
     found = resumed("wedge", bytes_of(proof_of(records)), tmp_path / "x.proof", max_nodes=3)
     assert len(found) == len(whole)
@@ -365,10 +357,9 @@ def test_files_of_other_searches(tmp_path):
         refused(path, message, problem, alpha)
     path.write_bytes(b"enumsol-proof 2\n" + bytes_of(whole.proof)[16:])
     refused(path, "is of another version", problem, alpha)
-    path.write_bytes(b"My notes on contact.\n")
-    refused(path, "is not a proof", problem, alpha)
-    path.write_bytes(bytes_of(proof_of([[1, 2], ["x"]])))
-    refused(path, "is not a proof", problem, alpha)
+    for content in (b"My notes on contact.\n", bytes_of(proof_of([[1, 2], ["x"]]))):
+        path.write_bytes(content)
+        refused(path, "is not a proof", problem, alpha)
     square = gallery.two_node_square()
     enumsol.branch_graph(square, (0, 10)).proof.save(path)
     refused(path, "is a proof of another kind, 'graph'", square, 5)
@@ -415,9 +406,8 @@ def length(path):
 
 @pytest.mark.skipif(sys.platform == "win32", reason="kill -9")
 def test_kill_9(tmp_path):
-    entry = gallery.get("wedge-14-5")
-    problem, path = entry.build(), tmp_path / "x.proof"
-    whole = enumerate_roots(problem, entry.alpha)
+    (problem, alpha), path = named("wedge-14-5"), tmp_path / "x.proof"
+    whole = enumerate_roots(problem, alpha)
     killed(path, 320)
     first, data = length(path), path.read_bytes()
     assert first >= 320 - FLUSH_EVERY
@@ -429,7 +419,7 @@ def test_kill_9(tmp_path):
     second = length(path)
     assert second >= 576 - FLUSH_EVERY - 1
     assert [path.name, path.name + BESIDE][: len(os.listdir(tmp_path))] == sorted(os.listdir(tmp_path))
-    found = all_roots(problem, entry.alpha, proof_path=path, resume=True)
+    found = all_roots(problem, alpha, proof_path=path, resume=True)
     assert not differences(found, whole, rtol=1e-9)
     assert found.stats.resumed >= second - 1
     assert found.stats.resumed + found.stats.nodes == whole.stats.nodes
@@ -440,8 +430,7 @@ def test_kill_9(tmp_path):
 @pytest.mark.parametrize("at", [64, 448])
 def test_ctrl_c_of_a_resumed_search(at, tmp_path, monkeypatch):
     monkeypatch.setattr(policy, "NODES", 1)
-    entry = gallery.get("wedge-14-5")
-    problem, path = entry.build(), tmp_path / "x.proof"
+    (problem, alpha), path = named("wedge-14-5"), tmp_path / "x.proof"
 
     def stop(progress):
         if progress.nodes + progress.resumed >= stop.at:
@@ -451,7 +440,7 @@ def test_ctrl_c_of_a_resumed_search(at, tmp_path, monkeypatch):
     for stop.at in (320, at):
         before = path.read_bytes() if path.exists() else None
         with pytest.raises(Interrupted):
-            enumerate_roots(problem, entry.alpha, proof_path=path, progress=stop, resume=True)
+            enumerate_roots(problem, alpha, proof_path=path, progress=stop, resume=True)
         lengths.append(length(path))
         assert os.listdir(tmp_path) == [path.name]
     assert lengths[1] >= lengths[0] >= 256
@@ -459,7 +448,7 @@ def test_ctrl_c_of_a_resumed_search(at, tmp_path, monkeypatch):
         assert path.read_bytes() == before
     else:
         assert lengths[1] > lengths[0]
-    found = all_roots(problem, entry.alpha, proof_path=path, resume=True)
+    found = all_roots(problem, alpha, proof_path=path, resume=True)
     assert found.stats.resumed >= lengths[1] - 1
     assert len(found) == 5
 

@@ -6,8 +6,9 @@ from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 import pytest
 from compare import differences
 from complete import accepted_report, all_roots
+from generators import named
 from interruptions import CtrlC, interrupted
-from proof_tools import bytes_of, records_of
+from proof_tools import bytes_of, kinds_of
 
 from enumsol import enumerate_roots, gallery, verify
 from enumsol.search import form_policy as policy, parallel
@@ -22,9 +23,8 @@ def small_parts(monkeypatch):
 
 @pytest.fixture(scope="module")
 def wedge():
-    entry = gallery.get("wedge-14-5")
-    problem = entry.build()
-    return problem, entry.alpha, enumerate_roots(problem, entry.alpha)
+    problem, alpha = named("wedge-14-5")
+    return problem, alpha, enumerate_roots(problem, alpha)
 
 
 class Watched(ThreadPoolExecutor):
@@ -110,8 +110,7 @@ def test_one_proof_with_forms(small_parts, tree_only, monkeypatch, nodes):
     problem = gallery.clamped_block(32, 16)
     whole = enumerate_roots(problem, 0.3)
     found = check_one_proof(problem, 0.3, whole)
-    kinds = [record[0] for record in records_of(found.proof)[1:-1]]
-    assert kinds.count("f") > 20
+    assert kinds_of(found.proof).count("f") > 20
     # begun again, not only went on: the records of the search with the energy are gone
     assert found.stats.nodes == pytest.approx(whole.stats.nodes, rel=0.1)
 
@@ -120,30 +119,24 @@ def test_one_proof_with_forms(small_parts, tree_only, monkeypatch, nodes):
 def test_the_limit_on_nodes_is_exact(small_parts, wedge, most):
     problem, alpha, whole = wedge
     with ThreadPoolExecutor(2) as executor:
-        found = enumerate_roots(problem, alpha, executor=executor, max_nodes=most)
-        again = enumerate_roots(problem, alpha, executor=executor, max_nodes=most)
+        found, again = (enumerate_roots(problem, alpha, executor=executor, max_nodes=most) for _ in range(2))
     assert found.stats.nodes == most
-    assert found.stopped == f"stopped after max_nodes = {most} node{'s' * (most > 1)}, {left(found)} not examined"
+    left = f"{len(found.undecided)} subtree{'s' * (len(found.undecided) > 1)}"
+    assert found.stopped == f"stopped after max_nodes = {most} node{'s' * (most > 1)}, {left} not examined"
     assert bytes_of(found.proof) == bytes_of(again.proof)
     report = accepted_report(problem, found.proof)
     assert (report.roots, report.undecided) == (len(found), len(found.undecided))
     assert len(found) <= found.at_least <= len(whole)
 
 
-def left(found):
-    count = len(found.undecided)
-    return f"{count} subtree{'s' * (count > 1)}"
-
-
 def test_an_interruption_keeps_what_came_in(small_parts, wedge, tmp_path):
     problem, alpha, whole = wedge
     path, stop = tmp_path / "x.proof", CtrlC(lambda progress: progress.covered > 0.6)
     with ThreadPoolExecutor(2) as executor:
-        partial = interrupted(
-            "interrupted", enumerate_roots, problem, alpha, executor=executor, progress=stop, proof_path=path
-        )
+        options = {"executor": executor, "proof_path": path}
+        partial = interrupted("interrupted", enumerate_roots, problem, alpha, progress=stop, **options)
         assert 0 < len(partial) <= len(whole)
-        found = all_roots(problem, alpha, executor=executor, proof_path=path, resume=True)
+        found = all_roots(problem, alpha, resume=True, **options)
     assert not differences(found, whole, rtol=1e-12)
 
 

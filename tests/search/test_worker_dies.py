@@ -41,6 +41,12 @@ def square():
     return gallery.two_node_square()
 
 
+def bereaved(call, *arguments, healthy, last=DEATHS["os._exit"], **options):
+    """What a call comes to that loses a process after so many tasks, and is told so."""
+    with ProcessPoolExecutor(2) as pool, pytest.warns(RuntimeWarning, match="a worker died"):
+        return call(*arguments, executor=DyingExecutor(pool, healthy, *last), **options)
+
+
 def check(found, problem, alpha):
     """Nothing is missing, and the proof is that of a search whose workers live."""
     with ThreadPoolExecutor(1) as pool:
@@ -61,10 +67,7 @@ def check(found, problem, alpha):
 @pytest.mark.parametrize("death", DEATHS)
 def test_a_process_that_dies(wedge, death, healthy, tmp_path):
     path = tmp_path / "p"
-    with ProcessPoolExecutor(2) as pool:
-        executor = DyingExecutor(pool, healthy, *DEATHS[death])
-        with pytest.warns(RuntimeWarning, match="a worker died"):
-            found = enumerate_roots(*wedge, executor=executor, proof_path=path)
+    found = bereaved(enumerate_roots, *wedge, healthy=healthy, last=DEATHS[death], proof_path=path)
     check(found, *wedge)
     assert found.stats.redone > 0
     assert bytes_of(Proof.load(path)) == bytes_of(found.proof)
@@ -121,11 +124,9 @@ class Forgetting(DyingExecutor):
 def test_a_task_that_a_broken_pool_forgets(square, wedge, monkeypatch):
     monkeypatch.setattr(workers, "_PATIENCE", 0.05)
     with pytest.warns(RuntimeWarning, match="a worker died"):
-        table = multiplicity_table(square, ALPHAS, executor=Forgetting(None, 0))
-    check_table(table, square)
+        check_table(multiplicity_table(square, ALPHAS, executor=Forgetting(None, 0)), square)
     with pytest.warns(RuntimeWarning, match="a worker died"):
-        found = enumerate_roots(*wedge, executor=Forgetting(None, 0))
-    check(found, *wedge)
+        check(enumerate_roots(*wedge, executor=Forgetting(None, 0)), *wedge)
 
 
 class Renewed(ThreadPoolExecutor):
@@ -154,19 +155,16 @@ def test_patience_is_for_what_was_forgotten_alone(monkeypatch):
 
 
 def test_arithmetic_without_a_proof(wedge):
-    with ProcessPoolExecutor(2) as pool, pytest.warns(RuntimeWarning, match="a worker died"):
-        found = enumerate_roots(*wedge, "fast", executor=DyingExecutor(pool, 12, *DEATHS["os._exit"]))
+    found = bereaved(enumerate_roots, *wedge, "fast", healthy=12)
     check(found, *wedge)
     assert found.proof is None
 
 
 def test_limits_hold_when_a_worker_dies(wedge):
-    problem, alpha = wedge
-    with ProcessPoolExecutor(2) as pool, pytest.warns(RuntimeWarning, match="a worker died"):
-        found = enumerate_roots(problem, alpha, executor=DyingExecutor(pool, 3, os._exit, 1), max_nodes=100)
-    assert found.stats.nodes == 100
-    assert found.stopped == f"stopped after max_nodes = 100 nodes, {len(found.undecided)} subtrees not examined"
-    assert verify(problem, found.proof).undecided == len(found.undecided)
+    found = bereaved(enumerate_roots, *wedge, healthy=3, max_nodes=100)
+    left = len(found.undecided)
+    assert (found.stats.nodes, verify(wedge[0], found.proof).undecided) == (100, left)
+    assert found.stopped == f"stopped after max_nodes = 100 nodes, {left} subtrees not examined"
 
 
 # -- pools that are made anew ------------------------------------------------------------------------------------------
@@ -227,10 +225,8 @@ def test_what_kills_every_worker_is_done_here():
 def test_pools_are_made_anew_in_a_process_of_their_own():
     """A process of the tests was once lost beside them, and all that it had still to do."""
     variables = {name: value for name, value in os.environ.items() if not name.startswith("PYTEST_")}
-    tests = [
-        f"{__file__}::{test.__name__}" for test in (test_a_pool_is_made_anew, test_what_kills_every_worker_is_done_here)
-    ]
-    command = [sys.executable, "-m", "pytest", "-n", "0", *tests]
+    tests = test_a_pool_is_made_anew, test_what_kills_every_worker_is_done_here
+    command = [sys.executable, "-m", "pytest", "-n", "0", *(f"{__file__}::{test.__name__}" for test in tests)]
     done = subprocess.run(command, check=False, env=variables, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "passed" in done.stdout
@@ -249,9 +245,7 @@ def check_table(table, problem):
 def test_a_table_is_whole(square, death):
     # the loss is found when a task is handed in, or, after the last one, when its result is
     for done in (0, 3, 5):
-        with ProcessPoolExecutor(2) as pool, pytest.warns(RuntimeWarning, match="a worker died"):
-            table = multiplicity_table(square, ALPHAS, executor=DyingExecutor(pool, done, *DEATHS[death]))
-        check_table(table, square)
+        check_table(bereaved(multiplicity_table, square, ALPHAS, healthy=done, last=DEATHS[death]), square)
 
 
 def test_a_table_whose_thread_runs_out_of_memory(square):
@@ -289,8 +283,7 @@ def test_errors_with_a_partial_result_survive_a_pickle(square):
     roots = enumerate_roots(square, 3.5)
     for kind in (enumsol.Interrupted, enumsol.OutputError):
         again = pickle.loads(pickle.dumps(kind("what happened", roots)))
-        assert type(again) is kind
-        assert str(again) == "what happened"
+        assert (type(again), str(again)) == (kind, "what happened")
         assert [root.statuses for root in again.partial] == [root.statuses for root in roots]
 
 
@@ -349,5 +342,4 @@ def test_a_worker_killed_from_outside(tmp_path):
     assert process.returncode == 0
     assert err.startswith("enumsol: warning: a worker died (")
     assert out.splitlines()[-1] == "complete: yes (proven)"
-    report = complete_report(problem, Proof.load(proof))
-    assert report.roots == 3**6
+    assert complete_report(problem, Proof.load(proof)).roots == 3**6
