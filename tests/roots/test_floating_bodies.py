@@ -67,31 +67,26 @@ def test_all_solutions_of_many_random_bodies():
 def test_a_bound_is_needed_if_it_cuts_something_off(seed):
     problem = random_body(seed)
     # all numbers are small: nothing begins as far away as this
-    near, far = ({v for _, part in Oracle(p, 0).parts for v in part} for p in (problem, _reaching(problem, 2.0**20)))
+    others = problem, problem.replace(max_rigid_displacement=2.0**20)
+    near, far = ({v for _, part in Oracle(other, 0).parts for v in part} for other in others)
     for arithmetic in ("verified", "exact"):
         roots = all_roots(problem, 0, arithmetic=arithmetic)
         assert roots.rigid_bound.needed == (near != far)
 
 
-def _reaching(problem, largest):
-    return problem.replace(max_rigid_displacement=largest)
-
-
 @pytest.mark.parametrize(("push", "statuses"), [(0.0, {"stick"}), (0.25, {"stick"}), (0.9, {"stick", "slip+"})])
 def test_a_block_below_sliding_has_one_solution(push, statuses):
     problem = block_on_table(cells=3, push=push)
-    roots = enumsol.enumerate_roots(problem, 0)
+    roots = proven_roots(problem, 0)
     assert roots.unique
-    assert {status.value for status in roots[0].statuses} <= statuses
     root = roots[0]
+    assert {status.value for status in root.statuses} <= statuses
     # nothing holds it: contact carries the whole load
     carried = problem.contact_rows.T @ np.r_[root.lambda_n, root.lambda_t]
     assert np.allclose(problem.rigid_modes.T @ (problem.f - carried), 0)
-    rest = problem.A @ root.u + carried - problem.f
-    assert np.max(np.abs(rest)) < 1e-12
+    assert np.max(np.abs(problem.A @ root.u + carried - problem.f)) < 1e-12
     held = problem.modes.held
     assert np.allclose(root.u[held], root.rigid_displacement[held], atol=1e-14)
-    assert enumsol.verify(problem, roots.proof).complete
 
 
 def test_a_block_at_the_limit_slides_as_far_as_is_asked():
@@ -109,17 +104,13 @@ def test_a_block_at_the_limit_slides_as_far_as_is_asked():
 def test_a_block_above_sliding_has_no_solution():
     problem = block_on_table(cells=3, push=1.25)
     roots = proven_roots(problem, 0)
-    assert not len(roots)
-    assert not roots.families
-    assert roots.at_least == 0
+    assert (len(roots), roots.families, roots.at_least) == (0, (), 0)
     assert not enumsol.is_unique(problem, 0)
 
 
 def test_a_block_pulled_off_the_table_has_no_solution():
-    problem = block_on_table(press=-1.0)
-    roots = all_roots(problem, 0)
-    assert not len(roots)
-    assert not roots.families
+    roots = all_roots(block_on_table(press=-1.0), 0)
+    assert (len(roots), roots.families) == (0, ())
 
 
 @pytest.mark.parametrize("push", [0.0, 0.5, 0.9])
@@ -131,8 +122,7 @@ def test_weak_springs_tend_to_the_body_that_nothing_holds(push):
         A = sp.csc_array(problem.A + weak * sp.eye_array(problem.n))
         held = enumsol.ContactProblem(A, problem.Bn, problem.Bt, problem.f, friction=problem.friction)
         (root,) = enumsol.enumerate_roots(held, 0)
-        assert root.statuses == free.statuses
-        assert root.index == free.index
+        assert (root.statuses, root.index) == (free.statuses, free.index)
         errors.append(max(np.max(np.abs(root.lambda_n - free.lambda_n)), np.max(np.abs(root.u - free.u))))
     assert errors[-1] < 1e-7
     assert all(b < 0.1 * a + 1e-7 for a, b in itertools.pairwise(errors))
@@ -151,9 +141,8 @@ def test_workers_limits_and_resumption(tmp_path):
     problem, path = block_on_table(cells=4, push=0.5), tmp_path / "block.proof"
     whole = enumsol.enumerate_roots(problem, 0)
     cut = enumsol.enumerate_roots(problem, 0, max_nodes=10, proof_path=path)
-    assert not cut.complete
     assert cut.undecided
-    assert cut.at_least == 0
+    assert (cut.complete, cut.at_least) == (False, 0)
     resumed = all_roots(problem, 0, proof_path=path, resume=True)
     assert resumed.stats.resumed
     assert resumed.rigid_bound == whole.rigid_bound
@@ -169,14 +158,12 @@ def test_what_is_kept_of_a_body_that_nothing_holds(tmp_path):
     for place in ("block.npz", "block"):
         enumsol.write_problem(problem, tmp_path / place)
         again = enumsol.read_problem(tmp_path / place)
-        assert again.fingerprint == problem.fingerprint
-        assert again.max_rigid_displacement == 7.0
+        assert (again.fingerprint, again.max_rigid_displacement) == (problem.fingerprint, 7.0)
     assert pickle.loads(pickle.dumps(problem)).fingerprint == problem.fingerprint
     assert dataclasses.replace(problem, f=2 * problem.f).rigid_reach == 7.0
-    prints = {problem.fingerprint, dataclasses.replace(problem, max_rigid_displacement=8.0).fingerprint}
-    prints.add(dataclasses.replace(problem, rigid_modes=2 * problem.rigid_modes).fingerprint)
-    prints.add(problem.on_springs.fingerprint)
-    assert len(prints) == 4
+    changes = {"max_rigid_displacement": 8.0}, {"rigid_modes": 2 * problem.rigid_modes}
+    others = problem, problem.on_springs, *(dataclasses.replace(problem, **change) for change in changes)
+    assert len({other.fingerprint for other in others}) == 4
     with pytest.raises(enumsol.EnumsolError, match="fclib has no place for rigid_modes"):
         enumsol.write_problem(problem, tmp_path / "block.h5")
 
@@ -243,23 +230,14 @@ def test_what_cannot_take_such_a_body_says_so(call):
 
 
 def test_fast_arithmetic_is_refused():
-    for call in (lambda *given: enumsol.enumerate_roots(given[0], 0, arithmetic="fast"), _fast_graph):
-        bad_argument('arithmetic is "fast" for a body that nothing holds', call, block_on_table())
-
-
-def _fast_graph(problem):
-    return enumsol.branch_graph(problem, (0, 1), "fast")
+    for call, place in ((enumsol.enumerate_roots, 0), (enumsol.branch_graph, (0, 1))):
+        bad_argument('arithmetic is "fast" for a body that nothing holds', call, block_on_table(), place, "fast")
 
 
 def test_a_table_of_roots_over_alpha():
     table = enumsol.multiplicity_table(block_on_table(push=0.5), [0, 1])
     assert table["roots"].tolist() == [1, 1]
     assert table["complete"].all()
-
-
-def solutions(problem, alpha):
-    """All isolated solutions of the oracle, (forces, u), as floats."""
-    return np.hstack(Oracle(problem, alpha).forces)
 
 
 def near(root, rows):
@@ -272,10 +250,10 @@ def near(root, rows):
 def branches_of(seed):
     """How many regular roots of a random body were compared with the solutions on both sides of their alpha."""
     problem, step, compared = random_body(seed), Fraction(1, 2**24), 0
-    slope = np.random.default_rng(seed).integers(-1, 2, problem.n).astype(float)
-    problem = problem.replace(load_slope=slope)
+    problem = problem.replace(load_slope=np.random.default_rng(seed).integers(-1, 2, problem.n).astype(float))
     roots = enumsol.enumerate_roots(problem, 0.5)
-    sides = [solutions(problem, Fraction(1, 2) + way * step) for way in (1, -1)] if len(roots) else []
+    # all isolated solutions of the oracle, (forces, u), as floats
+    sides = [np.hstack(Oracle(problem, Fraction(1, 2) + way * step).forces) for way in (1, -1)] if len(roots) else []
     for root in roots:
         test = root.local_branch_test()
         if root.regular:
@@ -293,13 +271,9 @@ def branches_of(seed):
     return compared
 
 
-@pytest.mark.parametrize(
-    "seeds",
-    [
-        range(8, 14),
-        pytest.param(range(14, 30), marks=pytest.mark.slow),
-        pytest.param(range(30, 400), marks=pytest.mark.long),
-    ],
-)
+SLOW, LONG = pytest.param(range(14, 30), marks=pytest.mark.slow), pytest.param(range(30, 400), marks=pytest.mark.long)
+
+
+@pytest.mark.parametrize("seeds", [range(8, 14), SLOW, LONG])
 def test_derivatives_and_local_branches_of_regular_roots(seeds):
     assert sum(branches_of(seed) for seed in seeds) > len(seeds) // 10

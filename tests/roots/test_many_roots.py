@@ -12,12 +12,17 @@ import enumsol
 from enumsol import gallery
 
 
+def all_of_chain(p, coupling):
+    """The roots of a chain at alpha = 5: every node is open, sticks or slips, whatever the others do."""
+    roots = enumsol.enumerate_roots(gallery.chain(p, coupling), 5.0, "fast")
+    assert (len(roots), roots.index_sum) == (3**p, 1)
+    assert statuses(roots) == set(itertools.product(("open", "stick", "slip-"), repeat=p))
+    return roots
+
+
 def test_uncoupled_chain_of_six():
     alpha = 5.0
-    roots = enumsol.enumerate_roots(gallery.chain(6, 0.0), alpha, "fast")
-    assert len(roots) == 729
-    assert statuses(roots) == set(itertools.product(("open", "stick", "slip-"), repeat=6))
-    assert roots.index_sum == 1
+    roots = all_of_chain(6, 0.0)
     value = {"open": 0.0, "stick": 1.5, "slip-": 1 / (alpha - 2)}
     for root in roots:
         expected = [value[s.value] for s in root.statuses]
@@ -34,8 +39,7 @@ def _peak(p):
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert len(roots) == 3**p
-    assert roots.index_sum == 1
+    assert (len(roots), roots.index_sum) == (3**p, 1)
     return peak / len(roots)
 
 
@@ -48,23 +52,16 @@ def test_memory_of_a_coupled_chain_grows_like_its_answer():
 
 @pytest.mark.slow
 def test_a_long_chain_with_coupling():
-    p = some(6, of=8)
-    roots = enumsol.enumerate_roots(gallery.chain(p, 0.01), 5.0, "fast")
-    assert len(roots) == 3**p
-    assert statuses(roots) == set(itertools.product(("open", "stick", "slip-"), repeat=p))
-    assert roots.index_sum == 1
+    all_of_chain(some(6, of=8), 0.01)
 
 
 def test_stop_after_two_of_very_many():
     roots = enumsol.enumerate_roots(gallery.chain(30, 0.01), 5.0, "fast", stop_after=2)
-    assert len(roots) == 2
-    assert not roots.complete
+    assert (len(roots), roots.complete) == (2, False)
     assert "enough" in roots.stopped
 
 
 @pytest.mark.parametrize("coupling", [0.0, 0.05])
 def test_tree_equals_exhaustive_on_a_chain(coupling):
-    problem = gallery.chain(4, coupling)
-    tree = enumsol.enumerate_roots(problem, 5.0, "fast")
-    assert len(tree) == 81
-    assert statuses(tree) == statuses(enumsol.enumerate_roots(problem, 5.0, "fast", "exhaustive"))
+    exhaustive = enumsol.enumerate_roots(gallery.chain(4, coupling), 5.0, "fast", "exhaustive")
+    assert statuses(exhaustive) == statuses(all_of_chain(4, coupling))

@@ -25,8 +25,7 @@ def test_a_node_whose_slip_is_enclosed_is_named_by_it(arithmetic):
     (root,) = enumerate_roots(diagonal_problem([1e-20, 1e-20, 1.0, 1.0], [-1.0, 0.0, 1.0, 0.5]), 0.0, arithmetic)
     assert root.statuses == (ContactStatus.OPEN, ContactStatus.SLIP_PLUS)
     assert root.active == (frozenset({ContactStatus.OPEN}), frozenset({ContactStatus.SLIP_PLUS}))
-    assert root.u_t[1] == 0.5
-    assert root.signs.tolist() == [[-1, 0, 0], [1, 1, 1]]
+    assert (root.u_t[1], root.signs.tolist()) == (0.5, [[-1, 0, 0], [1, 1, 1]])
 
 
 @pytest.mark.slow
@@ -57,23 +56,19 @@ def test_names_on_coupled_badly_scaled_bodies_agree_with_rationals(seed):
     problem = ContactProblem(A, rows[:p], rows[p:], f, friction=0.0)
     verified, exact = (enumerate_roots(problem, 0.0, arithmetic) for arithmetic in ("verified", "exact"))
     assert verified.complete
-    assert [(r.statuses, r.active, r.signs.tolist()) for r in verified] == [
-        (r.statuses, r.active, r.signs.tolist()) for r in exact
-    ]
+    one, other = ([(r.statuses, r.active, r.signs.tolist()) for r in roots] for roots in (verified, exact))
+    assert one == other
     for root in exact:
-        for node, holds in enumerate(root.active):
-            w = root.enclosure.u_t[node]
+        for holds, (low, high) in zip(root.active, root.enclosure.u_t, strict=True):
             if ContactStatus.OPEN not in holds:
-                sign = int(w[0] > 0) - int(w[1] < 0)
-                assert {s.value for s in holds} == SLIPS[sign]
+                assert {s.value for s in holds} == SLIPS[int(low > 0) - int(high < 0)]
 
 
 def test_a_slip_that_underflows_still_has_its_sign():
     # u_t = -1e-300 / 1e100 is far below the smallest float
     problem = diagonal_problem([1.0, 1e100, 1.0, 1.0], [1.0, -1e-300, 1.0, 0.5])
     (root,) = enumerate_roots(problem, 0.0, "exact")
-    assert [status.value for status in root.statuses] == ["slip-", "slip+"]
-    assert root.u_t[0] == 0.0
+    assert ([status.value for status in root.statuses], root.u_t[0]) == (["slip-", "slip+"], 0.0)
     low, high = root.enclosure.u_t[0]
     assert low < 0 <= high or low < 0 < high
 
@@ -84,8 +79,8 @@ def test_a_sign_that_nothing_decides_leaves_all_three_names(monkeypatch):
     problem = diagonal_problem([1.0, 3.0, 1.0, 3.0], [1.0, 0.0, 1.0, 0.5])
     signs = linearisation.SlipSigns(problem, 0.0, (4, 4), (None, 1))
     assert signs.sign(0) is None
-    assert {status.value for status in linearisation.slip_names(signs.sign(0))} == SLIPS[0]
-    assert {status.value for status in linearisation.slip_names(signs.sign(1))} == SLIPS[1]
+    for node in (0, 1):
+        assert {status.value for status in linearisation.slip_names(signs.sign(node))} == SLIPS[node]
 
 
 def test_branch_graphs_name_such_nodes_exactly():
@@ -110,7 +105,6 @@ def test_a_vertex_at_an_irrational_alpha_names_its_frictionless_node_exactly():
     graph = whole_graph(problem, (0.0, 4.0), "exact")
     assert any(not v.exact.is_rational for v in graph.vertices)
     for v in graph.vertices:
-        low, high = v.enclosure
-        sign = int(low > Fraction(3, 2)) - int(high < Fraction(3, 2))
-        assert {status.value for status in v.active[1]} == SLIPS[sign]
+        low, high = (end - Fraction(3, 2) for end in v.enclosure)
+        assert {status.value for status in v.active[1]} == SLIPS[int(low > 0) - int(high < 0)]
     assert set(NAMES) >= {"open", "stick"}

@@ -7,7 +7,17 @@ import oracles3d
 import pytest
 from complete import all_roots, complete_report, limit_of, proven_roots
 from effort import some
-from problems3d import bounds, exactly, forces, from_compliance, random_compliance, random_coupled, random_one_node
+from generators import named
+from problems3d import (
+    bounds,
+    exactly,
+    forces,
+    from_compliance,
+    random_compliance,
+    random_coupled,
+    random_one_node,
+    within,
+)
 from space_proofs import RANDOM, random_problem
 from trees import by_the_tree
 
@@ -30,27 +40,28 @@ def closed(problem, alpha=0):
 # -- blocks ------------------------------------------------------------------------------------------------------------
 
 
+def closed_block(cells, p, F):
+    problem = gallery.block3d(*cells, friction=F)
+    root = closed(problem)
+    assert (problem.p, root.regular) == (p, True)
+    return problem, root
+
+
 @pytest.mark.parametrize(("cells", "p"), [((3, 3, 2), 12), ((5, 5, 2), 30)])
 @pytest.mark.parametrize("F", [0.1, 0.3, 0.5])
 def test_blocks_take_one_leaf(cells, p, F):
-    problem = gallery.block3d(*cells, friction=F)
-    assert problem.p == p
-    root = closed(problem)
-    assert root.regular
+    problem, root = closed_block(cells, p, F)
     # as narrow as a leaf's
     assert np.max(np.ptp(root.enclosure.lambda_n, axis=1)) < 1e-10 * np.max(root.lambda_n)
     limit = limit_of(problem, 0, tolerance=1e-12)
-    assert np.max(np.abs(limit.lambda_n - root.lambda_n)) < 1e-9 * np.max(root.lambda_n)
-    assert np.max(np.abs(limit.lambda_t - root.lambda_t)) < 1e-9 * np.max(root.lambda_n)
+    assert np.max(np.abs(forces(limit) - forces(root))) < 1e-9 * np.max(root.lambda_n)
 
 
 @pytest.mark.few(0, 2)
 @pytest.mark.parametrize(("cells", "p"), [((6, 6, 2), 42), ((8, 8, 2), 72)])
 @pytest.mark.parametrize("F", [0.1, 0.3, 0.5, 1])
 def test_larger_blocks_take_one_leaf(cells, p, F):
-    problem = gallery.block3d(*cells, friction=F)
-    assert problem.p == p
-    assert closed(problem).regular
+    closed_block(cells, p, F)
 
 
 def test_better_numbers_where_plain_ones_will_not_do():
@@ -99,14 +110,11 @@ def compared(seed):
     roots = enumerate_roots(problem, 0, max_nodes=3000)
     with by_the_tree():
         expected = enumerate_roots(problem, 0, max_nodes=3000)
-    assert len(roots) == len(expected)
     assert (roots.complete, roots.index_sum) == (expected.complete, expected.index_sum)
     for one, other in zip(roots, expected, strict=True):
         (low, high), (other_low, other_high) = bounds(one), bounds(other)
-        assert np.all(low <= other_high)
-        assert np.all(other_low <= high)
-        assert one.statuses == other.statuses
-        assert (one.index, one.regular) == (other.index, other.regular)
+        assert np.all((low <= other_high) & (other_low <= high))
+        assert (one.statuses, one.index, one.regular) == (other.statuses, other.index, other.regular)
     if not roots.stats.closed:
         return False
     assert roots.complete
@@ -114,8 +122,7 @@ def compared(seed):
     low, high = bounds(roots[0])
     for lam in oracles3d.newton_set(S, g, F, 10, rng):
         near = 1e-6 * max(np.max(np.abs(lam)), 1e-6)
-        assert np.all(low - near <= lam)
-        assert np.all(lam <= high + near)
+        assert np.all((low - near <= lam) & (lam <= high + near))
     return True
 
 
@@ -148,8 +155,7 @@ def test_one_node_against_the_closed_form():
 
 @pytest.mark.parametrize("name", ["one-node-3d-3", "wedge3d-2-3", "wedge3d-4-3", "wedge3d-4-9", "wedge3d-8-5"])
 def test_problems_with_several_roots_are_searched(name):
-    entry = gallery.get(name)
-    stats = enumerate_roots(entry.build(), entry.alpha, max_nodes=2).stats
+    stats = enumerate_roots(*named(name), max_nodes=2).stats
     assert (stats.closed, stats.nodes) == (0, 2)
 
 
@@ -218,13 +224,10 @@ def test_any_theta_that_the_gap_allows_serves():
         for _ in range(10):
             n, phi, slip = rng.exponential(), rng.uniform(0, 2 * np.pi), rng.exponential()
             d = np.array([np.cos(phi), np.sin(phi)])
-            for other in (
-                ([n, *(n * d)], [0, *(slip * d)]),
-                ([n, *(n * rng.random() * d)], [0, 0, 0]),
-                ([0, 0, 0], [-n, *(slip * d)]),
-            ):
-                state = [np.array(part) for part in other]
-                assert terms(y, w, *state, (mu, kappa, nu, theta)) >= -1e-9
+            none, touching = np.zeros(3), np.array([0, *(slip * d)])
+            others = ([n, *(n * d)], touching), ([n, *(n * rng.random() * d)], none), (none, touching - [n, 0, 0])
+            for other_y, other_w in others:
+                assert terms(y, w, np.array(other_y), other_w, (mu, kappa, nu, theta)) >= -1e-9
     assert tight > some(50, of=200)
 
 
@@ -294,17 +297,13 @@ def names(root):
 def test_degenerate_solutions_are_roots(name):
     lam, w, statuses = DEGENERATE[name]
     root = closed(exactly(lam, w))
-    assert names(root) == statuses
-    assert not root.regular
-    assert root.margin == 0
+    assert (names(root), root.regular, root.margin) == (statuses, False, 0)
     assert all(status in held for status, held in zip(root.statuses, root.active, strict=True))
-    low, high = bounds(root)
-    assert np.all(low <= np.ravel(lam, order="F"))
-    assert np.all(np.ravel(lam, order="F") <= high)
-    assert np.max(high - low) < 1e-9
-    for value, box in ((root.u_n, root.enclosure.u_n), (root.u_t, root.enclosure.u_t)):
-        assert np.all(box[..., 0] <= value)
-        assert np.all(value <= box[..., 1])
+    box = np.transpose(bounds(root))
+    assert within(np.ravel(lam, order="F"), box)
+    assert np.max(np.ptp(box, axis=1)) < 1e-9
+    assert within(root.u_n, root.enclosure.u_n)
+    assert within(root.u_t, root.enclosure.u_t)
     for i, (one, slip) in enumerate(zip(root.slip_angle, np.array(w)[:, 1:], strict=True)):
         assert np.isnan(one[0]) == ("slip" not in statuses[i])
         if np.any(slip) and "slip" in statuses[i]:
@@ -315,12 +314,10 @@ def test_degenerate_solutions_are_roots(name):
 
 
 def test_nodes_with_one_tau_and_without_friction_that_graze():
-    S = np.eye(9)
-    for w, statuses in (([0.3, 0, 0.2], ("open slip", "open slip", "stick")),):
-        g = np.array([0, 0, 2.0, w[0], 0.7, w[2], 0, 0.1, 0])
-        root = closed(from_compliance(S, g, (np.array([0.5, 0, 1]), np.array([0, 0, 1]))))
-        assert names(root) == statuses
-        assert (root.lambda_n[:2] == 0).all() or np.max(np.abs(root.lambda_n[:2])) < 1e-12
+    g = np.array([0, 0, 2.0, 0.3, 0.7, 0.2, 0, 0.1, 0])
+    root = closed(from_compliance(np.eye(9), g, (np.array([0.5, 0, 1]), np.array([0, 0, 1]))))
+    assert names(root) == ("open slip", "open slip", "stick")
+    assert np.max(np.abs(root.lambda_n[:2])) < 1e-12
     # one tau, at the end of its segment
     root = closed(from_compliance(np.eye(3), np.array([2.0, 1, 0.3]), (np.array([0.5]), np.array([0.0]))))
     assert names(root) == ("slip stick",)
@@ -338,14 +335,11 @@ def test_repeated_nodes():
 def test_a_continuum_is_left_to_the_tree():
     ray = np.array([[1.0, -1, 0], [-1, 2, 0], [0, 0, 1]])
     roots = enumerate_roots(from_compliance(ray, np.array([0.0, 1, 0]), 1.0), 0)
-    assert roots.stats.closed == 0
-    assert not roots.complete
+    assert (roots.stats.closed, roots.complete) == (0, False)
 
 
 def test_coefficients_beyond_what_is_tried_are_left_to_the_tree():
-    problem = from_compliance(np.eye(3), np.array([1.0, 1, 1]), 1e-60)
-    roots = all_roots(problem, 0)
-    assert roots.stats.closed == 0
+    assert all_roots(from_compliance(np.eye(3), np.array([1.0, 1, 1]), 1e-60), 0).stats.closed == 0
 
 
 # -- the interface -----------------------------------------------------------------------------------------------------
@@ -366,15 +360,8 @@ def test_what_is_tried_again():
 
 def test_codes_of_a_leaf_are_checked():
     system = SpaceSolvers(from_compliance(np.eye(6), np.ones(6), (np.array([0.5, 0]), np.array([0, 0]))), 0.0, "fast")
-    for codes, right in (
-        ((1, 4), True),
-        ((2, 0), True),
-        ((5, 4), False),
-        ((1, 1), False),
-        ((1,), False),
-        ((20, 4), False),
-    ):
-        assert is_complete(system.enclosed, codes) == right
+    all_codes = (1, 4), (2, 0), (5, 4), (1, 1), (1,), (20, 4)
+    assert [is_complete(system.enclosed, codes) for codes in all_codes] == [True, True, *[False] * 4]
 
 
 def test_a_proof_is_resumed_by_its_leaf(tmp_path):

@@ -47,8 +47,7 @@ def test_what_successive_approximations_reach():
         several += 1
         starts = [0.0, *(root.lambda_n for root in roots), *rng.exponential(size=(6, 2))]
         limits = [enumsol.successive_approximations(problem, 0, start, max_iterations=300) for start in starts]
-        missed, _ = unmatched(roots, [forces(limit) for limit in limits if limit.converged])
-        assert not missed
+        assert unmatched(roots, [forces(limit) for limit in limits if limit.converged])[0] == []
         # from starts beside the roots themselves
         away = [enumsol.successive_approximations(problem, 0, s, max_iterations=300) for s in [0.0, *starts[-6:]]]
         _, unreached = unmatched(roots, [forces(limit) for limit in away if limit.converged])
@@ -75,10 +74,8 @@ def test_a_node_at_a_border_is_undecided_or_right(border, beside):
     for i, (n, tau, here) in enumerate(nodes):
         lam[[i, 2 + i, 4 + i]] = n * np.array([1, *(F[i] * tau)])
         w[[i, 2 + i, 4 + i]] = here
-    f = A @ w + lam
-    S = np.linalg.inv(A)
+    f, S, rows = A @ w + lam, np.linalg.inv(A), np.eye(6)
     assert oracles3d.violation(S, S @ f, F, lam) < 1e-12
-    rows = np.eye(6)
     problem = enumsol.ContactProblem3D(A, rows[:2], rows[2:4], rows[4:], f, friction=tuple(F.T))
     roots = enumerate_roots(problem, 0, max_nodes=400)
     here = [root for root in roots if unmatched([root], [lam]) == ([], [])]

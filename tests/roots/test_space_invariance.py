@@ -8,7 +8,7 @@ import scipy.linalg
 import scipy.sparse as sp
 from complete import all_roots
 from generators import random_problem
-from problems3d import bounds, forces, from_compliance, random_coupled, unmatched
+from problems3d import bounds, forces, from_compliance, random_coupled, unmatched, within
 
 from enumsol import ContactProblem3D, enumerate_roots, gallery
 
@@ -50,14 +50,12 @@ def test_a_problem_in_2d_keeps_its_roots(problem, alpha, ratio):
     space = enumerate_roots(with_second_tangent(problem, np.random.default_rng(problem.p), ratio), alpha)
     wanted = [np.concatenate([root.lambda_n, root.lambda_t, np.zeros(problem.p)]) for root in plane]
     assert unmatched(space, wanted) == ([], [])
-    assert space.complete
-    assert len(space) == len(plane)
+    assert (space.complete, len(space)) == (True, len(plane))
     for root in space:
         low, high = bounds(root)
         near = 1e-6 * np.max(np.abs(high))
-        (twin,) = [
-            twin for twin, lam in zip(plane, wanted, strict=True) if np.all((lam >= low - near) & (lam <= high + near))
-        ]
+        box = np.transpose([low - near, high + near])
+        (twin,) = [twin for twin, lam in zip(plane, wanted, strict=True) if within(lam, box)]
         assert root.index == twin.index
         assert [s.value.strip("+-") for s in twin.statuses] == [s.value for s in root.statuses]
         for i, status in enumerate(twin.statuses):
@@ -69,46 +67,32 @@ def test_a_problem_in_2d_keeps_its_roots(problem, alpha, ratio):
 # -- axes, units, numbering ------------------------------------------------------------------------------------------
 
 
-def coupled():
-    rng = np.random.default_rng(31)
-    while True:
-        S, g, F = random_coupled(rng, 2)
-        yield S, g, F
-
-
-def some(count, least=1):
+@functools.cache
+def some(count, least):
     """Problems with at least so many roots, and their roots."""
-    chosen = []
-    for S, g, F in coupled():
+    rng, chosen = np.random.default_rng(31), []
+    while len(chosen) < count:
+        S, g, F = random_coupled(rng, 2)
         roots = enumerate_roots(from_compliance(S, g, tuple(F.T)), 0)
         if roots.complete and len(roots) >= least:
             chosen.append((S, g, F, roots))
-        if len(chosen) == count:
-            return chosen
-    raise AssertionError
-
-
-@functools.cache
-def cases():
-    return [*some(3), *some(3, least=3)]
+    return chosen
 
 
 @pytest.fixture(params=range(6))
 def case(request):
     """S, g, F and their roots."""
-    return cases()[request.param]
+    return some(3, 1 if request.param < 3 else 3)[request.param % 3]
 
 
 def check(before, S, g, F, image, nodes=(0, 1)):
     """The problem (S, g, F) has exactly the images of the roots, with their indices."""
     after = all_roots(from_compliance(S, g, tuple(F.T)), 0)
     wanted = [image(forces(root)) for root in before]
-    assert len(after) == len(before)
-    assert unmatched(after, wanted) == ([], [])
+    assert (len(after), unmatched(after, wanted)) == (len(before), ([], []))
     for root, lam in zip(before, wanted, strict=True):
-        twins = [twin for twin in after if unmatched([twin], [lam]) == ([], [])]
-        assert [twin.index for twin in twins] == [root.index]
-        assert [twin.statuses for twin in twins] == [tuple(root.statuses[i] for i in nodes)]
+        (twin,) = [twin for twin in after if unmatched([twin], [lam]) == ([], [])]
+        assert (twin.index, twin.statuses) == (root.index, tuple(root.statuses[i] for i in nodes))
 
 
 @pytest.mark.few(0, 1)
@@ -125,11 +109,9 @@ def test_axes_turned_at_every_node(case):
 @pytest.mark.slow
 def test_a_quarter_turn_with_the_coefficients_exchanged(case):
     S, g, F, before = case
-    turn = [0, 1, 4, 5, 2, 3]
-    sign = np.repeat([1.0, 1.0, -1.0], 2)
-    check(
-        before, (sign[:, None] * S[np.ix_(turn, turn)] * sign), sign * g[turn], F[:, ::-1], lambda lam: sign * lam[turn]
-    )
+    turn, sign = [0, 1, 4, 5, 2, 3], np.repeat([1.0, 1.0, -1.0], 2)
+    turned = sign[:, None] * S[np.ix_(turn, turn)] * sign, sign * g[turn], F[:, ::-1]
+    check(before, *turned, lambda lam: sign * lam[turn])
 
 
 @pytest.mark.few(0, 9)

@@ -18,8 +18,8 @@ from enumsol.trusted.space.space_uniqueness import equations, lone_root
 
 
 def coupled(seed, p):
-    data = random_coupled(np.random.default_rng(seed), p)
-    return data, from_compliance(data[0], data[1], (data[2][:, 0], data[2][:, 1]))
+    S, g, F = random_coupled(np.random.default_rng(seed), p)
+    return (S, g, F), from_compliance(S, g, tuple(F.T))
 
 
 @pytest.mark.slow
@@ -53,22 +53,16 @@ def with_lone_root():
 def test_proofs_that_say_something_else_are_refused(with_lone_root):
     problem, _, records = with_lone_root
     (place, *_), p = of_kind(records, "m"), problem.p
-    codes, leaf = dict(leaves_of(records))[place], records[place][2]
     assert verify(problem, proof_of(records)).complete
-    assert codes != (UNDECIDED,) * p
-
-    def report(entry, value):
-        return verify(problem, proof_of(put(records, (place, entry), value)))
-
-    numbers = records[place][1]
-    theta = numbers[3 * p + (len(numbers) - 3 * p) // 2 :]
-    assert not report(1, numbers[: len(numbers) - len(theta)] + [0.5 * x for x in theta]).ok
-    assert not report(1, numbers[:-1]).ok
-    assert not report(2, [STICK if code == OPEN else OPEN for code in leaf]).ok
-    assert not report(2, []).ok
-    assert not report(2, leaf[:-1]).ok
-    assert not report(3, [x + 0.1 for x in records[place][3]]).ok
-    assert not report(5, -records[place][5]).ok
+    assert dict(leaves_of(records))[place] != (UNDECIDED,) * p
+    _, numbers, leaf, mid, _, index = records[place]
+    theta = 3 * p + (len(numbers) - 3 * p) // 2
+    for entry, value in (
+        *((1, numbers[:theta] + [0.5 * x for x in numbers[theta:]]), (1, numbers[:-1])),
+        *((2, [STICK if code == OPEN else OPEN for code in leaf]), (2, []), (2, leaf[:-1])),
+        *((3, [x + 0.1 for x in mid]), (5, -index)),
+    ):
+        assert not verify(problem, proof_of(put(records, (place, entry), value))).ok, (entry, value)
 
 
 def test_a_search_goes_on_from_a_lone_root(with_lone_root, tmp_path):
@@ -115,10 +109,8 @@ def test_no_numbers_close_an_assignment_with_two_roots(name):
     assert tried >= 6
 
 
-def test_statuses_that_an_assignment_does_not_allow():
-    _, problem = coupled(7, 2)
-    with closed_in_the_tree():
-        records = records_of(enumerate_roots(problem, 0).proof)
+def test_statuses_that_an_assignment_does_not_allow(with_lone_root):
+    problem, _, records = with_lone_root
     (place, *_) = of_kind(records, "m")
     enclosed, numbers, leaf = SpaceSolvers(problem, 0.0, "verified").enclosed, *records[place][1:3]
     codes, numbers = dict(leaves_of(records))[place], np.array(numbers)

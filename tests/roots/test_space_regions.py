@@ -53,8 +53,7 @@ def outside(box, S, g, lam):
     """How far a solution lies outside of the bounds of a region."""
     p = len(lam) // 3
     w = g - S @ lam
-    bounds = [box.lambda_n, *np.moveaxis(box.lambda_t, 1, 0), box.u_n, *np.moveaxis(box.u_t, 1, 0)]
-    ends = np.concatenate(bounds)
+    ends = np.concatenate([box.lambda_n, *np.moveaxis(box.lambda_t, 1, 0), box.u_n, *np.moveaxis(box.u_t, 1, 0)])
     values = np.concatenate([lam, w])
     assert ends.shape == (6 * p, 2)
     return max(0.0, float(np.max(ends[:, 0] - values)), float(np.max(values - ends[:, 1])))
@@ -71,12 +70,11 @@ def test_one_region_that_holds_what_is_known(name):
     S, g = beside(nodes)
     problem = from_compliance(S, g, 1.0)
     roots = enumerate_roots(problem, 0, max_nodes=400)
-    assert roots.stopped is None
-    assert len(roots) == 0
+    assert (roots.stopped, len(roots)) == (None, 0)
     (region,) = roots.undecided
     assert region.leaves > 1
     assert names(region) == statuses
-    F = np.full((len(nodes), 2), 1.0)
+    F = np.ones((len(nodes), 2))
     for solution in known:
         lam = np.array(solution, dtype=float)[places(len(nodes))]
         assert oracles3d.violation(S, g, F, lam) < 1e-12
@@ -88,9 +86,8 @@ def test_one_region_that_holds_what_is_known(name):
                 assert low - 1e-12 <= angle + 2 * np.pi * np.ceil((low - 1e-12 - angle) / (2 * np.pi)) <= high + 1e-12
     assert np.all(region.bounds.lambda_n[:, 0] >= 0)
     assert np.all(region.bounds.u_n[:, 1] <= 0)
-    # nothing of it is claimed
-    assert not roots.complete
-    assert (roots.at_least, roots.index_sum) == (1, None)  # there is a solution, whatever the data
+    # nothing of it is claimed, but that there is a solution, whatever the data
+    assert (roots.complete, roots.at_least, roots.index_sum) == (False, 1, None)
     text = repr(roots)
     assert f"undecided region 0: {', '.join(('1 ' if len(nodes) > 1 else '') + (s or 'any') for s in statuses)}" in (
         text.replace("2 contact", "1 contact, 1 contact")
@@ -103,16 +100,14 @@ def test_one_region_that_holds_what_is_known(name):
 @pytest.mark.slow
 def test_bounds_are_narrow_where_the_root_is_isolated():
     for name in ("grazing", "stick at its limit", "twice stick at its limit", "unloaded beside a loaded one"):
-        S, g = beside(CASES[name][0])
-        (region,) = enumerate_roots(from_compliance(S, g, 1.0), 0).undecided
+        (region,) = enumerate_roots(from_compliance(*beside(CASES[name][0]), 1.0), 0).undecided
         box = region.bounds
         for bounds in (box.lambda_n, box.lambda_t, box.u_n, box.u_t):
-            assert np.max(bounds[..., 1] - bounds[..., 0]) < 1e-11, name
+            assert np.max(np.ptp(bounds, axis=-1)) < 1e-11, name
 
 
 def test_degenerate_roots_far_apart_are_regions_of_their_own():
-    entry = gallery.get("one-node-3d-3")
-    one = entry.build()
+    one = gallery.get("one-node-3d-3").build()
     three = enumerate_roots(one, 0)
     assert len(three) == 3
     nodes = [(one.condensed.S, one.condensed.free_displacements(0)), STUCK_AT_ITS_LIMIT]
@@ -120,10 +115,8 @@ def test_degenerate_roots_far_apart_are_regions_of_their_own():
     F = np.vstack([one.friction_at(0), [[1.0, 1.0]]])
     roots = enumerate_roots(from_compliance(S, g, tuple(F.T)), 0)
     assert roots.stopped is None
-    assert len(roots.undecided) == 3
-    assert sorted(names(part) for part in roots.undecided) == sorted(
-        (root.statuses[0].value, "contact") for root in three
-    )
+    expected = sorted((root.statuses[0].value, "contact") for root in three)
+    assert sorted(names(part) for part in roots.undecided) == expected
     for root in three:
         lam = np.array([root.lambda_n[0], 5, root.lambda_t[0, 0], 4, root.lambda_t[0, 1], 3])
         assert sum(outside(part.bounds, S, g, lam) < 1e-9 for part in roots.undecided) == 1
@@ -172,16 +165,13 @@ def test_parts_that_were_not_searched_are_listed_one_by_one():
 def test_a_region_on_the_command_line_and_in_tables():
     problem = from_compliance(*beside([STUCK_AT_ITS_LIMIT]), 1.0)
     roots = enumerate_roots(problem, 0)
-    assert "undecided region 0: contact (2 leaves of the tree); a root in it has max lambda_n from 5 to 5" in (
-        root_report.roots_as_text(roots)
-    )
+    text = "undecided region 0: contact (2 leaves of the tree); a root in it has max lambda_n from 5 to 5"
+    assert text in root_report.roots_as_text(roots)
     (entry,) = json.loads(root_report.roots_as_json(roots, "here"))["undecided"]
-    assert entry["statuses"] == ["contact"]
-    assert entry["leaves"] == 2
+    assert (entry["statuses"], entry["leaves"]) == (["contact"], 2)
     np.testing.assert_allclose(entry["bounds"]["lambda_t"], [[[4, 4], [3, 3]]], atol=1e-10)
     np.testing.assert_allclose(entry["slip_angle"], np.arctan2(3, 4), atol=1e-6)
-    table = enumsol.multiplicity_table(problem, [0])
-    assert table["undecided"].tolist() == [1]
+    assert enumsol.multiplicity_table(problem, [0])["undecided"].tolist() == [1]
     plane = enumerate_roots(gallery.two_node_square(), 3.5, max_nodes=2)
     assert set(json.loads(root_report.roots_as_json(plane, "here"))["undecided"][0]) == {"statuses", "reason", "hint"}
 
@@ -255,21 +245,18 @@ def integers(seed):
     """A small integer stiffness, and a load in balance with tangential forces alone."""
     rng = np.random.default_rng([seed, 10])
     X = rng.integers(-2, 3, (9, 9))
-    A = (X @ X.T + np.eye(9)).astype(float)
+    A, rows = (X @ X.T + np.eye(9)).astype(float), np.eye(9)
     rng.integers(0, 2, 3)
     f, F = A @ np.concatenate([np.zeros(3), rng.integers(-1, 2, 6)]), rng.integers(1, 3, 3)
-    rows = np.eye(9)
     return enumsol.ContactProblem3D(A, rows[:3], rows[3:6], rows[6:], f, friction=(F, F))
 
 
 @pytest.mark.slow
 def test_the_reason_is_what_stands_in_the_way_and_the_hint_helps():
     perturb = "perturb the load, by 1e-4 of its largest entry, say"
-    wedging = from_compliance(*(np.array(part, dtype=float) for part in RAY), (np.ones(1), np.ones(1)))
-    assert undecided_and_perturbed(wedging) == ({(Cause.EQUATIONS.value, perturb)}, True)
-    stuck = from_compliance(np.eye(3), np.array([5.0, 4.0, 3.0]), (np.ones(1), np.ones(1)))
-    assert undecided_and_perturbed(stuck) == ({(Cause.EQUALITY.value, perturb)}, True)
-    assert undecided_and_perturbed(integers(8)) == ({(Cause.DIRECTIONS.value, perturb)}, True)
+    wedging, stuck = (from_compliance(*beside([node]), 1.0) for node in (RAY, STUCK_AT_ITS_LIMIT))
+    for problem, cause in ((wedging, Cause.EQUATIONS), (stuck, Cause.EQUALITY), (integers(8), Cause.DIRECTIONS)):
+        assert undecided_and_perturbed(problem) == ({(cause.value, perturb)}, True)
 
 
 @pytest.mark.long
