@@ -5,6 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from exact_balls import holds
 from generators import dense_compliance, fe_compliance, from_condensed
 from oracles import exact_condense
 
@@ -20,24 +21,16 @@ def units(problem, force=3, length=-2):
 
 
 def misses(problem, alpha):
-    """Entries of the exact S, g, F outside their balls."""
-    force, length = units(problem)
-    system = problem.enclosure.at(alpha, force, length)
+    """Which of the exact S, g and F have entries outside their balls."""
+    system = problem.enclosure.at(alpha, *units(problem))
     S, g, F = exact_condense(problem, alpha)
-    out = []
-
-    def look(name, exact, mid, rad):
-        if abs(exact - Fraction(float(mid))) > Fraction(float(rad)):
-            out.append((name, float(exact), mid, rad))
-
-    scales = [[Fraction(float(x)) for x in array] for array in (force, length)]
-    for i in range(2 * problem.p):
-        look("g", g[i] / scales[1][i], system.g[i], system.g_rad[i])
-        for j in range(2 * problem.p):
-            look("S", S[i][j] * scales[0][j] / scales[1][i], system.S[i, j], system.S_rad[i, j])
-    for i in range(problem.p):
-        look("F", F[i], system.F[i], system.F_rad[i])
-    return out
+    force, length = ([Fraction(x) for x in array.tolist()] for array in units(problem))
+    exact = {
+        "S": [[x * by / unit for x, by in zip(row, force, strict=True)] for row, unit in zip(S, length, strict=True)],
+        "g": [x / unit for x, unit in zip(g, length, strict=True)],
+        "F": F,
+    }
+    return [name for name in exact if not holds(*(getattr(system, name + end) for end in ("", "_rad")), exact[name])]
 
 
 def dense_problem(rng, n, p, decades):
@@ -65,12 +58,11 @@ def test_random_problems(decades):
 def test_badly_scaled_stiffness():
     rng = np.random.default_rng(5)
     for _ in range(10):
-        n, p = 6, 2
-        X = rng.normal(size=(n, n + 1))
-        scale = 10 ** rng.uniform(-20, 20, size=n)
+        X = rng.normal(size=(6, 7))
+        scale = 10 ** rng.uniform(-20, 20, size=6)
         A = X @ X.T * np.outer(scale, scale)
-        rows = np.eye(n)[rng.permutation(n)[: 2 * p]]
-        problem = ContactProblem(0.5 * (A + A.T), rows[:p], rows[p:], scale * rng.normal(size=n), gap=1e-3)
+        rows = np.eye(6)[rng.permutation(6)[:4]]
+        problem = ContactProblem(0.5 * (A + A.T), rows[:2], rows[2:], scale * rng.normal(size=6), gap=1e-3)
         assert not misses(problem, Fraction(7, 3))
 
 
@@ -98,8 +90,7 @@ def test_balls_of_bodies_are_a_few_ulps_wide(name):
 def test_balls_of_a_soft_body_are_a_few_ulps_wide():
     # the smallest eigenvalue of A is 4e-10 of its diagonal; with residuals of three halves of the working precision the
     # balls were 1e5 ulps wide
-    problem = gallery.clip(12, 1)
-    balls = problem.enclosure
+    balls = gallery.clip(12, 1).enclosure
     assert np.max(balls.S_rad / np.spacing(np.max(np.abs(balls.S)))) <= 64
     assert not misses(gallery.clip(2, 1), Fraction(1, 3))
 
@@ -158,26 +149,23 @@ def test_residual_is_enclosed():
         X = rng.normal(size=(n, m)) * 10 ** rng.uniform(-12, 12, size=(1, m))
         K = A @ X * (1 + 2.0**-50 * rng.normal(size=(n, m)))
         value, radius = balls.SlicedMatrix(sp.csr_array(A)).residual(X, K)
-        for i in range(n):
-            for j in range(m):
-                products = (Fraction(float(a)) * Fraction(float(x)) for a, x in zip(A[i], X[:, j], strict=True))
-                exact = Fraction(float(K[i, j])) - sum(products)
-                assert abs(exact - Fraction(float(value[i, j]))) <= Fraction(float(radius[i, j]))
+        exact = [[Fraction(x) for x in row] for row in K.tolist()]
+        for i, j in np.ndindex(n, m):
+            exact[i][j] -= sum(Fraction(a) * Fraction(x) for a, x in zip(A[i].tolist(), X[:, j].tolist(), strict=True))
+        assert holds(value, radius, exact)
         # about twice the working precision, beside the residual itself
-        assert np.all(
-            radius - 4e-16 * np.abs(value)
-            <= 1e-26 * np.outer(np.sum(np.abs(A), axis=1), np.max(np.abs(X), axis=0)) + 1e-280
-        )
+        sizes = np.outer(np.sum(np.abs(A), axis=1), np.max(np.abs(X), axis=0))
+        assert np.all(radius - 4e-16 * np.abs(value) <= 1e-26 * sizes + 1e-280)
 
 
 def test_what_overflows_is_refused():
     problem = ContactProblem(np.eye(2), [[1.0, 0.0]], [[0.0, 1.0]], [1.0, 1.0], load_slope=[1e200, 0.0])
     one = np.ones(2)
-    for alpha in (Fraction(10) ** 200, Fraction(10) ** 400):
+    beyond = [(Fraction(10) ** exponent, one, one) for exponent in (200, 400)]
+    beyond.append((1.0, np.ldexp(one, 900), np.ldexp(one, -900)))
+    for arguments in beyond:
         with pytest.raises(NotEnclosedError, match="underflows float64"):
-            problem.enclosure.at(alpha, one, one)
-    with pytest.raises(NotEnclosedError, match="underflows float64"):
-        problem.enclosure.at(1.0, np.ldexp(one, 900), np.ldexp(one, -900))
+            problem.enclosure.at(*arguments)
     with pytest.raises(AssertionError, match="powers of two"):
         problem.enclosure.at(1.0, 3.0 * one, one)
 

@@ -1,5 +1,6 @@
 """Engines of the relaxation are interchangeable, and their failures lose no root."""
 
+import builtins
 import importlib
 import os
 import shutil
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 from compare import differences
 from complete import all_roots
-from generators import random_problem, singular_problem
+from generators import named, random_problem, singular_problem
 
 import enumsol
 from enumsol import MissingDependencyError, enumerate_roots, gallery
@@ -23,9 +24,7 @@ from enumsol.selections.float_selections import FloatSelections
 
 
 def problems():
-    for name in ("one-node-6.1", "one-node-6.3", "two-node-5", "wedge-8-3", "wedge-8-5", "chain-4-coupled"):
-        entry = gallery.get(name)
-        yield entry.build(), entry.alpha
+    yield from map(named, ("one-node-6.1", "one-node-6.3", "two-node-5", "wedge-8-3", "wedge-8-5", "chain-4-coupled"))
     rng = np.random.default_rng(3)
     for p in (2, 3, 4, 5):
         yield random_problem(rng, p, planted=1.0), 0.0
@@ -37,11 +36,9 @@ PROBLEMS = list(problems())
 
 @pytest.mark.parametrize(("problem", "alpha"), PROBLEMS)
 def test_clarabel_gives_the_same(problem, alpha):
-    own = enumsol.enumerate_roots(problem, alpha, "fast", engine="active-set")
-    other = enumsol.enumerate_roots(problem, alpha, "fast", engine="clarabel")
+    own, other = (enumsol.enumerate_roots(problem, alpha, "fast", engine=name) for name in ("active-set", "clarabel"))
     assert not differences(other, own)
-    assert other.index_sum == 1
-    assert own.stats.fallback_qps == 0
+    assert (other.index_sum, own.stats.fallback_qps) == (1, 0)
 
 
 def searched(problem, alpha, **options):
@@ -54,21 +51,18 @@ def searched(problem, alpha, **options):
 @pytest.mark.parametrize("options", [{"candidates": 1}, {"candidates": 4}, {"candidates": 1000}, {"slow": True}])
 @pytest.mark.parametrize("name", ["wedge-8-5", "clamped-block-8"])
 def test_options_change_the_tree_and_not_what_is_found(name, options):
-    entry = gallery.get(name)
-    problem = entry.build()
-    want, found = searched(problem, entry.alpha), searched(problem, entry.alpha, **options)
+    want, found = searched(*named(name)), searched(*named(name), **options)
     assert sorted(s.codes for s in found.solutions) == sorted(s.codes for s in want.solutions)
-    assert len(found.solutions) == entry.roots
+    assert len(found.solutions) == gallery.get(name).roots
 
 
 def test_the_energy_is_the_form_that_is_minimised_by_default():
-    entry = gallery.get("wedge-8-5")
-    problem = entry.build()
-    system = problem.condensed.at(entry.alpha).scaled
-    want = searched(problem, entry.alpha)
-    assert searched(problem, entry.alpha, form=(system.S, system.g)).nodes == want.nodes
+    problem, alpha = named("wedge-8-5")
+    system = problem.condensed.at(alpha).scaled
+    want = searched(problem, alpha)
+    assert searched(problem, alpha, form=(system.S, system.g)).nodes == want.nodes
     # any multiple of the energy bounds it as well; a small one prunes no sooner
-    slack = searched(problem, entry.alpha, form=(1e-9 * system.S, 1e-9 * system.g))
+    slack = searched(problem, alpha, form=(1e-9 * system.S, 1e-9 * system.g))
     assert slack.nodes > want.nodes
     assert sorted(s.codes for s in slack.solutions) == sorted(s.codes for s in want.solutions)
 
@@ -125,8 +119,7 @@ def test_without_any_working_engine_it_is_an_exhaustive_search(monkeypatch):
     roots = enumsol.enumerate_roots(problem, alpha, "fast")
     assert not differences(roots, want)
     # two levels a node: open / contact, then stick / slip+ / slip-
-    assert roots.stats.selections == 16
-    assert roots.stats.pruned == 0
+    assert (roots.stats.selections, roots.stats.pruned) == (16, 0)
 
 
 def test_an_interior_point_solver_that_gives_up_concludes_nothing(monkeypatch):
@@ -142,8 +135,7 @@ def test_an_interior_point_solver_that_gives_up_concludes_nothing(monkeypatch):
     monkeypatch.setattr(clarabel, "DefaultSettings", impatient)
     roots = enumsol.enumerate_roots(problem, alpha, "fast", engine="clarabel")
     assert not differences(roots, want)
-    assert roots.stats.fallback_qps == roots.stats.nodes
-    assert roots.stats.selections == 16
+    assert (roots.stats.fallback_qps, roots.stats.selections) == (roots.stats.nodes, 16)
 
 
 @pytest.mark.parametrize("method", ["tree", "exhaustive"])
@@ -167,8 +159,6 @@ def test_exact_arithmetic_does_not_believe_a_wrong_pruning(monkeypatch, method):
 
 
 def test_missing_compiled_engine_warns_and_works(monkeypatch):
-    import builtins
-
     real = builtins.__import__
 
     def without(name, globals=None, locals=None, fromlist=(), level=0):
@@ -218,10 +208,8 @@ def test_a_checkout_in_which_nothing_is_compiled_says_so(tmp_path):
     """The warning of the search, the errors of the graph and of the engine asked for."""
     checkout = tmp_path / "checkout"
     shutil.copytree(PACKAGE, checkout / "enumsol", ignore=shutil.ignore_patterns("*.so", "*.pyd", "__pycache__"))
-    environment = os.environ | {"PYTHONPATH": str(checkout)}
-    done = subprocess.run(
-        [sys.executable, "-c", CODE], cwd=checkout, env=environment, check=True, capture_output=True, text=True
-    )
+    options = {"cwd": checkout, "env": os.environ | {"PYTHONPATH": str(checkout)}, "text": True}
+    done = subprocess.run([sys.executable, "-c", CODE], check=True, capture_output=True, **options)
     lines = done.stdout.splitlines()
     assert len(lines) == 3
     assert lines[0].endswith("; the much slower interior-point solver is used")

@@ -1,5 +1,7 @@
 """Relaxations in 3D: which node is branched on, and children that were solved for that."""
 
+from itertools import islice
+
 import numpy as np
 import pytest
 from problems3d import from_compliance, random_coupled
@@ -39,19 +41,22 @@ def with_code(codes, node, code):
     return (*codes[:node], code, *codes[node + 1 :])
 
 
+def walked(engine):
+    """Codes, relaxation and node to branch on of the nodes of a tree, and the stack, to which those below are added."""
+    stack = [(UNDECIDED,) * 3]
+    while stack:
+        codes = stack.pop()
+        relaxation = fresh(engine, codes)
+        yield codes, relaxation, relaxation.choose(codes), stack
+
+
 def test_branching_takes_a_node_of_which_all_children_but_one_are_excluded_or_the_most_promising_one():
     forced = free = several = given = 0
     for seed in range(8):
         S, g, F = random_coupled(np.random.default_rng(seed), 3)
         engine = SpaceEngine(SpaceSystem.scaled(S, g, F))
         balls = EnclosedSpace.of_floats(engine.system)
-        stack = [(UNDECIDED,) * 3]
-        for _ in range(20):
-            if not stack:
-                break
-            codes = stack.pop()
-            relaxation = fresh(engine, codes)
-            node = relaxation.choose(codes)
+        for codes, relaxation, node, stack in islice(walked(engine), 20):
             if node < 0:
                 assert not {CONTACT, UNDECIDED} & set(codes)
                 continue
@@ -74,7 +79,7 @@ def test_branching_takes_a_node_of_which_all_children_but_one_are_excluded_or_th
                     assert sector_margin(balls, with_code(codes, node, code), rows, values) > 0
                     assert len(child.forces) == len(child.displacements) == len(g)
                     given += 1
-            stack += left[node]
+            stack.extend(left[node])
     assert forced > 20
     assert free > 5
     assert several > 3
@@ -86,17 +91,13 @@ def leaves_of_trees(seeds):
     for seed in seeds:
         S, g, F = random_coupled(np.random.default_rng(seed), 3)
         engine = SpaceEngine(SpaceSystem.scaled(S, g, F))
-        stack = [(UNDECIDED,) * 3]
-        while stack:
-            codes = stack.pop()
-            relaxation = fresh(engine, codes)
-            node = relaxation.choose(codes)
+        for codes, relaxation, node, stack in walked(engine):
             if not {CONTACT, UNDECIDED} & set(codes):
                 yield engine, codes, relaxation, node
             if relaxation.cut is not None:
                 stack.append(with_code(codes, node, relaxation.cut[1][-1]))
             elif node >= 0:
-                stack += children_left(engine, codes, node)
+                stack.extend(children_left(engine, codes, node))
 
 
 def test_slices_that_are_cut_off_sectors_are_excluded_and_leave_the_rest():
