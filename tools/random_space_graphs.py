@@ -5,9 +5,9 @@
 
 Prints for every problem what the tree took, arcs and vertices, why the graph is not complete, whether the proof is
 verified, and at how many alphas the graph is wrong: its roots are not those of enumerate_roots, or Newton's method from
-random starts finds a root that is not on it. Friction, or load, or both depend on alpha. Of a graph that is not complete
-the number of roots must be at least what it says. With --plane the problems are those of a plane, written in 3D with a
-second tangent that nothing loads.
+random starts finds a root that is not on it. Friction, or load, or both depend on alpha. Of a graph that is not
+complete the number of roots must be at least what it says. With --plane the problems are those of a plane, written in
+3D with a second tangent that nothing loads.
 """
 
 from __future__ import annotations

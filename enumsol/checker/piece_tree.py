@@ -2,9 +2,10 @@
 
 A tree is given by its records in the order of a walk: ``["a", alpha]`` (the piece is cut there), ``["b", node, codes]``
 (a status is split), ``["x", rows, multipliers]`` (no solution over the piece), ``["n"]`` (the same, by the equations of
-a leaf), ``["k", box]`` (all solutions of a leaf lie in the box), ``["r", box]`` (the roots of a leaf, one at every
-alpha, are an arc, which is in the box at the middle), ``["m", numbers, first, last]`` (all solutions with the statuses
-of the assignment lie on the curve between two boxes, by one certificate) and ``["u", reason]`` (open: a gap).
+a leaf), ``["k", first, last]`` (all solutions of a leaf lie in boxes of one curve), ``["r", box]`` (the roots of a
+leaf, one at every alpha, are an arc, which is in the box at the middle), ``["m", numbers, first, last]`` (all solutions
+with the statuses of the assignment lie on the curve between two boxes, by one certificate) and ``["u", reason]`` (open:
+a gap).
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from enumsol.proof.space_records import (
     PIECE_LEAVES,
     CutPiece,
     ExcludedInSpace,
-    InCurveBox,
+    InCurveBoxes,
     OnlyOnCurve,
     ThroughCurveBox,
 )
@@ -135,9 +136,11 @@ class PieceTreeChecker:
             return "its statuses are not final"
         if isinstance(leaf, NoRoot):
             return None if piece.held(codes) is None else "it is not proven to hold no root"
-        if isinstance(leaf, InCurveBox):
-            inside = piece.holds_all(codes, self.given, self._curve(leaf.box))
-            return None if inside else "its roots are not proven to lie in its box"
+        if isinstance(leaf, InCurveBoxes):
+            (known, first), (other, last) = self._boxes[leaf.first], self._boxes[leaf.last]
+            curves = [link.curve for link in known.chain.links[first : last + 1]] if known is other else []
+            inside = piece.holds_all(codes, self.given, curves)
+            return None if inside else "its roots are not proven to lie in its boxes"
         if isinstance(leaf, ThroughCurveBox):
             met = piece.meets(codes, self.given, self._curve(leaf.box))
             return None if met else "its roots are not proven to be an arc through its box"

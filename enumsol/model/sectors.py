@@ -14,6 +14,12 @@ import math
 from collections.abc import Sequence
 from fractions import Fraction
 from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from enumsol.support.array_types import Floats
 
 #: The status code of sector i is SECTORS + i.
 SECTORS = 8
@@ -152,3 +158,25 @@ def nearest(x: float, y: float, level: int) -> int:
     s = y / (size + x) if size > 0 else 0.0
     count = 1 << level
     return count + round((quarter % 4 + s) * (count >> 2)) % count
+
+
+def places(vectors: Floats) -> Floats:
+    """How far the directions of vectors, (..., 2), are along the circle, in sectors of level DEEPEST + 2."""
+    x, y = 63.0 * vectors[..., 0] + 16.0 * vectors[..., 1], 63.0 * vectors[..., 1] - 16.0 * vectors[..., 0]
+    quarter = np.floor(np.arctan2(y, x) / (0.5 * np.pi)) % 4
+    for k in (1, 2, 3):
+        turned = quarter >= k
+        x, y = np.where(turned, y, x), np.where(turned, -x, y)
+    size = np.hypot(x, y)
+    s = np.clip(y / np.where(size > 0, size + x, 1.0), 0.0, 1.0)
+    return np.asarray(np.ldexp(quarter + s, DEEPEST))
+
+
+def parts_around(number: int, low: float, high: float, level: int) -> tuple[int, ...]:
+    """A sector in at most three parts, whose middle one holds what is between two places, by sectors of a level."""
+    up = max(DEEPEST + 2 - max(level, level_of(number)), 0)
+    begin, end = (place >> up for place in span(number))
+    first, last = max(math.floor(low) >> up, begin), min((math.floor(high) >> up) + 1, end)
+    all_of = 1 << (DEEPEST + 2 - up)
+    inner = [(first, last), (begin, first), (last, end)]
+    return tuple(run_of(all_of + a, b - a) for a, b in inner if a < b)

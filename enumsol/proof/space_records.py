@@ -258,31 +258,40 @@ class CutPiece(Record):
 
 
 @dataclass(frozen=True)
-class _Boxed(Record):
-    """Base of leaves that refer to a box around a curve."""
+class InCurveBoxes(Record):
+    """All solutions over the piece lie in these boxes of a curve, one after the other."""
 
-    sizes = (2,)
+    kind, sizes = "k", (3,)
+
+    first: int
+    last: int
+
+    @classmethod
+    def of(cls, entries: list[Any], limits: Limits) -> InCurveBoxes:
+        """The numbers of the boxes."""
+        return cls(*_boxes(entries, limits))
+
+
+@dataclass(frozen=True)
+class ThroughCurveBox(Record):
+    """There is one regular root at every alpha of the piece, in this box at the middle."""
+
+    kind, sizes = "r", (2,)
 
     box: int
 
     @classmethod
-    def of(cls, entries: list[Any], limits: Limits) -> Any:
+    def of(cls, entries: list[Any], limits: Limits) -> ThroughCurveBox:
         """The number of the box."""
-        if type(entries[0]) is not int or not 0 <= entries[0] < limits.boxes:
-            raise RecordError(f"there is no box {quoted(entries[0])}")
-        return cls(entries[0])
+        return cls(*_boxes(entries, limits))
 
 
-class InCurveBox(_Boxed):
-    """All solutions over the piece lie in this box."""
-
-    kind = "k"
-
-
-class ThroughCurveBox(_Boxed):
-    """There is one regular root at every alpha of the piece, in this box at the middle."""
-
-    kind = "r"
+def _boxes(entries: list[Any], limits: Limits) -> list[int]:
+    """Numbers of boxes around curves."""
+    for box in entries:
+        if type(box) is not int or not 0 <= box < limits.boxes:
+            raise RecordError(f"there is no box {quoted(box)}")
+    return entries
 
 
 @dataclass(frozen=True, eq=False)
@@ -305,9 +314,7 @@ class OnlyOnCurve(Record):
     def of(cls, entries: list[Any], limits: Limits) -> OnlyOnCurve:
         """The numbers; RecordError where there are not as many as there must be, or no such boxes."""
         values, *run = entries
-        for box in run:
-            if type(box) is not int or not 0 <= box < limits.boxes:
-                raise RecordError(f"there is no box {quoted(box)}")
+        _boxes(run, limits)
         try:
             return cls(numbers_from(values, 2 * limits.p + 3 * limits.components - 3 * limits.p), *run)
         except ValueError as error:
@@ -330,7 +337,7 @@ LEAVES = table_of(
 #: The same of a body that nothing holds; others rest on a stiffness that is positive definite.
 FLOATING_LEAVES = table_of(ExcludedInSpace, Unbalanced, NoRoot, RegularRoot, UndecidedRecord)
 #: Of a tree over alpha, too.
-PIECE_LEAVES = table_of(ExcludedInSpace, NoRoot, InCurveBox, ThroughCurveBox, OnlyOnCurve, UndecidedRecord)
+PIECE_LEAVES = table_of(ExcludedInSpace, NoRoot, InCurveBoxes, ThroughCurveBox, OnlyOnCurve, UndecidedRecord)
 
 
 def _is_final(code: Any) -> bool:

@@ -77,7 +77,7 @@ SHARED = {
     "trusted.space.curve_events": None,
     "trusted.space.curve_runs": {"CurveParts", "KnownCurve", "Run"},
     "trusted.space.piece_forms": {"PieceWeights", "how_far_off"},
-    "trusted.space.pieces": {"AlphaPiece", "lies_in"},
+    "trusted.space.pieces": {"AlphaPiece", "lie_along"},
     "trusted.space.space_uniqueness": {
         *("LARGEST_UNIT", "LooseSolution", "OnlySolution"),
         *("equations", "lone_root", "only_root", "only_solution_in_space"),

@@ -110,9 +110,11 @@ def mutants(records, rng, count):
             part = found[k][int(rng.integers(1, 6))]
             i = int(rng.integers(len(part)))
             part[i] = float(part[i] * 10 ** rng.uniform(-3, 3) * rng.choice([-1, 1]) + rng.choice([0, 1e-6, 1e-3]))
+        elif isinstance(found[k], list) and found[k][0] == "k" and rng.random() < 0.5:
+            found[k][int(rng.integers(1, 3))] += int(rng.integers(-3, 4))
         elif isinstance(found[k], list) and found[k][0] in "ark":
-            found[k] = [str(rng.choice(["a", "r", "k", "n", "u"])), found[k][1]]
-            found[k] = found[k][:1] if found[k][0] == "n" else found[k]
+            kind = str(rng.choice(["a", "r", "k", "n", "u"]))
+            found[k] = [kind, *{"k": [found[k][1], found[k][-1]], "n": []}.get(kind, found[k][1:2])]
         elif isinstance(found[k], list) and found[k][0] == "m":
             numbers = found[k][1]
             if rng.random() < 0.3:

@@ -4,16 +4,19 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from problems3d import SLIDING, sliding_node
 from space_proofs import random_problem
 
 from enumsol import enumerate_roots
 from enumsol.arithmetic.balls import Ball
+from enumsol.branches.space.chains import chain_through
 from enumsol.model.sectors import SECTORS, nearest, start_of
 from enumsol.search.space.piece_multipliers import balanced
 from enumsol.search.space.space_setup import SpaceSolvers
-from enumsol.trusted.space.leaves import Open, SpaceRoot
-from enumsol.trusted.space.pieces import AlphaPiece
+from enumsol.trusted.space.leaves import Open, SpaceRoot, _Leaf
+from enumsol.trusted.space.pieces import AlphaPiece, lie_along
 from enumsol.trusted.space.sector_rows import CONTACT, OPEN, STICK, UNDECIDED, row_sign, sector_margin, sector_row_terms
+from enumsol.trusted.space.solution_curve import AlphaProblem
 
 LOW, HIGH = Fraction(1, 4), Fraction(1, 2)
 
@@ -122,6 +125,63 @@ def test_multipliers_for_both_ends_serve_wherever_others_do(seed):
     assert served
 
 
+def lies_between(low, high, x):
+    """Whether x is within (1 - t) low + t high for one t from 0 to 1, by the inequalities for t of every number."""
+    slack = 1e-9 * (1.0 + np.abs(x))
+    rate = high.mid - low.mid, high.rad - low.rad
+    a = np.concatenate([rate[0] - rate[1], -rate[0] - rate[1], [1.0, -1.0]])
+    b = np.concatenate([x - low.mid + low.rad + slack, low.mid - x + low.rad + slack, [1.0, 0.0]])
+    most = np.min(np.where(a > 0, b / np.where(a > 0, a, 1.0), np.inf))
+    least = np.max(np.where(a < 0, b / np.where(a < 0, a, 1.0), -np.inf))
+    return bool(np.all(b[a == 0] >= 0) and least <= most)
+
+
+@pytest.mark.parametrize(("p", "seed"), [(1, 1), (2, 1), pytest.param(3, 1, marks=pytest.mark.slow)])
+def test_second_derivatives_over_a_piece_hold_differences(p, seed):
+    """Quotients of differences of G are means of its second derivatives with respect to (psi, s)."""
+    problem, rng = changing_problem(p, seed), np.random.default_rng(seed)
+    piece = piece_of(problem, Fraction(3, 8), Fraction(3, 8) + Fraction(1, 64))
+    for _ in range(6):
+        codes = [SECTORS + int(rng.integers(256, 512)) for _ in range(p)]
+        leaf = _Leaf(piece.whole, codes)
+        state = leaf._state(np.zeros(p), leaf.half)
+        if state is None:
+            continue
+        second = leaf._second(state, np.zeros(p), leaf.half)
+        half = (piece.high - piece.low) / 2
+
+        def at(z, codes=codes, half=half):
+            alpha = piece.middle + Fraction(float(z[-1])) * half
+            return _Leaf(piece.at(alpha, alpha), codes)._state(z[:-1], np.zeros(p), still=True).G.mid
+
+        steps = np.diag(np.append(0.4 * leaf.half, 0.4))
+        z = np.append(rng.uniform(-0.2, 0.2, p) * leaf.half, rng.uniform(-0.2, 0.2))
+        for j, one in enumerate(steps):
+            for k, other in enumerate(steps):
+                difference = at(z + one + other) - at(z + one) - at(z + other) + at(z)
+                mean = difference / (one[j] * other[k])
+                lost = 1e-13 * np.max(np.abs(at(z))) / (one[j] * other[k])
+                assert np.all(np.abs(second.mid[:, j, k] - mean) <= second.rad[:, j, k] + lost)
+
+
+def test_what_lies_in_several_boxes_lies_along_their_curve():
+    """Between two points of a curve are the boxes between them, and no fewer."""
+    given, interval = AlphaProblem.of(SLIDING.enclosure), (Fraction(2, 5), Fraction(3, 5))
+    chain = chain_through(given, SLIDING, np.append(sliding_node(0.5), 0.5), interval)
+    curves = [link.curve for link in chain.links]
+    assert len(curves) > 2
+    for k in range(len(curves) - 1):
+        ends = [curve.at(share * curve.box.half) for curve, share in ((curves[k], 0.0), (curves[k + 1], 0.0))]
+        for low, high in (ends, ends[::-1]):
+            assert lie_along((low, high), curves[k : k + 2])
+            assert not lie_along((low, high), curves[k : k + 1])
+            assert not lie_along((low, high), [])
+        if k + 2 < len(curves):
+            ends = [curves[i].at(0.0) for i in (k, k + 2)]
+            assert lie_along(ends, curves[k : k + 3])
+            assert not lie_along(ends, [curves[k], curves[k + 2]])
+
+
 #: Nodes and seeds.
 LARGER = [
     pytest.param(2, 0, marks=pytest.mark.slow),
@@ -132,8 +192,9 @@ LARGER = [
 @pytest.mark.parametrize(("p", "seed"), [(1, 0), (1, 22), *LARGER])
 def test_no_root_over_a_piece_is_missed(p, seed):
     """Leaves that hold a root at some alpha of a piece are not empty, and bounds of their forces hold it."""
-    problem = changing_problem(p, seed)
-    settled = 0
+    problem = changing_problem(p, seed, isotropic=bool(seed % 2))
+    settled = drifts = 0
+    given = AlphaProblem.of(problem.enclosure)
     for alpha in (LOW, Fraction(13, 32), HIGH):
         F = problem.friction_at(alpha)
         for root in enumerate_roots(problem, alpha):
@@ -146,11 +207,15 @@ def test_no_root_over_a_piece_is_missed(p, seed):
                     forces = piece.forces(found.y)
                     near = np.concatenate([root.lambda_n, *root.lambda_t.T])
                     assert np.all(np.abs(forces.mid - near) <= forces.rad + 1e-9 * np.max(np.abs(near)))
-                    w = piece.displacements(found.y, found.w)
+                    w = piece.displacements(found.y, found.w, piece.alphas)
                     moved = problem.condensed.free_displacements(float(alpha)) - problem.condensed.S @ near
                     assert np.all(np.abs(w.mid - moved) <= w.rad + 1e-9 * np.max(np.abs(moved)))
+                for low, high in (ends for ends in piece.places(found, given) if len(ends) == 2):
+                    assert lies_between(low, high, given.placed(np.append(near, float(alpha))))
+                    drifts += 1
                 settled += isinstance(found, SpaceRoot)
     assert settled
+    assert drifts
 
 
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2))])
@@ -187,7 +252,7 @@ def test_displacements_of_nodes_without_friction_follow_from_the_forces():
     assert np.all(forces.reshape(3, 2)[1:, 0] == 0)
     for alpha in (piece.low, piece.middle, piece.high):
         scaled = piece.at(alpha, alpha)
-        w = piece.displacements(Ball.exact(y), Ball.exact(scaled.g - scaled.S @ y))
+        w = piece.displacements(Ball.exact(y), Ball.exact(scaled.g - scaled.S @ y), piece.alphas)
         moved = problem.condensed.free_displacements(float(alpha)) - problem.condensed.S @ forces
         assert np.all(np.abs(w.mid - moved) <= w.rad + 1e-12 * np.max(np.abs(moved)))
 

@@ -17,6 +17,7 @@ from enumsol.proof.proof_file import Proof
 from enumsol.proof.records import UndecidedRecord
 from enumsol.proof.space_records import CurveBoxRecord
 from enumsol.proof.writer import ProofWriter, unit_exponents
+from enumsol.roots.enumerate import enumerate_roots
 from enumsol.search.space.piece_tree import OpenLeaf, PieceTree
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.support.deadlines import TimeOverError
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
+#: Nodes of a search at one alpha that is to find curves.
+_SAMPLED = 500
 #: After so many curves that are not proven to be whole no further one is followed.
 _FAILURES = 3
 #: What the record of an open leaf says.
@@ -111,11 +114,18 @@ class SpaceCover:
             self.chains.append(chain)
             return chain
 
-        tree = PieceTree(self.problem.enclosure, self.interval, self._units(), more, max_nodes, tick)
+        tree = PieceTree(
+            self.problem.enclosure, self.interval, self._units(), more, max_nodes, tick, solutions=self._solutions
+        )
         try:
             self.records = tree.run()
         finally:
             self.nodes, self.stopped = tree.nodes, tree.stopped
+
+    def _solutions(self, alpha: Fraction) -> list[Array]:
+        """Forces of solutions at an alpha, as many as a short search finds."""
+        roots = enumerate_roots(self.problem, alpha, max_nodes=_SAMPLED)
+        return [np.concatenate([root.lambda_n, *root.lambda_t.T]) for root in roots]
 
     def _is_new(self, chain: Chain) -> bool:
         """Whether a chain is proven to be whole, and none that is known."""

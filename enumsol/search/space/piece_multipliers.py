@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 #: The weight of the squares of multipliers, each by the length of its row, which keeps them bounded.
-_RIDGE = 1e-6
+_RIDGE = 1e-12
 #: How often the share of an end in the bound that is made as large as possible is halved.
 _HALVINGS = 4
 

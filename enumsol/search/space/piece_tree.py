@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections import OrderedDict
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.arithmetic.balls import Ball
 from enumsol.condensation.space_condensed import SpaceSystem
-from enumsol.model.sectors import DEEPEST, SECTORS, level_of, width_level
+from enumsol.model.sectors import DEEPEST, SECTORS, level_of, parts_around, places, span, width_level, width_of
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.proof.records import Branching, NoRoot
-from enumsol.proof.space_records import CutPiece, ExcludedInSpace, InCurveBox, OnlyOnCurve, ThroughCurveBox
+from enumsol.proof.space_records import CutPiece, ExcludedInSpace, InCurveBoxes, OnlyOnCurve, ThroughCurveBox
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.outcome import StopReason
@@ -24,13 +26,13 @@ from enumsol.search.space.space_newton import Isotropic
 from enumsol.search.space.space_search import SpaceSplitting
 from enumsol.search.splitting import ImposedRows
 from enumsol.support.deadlines import TimeOverError, look
-from enumsol.trusted.space.curve_runs import KnownCurve
+from enumsol.trusted.space.curve_runs import CurveParts, KnownCurve, Run
 from enumsol.trusted.space.leaves import Open, SpaceRoot
-from enumsol.trusted.space.pieces import AlphaPiece, lies_in
+from enumsol.trusted.space.pieces import AlphaPiece, lie_along
 from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -38,6 +40,7 @@ if TYPE_CHECKING:
     from enumsol.relaxation.space_relaxation import SpaceRelaxation
     from enumsol.selections.solution import Codes
     from enumsol.trusted.space.curve_chains import CurveChain
+    from enumsol.trusted.space.sector_rows import Row
     from enumsol.trusted.space.solution_curve import SolutionCurve
 
     Array = NDArray[np.float64]
@@ -45,9 +48,19 @@ if TYPE_CHECKING:
 #: Pieces whose engines are kept.
 _KEPT = 32
 #: Pieces are cut down to this share of the interval where only their length stands in the way of a certificate.
-_ALONE = 2.0**-26
-#: Pieces of undecided statuses at most at which a first curve is sought.
-_SOUGHT = 8
+_ALONE = 2.0**-9
+#: Pieces are cut so often at most between two branchings where multipliers fail at their ends only.
+_CUTS = 2
+#: Around the directions of known curves sectors get more room by this share of what these turn by, and are no narrower
+#: than those of a level; a sector is cut so if no more than this share of it is left.
+_ROOM, _NARROWEST, _LEFT = 0.5, 9, 0.5
+#: Boxes of a curve in a row in which a leaf may lie, and how many such rows are tried.
+_LONGEST, _RUNS = 9, 4
+#: Longer pieces are cut where statuses occur along one curve over a part of them.
+_SHORT = 2.0**-6
+#: Pieces of undecided statuses at most at which a first curve is sought; where solutions are sampled, as shares of the
+#: interval, if more than one curve may be needed.
+_SOUGHT, _SAMPLED = 8, (Fraction(15, 16), Fraction(1, 2), Fraction(1, 16))
 #: Leaves are tested from this level of their sectors on.
 _TRIED = 3
 #: Sectors above this level are halved, rather than alpha, where a leaf is settled in the middle only; by how many
@@ -74,6 +87,15 @@ class OpenLeaf:
     forces: Array | None
 
 
+def _without_sectors(codes: Codes) -> tuple[int, ...]:
+    """Statuses, with contact for a sector."""
+    return tuple(CONTACT if code > SECTORS else code for code in codes)
+
+
+def _is_excluded(relaxation: SpaceRelaxation) -> bool:
+    return relaxation.pruned and relaxation.bound > PRUNE_MARGIN
+
+
 class _Examined:
     """A piece with what the search needs of it."""
 
@@ -90,8 +112,17 @@ class _Examined:
         #: Runs of known curves that pass the piece, of so many curves.
         self.passages: list[Passage] = []
         self.curves = 0
+        #: Parts of known curves over the piece.
+        self.parts: list[CurveParts] = []
         #: Assignments of statuses for which no form is definite.
         self.hopeless: set[tuple[int, ...]] = set()
+
+    def along(self, curves: Sequence[KnownCurve]) -> list[CurveParts]:
+        """The parts of known curves over the piece."""
+        for known in curves[len(self.parts) :]:
+            whole = Run(0, len(known.chain.links) - 1)
+            self.parts.append(known.over(whole, self.piece.low, self.piece.high))
+        return self.parts
 
     def solution(self) -> Array | None:
         """Forces of a solution at the middle, in the units of the problem, by Newton's method; no claim."""
@@ -125,6 +156,8 @@ class PieceTree:
     tick : callable, optional
         Called with the share of the tree that is done, every child of a node being as large as the others.
     smallest : pieces are cut down to this share of the interval
+    solutions : callable, optional
+        Called with an alpha; gives forces of solutions there, in the units of the problem, not necessarily all.
 
     Attributes
     ----------
@@ -142,7 +175,9 @@ class PieceTree:
         max_nodes: int | None = None,
         tick: Callable[[float], object] | None = None,
         smallest: float = 2.0**-30,
+        solutions: Callable[[Fraction], Sequence[Array]] | None = None,
     ) -> None:
+        self._solutions, self._sampled = solutions, False
         self._enclosure, self._units, self.interval = enclosure, units, interval
         self._given = AlphaProblem.of(enclosure)
         self._more, self._most, self._tick = more, max_nodes, tick
@@ -154,6 +189,7 @@ class PieceTree:
         self.curves: list[KnownCurve] = []
         #: The curve of every box, numbered as in a proof.
         self._boxes: list[SolutionCurve] = []
+        self._owner: list[int] = []
         self._sought = 0
 
     def _follow(self, x: Array) -> bool:
@@ -163,6 +199,7 @@ class PieceTree:
             return False
         self.curves.append(KnownCurve(self._given, chain))
         self._boxes += [link.curve for link in chain.links]
+        self._owner += [len(self.curves)] * len(chain.links)
         boxes = [curve.box for curve in self._boxes]
         self._c, self._d, self._e = (
             np.array([getattr(box, name) for box in boxes]) for name in ("centre", "direction", "border")
@@ -201,7 +238,7 @@ class PieceTree:
     def run(self) -> list[Any]:
         """Records of the tree, in the order of a walk; what is open is an OpenLeaf."""
         records: list[Any] = []
-        stack: list[Any] = [(*self.interval, (UNDECIDED,) * self._enclosure.problem.p, None, -1, False)]
+        stack: list[Any] = [(*self.interval, (UNDECIDED,) * self._enclosure.problem.p, None, -1, False, 0)]
         sizes, done = [1.0], 0.0
         while stack:
             if self.stopped is None and self._most is not None and self.nodes >= self._most:
@@ -226,10 +263,13 @@ class PieceTree:
         return records
 
     def _step(
-        self, low: Fraction, high: Fraction, codes: Codes, parent: Any, changed: int, last: bool
+        self, low: Fraction, high: Fraction, codes: Codes, parent: Any, changed: int, last: bool, cuts: int
     ) -> tuple[Any, list[Any]]:
         at = self._examined(low, high) if parent is None else parent[0]
-        if (done := self._certified(at, codes)) is not None:
+        done = self._certified(at, codes)
+        if done is None and not self._sampled and self._sample():
+            done = self._certified(at, codes)
+        if done is not None:
             return done
         final = not {CONTACT, UNDECIDED} & set(codes)
         if final and parent is None:
@@ -240,13 +280,17 @@ class PieceTree:
             relaxation = at.root(codes)
         else:
             relaxation = parent[1].child(*at.rows.of(changed, codes[changed]), last=last)
-        if relaxation.pruned and relaxation.bound > PRUNE_MARGIN:
+        if _is_excluded(relaxation):
             done = self._excluded(at, codes, relaxation)
-            return self._halved(at, codes) if done is None else done
+            if done is None and final:
+                done = self._on_curve(at.piece, at.piece.held(codes))
+            return self._undecided(at, codes, cuts) if done is None else done
         if final and all(code < SECTORS or width_level(code - SECTORS) >= _TRIED for code in codes):
             done = self._leaf(at, codes) if parent is not None else None
             if done is not None:
                 return done
+            if (parts := self._around_curve(at, codes)) is not None:
+                return self._branched(at, codes, parts[0], relaxation, children=parts[1])
             node = self._widest(codes)
         else:
             node = relaxation.most_promising(codes, relaxation.violations(codes))
@@ -255,13 +299,15 @@ class PieceTree:
             return self._halved(at, codes)
         return self._branched(at, codes, node, relaxation)
 
-    @staticmethod
-    def _excluded(at: _Examined, codes: Codes, relaxation: Any) -> tuple[Any, list[Any]] | None:
+    def _excluded(self, at: _Examined, codes: Codes, relaxation: Any) -> tuple[Any, list[Any]] | None:
         """By multipliers of the middle, or else by some that serve both ends of the piece."""
-        numbers, values = relaxation.multipliers()
-        rows = [at.engine.rows[number] for number in numbers.tolist()]
+        rows, values = self._multipliers(at, relaxation)
         if at.piece.margin(codes, rows, values, 2.0) > 0:
             return ExcludedInSpace(rows, values), []
+        for end, other in self._ends(at, codes):
+            if not _is_excluded(other):
+                return None
+            rows += self._multipliers(end, other)[0]
         imposed = [at.engine.rows[k] for i, code in enumerate(codes) for k in at.engine.imposed(i, code)[0]]
         rows = list(dict.fromkeys([*rows, *imposed]))
         both = balanced(at.piece, codes, rows)
@@ -271,10 +317,55 @@ class PieceTree:
         return ExcludedInSpace([rows[k] for k in used], both[used]), []
 
     @staticmethod
+    def _multipliers(at: _Examined, relaxation: SpaceRelaxation) -> tuple[list[Row], Array]:
+        numbers, values = relaxation.multipliers()
+        return [at.engine.rows[number] for number in numbers.tolist()], values
+
+    def _ends(self, at: _Examined, codes: Codes) -> list[tuple[_Examined, SpaceRelaxation]]:
+        """The relaxations of an assignment at the ends of a piece; not at one where friction vanishes."""
+        ends = [self._examined(alpha, alpha) for alpha in (at.piece.low, at.piece.high)]
+        return [(end, end.root(codes)) for end in ends if np.array_equal(end.system.tau, at.system.tau)]
+
+    def _undecided(self, at: _Examined, codes: Codes, cuts: int) -> tuple[Any, list[Any]]:
+        """An assignment that the middle excludes and the piece does not: cut, or branched where an end is possible."""
+        if cuts >= _CUTS:
+            for end, relaxation in self._ends(at, codes):
+                if _is_excluded(relaxation):
+                    continue
+                node = relaxation.most_promising(codes, relaxation.violations(codes))
+                node = self._widest(codes) if node < 0 else node
+                if node >= 0:
+                    return self._branched(end, codes, node, relaxation, piece=at)
+            node = next((i for i, code in enumerate(codes) if code in (CONTACT, UNDECIDED)), self._widest(codes))
+            if node >= 0:
+                return self._branched(at, codes, node, at.root(codes), piece=at)
+        return self._halved(at, codes, cuts=cuts + 1)
+
+    @staticmethod
     def _widest(codes: Codes) -> int:
         """The node with the widest sector that can be halved; -1 if there is none."""
         sectors = [i for i, code in enumerate(codes) if code > SECTORS and level_of(code - SECTORS) < DEEPEST]
         return min(sectors, key=lambda i: width_level(codes[i] - SECTORS)) if sectors else -1
+
+    def _around_curve(self, at: _Examined, codes: Codes) -> tuple[int, Sequence[int]] | None:
+        """A node in a sector, and the part of that around the directions of known curves, then what is left of it."""
+        nodes = [i for i, code in enumerate(codes) if code > SECTORS]
+        statuses = _without_sectors(codes)
+        towards = [parts.thetas[0][parts.held(statuses)][:, nodes] for parts in at.along(self.curves)]
+        where = np.concatenate([places(theta) for theta in towards]) if nodes and towards else np.zeros((0, 0))
+        spans = np.array([span(codes[i] - SECTORS) for i in nodes], dtype=float).reshape(-1, 2)
+        where = where[np.all((where >= spans[:, 0]) & (where < spans[:, 1]), axis=1)] if len(where) else where
+        if not len(where):
+            return None
+        low, high = np.min(where, axis=0), np.max(where, axis=0)
+        room = np.maximum(_ROOM * (high - low), np.ldexp(1.0, DEEPEST + 2 - _NARROWEST))
+        k = int(np.argmax((spans[:, 1] - spans[:, 0]) / (high - low + room)))
+        number, half = codes[nodes[k]] - SECTORS, 0.5 * float(room[k])
+        level = DEEPEST + 2 - math.floor(math.log2(half))
+        children = parts_around(number, low[k] - half, high[k] + half, level)
+        if width_of(children[0]) > _LEFT * width_of(number):
+            return None
+        return nodes[k], [SECTORS + child for child in children]
 
     def _is_wide(self, piece: AlphaPiece, codes: Codes) -> bool:
         """Whether a sector is to be halved rather than the piece: those of short pieces may be narrow."""
@@ -282,20 +373,34 @@ class PieceTree:
         level = max(_WIDE, -np.log2(share) - _NARROW)
         return any(code > SECTORS and width_level(code - SECTORS) < min(level, DEEPEST) for code in codes)
 
-    def _branched(self, at: _Examined, codes: Codes, node: int, relaxation: Any) -> tuple[Any, list[Any]]:
-        children = at.splitting.children(codes, node, relaxation)
+    def _branched(
+        self,
+        at: _Examined,
+        codes: Codes,
+        node: int,
+        relaxation: Any,
+        piece: _Examined | None = None,
+        children: Sequence[int] | None = None,
+    ) -> tuple[Any, list[Any]]:
+        """Children of a node, by default as the relaxation has them.
+
+        ``piece``: that of the children, where their relaxations do not go on from this one.
+        """
+        children = at.splitting.children(codes, node, relaxation) if children is None else children
+        parent = (at, relaxation) if piece is None else None
+        at = at if piece is None else piece
         below = []
         for k, child in enumerate(children):
             there = (*codes[:node], child, *codes[node + 1 :])
-            below.append((at.piece.low, at.piece.high, there, (at, relaxation), node, k + 1 == len(children)))
+            below.append((at.piece.low, at.piece.high, there, parent, node, k + 1 == len(children), 0))
         return Branching(node, list(children)), below
 
-    def _halved(self, at: _Examined, codes: Codes, forces: Array | None = None) -> tuple[Any, list[Any]]:
+    def _halved(self, at: _Examined, codes: Codes, forces: Array | None = None, cuts: int = 0) -> tuple[Any, list[Any]]:
         low, high = at.piece.low, at.piece.high
         if high - low <= self._least:
             return self._open(at, codes, forces), []
         middle = at.piece.middle
-        return CutPiece(str(middle)), [(x, y, codes, None, -1, False) for x, y in ((low, middle), (middle, high))]
+        return CutPiece(str(middle)), [(x, y, codes, None, -1, False, cuts) for x, y in ((low, middle), (middle, high))]
 
     def _open(self, at: _Examined, codes: Codes, forces: Array | None) -> OpenLeaf:
         return OpenLeaf(at.piece.low, at.piece.high, codes, forces)
@@ -314,10 +419,10 @@ class PieceTree:
 
     def _certified(self, at: _Examined, codes: Codes) -> tuple[Any, list[Any]] | None:
         """One certificate for all that is below an assignment, or the piece is cut since it is too long for that."""
-        piece, statuses = at.piece, tuple(CONTACT if code > SECTORS else code for code in codes)
-        if piece.high - piece.low <= Fraction(_ALONE) * (self.interval[1] - self.interval[0]):
-            return None
+        piece, statuses = at.piece, _without_sectors(codes)
         passages = [passage for passage in self._passages(at, statuses) if passage.parts.allowed(statuses)]
+        if not passages and statuses == codes and self._is_longer(piece, _SHORT) and self._ends_within(at, statuses):
+            return self._halved(at, codes)
         # where two curves have these statuses no form is definite
         if len(passages) != 1 or statuses in at.hopeless:
             return None
@@ -327,12 +432,35 @@ class PieceTree:
         if numbers is not None and piece.lies_on(known, run, statuses, numbers, ERRORS):
             before = sum(len(other.chain.links) for other in self.curves[: passage.curve])
             return OnlyOnCurve(numbers, before + run.first, before + run.last), []
-        if at.proposals.is_hopeful(statuses, known.over(run, piece.middle, piece.middle)):
+        middle = known.over(run, piece.middle, piece.middle)
+        if self._is_longer(piece, _ALONE) and at.proposals.is_hopeful(statuses, middle):
             # a leaf may be decided over a longer piece
             done = None if {CONTACT, UNDECIDED} & set(codes) else self._leaf(at, codes)
             return self._halved(at, codes) if done is None or isinstance(done[0], OpenLeaf) else done
         at.hopeless.add(statuses)
         return None
+
+    def _sample(self) -> bool:
+        """Whether there are new curves through the solutions at some alphas."""
+        self._sampled, known = True, len(self.curves)
+        low, high = self.interval
+        for alpha in (low + share * (high - low) for share in _SAMPLED):
+            for forces in () if self._solutions is None else self._solutions(alpha):
+                self._follow(np.append(forces, float(alpha)))
+        return len(self.curves) > known
+
+    def _is_longer(self, piece: AlphaPiece, share: float) -> bool:
+        """Than a share of the interval."""
+        return piece.high - piece.low > Fraction(share) * (self.interval[1] - self.interval[0])
+
+    def _ends_within(self, at: _Examined, statuses: tuple[int, ...]) -> bool:
+        """Whether in one run along the known curves, and in no other, these statuses hold over a part of a piece."""
+        runs = 0
+        for parts in at.along(self.curves):
+            held = parts.held(statuses)
+            if len(held):
+                runs += int(held[0]) + int(np.sum(held[1:] & ~held[:-1]))
+        return runs == 1
 
     def _passages(self, at: _Examined, statuses: tuple[int, ...]) -> list[Passage]:
         """Runs of known curves that pass a piece; the first ones are sought where no status is assigned."""
@@ -352,33 +480,40 @@ class PieceTree:
         """A leaf that is decided, or halved; None where statuses are to be split further."""
         piece = at.piece
         found = piece.held(codes)
-        if found is None:
-            return NoRoot(), []
-        if (number := self._box(piece, found)) is not None:
-            return InCurveBox(number), []
-        # is it the piece or the sectors that are too wide? slip directions first: near a corner all are left open
+        if (done := self._on_curve(piece, found)) is not None:
+            return done
+        if isinstance(found, Open) and not found.swept and self._widest(codes) >= 0:
+            return None
         there = piece.point.held(codes)
-        if there is None:
-            return None if self._is_wide(piece, codes) else self._halved(at, codes)
         if isinstance(there, SpaceRoot):
             number = self._met(piece.point, there)
             if number is None and not self._is_known(self._middle(piece, there)):
                 return self._open(at, codes, piece.forces(there.y).mid), []
             if number is not None and isinstance(found, SpaceRoot):
                 return ThroughCurveBox(number), []
-            return None if self._is_wide(piece, codes) else self._halved(at, codes)
-        return None if self._box(piece.point, there) is None else self._halved(at, codes)
+        elif self._is_wide(piece, codes) and (there is None or self._box(piece.point, there) is None):
+            return None
+        return self._halved(at, codes)
+
+    def _on_curve(self, piece: AlphaPiece, found: SpaceRoot | Open | None) -> tuple[Any, list[Any]] | None:
+        """The record of a leaf that has no root, or none that is not known."""
+        if found is None:
+            return NoRoot(), []
+        run = self._run(piece, found)
+        return None if run is None else (InCurveBoxes(*run), [])
+
+    def _run(self, piece: AlphaPiece, found: SpaceRoot | Open) -> tuple[int, int] | None:
+        """The first and the last of the boxes in which forces lie."""
+        for ends in piece.places(found, self._given) if self._boxes else ():
+            sides = [np.flatnonzero(self._around(end.mid, end.rad, slice(None))).tolist() for end in ends]
+            runs = {(min(pair), max(pair)) for pair in product(sides[0], sides[-1])}
+            for first, last in sorted(runs, key=lambda run: run[1] - run[0])[:_RUNS]:
+                near = last - first < _LONGEST and self._owner[first] == self._owner[last]
+                if near and lie_along(ends, self._boxes[first : last + 1], 2.0):
+                    return first, last
+        return None
 
     def _box(self, piece: AlphaPiece, found: SpaceRoot | Open) -> int | None:
-        """The box in which forces lie."""
-        place = piece.place(found, self._given) if self._boxes else None
-        if place is None:
-            return None
-        near = np.flatnonzero((self._low <= float(piece.low)) & (float(piece.high) <= self._high))
-        if not len(near):
-            return None
-        inside = self._around(place.mid, place.rad, near)
-        for k in near[inside].tolist():
-            if lies_in(place, self._boxes[k], 2.0):
-                return int(k)
-        return None
+        """The box in which a root in a point of alpha lies."""
+        run = self._run(piece, found)
+        return None if run is None or run[0] != run[1] else run[0]

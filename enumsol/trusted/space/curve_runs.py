@@ -118,15 +118,18 @@ class CurveParts:
         theta = tangent.mid / np.where(divisor > 0, divisor, 1.0)[:, :, None]
         return theta, np.where(known, far, np.inf)
 
-    def allowed(self, codes: Sequence[int]) -> bool:
-        """Whether all solutions have the statuses of an assignment; a sector counts as contact."""
+    def held(self, codes: Sequence[int]) -> Flags:
+        """In which parts all solutions have the statuses of an assignment, (N,); a sector counts as contact."""
+        held = np.ones(len(self.alpha.mid), dtype=bool)
         for i, code in enumerate(codes):
-            if code == UNDECIDED:
-                continue
-            held = self.open if code == OPEN else self.sticking if code == STICK else self.touching
-            if not np.all(held[:, i]):
-                return False
-        return True
+            if code != UNDECIDED:
+                known = self.open if code == OPEN else self.sticking if code == STICK else self.touching
+                held &= known[:, i]
+        return held
+
+    def allowed(self, codes: Sequence[int]) -> bool:
+        """Whether they have them in all parts."""
+        return bool(np.all(self.held(codes)))
 
 
 class _Links(NamedTuple):
@@ -189,7 +192,7 @@ class KnownCurve:
         return _Links(Ball(t_mid, t_rad), alpha, rate, reach, Ball(z_mid, z_rad), Ball(slope, slope_rad), wides, steps)
 
     def over(self, run: Run, low: Fraction, high: Fraction) -> CurveParts:
-        """The part of a run with alphas in a piece, in parts; none where it does not come there."""
+        """The part of a run with alphas in a piece, in parts in its order; none where it does not come there."""
         links, places = self._links, self.places(run)
         assert places is not None
         where, t, wanted = places, links.t[places], max(_PARTS, _OF_LINK * len(places))
@@ -205,6 +208,8 @@ class KnownCurve:
             rad = half * SAFE + 2 * UNIT * np.abs(t.mid)
             t = Ball(np.concatenate([t.mid - half, t.mid + half]), np.concatenate([rad, rad]))
             where = np.concatenate([where, where])
+        order = np.lexsort((t.mid, np.argsort(places)[np.searchsorted(np.sort(places), where)]))
+        where, t = where[order], t[order]
         alpha = self._alphas(where, t)
         # the solutions that are spoken of have their alphas in the piece
         begin, end = np.maximum(alpha.mid - alpha.rad * SAFE, least), np.minimum(alpha.mid + alpha.rad * SAFE, most)

@@ -61,6 +61,16 @@ def _cut(angle: Floats, radius: Floats, reach: Floats, move: Ball) -> tuple[Floa
     return angle + middle, np.maximum(high - middle, middle - low) * SAFE + 4 * UNIT * reach
 
 
+class Drift(NamedTuple):
+    """Two bounds of y, then w, (2 m,), and of s, between which all solutions of a leaf lie over a piece of alpha.
+
+    Every solution is in (1 - t) ``low`` + t ``high`` with a t from 0 to 1; s goes from -1 to 1 over the piece.
+    """
+
+    low: tuple[Ball, Ball]
+    high: tuple[Ball, Ball]
+
+
 @dataclass(frozen=True)
 class SpaceRoot:
     """Exactly one root in a box of directions, regular: all conditions hold strictly.
@@ -80,6 +90,8 @@ class SpaceRoot:
         A lower bound of the least slack.
     rigid : Ball of shape (r,), or None
         Of a body that nothing holds, the coordinates q of its rigid displacement.
+    drift : Drift or None
+        Over a piece of alpha.
     """
 
     y: Ball
@@ -91,6 +103,7 @@ class SpaceRoot:
     index: int
     slack: float
     rigid: Ball | None = None
+    drift: Drift | None = None
 
 
 class Cause(Enum):
@@ -120,6 +133,10 @@ class Open:
         What stands in the way, as computed in the middle of the box; no claim.
     mode : int or None
         The rigid mode that is free for that cause.
+    drift : Drift or None
+        Over a piece of alpha, where it is known.
+    swept : bool
+        Whether rather the piece of alpha stands in the way than the widths of sectors, as computed; no claim.
     """
 
     node: int | None
@@ -130,6 +147,8 @@ class Open:
     angle_rad: Floats
     cause: Cause
     mode: int | None = None
+    drift: Drift | None = None
+    swept: bool = False
 
 
 def settle(system: EnclosedSpace, codes: Sequence[int]) -> SpaceRoot | Open | None:
@@ -154,6 +173,12 @@ class _State(NamedTuple):
     box: Box
     #: Derivatives of G along a piece of alpha.
     G_turn: Ball | None = None
+
+    @property
+    def whole_J(self) -> Ball:  # noqa: N802 (as J)
+        """Derivatives with respect to (psi, s), over a piece of alpha."""
+        assert self.G_turn is not None
+        return Ball.beside(self.J, self.G_turn[:, None])
 
 
 class _Leaf:
@@ -289,36 +314,106 @@ class _Leaf:
         return np.r_[angle[:q], middle], np.r_[radius[:q], np.maximum(wide, 0.0)]
 
     def _move(self, angle: Floats, radius: Floats, state: _State, *, rough: bool = False) -> Ball | None:
-        """Krawczyk's operator: a ball of psi - angle for all zeros psi in a box over which the state is known.
+        """Krawczyk's operator: a ball of psi - angle for all zeros psi in a box over which the state is known."""
+        found = self._moves(angle, radius, state, rough=rough)
+        if found is None:
+            return None
+        move, along = found
+        # from the middle of a piece to any alpha, the angles held, then to any angles
+        return move if along is None else Ball(move.mid, (move.rad + along.size) * SAFE)
+
+    def _moves(
+        self, angle: Floats, radius: Floats, state: _State, *, rough: bool = False
+    ) -> tuple[Ball, Ball | None] | None:
+        """Balls u and v: psi - angle is in u for all zeros psi in a box, or over a piece of alpha in u + s v at s.
 
         ``rough``: only in the directions in which dG/dpsi is surely not singular, so that those of other nodes are cut.
         """
         q = len(angle)
         point = self._state(angle, np.zeros(q), still=True)
-        across = self._state(angle, np.zeros(q)) if self.piece else point
-        if point is None or across is None:
-            return None
-        if not (state.J.finite and point.J.finite):
+        if point is None or not (state.J.finite and point.J.finite):
             return None
         try:
-            Y = rough_inverse(state.J) if rough else np.linalg.inv(point.J.mid)
+            Y = np.asarray(rough_inverse(state.J) if rough else np.linalg.inv(point.J.mid), dtype=np.float64)
         except np.linalg.LinAlgError:
             return None
-        inverse, span = Ball.exact(np.asarray(Y, dtype=np.float64)), Ball(np.zeros(q), radius)
+        if self.piece:
+            return self._along(Y, q, angle, radius, state, point)
+        inverse, span = Ball.exact(Y), Ball(np.zeros(q), radius)
         if self.free:
-            return (Ball.exact(np.eye(q)) - inverse @ state.J) @ span - inverse @ point.G
-        # Y times the second derivatives first: they are large where Y is small
-        bends = self._bends(state, angle, radius)
-        wide = (inverse @ Ball(bends.mid.reshape(q, -1), bends.rad.reshape(q, -1))).size.reshape(q, q, q) * radius
-        slope = inverse @ across.J
-        slope = Ball(slope.mid, (slope.rad + upper_sum(wide, axis=2)) * SAFE)
-        slope = smaller(slope, inverse @ state.J)
-        move = (Ball.exact(np.eye(q)) - slope) @ span - inverse @ point.G
-        if across.G_turn is not None:
-            # from the middle of a piece to any alpha, the angles held, then to any angles
-            along = inverse @ across.G_turn
-            move = Ball(move.mid, (move.rad + along.size) * SAFE)
-        return move
+            return (Ball.exact(np.eye(q)) - inverse @ state.J) @ span - inverse @ point.G, None
+        slope = self._preconditioned(inverse, point.J, state.J, self._bends(state, angle, radius), radius)
+        return (Ball.exact(np.eye(q)) - slope) @ span - inverse @ point.G, None
+
+    @staticmethod
+    def _preconditioned(inverse: Ball, point: Ball, box: Ball, second: Ball, reach: Floats) -> Ball:
+        """Y dG over a box: Y times the second derivatives first, which are large where Y is small."""
+        rows, columns = box.mid.shape
+        wide = (inverse @ Ball(second.mid.reshape(rows, -1), second.rad.reshape(rows, -1))).size
+        middle = inverse @ point
+        beside = upper_sum(wide.reshape(rows, columns, columns) * reach, axis=2)
+        return smaller(Ball(middle.mid, (middle.rad + beside) * SAFE), inverse @ box)
+
+    def _along(
+        self, Y: Floats, k: int, angle: Floats, radius: Floats, state: _State, point: _State
+    ) -> tuple[Ball, Ball]:
+        """Balls u and v over a piece: for all zeros z = (psi - angle, s) in a box z without z_k is in u + z_k v."""
+        q = len(angle)
+        others, reach = np.delete(np.arange(q + 1), k), np.r_[radius, 1.0]
+        inverse, box, middle = Ball.exact(Y), state.whole_J, point.whole_J
+        slope = self._preconditioned(inverse, middle, box, self._second(state, angle, radius), reach)
+        span = Ball(np.zeros(q), reach[others])
+        return (Ball.exact(np.eye(q)) - slope[:, others]) @ span - inverse @ point.G, -slope[:, k]
+
+    def _drift(self, angle: Floats, radius: Floats) -> Drift | None:
+        """Between which two bounds all solutions in a box lie over a piece of alpha.
+
+        Of psi and s, the one that changes most along the zeros of G in the middle is the parameter; the others are
+        affine in it but for what is left over (``_along``), and so are y and w, by their derivatives.
+        """
+        q = len(angle)
+        state = self._state(angle, radius) if self.piece else None
+        point = None if state is None else self._state(angle, 0.0 * radius, still=True)
+        if state is None or point is None or not (state.whole_J.finite and point.J.finite):
+            return None
+        slopes, k, reach = Ball.beside(state.box.slope, state.box.lone[:, :1]), q, 1.0
+        beside, along = Ball.exact(np.zeros(0)), Ball.exact(np.zeros(0))
+        if q:
+            J, sizes = point.whole_J.mid, np.r_[radius, 1.0]
+            k = int(np.argmax(np.abs(np.linalg.svd(J * sizes)[2][-1])))
+            reach = float(sizes[k])
+            try:
+                Y = np.asarray(np.linalg.inv(np.delete(J, k, axis=1)), dtype=np.float64)
+            except np.linalg.LinAlgError:
+                return None
+            beside, along = self._along(Y, k, angle, radius, state, point)
+        others = np.delete(np.arange(q + 1), k)
+        turn = (slopes[:, others] @ along[:, None])[:, 0] + slopes[:, k]
+        middle = Ball.joined(point.y, point.w) + (slopes[:, others] @ beside[:, None])[:, 0]
+        fixed = len(point.y.mid) + np.array(self.rows, dtype=np.intp)
+        for part in (middle, turn):
+            part.mid[fixed], part.rad[fixed] = 0.0, 0.0
+        ends = []
+        for t in (Ball.exact(np.array(-reach)), Ball.exact(np.array(reach))):
+            s = t if k == q else beside[-1] + along[-1] * t
+            ends.append((middle + turn * t, s))
+        return Drift(*ends)
+
+    def _is_swept(self, angle: Floats, radius: Floats, state: _State | None) -> bool:
+        """Whether dG/dpsi changes more along the piece than over the angles."""
+        point = self._state(angle, 0.0 * radius, still=True)
+        if point is None or not len(angle):
+            return True
+        if state is None or not state.J.finite:
+            return self._state(angle, radius, still=True) is not None
+        try:
+            Y = np.abs(np.linalg.inv(point.J.mid))
+        except np.linalg.LinAlgError:
+            return False
+        second = self._second(state, angle, radius).size
+        bends, mixed = second[:, :-1, :-1] @ radius, second[:, :-1, -1]
+        turned, swept = (np.max(Y @ part @ radius / radius) for part in (bends, mixed))
+        return bool(swept > turned)
 
     def _refined(self, angle: Floats, radius: Floats, reach: Floats) -> SpaceRoot | Open | None:
         """The one zero of a box, enclosed as closely as floats can."""
@@ -355,10 +450,11 @@ class _Leaf:
         y, w = (None, None) if state is None else (state.y[:m], state.w[:m])
         cause = self._cause(angle, state)
         mode = self._free_mode(angle) if cause is Cause.RIGID else None
+        drift, swept = self._drift(angle, radius), self.piece and self._is_swept(angle, radius, state)
         angle, radius = angle[:q], radius[:q]
         low, high = np.maximum(angle - radius, -self.half), np.minimum(angle + radius, self.half)
         box = 0.5 * (low + high), 0.5 * np.abs(high - low) * SAFE + 4 * UNIT
-        return Open(node, y, w, self.centre, *box, cause, mode)
+        return Open(node, y, w, self.centre, *box, cause, mode, drift, swept)
 
     def _free_mode(self, angle: Floats) -> int:
         """The rigid mode that moves most along what the equations in the middle leave free; no claim."""
@@ -415,9 +511,10 @@ class _Leaf:
         # with the columns of q in place of those of -q, and with the rows of equilibrium of the other sign
         sign = -sign if (modes + len(self.free)) % 2 else sign
         q = len(self.turning)
+        drift = self._drift(angle, radius)
         angle, radius, reach = angle[:q], radius[:q], reach[:q]
         rigid = -state.y[m:] if modes else None
-        return SpaceRoot(state.y[:m], state.w[:m], self.centre, angle, radius, reach, sign, least, rigid)
+        return SpaceRoot(state.y[:m], state.w[:m], self.centre, angle, radius, reach, sign, least, rigid, drift)
 
     # -- evaluation over a box -------------------------------------------------------------------------------------
 
@@ -487,6 +584,24 @@ class _Leaf:
             there = bends[part] + add
             bends.mid[part], bends.rad[part] = there.mid, there.rad
         return bends
+
+    def _second(self, state: _State, angle: Floats, radius: Floats) -> Ball:
+        """Second derivatives of G with respect to (psi, s) over a box and a piece of alpha, (q, q + 1, q + 1)."""
+        q, box, (d, turned), own = len(angle), state.box, self._directions(angle, radius), np.arange(len(angle))
+        (m1, m2), (s1, s2), (t1, t2) = (self._slips(part) for part in (box.mixed(), box.ds[:, 0], box.twice()))
+        d1, d2 = d[:, 0], d[:, 1]
+        mixed = m1 * d2[:, None] - m2 * d1[:, None]
+        there = mixed[own, own] + (s1 * turned[:, 1] - s2 * turned[:, 0])
+        mixed.mid[own, own], mixed.rad[own, own] = there.mid, there.rad
+        second = Ball(np.zeros((q, q + 1, q + 1)), np.zeros((q, q + 1, q + 1)))
+        for part, value in (
+            ((slice(None), slice(0, q), slice(0, q)), self._bends(state, angle, radius)),
+            ((slice(None), slice(0, q), q), mixed),
+            ((slice(None), q, slice(0, q)), mixed),
+            ((slice(None), q, q), t1 * d2 - t2 * d1),
+        ):
+            second.mid[part], second.rad[part] = value.mid, value.rad
+        return second
 
     def _slips(self, w: Ball) -> tuple[Ball, Ball]:
         """Both components of v at the nodes in sectors, times ``slip_scale`` of FrictionUnits; ``w`` by rows."""

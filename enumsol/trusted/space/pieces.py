@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 #: What a writer of proofs asks for beyond what a checker does, of the size of a box.
 _MARGIN = 2.0**-10
+#: Halvings of the way through a box.
+_STEPS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,8 +92,8 @@ class AlphaPiece:
             found[(1 + k) * p + nodes] = Ball(part.mid * force[nodes], part.rad * force[nodes] + TINY)
         return found
 
-    def displacements(self, y: Ball, w: Ball) -> Ball:
-        """The same of displacements w, (3p,), at all alpha of the piece."""
+    def displacements(self, y: Ball, w: Ball, alpha: Ball) -> Ball:
+        """The same of displacements w, (3p,), at all alpha of a ball."""
         system, (_, length), p = self.whole, self.units, len(self.units[0])
         found = Ball(np.zeros(3 * p), np.zeros(3 * p))
         found[:p] = Ball(w.mid[:p] * length, w.rad[:p] * length + TINY)
@@ -107,7 +109,7 @@ class AlphaPiece:
             data = self.enclosure
             S, g0, g1 = Ball(data.S, data.S_rad), Ball(data.g0, data.g0_rad), Ball(data.g1, data.g1_rad)
             pushed = (S[missing] @ self.forces(y)[:, None])[:, 0]
-            found[missing] = g0[missing] + self.alphas * g1[missing] - pushed
+            found[missing] = g0[missing] + alpha * g1[missing] - pushed
         return found
 
     @cached_property
@@ -149,18 +151,39 @@ class AlphaPiece:
         there = self.point.held(codes)
         return isinstance(there, SpaceRoot) and lies_in(self.point.place(there, given), curve, errors)
 
-    def holds_all(self, codes: Sequence[int], given: AlphaProblem, curve: SolutionCurve, errors: float = 1.0) -> bool:
-        """Whether all roots of a leaf are on the curve of a box, at every alpha of the piece."""
+    def holds_all(
+        self, codes: Sequence[int], given: AlphaProblem, curves: Sequence[SolutionCurve], errors: float = 1.0
+    ) -> bool:
+        """Whether all roots of a leaf are on the curve of some boxes, at every alpha of the piece."""
         found = self.held(codes)
-        place = None if found is None else self.place(found, given)
-        return found is None or lies_in(place, curve, errors)
+        return found is None or any(lie_along(ends, curves, errors) for ends in self.places(found, given))
 
     def place(self, found: SpaceRoot | Open, given: AlphaProblem) -> Ball | None:
         """Bounds of (zeta, alpha) of what a leaf holds, (3p + 1,); None where there are none."""
         if found.y is None or found.w is None:
             return None
-        zeta = given.coordinates(self.forces(found.y), self.displacements(found.y, found.w))
-        return Ball.joined(zeta, self.alphas[None])
+        return self._placed(found.y, found.w, self.alphas, given)
+
+    def places(self, found: SpaceRoot | Open, given: AlphaProblem) -> list[tuple[Ball, ...]]:
+        """Bounds of (zeta, alpha) of what a leaf holds: all of it lies in each of these, or between two of them."""
+        place = self.place(found, given)
+        if found.drift is None:
+            return [] if place is None else [(place,)]
+        # alpha is affine in s
+        middle, half = (self._rounded(part) for part in (self.middle, (self.high - self.low) / 2))
+        ends = []
+        for both, s in found.drift:
+            m = len(both.mid) // 2
+            ends.append(self._placed(both[:m], both[m:], middle + half * s, given))
+        return [] if place is None else [(place,), tuple(ends)]
+
+    @staticmethod
+    def _rounded(number: Fraction) -> Ball:
+        near = float(number)
+        return Ball(np.array(near), np.array(float(abs(number - Fraction(near))) * (1.0 + 4 * UNIT) + TINY))
+
+    def _placed(self, y: Ball, w: Ball, alpha: Ball, given: AlphaProblem) -> Ball:
+        return Ball.joined(given.coordinates(self.forces(y), self.displacements(y, w, alpha)), alpha[None])
 
 
 def lies_in(place: Ball | None, curve: SolutionCurve, errors: float = 1.0) -> bool:
@@ -169,6 +192,36 @@ def lies_in(place: Ball | None, curve: SolutionCurve, errors: float = 1.0) -> bo
     ``errors``: 1 proves, a writer of proofs takes more.
     """
     return place is not None and curve.holds(place, 1.0 - (errors - 1.0) * _MARGIN)
+
+
+def lie_along(ends: Sequence[Ball], curves: Sequence[SolutionCurve], errors: float = 1.0) -> bool:
+    """Whether all between two bounds, or within one, is on the curve of some boxes, in one box after the other.
+
+    The sets in which curves are the only solutions are convex: what is between two bounds that lie in one does so, too.
+    """
+    if not curves:
+        return False
+    low, high = ends[0], ends[-1]
+    if not lies_in(low, curves[0], errors):
+        low, high = high, low
+    place, share = low, 0.0
+    for curve in curves[:-1]:
+        if not lies_in(place, curve, errors):
+            return False
+        # as far as this box has all of it
+        step = 1.0 - share
+        for _ in range(_STEPS):
+            step *= 0.5
+            ahead = _between(low, high, share + step)
+            if lies_in(ahead, curve, errors):
+                place, share = ahead, share + step
+    return lies_in(place, curves[-1], errors) and lies_in(high, curves[-1], errors)
+
+
+def _between(low: Ball, high: Ball, share: float) -> Ball:
+    """A ball of (1 - share) x + share y for all x and y of two balls."""
+    rest = 1.0 - share
+    return low * Ball.exact(np.array(rest)) + high * Ball.exact(np.array(share))
 
 
 def _inverse(F: Ball) -> Ball:

@@ -36,9 +36,8 @@ class Box:
     ----------
     y, w : Ball of shape (m,)
         w is zero, exactly, where the equations say so.
-    dw : Ball of shape (m, q)
-    ds : Ball of shape (m, k)
-        Derivatives of w with respect to the free unknowns.
+    slope, lone : Ball of shape (2 m, q), (2 m, k)
+        Derivatives of y, then of w, with respect to the angles and to the free unknowns.
     x : Ball of shape (q,)
         The turning nodes' normal forces.
     z : Ball of shape (q, q)
@@ -47,16 +46,32 @@ class Box:
         Change of w with forces of size one along d.
     across : Ball of shape (m, q)
         The same a quarter turn further, so that dw_j is across_j x_j.
+    lag : Ball of shape (q, k)
+        -dx with respect to the free unknowns.
+    share : Ball of shape (q,), or None
+        Over a piece of alpha (see Turning).
     """
 
     y: Ball
     w: Ball
-    dw: Ball
-    ds: Ball
+    slope: Ball
+    lone: Ball
     x: Ball
     z: Ball
     along: Ball
     across: Ball
+    lag: Ball
+    share: Ball | None
+
+    @property
+    def dw(self) -> Ball:
+        """Derivatives of w with respect to the angles."""
+        return self.slope[len(self.w.mid) :]
+
+    @property
+    def ds(self) -> Ball:
+        """Derivatives of w with respect to the free unknowns."""
+        return self.lone[len(self.w.mid) :]
 
     def bends(self) -> Ball:
         """Second derivatives of w with respect to the angles, (m, q, q)."""
@@ -69,6 +84,24 @@ class Box:
         own = bends[:, diagonal, diagonal] + self.along * self.x
         bends.mid[:, diagonal, diagonal], bends.rad[:, diagonal, diagonal] = own.mid, own.rad
         return Ball(-bends.mid, bends.rad)
+
+    def mixed(self) -> Ball:
+        """Over a piece of alpha, second derivatives of w with respect to the angles and to s, (m, q).
+
+        With x_s = -lag, and across_j,s = across_j share_j / (1 + s share_j) - sum_k along_k share_k z_kj.
+        """
+        assert self.share is not None
+        size = self.share.size
+        # share / (1 + s share), |s| <= 1
+        grown = Ball(self.share.mid, (self.share.rad + size * size / np.where(size < 1, 1.0 - size, 0.0)) * SAFE)
+        turned = self.across * grown - self.along @ (self.share[:, None] * self.z)
+        return turned * self.x - self.across * self.lag[:, 0]
+
+    def twice(self) -> Ball:
+        """Over a piece of alpha, second derivatives of w with respect to s, (m,): x_ss is 2 straight share lag."""
+        assert self.share is not None
+        moved = self.share * self.lag[:, 0]
+        return -(self.along @ (moved + moved)[:, None])[:, 0]
 
 
 @dataclass(frozen=True)
@@ -266,6 +299,7 @@ class Turning:
                 moves = (z * x) @ span
                 lag = shift if self.share is None else shift + (straight @ (share * x)[:, None])
                 x = smaller(x, point.x - (moves + lag @ beside if len(free.mid) else moves)[:, 0])
+        lag = shift if self.share is None else shift + straight @ (share * x)[:, None]
         across, along = push - moved @ z, ahead - moved @ straight
         value, slope, lone = start + (moved @ x[:, None])[:, 0], across * x, lone - moved @ shift
         if self.share is not None:
@@ -276,7 +310,7 @@ class Turning:
             value = smaller(value, Ball.joined(point.y, point.w) + moves[:, 0])
         w = value[m:]
         w.mid[self.rows], w.rad[self.rows] = 0.0, 0.0
-        return Box(value[:m], w, slope[m:], lone[m:], x, z, along[m:], across[m:])
+        return Box(value[:m], w, slope, lone, x, z, along[m:], across[m:], lag, self.share)
 
 
 def _quotient_error(one: Ball, other: Ball) -> Floats:
