@@ -20,7 +20,8 @@ def checked(problem, **options):
     roots = enumsol.enumerate_roots(problem, 0, **options)
     report = accepted_report(problem, roots.proof)
     assert (report.roots, report.complete) == (len(roots), roots.complete)
-    assert (report.within is not None) == roots.rigid_bound.needed
+    # a checker may see that the bound is not needed where a search, which allows for its errors, does not
+    assert report.within is None or roots.rigid_bound.needed
     return roots
 
 

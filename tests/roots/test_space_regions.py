@@ -261,7 +261,7 @@ def test_the_reason_is_what_stands_in_the_way_and_the_hint_helps():
 
 @pytest.mark.long
 def test_a_body_that_is_almost_free_to_move():
-    roots = enumerate_roots(body(1e-9, 0.1), 0, max_nodes=600)
+    roots = enumerate_roots(body(1e-10, 0.1), 0, max_nodes=2500)
     reasons = {(region.reason, region.hint) for region in roots.undecided}
     assert (Cause.ROUNDING.value, "hold the body by stiffer springs") in reasons
-    assert enumerate_roots(body(1e-8, 0.1), 0).complete
+    assert enumerate_roots(body(1e-9, 0.1), 0).complete

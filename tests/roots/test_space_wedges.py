@@ -49,7 +49,7 @@ def test_all_roots_of_a_wedge_that_jams(name):
     rng = np.random.default_rng(1)
     unreached = solve_as_newton_does(problem, alpha, roots, some(300, of=600), rng)
     assert all(enumsol.is_fixed_point(problem, root) for root in roots)
-    assert len(unreached) <= 1
+    assert len(unreached) <= 2
 
     size = max(np.max(root.lambda_n) for root in roots)
     starts = [0.0, *(size * rng.exponential(size=(12, problem.p)))]
