@@ -266,6 +266,8 @@ CLAIMS = [
 ]
 #: Paragraphs that name a study without a number of its results.
 WITHOUT_NUMBERS = {
+    ("architecture.md", "branching_rule"),
+    ("architecture.md", "search_in_3d_choices"),
     ("README.md", "peers"),
     ("README.md", "same_body_by_other_codes"),
     ("arithmetic.md", "extremes"),
