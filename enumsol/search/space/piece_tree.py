@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 #: Pieces whose engines are kept.
 _KEPT = 32
 #: Pieces are cut down to this share of the interval where only their length stands in the way of a certificate.
-_ALONE = 2.0**-9
+_ALONE = 2.0**-5
 #: Pieces are cut so often at most between two branchings where multipliers fail at their ends only.
 _CUTS = 2
 #: Around the directions of known curves sectors get more room by this share of what these turn by, and are no narrower
