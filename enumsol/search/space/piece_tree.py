@@ -206,8 +206,6 @@ class PieceTree:
         )
         self._b = np.array([curve.reach for curve in self._boxes])
         self._h = np.array([box.half for box in boxes])
-        reach = np.abs(self._d[:, -1]) * self._h + self._b[:, -1]
-        self._low, self._high = self._c[:, -1] - reach, self._c[:, -1] + reach
         return True
 
     def _is_known(self, x: Array) -> bool:
@@ -432,8 +430,8 @@ class PieceTree:
         if numbers is not None and piece.lies_on(known, run, statuses, numbers, ERRORS):
             before = sum(len(other.chain.links) for other in self.curves[: passage.curve])
             return OnlyOnCurve(numbers, before + run.first, before + run.last), []
-        middle = known.over(run, piece.middle, piece.middle)
-        if self._is_longer(piece, _ALONE) and at.proposals.is_hopeful(statuses, middle):
+        longer = self._is_longer(piece, _ALONE)
+        if longer and at.proposals.is_hopeful(statuses, known.over(run, piece.middle, piece.middle)):
             # a leaf may be decided over a longer piece
             done = None if {CONTACT, UNDECIDED} & set(codes) else self._leaf(at, codes)
             return self._halved(at, codes) if done is None or isinstance(done[0], OpenLeaf) else done
