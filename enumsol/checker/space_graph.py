@@ -144,11 +144,10 @@ class SpaceGraphChecker:
         self.curves.append(chain)
 
     def _compare(self) -> None:
-        """Refuse curves that may be the same: whole ones are, if they have a point in common."""
-        assert self.interval is not None
+        """Refuse curves that may have a point in common, and so all that they have between the ends of one of them."""
         for k, one in enumerate(self.curves):
             for other in self.curves[:k]:
-                if one.closed == other.closed and not apart(one.joints, other.links, self.interval):
+                if not apart(one, other):
                     self._fail("two curves may be the same")
 
 

@@ -21,8 +21,8 @@ def test_one_curve_followed_twice_is_not_two(monkeypatch):
     one, other = found
     assert (one.whole, other.whole) == (True, True)
     assert float(other.joints[-1].alphas[0]) > float(one.joints[-1].alphas[1]) + 0.004
-    assert not apart(other.joints, one.links, interval)
-    assert not apart(one.joints, other.links, interval)
+    assert not apart(other, one)
+    assert not apart(one, other)
 
 
 @pytest.mark.parametrize("alpha", [0.41, 0.59])

@@ -130,9 +130,7 @@ class SpaceCover:
     def _is_new(self, chain: Chain) -> bool:
         """Whether a chain is proven to be whole, and none that is known."""
         whole = chain.whole and (chain.closed or leaves_interval(chain.links, chain.joints, self.interval))
-        return whole and all(
-            other.closed != chain.closed or apart(chain.joints, other.links, self.interval) for other in self.chains
-        )
+        return whole and all(apart(chain, other) for other in self.chains)
 
     def proof(self) -> Proof:
         """Curves and tree for ``enumsol.verify``."""

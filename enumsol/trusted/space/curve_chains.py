@@ -117,14 +117,18 @@ def leaves_interval(
     return _leaves(links[0], joints[0], -1, interval) and _leaves(links[-1], joints[-1], 1, interval)
 
 
-def apart(joints: Sequence[SolutionCurve], links: Sequence[CurveLink], interval: tuple[Fraction, Fraction]) -> bool:
-    """Whether a whole curve with these points is another one than that of some links, over an interval.
+def apart(one: CurveChain, other: CurveChain) -> bool:
+    """Whether two whole curves have no point in common.
 
-    Its points inside the interval, of which there is one at least, lie in none of the links. Those beyond it say
-    nothing: two chains along one curve end at different points there.
+    From a point in common they run on together until one of them ends, or, if both are closed, all the way round. So
+    the ends of neither lie in a box of the other one, of a closed curve any of its points.
     """
-    inside = [joint for joint in joints if interval[0] < joint.alphas[0] and joint.alphas[1] < interval[1]]
-    return bool(inside) and all(_outside(link.curve.box, joint.at(0.0)) for joint in inside for link in links)
+    return _ends_outside(one, other) and _ends_outside(other, one)
+
+
+def _ends_outside(one: CurveChain, other: CurveChain) -> bool:
+    ends = one.joints[:1] if one.closed else (one.joints[0], one.joints[-1])
+    return all(_outside(link.curve.box, end.at(0.0)) for end in ends for link in other.links)
 
 
 def _outside(box: CurveBox, x: Ball) -> bool:
