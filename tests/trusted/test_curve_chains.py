@@ -4,12 +4,14 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from problems3d import SLIDING, sliding_node
+from complete import only_root
+from problems3d import SLIDING, random_over_alpha, sliding_node
 
+from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space import chains
 from enumsol.branches.space.chains import chain_through
-from enumsol.trusted.space.curve_chains import apart
-from enumsol.trusted.space.solution_curve import AlphaProblem
+from enumsol.trusted.space.curve_chains import CurveChain, apart
+from enumsol.trusted.space.solution_curve import AlphaProblem, curve_around, curve_point, lies_in
 
 
 def test_one_curve_followed_twice_is_not_two(monkeypatch):
@@ -33,3 +35,21 @@ def test_a_chain_reaches_beyond_both_ends(alpha):
     assert ends[0][1] < interval[0]
     assert ends[1][0] > interval[1]
     assert all(link.curve.index == 1 for link in chain.links)
+
+
+def test_a_point_where_a_curve_bends_beyond_its_box_is_on_it():
+    problem, alpha = random_over_alpha(2, 126), 0.5
+    given, root = AlphaProblem.of(problem.enclosure), only_root(problem, alpha)
+    x = np.concatenate([root.lambda_n, *root.lambda_t.T, [alpha]])
+    chain = chain_through(given, problem, x, (Fraction(0), Fraction(1)))
+    (corner,) = (link for link in chain.links if None in link.curve.statuses)
+    box = corner.curve.box
+    beside = 0
+    for t in np.linspace(float(corner.start.mid), float(corner.end.mid), 9)[1:-1]:
+        point = curve_point(given, corner.curve.at(t).mid, box.border)
+        if None in point.statuses or any(lies_in(link.curve.box, Ball.exact(point.x)) for link in chain.links):
+            continue
+        joint = curve_around(given, point.x, point.direction, box.border, 0.0)
+        beside += 1
+        assert not apart(CurveChain([], [joint], True), chain)
+    assert beside > 2

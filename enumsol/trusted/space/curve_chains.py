@@ -128,16 +128,16 @@ def apart(one: CurveChain, other: CurveChain) -> bool:
 
 def _ends_outside(one: CurveChain, other: CurveChain) -> bool:
     ends = one.joints[:1] if one.closed else (one.joints[0], one.joints[-1])
-    return all(_outside(link.curve.box, end.at(0.0)) for end in ends for link in other.links)
+    return all(_outside(link.curve, end.at(0.0)) for end in ends for link in other.links)
 
 
-def _outside(box: CurveBox, x: Ball) -> bool:
-    """Whether all of a ball is beyond a box."""
-    t = parameter_in(box, x)
-    if abs(t.mid) - t.rad * SAFE > box.half:
+def _outside(curve: SolutionCurve, x: Ball) -> bool:
+    """Whether a curve has no point in a ball: it may bend beyond its box where a node changes its status."""
+    t = parameter_in(curve.box, x)
+    if abs(t.mid) - t.rad * SAFE > curve.box.half:
         return True
-    beside = (x - Ball.exact(box.centre)) - t * Ball.exact(box.direction)
-    return bool(np.any(np.abs(beside.mid) - beside.rad * SAFE > box.radius))
+    beside = (x - Ball.exact(curve.box.centre)) - t * Ball.exact(curve.box.direction)
+    return bool(np.any(np.abs(beside.mid) - beside.rad * SAFE > curve.spread))
 
 
 def _same(one: CurveBox, other: CurveBox) -> bool:
