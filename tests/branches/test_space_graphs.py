@@ -6,6 +6,7 @@ from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise, product
 from math import sqrt
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -30,10 +31,11 @@ import enumsol
 from enumsol.arithmetic.balls import Ball
 from enumsol.branches.claims import uniqueness_bound
 from enumsol.branches.elements import VertexKind
-from enumsol.branches.space import cover
+from enumsol.branches.space import chains, cover
 from enumsol.branches.space.chains import chain_through
 from enumsol.branches.space.make_curved import unordered
 from enumsol.branches.space.pieces import Run, Turn, orders, runs_and_turns
+from enumsol.continuation.path_data import PathStatus
 from enumsol.trusted.space.curve_chains import leaves_interval
 from enumsol.trusted.space.curve_events import CurveMotion
 from enumsol.trusted.space.sector_rows import OPEN, STICK
@@ -332,6 +334,18 @@ def test_a_curve_is_whole_over_an_interval_in_which_continuation_has_to_take_ver
     assert leaves_interval(chain.links, chain.joints, interval)
 
 
+def test_no_curve_is_followed_from_where_continuation_goes_neither_way(monkeypatch):
+    """From a fold, for example (node 258 with a load): the skeleton would be one point."""
+    node = OneNode(20, load=True)
+    alpha, n, t = node.at(node.folds()[-1])
+    still = SimpleNamespace(
+        lambda_n=np.array([[n]]), lambda_t=t[None, None], alpha=[alpha], status=PathStatus.STALLED, transitions=[]
+    )
+    monkeypatch.setattr(chains, "_path", lambda *_: still)
+    given = AlphaProblem.of(node.problem.enclosure)
+    assert chain_through(given, node.problem, np.array([n, *t, alpha]), around(alpha, 1)) is None
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("first", range(0, 500, 20))
 def test_folds_of_many_nodes_are_those_of_the_closed_form(first):
@@ -352,7 +366,11 @@ def fold_is_found(node, given, phi, way):
     chain = chain_through(given, node.problem, np.array([n, *t, alpha]), around(fold, 5 * abs(alpha - fold)))
     if chain is None or not chain.whole:
         return False
-    (turn,) = (part for part in runs_and_turns(given, chain) if isinstance(part, Turn))
+    turns = [part for part in runs_and_turns(given, chain) if isinstance(part, Turn)]
+    if len(turns) != 1:
+        # the curve ends before it turns, or turns again where the node loses contact
+        return False
+    (turn,) = turns
     low, high = turn.alphas
     near = Fraction(1e-12 * max(1.0, abs(fold)))
     assert low - near <= Fraction(fold) <= high + near

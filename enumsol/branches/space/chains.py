@@ -126,7 +126,9 @@ def skeleton_through(problem: ContactProblem3D, x: Array, span: tuple[float, flo
             lines[k] = np.vstack([line, line[-1] + _BEYOND * (line[-1] - line[-2])])
     back, last = lines[0][::-1], len(lines[0]) - 1
     places = {last - k for k in corners[0]} | {last + k for k in corners[1]}
-    return Skeleton(np.vstack([back, lines[1][1:]]), sorted(places), closed=False)
+    points = np.vstack([back, lines[1][1:]])
+    # from a fold continuation may start in neither direction
+    return Skeleton(points, sorted(places), closed=False) if len(points) > 1 else None
 
 
 def _path(problem: ContactProblem3D, start: tuple[float, Array, Array], way: int, span: tuple[float, float]) -> Path:
