@@ -5,9 +5,9 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from problems3d import in_space
+from space_graph_proofs import closed_branch
 
-from enumsol import enumerate_roots, gallery, verify
+from enumsol import enumerate_roots, verify
 from enumsol.branches.space.chains import chain_through
 from enumsol.branches.space.cover import SpaceCover
 from enumsol.search.space.piece_tree import OpenLeaf
@@ -16,9 +16,7 @@ from enumsol.trusted.space.solution_curve import AlphaProblem
 
 @functools.cache
 def problem():
-    """Two nodes with a branch that is closed, for alpha from 0.953 to 1.441."""
-    options = {"friction": (0.5, 1.7), "load_slope": ((-1.1, -0.2), (-0.8, 0.3))}
-    return in_space(gallery.two_node_square((3.7, -5.3), (1.1, 0.9), **options))
+    return closed_branch()
 
 
 @functools.cache

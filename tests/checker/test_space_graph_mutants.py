@@ -1,0 +1,99 @@
+"""Mutants of graphs' proofs in 3D are refused, or what they say of curves and leaves is true."""
+
+import functools
+from collections import Counter
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from complete import complete_report
+from effort import some
+from problems3d import OneNode, in_space, random_over_alpha, random_plane_over_alpha
+from proof_tools import copied, proof_of, records_of
+from space_graph_proofs import GraphTruth, Parts, closed_branch, mutant
+
+from enumsol import ProofFormatError, verify
+from enumsol.branches.space.cover import SpaceCover
+
+
+def orthotropic(p, seed):
+    problem = random_over_alpha(p, seed)
+    (F, _), (slope, _) = problem.friction, problem.friction_slope
+    return problem.replace(friction=(F, 0.5 * F), friction_slope=(slope, 0.5 * slope))
+
+
+CASES = {
+    "friction": (lambda: random_over_alpha(2, 115), "0", "1"),
+    "three curves": (lambda: random_over_alpha(2, 100), "0", "1/64"),
+    "plane": (lambda: in_space(random_plane_over_alpha(1, 5)), "0", "1"),
+    "orthotropic": (lambda: orthotropic(1, 514), "0", "1"),
+    "load": (lambda: OneNode(5, load=True).problem, "-1", "1"),
+    "fold": (lambda: random_over_alpha(2, 119), "0", "1/8"),
+    "curves": (lambda: random_over_alpha(1, 513), "0", "1"),
+    "closed": (closed_branch, "1.3", "1.6"),
+}
+
+
+@functools.cache
+def proven(name):
+    """Problem, proof and records of a graph that leaves nothing open."""
+    build, low, high = CASES[name]
+    cover = SpaceCover(build(), (Fraction(low), Fraction(high)))
+    cover.search(max_nodes=700)
+    proof = cover.proof()
+    return cover.problem, proof, records_of(proof)
+
+
+@pytest.mark.few(0, 2)
+@pytest.mark.parametrize("name", CASES)
+def test_mutants_are_refused_or_say_what_is_true(name):
+    problem, proof, records = proven(name)
+    truth, rng, told = GraphTruth(problem, records), np.random.default_rng(40), Counter()
+    assert not truth.falsehoods(complete_report(problem, proof), proof)
+    for k in range(some(20, of=250)):
+        found, how = mutant(rng, records)
+        try:
+            report = verify(problem, found)
+        except ProofFormatError:
+            told["unreadable"] += 1
+            continue
+        told[report.ok] += 1
+        if report.ok:
+            assert not truth.falsehoods(report, found), (k, how)
+    assert told[False] > told[True] > 0
+
+
+@pytest.mark.few(0, 1)
+@pytest.mark.parametrize("name", ["three curves", "closed"])
+def test_the_judge_of_mutants_sees_wrong_claims(name):
+    """Each of these would be wrong if it was accepted."""
+    problem, proof, records = proven(name)
+    truth, report = GraphTruth(problem, records, count=8), complete_report(problem, proof)
+
+    def judged(change):
+        parts = Parts.of(copied(records))
+        change(parts)
+        parts.count()
+        return truth.falsehoods(replace(report, curves=len(parts.curves)), proof_of(parts.records()))
+
+    def no_solutions(parts):
+        parts.tree = [["n"] if record[0] in ("k", "r", "m") else record for record in parts.tree]
+
+    def other_curve(parts):
+        starts = parts.first_boxes()
+        parts.renumber(lambda box: starts[1] if box < starts[1] else 0)
+
+    def a_curve_twice(parts):
+        parts.curves.append(parts.curves[0])
+
+    def too_short(parts):
+        del parts.curves[0][1 : len(parts.curves[0]) // 4 * 2 + 1]
+
+    def moved(parts):
+        for record in parts.curves[-1]:
+            record[1] = [x * 1.01 for x in record[1]]
+
+    assert not judged(lambda parts: None)
+    for change in (no_solutions, other_curve, a_curve_twice, too_short, moved):
+        assert judged(change), change.__name__
