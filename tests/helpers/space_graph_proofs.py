@@ -501,7 +501,9 @@ class _Curve:
     def wrong(self, problem, low, high):
         """What is wrong of its points: they are solutions, and the ends lie beyond the interval."""
         for record, alpha in zip(self.records[::2], self._alphas, strict=True):
-            F, data = problem.friction_at(alpha), problem.condensed
+            # beyond the interval it may be negative
+            F = np.transpose(problem.friction) + alpha * np.transpose(problem.friction_slope)
+            data = problem.condensed
             lam = self.given.unplaced(np.array(record[_CENTRE]))[:-1]
             far = max(record[_RADIUS]) / np.abs(lam).max() if lam.any() else np.inf
             if np.all(F >= 0) and violation(data.S, data.free_displacements(alpha), F, lam) > 1e-6 + 1e2 * far:
