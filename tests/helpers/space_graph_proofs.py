@@ -559,7 +559,7 @@ def _has(status, angle, code):
 
 
 def _within(angle, number):
-    """Whether a direction lies in a sector and not at its ends (docs/proof_format.md, section 7.2)."""
+    """Whether a direction lies in a sector and not at its ends (docs/proof_format.md, under Sectors)."""
     begin, end = (_angle(share) for share in space_proofs.arc_of_sector(number))
     return 1e-7 < (angle - begin) % (2 * np.pi) < (end - begin) % (2 * np.pi) - 1e-7
 
