@@ -62,7 +62,7 @@ def test_one_certificate_says_that_a_curve_has_all_solutions_of_a_piece():
     assert all(len(enumerate_roots(cover.problem, alpha)) == 1 for alpha in (0.5, 0.75, 1))
 
 
-@pytest.mark.parametrize("way", ["numbers", "theta", "run", "backwards", "no box", "piece", "none"])
+@pytest.mark.parametrize("way", ["numbers", "huge", "theta", "run", "backwards", "no box", "piece", "none", "steps"])
 def test_forged_certificates_over_a_piece_are_refused(way):
     cover = block_by_certificates()
     records = records_of(cover.proof())
@@ -70,6 +70,8 @@ def test_forged_certificates_over_a_piece_are_refused(way):
     _, numbers, first, last = records[k]
     forged = {
         "numbers": put(records, (k, 1, 0), -numbers[0]),
+        # nu, the square of which overflows
+        "huge": put(records, (k, 1, 2 * cover.problem.p), 1e200),
         "theta": put(records, (k, 1), numbers[:8] + [number + 30.0 for number in numbers[8:]]),
         "run": put(records, (k, 3), first),
         "backwards": put(records, (k,), ["m", numbers, last, first]),
@@ -77,6 +79,7 @@ def test_forged_certificates_over_a_piece_are_refused(way):
         # the same said of more than the curve passes
         "piece": put(records, (0, "interval"), ["1/1000", "50"]),
         "none": replaced(records, k),
+        "steps": put(records, (0, "steps", 0), 1e308),
     }
     assert not verify(cover.problem, proof_of(forged[way])).ok
 

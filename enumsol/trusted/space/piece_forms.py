@@ -63,8 +63,9 @@ class PieceWeights:
         (mu, kappa), vectors = numbers[: 2 * p].reshape(2, p), numbers[2 * p :].reshape(3, m - p)
         place = np.where(system.tau >= 0, system.tau - p, m - p)
         nu, low, high = (np.append(vector, 0.0)[place] for vector in vectors)
-        wrong = (mu <= 0) | (kappa <= 0) | (upper_norm(nu, axis=1) * system.largest_discs * SAFE > mu)
-        return None if np.any(wrong) else cls(mu, kappa, nu, (low, high))
+        with np.errstate(over="ignore", invalid="ignore"):
+            right = (mu > 0) & (kappa > 0) & (upper_norm(nu, axis=1) * system.largest_discs * SAFE <= mu)
+        return cls(mu, kappa, nu, (low, high)) if np.all(right) else None
 
 
 def only_on_curve(

@@ -153,10 +153,12 @@ class AlphaProblem:
         if not (S.finite and g0.finite and g1.finite):
             raise NotEnclosedError("the condensed problem over- or underflows float64; expected data in other units")
         tau = [np.array([(1 + k) * p + i for k in range(2) if occurs[k, i]], dtype=np.intp) for i in range(p)]
-        rho = _steps(S.mid / inverse.mid, tau) if steps is None else steps / (force / length)
-        turned = Ball.exact(rho[:, None]) * S * ratio + Ball.exact(np.eye(3 * p))
-        right = Ball.exact(rho)[:, None] * Ball.beside(g1[:, None], g0[:, None])
-        found = solution(turned, Ball.beside(Ball.exact(np.eye(3 * p)), right))
+        # the steps of a proof may be any floats
+        with np.errstate(over="ignore", invalid="ignore"):
+            rho = _steps(S.mid / inverse.mid, tau) if steps is None else steps / (force / length)
+            turned = Ball.exact(rho[:, None]) * S * ratio + Ball.exact(np.eye(3 * p))
+            right = Ball.exact(rho)[:, None] * Ball.beside(g1[:, None], g0[:, None])
+            found = solution(turned, Ball.beside(Ball.exact(np.eye(3 * p)), right)) if turned.finite else None
         if found is None:
             raise NotEnclosedError("forces and displacements of the condensed problem cannot be told apart")
         part, offset = found[:, : 3 * p + 1], found[:, 3 * p + 1]
