@@ -2,10 +2,10 @@
 
 A tree is given by its records in the order of a walk: ``["a", alpha]`` (the piece is cut there), ``["b", node, codes]``
 (a status is split), ``["x", rows, multipliers]`` (no solution over the piece), ``["n"]`` (the same, by the equations of
-a leaf), ``["k", first, last]`` (all solutions of a leaf lie in boxes of one curve), ``["r", box]`` (the roots of a
-leaf, one at every alpha, are an arc, which is in the box at the middle), ``["m", numbers, first, last]`` (all solutions
-with the statuses of the assignment lie on the curve between two boxes, by one certificate) and ``["u", reason]`` (open:
-a gap).
+a leaf), ``["k", first, last]`` (all solutions of a leaf lie in boxes of one curve), ``["r", box, low, high, alpha,
+codes]`` (the roots of a leaf lie on one arc over another piece, and one of its points is in the box), ``["m", numbers,
+first, last]`` (all solutions with the statuses of the assignment lie on the curve between two boxes, by one
+certificate) and ``["u", reason]`` (open: a gap).
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ class PieceTreeChecker:
         RefusedError
             They are no tree.
         """
-        problem = self.enclosure.problem
+        problem, self._interval = self.enclosure.problem, (low, high)
         pairs = list(zip(problem.friction, problem.friction_slope, strict=True))
         ends = [[exactly_at(end, *pair) for end in (low, high)] for pair in pairs]
         occurs = [[max(values) > 0 for values in zip(*both, strict=True)] for both in ends]
@@ -135,16 +135,25 @@ class PieceTreeChecker:
         if not is_complete(piece.whole, codes):
             return "its statuses are not final"
         if isinstance(leaf, NoRoot):
-            return None if piece.held(codes) is None else "it is not proven to hold no root"
+            return None if piece.narrowed(codes)[1] is None else "it is not proven to hold no root"
         if isinstance(leaf, InCurveBoxes):
             (known, first), (other, last) = self._boxes[leaf.first], self._boxes[leaf.last]
             curves = [link.curve for link in known.chain.links[first : last + 1]] if known is other else []
             inside = piece.holds_all(codes, self.given, curves)
             return None if inside else "its roots are not proven to lie in its boxes"
         if isinstance(leaf, ThroughCurveBox):
-            met = piece.meets(codes, self.given, self._curve(leaf.box))
+            met = self._is_arc(piece.narrowed(codes)[0], codes, leaf)
             return None if met else "its roots are not proven to be an arc through its box"
         raise AssertionError(leaf)
+
+    def _is_arc(self, narrowed: AlphaPiece, codes: Codes, leaf: ThroughCurveBox) -> bool:
+        """Whether the roots of a leaf are on an arc, which is over a longer piece than they, through a box."""
+        (a, b), (low, high) = self._interval, leaf.piece
+        if not a <= low <= narrowed.low <= narrowed.high <= high <= b:
+            return False
+        whole = AlphaPiece(self.enclosure, low, high, self.units)
+        arc = whole.arc(codes)
+        return arc is not None and whole.meets(arc, leaf.point, self.given, self._curve(leaf.box))
 
     def _curve(self, box: int) -> SolutionCurve:
         known, number = self._boxes[box]

@@ -274,16 +274,49 @@ class InCurveBoxes(Record):
 
 @dataclass(frozen=True)
 class ThroughCurveBox(Record):
-    """There is one regular root at every alpha of the piece, in this box at the middle."""
+    """All roots over the piece lie on one arc, and one of its points in this box.
 
-    kind, sizes = "r", (2,)
+    Attributes
+    ----------
+    box : int
+    low, high : str
+        The arc is one over this piece, which has all alpha of the roots.
+    alpha : str
+    leaf : codes of a leaf whose root at that alpha is the point
+    """
+
+    kind, sizes = "r", (6,)
 
     box: int
+    low: str
+    high: str
+    alpha: str
+    leaf: tuple[int, ...]
 
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> ThroughCurveBox:
-        """The number of the box."""
-        return cls(*_boxes(entries, limits))
+        """The entries; RecordError where there is no such box, or they are no numbers or no leaf."""
+        box, low, high, alpha, leaf = entries
+        _boxes([box], limits)
+        if not isinstance(leaf, list) or len(leaf) != limits.p or not all(map(_is_final, leaf)):
+            raise RecordError("the leaf of a point of an arc is none")
+        try:
+            inside = rational_from(low) <= rational_from(alpha) <= rational_from(high)
+        except ValueError as error:
+            raise RecordError(f"an arc is over no piece: {error}") from None
+        if not inside:
+            raise RecordError("a point of an arc is not over its piece")
+        return cls(box, low, high, alpha, tuple(leaf))
+
+    @property
+    def piece(self) -> tuple[Fraction, Fraction]:
+        """Of the arc."""
+        return rational_from(self.low), rational_from(self.high)
+
+    @property
+    def point(self) -> tuple[Fraction, tuple[int, ...]]:
+        """Alpha and the leaf."""
+        return rational_from(self.alpha), self.leaf
 
 
 def _boxes(entries: list[Any], limits: Limits) -> list[int]:

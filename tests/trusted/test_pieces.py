@@ -13,7 +13,7 @@ from enumsol.branches.space.chains import chain_through
 from enumsol.model.sectors import SECTORS, nearest, start_of
 from enumsol.search.space.piece_multipliers import balanced
 from enumsol.search.space.space_setup import SpaceSolvers
-from enumsol.trusted.space.leaves import Open, SpaceRoot, _Leaf
+from enumsol.trusted.space.leaves import Leaf, Open, SpaceRoot
 from enumsol.trusted.space.pieces import AlphaPiece, lie_along
 from enumsol.trusted.space.sector_rows import CONTACT, OPEN, STICK, UNDECIDED, row_sign, sector_margin, sector_row_terms
 from enumsol.trusted.space.solution_curve import AlphaProblem
@@ -143,7 +143,7 @@ def test_second_derivatives_over_a_piece_hold_differences(p, seed):
     piece = piece_of(problem, Fraction(3, 8), Fraction(3, 8) + Fraction(1, 64))
     for _ in range(6):
         codes = [SECTORS + int(rng.integers(256, 512)) for _ in range(p)]
-        leaf = _Leaf(piece.whole, codes)
+        leaf = Leaf(piece.whole, codes)
         state = leaf._state(np.zeros(p), leaf.half)
         if state is None:
             continue
@@ -152,7 +152,7 @@ def test_second_derivatives_over_a_piece_hold_differences(p, seed):
 
         def at(z, codes=codes, half=half):
             alpha = piece.middle + Fraction(float(z[-1])) * half
-            return _Leaf(piece.at(alpha, alpha), codes)._state(z[:-1], np.zeros(p), still=True).G.mid
+            return Leaf(piece.at(alpha, alpha), codes)._state(z[:-1], np.zeros(p), still=True).G.mid
 
         steps = np.diag(np.append(0.4 * leaf.half, 0.4))
         z = np.append(rng.uniform(-0.2, 0.2, p) * leaf.half, rng.uniform(-0.2, 0.2))

@@ -17,7 +17,7 @@ from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.sectors import DEEPEST, RUN, SECTORS, contains, cut, end_number, is_sector, run_of, start_of
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space import sector_rows as sr
-from enumsol.trusted.space.leaves import SpaceRoot, _cut, _Leaf, distinct_roots, same_root, settle
+from enumsol.trusted.space.leaves import Leaf, SpaceRoot, _cut, distinct_roots, same_root, settle
 
 TAU_ONE = np.array([[1, 2]])
 
@@ -68,7 +68,7 @@ def test_boxes_of_angles_cover_their_sectors():
     system = SpaceSystem.scaled(np.eye(3), np.array([1.0, 1.0, 1.0]), np.ones((1, 2)))
     enclosed = EnclosedSpace.of_floats(system)
     for number in sectors():
-        leaf = _Leaf(enclosed, (SECTORS + number,))
+        leaf = Leaf(enclosed, (SECTORS + number,))
         (c,), (half,) = leaf.centre, leaf.half
         assert half < 4 * (1 + number // RUN) / (1 << ((number % RUN).bit_length() - 1)) * 1.2
         for end in (start_of(number), start_of(end_number(number))):

@@ -9,7 +9,7 @@ from flint import fmpq, fmpq_mat
 
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.sectors import SECTORS
-from enumsol.trusted.space.leaves import _Leaf
+from enumsol.trusted.space.leaves import Leaf
 from enumsol.trusted.space.sector_rows import OPEN, STICK
 
 
@@ -103,7 +103,7 @@ def test_values_and_slopes_lie_in_their_balls(seed):
         system = rational_system(rng, spread=k % 7)
         sectors = [SECTORS + n for n in (4, 7, int(rng.integers(16, 32)), int(rng.integers(1024, 2048)))]
         codes = tuple(int(rng.choice([OPEN, STICK, *sectors])) for _ in range(system.p))
-        leaf = _Leaf(EnclosedSpace.of_floats(system), codes)
+        leaf = Leaf(EnclosedSpace.of_floats(system), codes)
         size = len(leaf.turning)
         radius = leaf.half * 10.0 ** -rng.uniform(0, 6, size=size)
         angle = leaf.half * rng.uniform(-0.5, 0.5, size=size)
@@ -136,7 +136,7 @@ def test_weak_springs_widen_nothing():
         # the load that the springs do not feel
         g = S @ np.array([1.0, 2.0, 1.5, 0.1, 0.2, 0.1, 0.0, 0.1, 0.2])
         system = SpaceSystem.scaled(S, g, np.full((3, 2), 0.25))
-        leaf = _Leaf(EnclosedSpace.of_floats(system), (STICK, SECTORS + 64, SECTORS + 70))
+        leaf = Leaf(EnclosedSpace.of_floats(system), (STICK, SECTORS + 64, SECTORS + 70))
         state = leaf._state(np.zeros(2), leaf.half)
         wide.append([np.max(ball.rad) / np.max(np.abs(ball.mid)) for ball in state[:4]])
     assert np.allclose(wide, wide[0], rtol=0.02)

@@ -5,7 +5,7 @@ Nothing here is trusted: what is proposed is proven, or the tree goes on.
 
 from __future__ import annotations
 
-from itertools import combinations_with_replacement
+from itertools import combinations_with_replacement, pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -50,20 +50,13 @@ class Passage(NamedTuple):
 
 def runs_over(known: KnownCurve, low: Fraction, high: Fraction) -> list[Run]:
     """The runs of a curve that pass every alpha of a piece, each as short as may be."""
-    joints, count = known.chain.joints, len(known.chain.links)
-    sides = [int(joint.alphas[0] >= high) - int(joint.alphas[1] <= low) for joint in joints[:-1]]
-    if known.chain.closed:
-        sides += sides
-    else:
-        sides.append(int(joints[-1].alphas[0] >= high) - int(joints[-1].alphas[1] <= low))
-    found: dict[Run, None] = {}
-    last, where = 0, 0
-    for k, side in enumerate(sides):
-        if side and last == -side:
-            found[Run(where % count, (k - 1) % count)] = None
-        if side:
-            last, where = side, k
-    return list(found)
+    (first, last), count = known.joint_alphas, len(known.chain.links)
+    below, above = np.nextafter(float(low), -np.inf), np.nextafter(float(high), np.inf)
+    sides = (first >= above).astype(int) - (last <= below)
+    sides = np.concatenate([sides[:-1], sides[:-1]]) if known.chain.closed else sides
+    beside = np.flatnonzero(sides)
+    found = {Run(int(j) % count, int(k - 1) % count) for j, k in pairwise(beside) if sides[j] == -sides[k]}
+    return sorted(found)
 
 
 class PieceProposals:

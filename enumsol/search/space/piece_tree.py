@@ -13,7 +13,16 @@ import numpy as np
 
 from enumsol.arithmetic.balls import Ball
 from enumsol.condensation.space_condensed import SpaceSystem
-from enumsol.model.sectors import DEEPEST, SECTORS, level_of, parts_around, places, span, width_level, width_of
+from enumsol.model.sectors import (
+    DEEPEST,
+    SECTORS,
+    level_of,
+    parts_around,
+    places,
+    span,
+    width_level,
+    width_of,
+)
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.proof.records import Branching, NoRoot
 from enumsol.proof.space_records import CutPiece, ExcludedInSpace, InCurveBoxes, OnlyOnCurve, ThroughCurveBox
@@ -22,6 +31,7 @@ from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.outcome import StopReason
 from enumsol.search.space.piece_certificates import ERRORS, Passage, PieceProposals, runs_over
 from enumsol.search.space.piece_multipliers import balanced
+from enumsol.search.space.space_fathoming import without_sectors
 from enumsol.search.space.space_newton import Isotropic
 from enumsol.search.space.space_search import SpaceSplitting
 from enumsol.search.splitting import ImposedRows
@@ -29,7 +39,7 @@ from enumsol.support.deadlines import TimeOverError, look
 from enumsol.trusted.space.curve_runs import CurveParts, KnownCurve, Run
 from enumsol.trusted.space.leaves import Open, SpaceRoot
 from enumsol.trusted.space.pieces import AlphaPiece, lie_along
-from enumsol.trusted.space.solution_curve import AlphaProblem
+from enumsol.trusted.space.solution_curve import AlphaProblem, curve_point
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -40,6 +50,7 @@ if TYPE_CHECKING:
     from enumsol.relaxation.space_relaxation import SpaceRelaxation
     from enumsol.selections.solution import Codes
     from enumsol.trusted.space.curve_chains import CurveChain
+    from enumsol.trusted.space.leaf_arcs import LeafArc
     from enumsol.trusted.space.sector_rows import Row
     from enumsol.trusted.space.solution_curve import SolutionCurve
 
@@ -61,6 +72,11 @@ _SHORT = 2.0**-6
 #: Pieces of undecided statuses at most at which a first curve is sought; where solutions are sampled, as shares of the
 #: interval, if more than one curve may be needed.
 _SOUGHT, _SAMPLED = 8, (Fraction(15, 16), Fraction(1, 2), Fraction(1, 16))
+#: By so many times their lengths pieces are made longer on both sides for arcs; where points of these are taken from
+#: known curves, as shares of their parts in a leaf, and the level of the sectors around them.
+_FACTORS, _PLACES, _POINTED = (0, 1), (0.5, 0.25, 0.75), 12
+#: Arcs are sought where a known curve has directions in a leaf, or beside it by this factor.
+_BESIDE = 1.5
 #: Leaves are tested from this level of their sectors on.
 _TRIED = 3
 #: Sectors above this level are halved, rather than alpha, where a leaf is settled in the middle only; by how many
@@ -87,9 +103,17 @@ class OpenLeaf:
     forces: Array | None
 
 
-def _without_sectors(codes: Codes) -> tuple[int, ...]:
-    """Statuses, with contact for a sector."""
-    return tuple(CONTACT if code > SECTORS else code for code in codes)
+def _slides(parts: CurveParts, codes: Codes) -> NDArray[np.bool_]:
+    """In which parts of a curve the statuses of a leaf hold, and those in sectors do not stick all the time, (N,)."""
+    nodes = [i for i, code in enumerate(codes) if code > SECTORS]
+    return np.asarray(parts.held(without_sectors(codes)) & ~np.any(parts.sticking[:, nodes], axis=1))
+
+
+def _beside(parts: CurveParts, codes: Codes, centre: Array, angle: Array | float, radius: Array) -> NDArray[np.intp]:
+    """Which parts of a curve have the statuses of a leaf, and directions within angles from those at its middle."""
+    theta = parts.thetas[0][:, [i for i, code in enumerate(codes) if code > SECTORS]]
+    turned = np.arctan2(centre[:, 0] * theta[:, :, 1] - centre[:, 1] * theta[:, :, 0], np.sum(centre * theta, axis=2))
+    return np.flatnonzero(_slides(parts, codes) & np.all(np.abs(turned - angle) < radius, axis=1))
 
 
 def _is_excluded(relaxation: SpaceRelaxation) -> bool:
@@ -112,17 +136,21 @@ class _Examined:
         #: Runs of known curves that pass the piece, of so many curves.
         self.passages: list[Passage] = []
         self.curves = 0
-        #: Parts of known curves over the piece.
-        self.parts: list[CurveParts] = []
+        #: Parts of known curves over the piece, and over longer ones.
+        self.parts: dict[tuple[Fraction, Fraction], list[CurveParts]] = {}
         #: Assignments of statuses for which no form is definite.
         self.hopeless: set[tuple[int, ...]] = set()
 
-    def along(self, curves: Sequence[KnownCurve]) -> list[CurveParts]:
-        """The parts of known curves over the piece."""
-        for known in curves[len(self.parts) :]:
+    def along(
+        self, curves: Sequence[KnownCurve], piece: AlphaPiece | None = None
+    ) -> list[tuple[KnownCurve, CurveParts]]:
+        """Known curves and their parts over the piece, or over a longer one."""
+        piece = self.piece if piece is None else piece
+        parts = self.parts.setdefault((piece.low, piece.high), [])
+        for known in curves[len(parts) :]:
             whole = Run(0, len(known.chain.links) - 1)
-            self.parts.append(known.over(whole, self.piece.low, self.piece.high))
-        return self.parts
+            parts.append(known.over(whole, piece.low, piece.high))
+        return list(zip(curves, parts, strict=True))
 
     def solution(self) -> Array | None:
         """Forces of a solution at the middle, in the units of the problem, by Newton's method; no claim."""
@@ -281,7 +309,7 @@ class PieceTree:
         if _is_excluded(relaxation):
             done = self._excluded(at, codes, relaxation)
             if done is None and final:
-                done = self._on_curve(at.piece, at.piece.held(codes))
+                done = self._settled(at, codes, at.piece.narrowed(codes))
             return self._undecided(at, codes, cuts) if done is None else done
         if final and all(code < SECTORS or width_level(code - SECTORS) >= _TRIED for code in codes):
             done = self._leaf(at, codes) if parent is not None else None
@@ -348,8 +376,7 @@ class PieceTree:
     def _around_curve(self, at: _Examined, codes: Codes) -> tuple[int, Sequence[int]] | None:
         """A node in a sector, and the part of that around the directions of known curves, then what is left of it."""
         nodes = [i for i, code in enumerate(codes) if code > SECTORS]
-        statuses = _without_sectors(codes)
-        towards = [parts.thetas[0][parts.held(statuses)][:, nodes] for parts in at.along(self.curves)]
+        towards = [parts.thetas[0][_slides(parts, codes)][:, nodes] for _, parts in at.along(self.curves)]
         where = np.concatenate([places(theta) for theta in towards]) if nodes and towards else np.zeros((0, 0))
         spans = np.array([span(codes[i] - SECTORS) for i in nodes], dtype=float).reshape(-1, 2)
         where = where[np.all((where >= spans[:, 0]) & (where < spans[:, 1]), axis=1)] if len(where) else where
@@ -417,7 +444,7 @@ class PieceTree:
 
     def _certified(self, at: _Examined, codes: Codes) -> tuple[Any, list[Any]] | None:
         """One certificate for all that is below an assignment, or the piece is cut since it is too long for that."""
-        piece, statuses = at.piece, _without_sectors(codes)
+        piece, statuses = at.piece, without_sectors(codes)
         passages = [passage for passage in self._passages(at, statuses) if passage.parts.allowed(statuses)]
         if not passages and statuses == codes and self._is_longer(piece, _SHORT) and self._ends_within(at, statuses):
             return self._halved(at, codes)
@@ -454,7 +481,7 @@ class PieceTree:
     def _ends_within(self, at: _Examined, statuses: tuple[int, ...]) -> bool:
         """Whether in one run along the known curves, and in no other, these statuses hold over a part of a piece."""
         runs = 0
-        for parts in at.along(self.curves):
+        for _, parts in at.along(self.curves):
             held = parts.held(statuses)
             if len(held):
                 runs += int(held[0]) + int(np.sum(held[1:] & ~held[:-1]))
@@ -477,8 +504,8 @@ class PieceTree:
     def _leaf(self, at: _Examined, codes: Codes) -> tuple[Any, list[Any]] | None:
         """A leaf that is decided, or halved; None where statuses are to be split further."""
         piece = at.piece
-        found = piece.held(codes)
-        if (done := self._on_curve(piece, found)) is not None:
+        narrowed, found = piece.narrowed(codes)
+        if (done := self._settled(at, codes, (narrowed, found))) is not None:
             return done
         if isinstance(found, Open) and not found.swept and self._widest(codes) >= 0:
             return None
@@ -487,18 +514,66 @@ class PieceTree:
             number = self._met(piece.point, there)
             if number is None and not self._is_known(self._middle(piece, there)):
                 return self._open(at, codes, piece.forces(there.y).mid), []
-            if number is not None and isinstance(found, SpaceRoot):
-                return ThroughCurveBox(number), []
+            passed = number is not None and narrowed.low <= piece.middle <= narrowed.high and found is not None
+            arc = narrowed.arc(codes, 2.0, found) if passed else None
+            if number is not None and arc is not None and arc.has(there, codes):
+                return ThroughCurveBox(number, str(narrowed.low), str(narrowed.high), str(piece.middle), codes), []
         elif self._is_wide(piece, codes) and (there is None or self._box(piece.point, there) is None):
             return None
         return self._halved(at, codes)
 
-    def _on_curve(self, piece: AlphaPiece, found: SpaceRoot | Open | None) -> tuple[Any, list[Any]] | None:
+    def _settled(
+        self, at: _Examined, codes: Codes, settled: tuple[AlphaPiece, SpaceRoot | Open | None]
+    ) -> tuple[Any, list[Any]] | None:
         """The record of a leaf that has no root, or none that is not known."""
+        piece, found = settled
         if found is None:
             return NoRoot(), []
         run = self._run(piece, found)
-        return None if run is None else (InCurveBoxes(*run), [])
+        return self._on_arc(at, codes, (piece, found)) if run is None else (InCurveBoxes(*run), [])
+
+    def _on_arc(
+        self, at: _Examined, codes: Codes, settled: tuple[AlphaPiece, SpaceRoot | Open]
+    ) -> tuple[Any, list[Any]] | None:
+        """The record of a leaf whose roots lie on an arc that has a point of a known curve."""
+        centre, half = settled[1].centre, np.abs(settled[1].angle) + settled[1].angle_rad
+        for factor in _FACTORS:
+            whole = settled[0].wider(factor, self.interval)
+            runs = at.along(self.curves, whole)
+            if not any(len(_beside(parts, codes, centre, 0.0, _BESIDE * half)) for _, parts in runs):
+                continue
+            arc = whole.arc(codes, 2.0, None if factor else settled[1])
+            if arc is None:
+                continue
+            for known, parts in runs:
+                for point in self._points(arc, known, parts, codes):
+                    there = whole.point_at(point[0])
+                    root = there.held(point[1])
+                    number = self._box(there, root) if isinstance(root, SpaceRoot) else None
+                    if number is not None and whole.meets(arc, point, self._given, self._boxes[number], 2.0):
+                        ends = str(whole.low), str(whole.high)
+                        return ThroughCurveBox(number, *ends, str(point[0]), point[1]), []
+        return None
+
+    def _points(self, arc: LeafArc, known: KnownCurve, parts: CurveParts, codes: Codes) -> list[tuple[Fraction, Codes]]:
+        """Points of a curve that seem to be on an arc, as alphas and leaves of narrow sectors."""
+        nodes = [i for i, code in enumerate(codes) if code > SECTORS]
+        chosen, found = _beside(parts, codes, arc.centre, arc.angle, arc.radius), []
+        for k in [chosen[int(share * (len(chosen) - 1))] for share in _PLACES] if len(chosen) else []:
+            box = known.chain.links[parts.links[k]].curve.box
+            near = curve_point(self._given, box.centre + parts.t.mid[k] * box.direction, box.border)
+            if near is not None:
+                found.append(self._pointed(near.x, codes, nodes))
+        return found
+
+    def _pointed(self, x: Array, codes: Codes, nodes: Sequence[int]) -> tuple[Fraction, Codes]:
+        """Alpha of a solution, in the units of boxes, and a leaf of narrow sectors around it."""
+        leaf, p = list(codes), len(codes)
+        y = (self._given.unplaced(x)[:-1] / self._given.ratio.mid)[p:].reshape(2, p)
+        for i in nodes:
+            up = DEEPEST + 2 - max(_POINTED, level_of(codes[i] - SECTORS))
+            leaf[i] = SECTORS + (1 << (DEEPEST + 2 - up)) + (int(places(y[:, i])) >> up)
+        return Fraction(float(x[-1])), tuple(leaf)
 
     def _run(self, piece: AlphaPiece, found: SpaceRoot | Open) -> tuple[int, int] | None:
         """The first and the last of the boxes in which forces lie."""

@@ -52,6 +52,11 @@ _SHARED = 0.5
 _WEIGHT = 1024.0
 
 
+def without_sectors(codes: Codes) -> tuple[int, ...]:
+    """Statuses, with contact for a sector."""
+    return tuple(CONTACT if code > SECTORS else code for code in codes)
+
+
 class SpaceClosing(Protocol):
     """A certifier that can close the whole tree, or parts of it."""
 
@@ -145,7 +150,7 @@ class SpaceCloser:
 
         Sectors count as contact: each assignment of statuses is tried once.
         """
-        statuses, found = tuple(CONTACT if code > SECTORS else code for code in codes), None
+        statuses, found = without_sectors(codes), None
         with np.errstate(all="ignore"):
             point = self._point
             if point is None or point.slack <= self._least or statuses in self._tried:

@@ -53,6 +53,9 @@ class CurveParts:
     rho : (N, 3p) array
     rubs : (p, 2) bool array
         Axes along which there is friction.
+    links : (N,) array of ints
+    t : Ball of shape (N,)
+        Parameters of the links there.
     """
 
     alpha: Ball
@@ -60,6 +63,8 @@ class CurveParts:
     z: Ball
     rho: Array
     rubs: Flags
+    links: NDArray[np.intp]
+    t: Ball
 
     @cached_property
     def open(self) -> Flags:
@@ -191,6 +196,13 @@ class KnownCurve:
         z_mid, z_rad, slope, slope_rad, wides, steps = rest
         return _Links(Ball(t_mid, t_rad), alpha, rate, reach, Ball(z_mid, z_rad), Ball(slope, slope_rad), wides, steps)
 
+    @cached_property
+    def joint_alphas(self) -> tuple[Array, Array]:
+        """Bounds of alpha at the points between two links, and at both ends."""
+        bounds = [joint.alphas for joint in self.chain.joints]
+        low, high = (np.array([float(pair[k]) for pair in bounds]) for k in (0, 1))
+        return np.nextafter(low, -np.inf), np.nextafter(high, np.inf)
+
     def over(self, run: Run, low: Fraction, high: Fraction) -> CurveParts:
         """The part of a run with alphas in a piece, in parts in its order; none where it does not come there."""
         links, places = self._links, self.places(run)
@@ -218,7 +230,7 @@ class KnownCurve:
         z = links.z[where] + t[:, None] * links.slope[where]
         F = Ball.exact(self.problem.F0) + alpha[:, None] * Ball.exact(self.problem.F1)
         z = Ball(z.mid, (z.rad + links.wide[where]) * SAFE)
-        return CurveParts(alpha, F, z, links.rho[where], self._rubs)
+        return CurveParts(alpha, F, z, links.rho[where], self._rubs, where, t)
 
     @cached_property
     def _rubs(self) -> Flags:

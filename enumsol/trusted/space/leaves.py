@@ -45,6 +45,8 @@ _CONTRACTIONS = 10
 _REFINEMENTS = 60
 #: The same over a piece of alpha, over which the zero moves.
 _OVER_PIECE = 2
+#: What is rounded of an angle between two directions.
+ROUNDED_ANGLE = 1e-12
 #: Boxes of directions narrower than this hold a point, and forces known no better are not known; neither is halved for.
 _POINT = 2.0**-24
 #: Rigid modes that move what the equations fix by no more than this, relatively, are left free by them.
@@ -69,6 +71,29 @@ class Drift(NamedTuple):
 
     low: tuple[Ball, Ball]
     high: tuple[Ball, Ball]
+
+
+class _Sweep(NamedTuple):
+    """Bounds along a parameter t, |t| <= reach, which is s or one of the directions: y, then w, are middle + t turn.
+
+    The other unknowns are beside + t along.
+    """
+
+    middle: Ball
+    turn: Ball
+    beside: Ball
+    along: Ball
+    reach: float
+    by_alpha: bool
+
+
+def _allowed(high: Floats, slope: Floats) -> tuple[float, float] | None:
+    """Bounds of the s from 0 to 1 at which no high + slope s is negative; None if there are none."""
+    zero = -high / np.where(slope == 0, 1.0, slope)
+    first = np.where(high < 0, np.where(slope > 0, zero, np.inf), 0.0)
+    last = np.where((high >= 0) & (slope < 0), zero, np.inf)
+    low, up = float(np.max(first, initial=0.0)) / SAFE, min(float(np.min(last, initial=1.0)) * SAFE, 1.0)
+    return (low, up) if low <= up else None
 
 
 @dataclass(frozen=True)
@@ -137,6 +162,8 @@ class Open:
         Over a piece of alpha, where it is known.
     swept : bool
         Whether rather the piece of alpha stands in the way than the widths of sectors, as computed; no claim.
+    span : pair of floats
+        Over a piece of alpha, bounds of s, from -1 to 1, at all solutions in it.
     """
 
     node: int | None
@@ -149,21 +176,22 @@ class Open:
     mode: int | None = None
     drift: Drift | None = None
     swept: bool = False
+    span: tuple[float, float] = (-1.0, 1.0)
 
 
 def settle(system: EnclosedSpace, codes: Sequence[int]) -> SpaceRoot | Open | None:
     """What a leaf holds: exactly one root in its box, no root (None), or it is not settled."""
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        return _Leaf(system, codes).settle()
+        return Leaf(system, codes).settle()
 
 
 def unsettled(system: EnclosedSpace, codes: Sequence[int]) -> Open:
     """A leaf of which nothing is known but its sectors."""
-    leaf = _Leaf(system, codes)
+    leaf = Leaf(system, codes)
     return Open(None, None, None, leaf.centre, np.zeros(len(leaf.half)), leaf.half, Cause.EQUALITY)
 
 
-class _State(NamedTuple):
+class State(NamedTuple):
     """y, w, G and dG/dpsi over a box of angles, and what they are made of."""
 
     y: Ball
@@ -181,7 +209,7 @@ class _State(NamedTuple):
         return Ball.beside(self.J, self.G_turn[:, None])
 
 
-class _Leaf:
+class Leaf:
     """Equations of a leaf: y = E(psi) x with x = (lambda_n of the nodes in contact, tau of the sticking ones).
 
     psi are angles of the slip directions d = cos psi c + sin psi c' from a direction c in every sector, c' a quarter
@@ -194,7 +222,7 @@ class _Leaf:
     """
 
     def __init__(self, system: EnclosedSpace, codes: Sequence[int]) -> None:
-        self.system = system
+        self.system, self.codes = system, codes
         tau = system.tau
         self.open = [i for i, code in enumerate(codes) if code == OPEN]
         self.closed = [i for i, code in enumerate(codes) if code != OPEN]
@@ -224,6 +252,7 @@ class _Leaf:
         self.E = E
         self.centre, self.half = self._boxes()
         self._last: tuple[bytes, Turning | None] | None = None
+        self._known: dict[tuple[bytes, bytes, bool], State | None] = {}
 
     def _free_modes(self) -> list[int]:
         """Rigid modes that the equations leave free, one of those that are no other ones' combinations there."""
@@ -313,7 +342,7 @@ class _Leaf:
         wide = np.maximum(high - middle, middle - low) * SAFE + slack + TINY
         return np.r_[angle[:q], middle], np.r_[radius[:q], np.maximum(wide, 0.0)]
 
-    def _move(self, angle: Floats, radius: Floats, state: _State, *, rough: bool = False) -> Ball | None:
+    def _move(self, angle: Floats, radius: Floats, state: State, *, rough: bool = False) -> Ball | None:
         """Krawczyk's operator: a ball of psi - angle for all zeros psi in a box over which the state is known."""
         found = self._moves(angle, radius, state, rough=rough)
         if found is None:
@@ -323,7 +352,7 @@ class _Leaf:
         return move if along is None else Ball(move.mid, (move.rad + along.size) * SAFE)
 
     def _moves(
-        self, angle: Floats, radius: Floats, state: _State, *, rough: bool = False
+        self, angle: Floats, radius: Floats, state: State, *, rough: bool = False
     ) -> tuple[Ball, Ball | None] | None:
         """Balls u and v: psi - angle is in u for all zeros psi in a box, or over a piece of alpha in u + s v at s.
 
@@ -354,34 +383,36 @@ class _Leaf:
         beside = upper_sum(wide.reshape(rows, columns, columns) * reach, axis=2)
         return smaller(Ball(middle.mid, (middle.rad + beside) * SAFE), inverse @ box)
 
-    def _along(
-        self, Y: Floats, k: int, angle: Floats, radius: Floats, state: _State, point: _State
-    ) -> tuple[Ball, Ball]:
+    def _along(self, Y: Floats, k: int, angle: Floats, radius: Floats, state: State, point: State) -> tuple[Ball, Ball]:
         """Balls u and v over a piece: for all zeros z = (psi - angle, s) in a box z without z_k is in u + z_k v."""
         q = len(angle)
         others, reach = np.delete(np.arange(q + 1), k), np.r_[radius, 1.0]
-        inverse, box, middle = Ball.exact(Y), state.whole_J, point.whole_J
-        slope = self._preconditioned(inverse, middle, box, self._second(state, angle, radius), reach)
+        slope = self._slope(Y, angle, radius, state, point)
         span = Ball(np.zeros(q), reach[others])
-        return (Ball.exact(np.eye(q)) - slope[:, others]) @ span - inverse @ point.G, -slope[:, k]
+        return (Ball.exact(np.eye(q)) - slope[:, others]) @ span - Ball.exact(Y) @ point.G, -slope[:, k]
 
-    def _drift(self, angle: Floats, radius: Floats) -> Drift | None:
-        """Between which two bounds all solutions in a box lie over a piece of alpha.
+    def _slope(self, Y: Floats, angle: Floats, radius: Floats, state: State, point: State) -> Ball:
+        """Y dG/d(psi, s) over a box and a piece."""
+        inverse, second = Ball.exact(Y), self._second(state, angle, radius)
+        return self._preconditioned(inverse, point.whole_J, state.whole_J, second, np.r_[radius, 1.0])
 
-        Of psi and s, the one that changes most along the zeros of G in the middle is the parameter; the others are
-        affine in it but for what is left over (``_along``), and so are y and w, by their derivatives.
+    def _swept(self, angle: Floats, radius: Floats, *, by_alpha: bool = False) -> _Sweep | None:
+        """y, w and all unknowns z = (psi, s) at solutions in a box over a piece of alpha, to first order in one of z.
+
+        That is the one that changes most along the zeros of G in the middle, or s if asked; the others are affine in it
+        but for what is left over (``_along``), and so are y and w, by their derivatives.
         """
         q = len(angle)
         state = self._state(angle, radius) if self.piece else None
         point = None if state is None else self._state(angle, 0.0 * radius, still=True)
         if state is None or point is None or not (state.whole_J.finite and point.J.finite):
             return None
-        slopes, k, reach = Ball.beside(state.box.slope, state.box.lone[:, :1]), q, 1.0
+        slopes, k = Ball.beside(state.box.slope, state.box.lone[:, :1]), q
         beside, along = Ball.exact(np.zeros(0)), Ball.exact(np.zeros(0))
+        sizes = np.r_[radius, 1.0]
         if q:
-            J, sizes = point.whole_J.mid, np.r_[radius, 1.0]
-            k = int(np.argmax(np.abs(np.linalg.svd(J * sizes)[2][-1])))
-            reach = float(sizes[k])
+            J = point.whole_J.mid
+            k = q if by_alpha else int(np.argmax(np.abs(np.linalg.svd(J * sizes)[2][-1])))
             try:
                 Y = np.asarray(np.linalg.inv(np.delete(J, k, axis=1)), dtype=np.float64)
             except np.linalg.LinAlgError:
@@ -393,13 +424,68 @@ class _Leaf:
         fixed = len(point.y.mid) + np.array(self.rows, dtype=np.intp)
         for part in (middle, turn):
             part.mid[fixed], part.rad[fixed] = 0.0, 0.0
+        return _Sweep(middle, turn, beside, along, float(sizes[k]), k == q)
+
+    def _drift(self, angle: Floats, radius: Floats) -> Drift | None:
+        """Between which two bounds all solutions in a box lie over a piece of alpha."""
+        sweep = self._swept(angle, radius)
+        if sweep is None:
+            return None
         ends = []
-        for t in (Ball.exact(np.array(-reach)), Ball.exact(np.array(reach))):
-            s = t if k == q else beside[-1] + along[-1] * t
-            ends.append((middle + turn * t, s))
+        for t in (Ball.exact(np.array(-sweep.reach)), Ball.exact(np.array(sweep.reach))):
+            s = t if sweep.by_alpha else sweep.beside[-1] + sweep.along[-1] * t
+            ends.append((sweep.middle + sweep.turn * t, s))
         return Drift(*ends)
 
-    def _is_swept(self, angle: Floats, radius: Floats, state: _State | None) -> bool:
+    def _span(self, angle: Floats, radius: Floats) -> tuple[float, float] | None:
+        """Bounds of s at all solutions in a box over a piece of alpha; None if there are none.
+
+        Every condition is at most a + b s with some a and b in balls, and so is what is left to an end of a sector.
+        """
+        sweep, turns = self._swept(angle, radius, by_alpha=True) if self.piece else None, self.system.turn
+        if sweep is None or turns is None:
+            return -1.0, 1.0
+        m, tau, unit, (middle, turn) = len(self.system.g), self.system.tau, self.system.unit, sweep[:2]
+        pairs = [(middle[i], turn[i]) for i in self.closed] + [(-middle[m + i], -turn[m + i]) for i in self.open]
+        for i in self.stick:
+            t = [int(k) for k in tau[i] if k >= 0]
+            if t:
+                # |tau| is at least e . tau with |e| = 1
+                rubbed = unit[t] * middle.mid[t]
+                length = float(np.linalg.norm(rubbed))
+                e = (rubbed / length if length > 0 else np.zeros(len(t))) * unit[t]
+                towards = Ball(e, 16 * UNIT * np.abs(e))[None]
+                disc, disc_turn = turns.disc[i], turns.disc_turn[i]
+                bent = disc_turn * turn[i]
+                most = disc * middle[i] - (towards @ middle[t][:, None])[0, 0]
+                rate = disc * turn[i] + disc_turn * middle[i] - (towards @ turn[t][:, None])[0, 0]
+                pairs.append((Ball(most.mid, (most.rad + bent.size) * SAFE), rate))
+        for i, sign in self.sliding:
+            along = m + int(np.max(tau[i]))
+            pairs.append(
+                (Ball(sign * middle.mid[along], middle.rad[along]), Ball(sign * turn.mid[along], turn.rad[along]))
+            )
+        high = np.array([part.mid + part.rad for part, _ in pairs])
+        slopes = np.array([[part.mid - part.rad, part.mid + part.rad] for _, part in pairs]).reshape(-1, 2)
+        if self.turning:
+            d, _ = self._directions(angle, radius)
+            ahead, rate = (
+                one * d[:, 0] + other * d[:, 1] for one, other in (self._slips(part[m:]) for part in sweep[:2])
+            )
+            left = Ball.exact(self.half - angle) - sweep.beside, Ball.exact(self.half + angle) + sweep.beside
+            first, second = Ball.joined(ahead, *left), Ball.joined(rate, -sweep.along, sweep.along)
+            high = np.concatenate([high, first.mid + first.rad])
+            slopes = np.vstack([slopes, np.column_stack([second.mid - second.rad, second.mid + second.rad])])
+        slack = 8 * UNIT * (np.abs(high) + np.max(np.abs(slopes), axis=1)) + TINY
+        if not np.all(np.isfinite(slack)):
+            return -1.0, 1.0
+        after, before = _allowed(high + slack, slopes[:, 1] + slack), _allowed(high + slack, slack - slopes[:, 0])
+        if after is None and before is None:
+            return None
+        low = -before[1] if before is not None else after[0] if after is not None else 0.0
+        return low, after[1] if after is not None else -before[0] if before is not None else 0.0
+
+    def _is_swept(self, angle: Floats, radius: Floats, state: State | None) -> bool:
         """Whether dG/dpsi changes more along the piece than over the angles."""
         point = self._state(angle, 0.0 * radius, still=True)
         if point is None or not len(angle):
@@ -438,8 +524,8 @@ class _Leaf:
             return None
         return self._root(state, angle, radius, reach)
 
-    def _left_open(self, angle: Floats, radius: Floats, state: _State | None) -> Open:
-        """What is known of a leaf that is not settled."""
+    def _left_open(self, angle: Floats, radius: Floats, state: State | None) -> Open | None:
+        """What is known of a leaf that is not settled; None if there is nothing."""
         node = None
         # what is proven does not depend on which sector is halved, and whether any is
         q = len(self.turning)
@@ -450,11 +536,14 @@ class _Leaf:
         y, w = (None, None) if state is None else (state.y[:m], state.w[:m])
         cause = self._cause(angle, state)
         mode = self._free_mode(angle) if cause is Cause.RIGID else None
+        span = self._span(angle, radius)
+        if span is None:
+            return None
         drift, swept = self._drift(angle, radius), self.piece and self._is_swept(angle, radius, state)
         angle, radius = angle[:q], radius[:q]
         low, high = np.maximum(angle - radius, -self.half), np.minimum(angle + radius, self.half)
         box = 0.5 * (low + high), 0.5 * np.abs(high - low) * SAFE + 4 * UNIT
-        return Open(node, y, w, self.centre, *box, cause, mode, drift, swept)
+        return Open(node, y, w, self.centre, *box, cause, mode, drift, swept, span)
 
     def _free_mode(self, angle: Floats) -> int:
         """The rigid mode that moves most along what the equations in the middle leave free; no claim."""
@@ -469,7 +558,7 @@ class _Leaf:
         _, _, rows = np.linalg.svd((self.system.balls[0].mid @ E)[self.rows])
         return int(np.argmax(np.abs(rows[-1][-k:])))
 
-    def _cause(self, angle: Floats, state: _State | None) -> Cause:
+    def _cause(self, angle: Floats, state: State | None) -> Cause:
         point = self._state(angle, np.zeros(len(angle)))
         if state is None or point is None:
             return Cause.RIGID if len(self.system.reach) else Cause.EQUATIONS
@@ -479,7 +568,7 @@ class _Leaf:
             return Cause.ROUNDING
         return Cause.DIRECTIONS if len(angle) and nearly_singular(point.J.mid) else Cause.EQUALITY
 
-    def _worth_halving(self, angle: Floats, radius: Floats, state: _State | None) -> Floats:
+    def _worth_halving(self, angle: Floats, radius: Floats, state: State | None) -> Floats:
         """What is expected of halving each sector; 0 where smaller ones would be left open, too."""
         point = self._state(angle, np.zeros(len(angle)))
         if state is not None and point is not None and np.all(point.y.rad <= _POINT):
@@ -500,7 +589,7 @@ class _Leaf:
         q = len(self.turning)
         return np.abs(angle[:q]) - radius[:q] > self.half * (1.0 + 1e-9)
 
-    def _root(self, state: _State, angle: Floats, radius: Floats, reach: Floats) -> SpaceRoot | Open:
+    def _root(self, state: State, angle: Floats, radius: Floats, reach: Floats) -> SpaceRoot | Open | None:
         slack = self._slacks(state.y, state.w, angle, radius)
         turning = self._turning(angle) if np.all(slack > 0) else None
         sign = 0 if turning is None else turning.sign * determinant_sign(state.J)
@@ -538,11 +627,17 @@ class _Leaf:
             self._last = key, Turning.of(self.system, self.E, at, directions, self.discs, self.free)
         return self._last[1]
 
-    def _state(self, angle: Floats, radius: Floats, *, still: bool = False) -> _State | None:
+    def _state(self, angle: Floats, radius: Floats, *, still: bool = False) -> State | None:
         """y, w, G and dG/dpsi over a box; None where the linear system is not proven regular in it.
 
         Over all of a piece of alpha, if there is one, or ``still`` in its middle.
         """
+        key = angle.tobytes(), radius.tobytes(), still
+        if key not in self._known:
+            self._known[key] = self._evaluated(angle, radius, still=still)
+        return self._known[key]
+
+    def _evaluated(self, angle: Floats, radius: Floats, *, still: bool) -> State | None:
         turning = self._turning(angle)
         q = len(self.turning)
         free = Ball(np.zeros(1), np.full(1, 0.0 if still else 1.0)) if self.piece else Ball(angle[q:], radius[q:])
@@ -559,16 +654,16 @@ class _Leaf:
         G = v1 * d2 - v2 * d1
         if self.piece:
             s1, s2 = self._slips(box.ds[:, 0])
-            return _State(box.y, box.w, G, J, box, s1 * d2 - s2 * d1)
+            return State(box.y, box.w, G, J, box, s1 * d2 - s2 * d1)
         if self.free:
             (s1, s2), w = self._slips(box.ds), box.w[self.free]
             G = Ball.joined(G, w)
             across = Ball.joined(s1 * d2[:, None] - s2 * d1[:, None], box.ds[self.free])
             along = Ball.joined(J, box.dw[self.free])
             J = Ball.beside(along, across)
-        return _State(box.y, box.w, G, J, box)
+        return State(box.y, box.w, G, J, box)
 
-    def _bends(self, state: _State, angle: Floats, radius: Floats) -> Ball:
+    def _bends(self, state: State, angle: Floats, radius: Floats) -> Ball:
         """Second derivatives of G over a box, (q, q, q)."""
         box, (d, turned), own = state.box, self._directions(angle, radius), np.arange(len(angle))
         (b1, b2), (dv1, dv2), (v1, v2) = (self._slips(part) for part in (box.bends(), box.dw, box.w))
@@ -585,7 +680,7 @@ class _Leaf:
             bends.mid[part], bends.rad[part] = there.mid, there.rad
         return bends
 
-    def _second(self, state: _State, angle: Floats, radius: Floats) -> Ball:
+    def _second(self, state: State, angle: Floats, radius: Floats) -> Ball:
         """Second derivatives of G with respect to (psi, s) over a box and a piece of alpha, (q, q + 1, q + 1)."""
         q, box, (d, turned), own = len(angle), state.box, self._directions(angle, radius), np.arange(len(angle))
         (m1, m2), (s1, s2), (t1, t2) = (self._slips(part) for part in (box.mixed(), box.ds[:, 0], box.twice()))
@@ -671,11 +766,13 @@ def same_root(one: SpaceRoot, other: SpaceRoot) -> bool | None:
     """
     if _apart(one.y, other.y) or (one.rigid is not None and other.rigid is not None and _apart(one.rigid, other.rigid)):
         return False
-    # the angle of one root's centre from the other's
-    c, e = other.centre, one.centre
-    shift = np.arctan2(c[:, 0] * e[:, 1] - c[:, 1] * e[:, 0], np.sum(c * e, axis=1))
-    away = np.abs(shift + one.angle) + one.angle_rad + 1e-12
+    away = np.abs(turned(other.centre, one.centre) + one.angle) + one.angle_rad + ROUNDED_ANGLE
     return True if np.all(away < other.reach) else None
+
+
+def turned(one: Floats, other: Floats) -> Floats:
+    """Angles from directions to others, (q,), for which ``ROUNDED_ANGLE`` has room."""
+    return np.asarray(np.arctan2(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0], np.sum(one * other, axis=1)))
 
 
 def _apart(one: Ball, other: Ball) -> bool:

@@ -5,15 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
+from math import ceil, floor
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
 from enumsol.condensation.space_condensed import PieceSpace
+from enumsol.trusted.space.leaf_arcs import LeafArc, arc_of
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
 from enumsol.trusted.space.piece_forms import only_on_curve
 from enumsol.trusted.space.sector_rows import sector_margin
+from enumsol.trusted.space.space_uniqueness import is_complete
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,6 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.enclosure import CondensedEnclosure
+    from enumsol.selections.solution import Codes
     from enumsol.trusted.space.curve_runs import KnownCurve, Run
     from enumsol.trusted.space.sector_rows import Row
     from enumsol.trusted.space.solution_curve import AlphaProblem, SolutionCurve
@@ -29,6 +33,8 @@ if TYPE_CHECKING:
 
 #: What a writer of proofs asks for beyond what a checker does, of the size of a box.
 _MARGIN = 2.0**-10
+#: How often a piece is narrowed for a leaf, to which multiples of its half, and where that is too little.
+_NARROWINGS, _GRID, _NARROWER = 8, 1 << 12, Fraction(3, 2)
 #: Halvings of the way through a box.
 _STEPS = 8
 
@@ -124,6 +130,25 @@ class AlphaPiece:
         """What a leaf holds at every alpha of the piece: exactly one root, none (None), or it is not settled."""
         return settle(self.whole, codes)
 
+    def narrowed(self, codes: Sequence[int]) -> tuple[AlphaPiece, SpaceRoot | Open | None]:
+        """A part of the piece with all alpha at which a leaf holds roots, and what it holds there."""
+        piece, found = self, self.held(codes)
+        for _ in range(_NARROWINGS):
+            if not isinstance(found, Open) or piece.low == piece.high:
+                break
+            low, high = (
+                Fraction(end(share * _GRID), _GRID) for end, share in zip((floor, ceil), found.span, strict=True)
+            )
+            if high - low > _NARROWER:
+                break
+            middle, half = piece.middle, (piece.high - piece.low) / 2
+            ends = middle + max(low, Fraction(-1)) * half, middle + min(high, Fraction(1)) * half
+            if ends[0] == ends[1]:
+                break
+            piece = AlphaPiece(self.enclosure, *ends, self.units)
+            found = piece.held(codes)
+        return piece, found
+
     def lies_on(self, known: KnownCurve, run: Run, codes: Sequence[int], numbers: Array, errors: float = 1.0) -> bool:
         """Whether all solutions with the statuses of an assignment, at every alpha of the piece, are those of a run.
 
@@ -142,21 +167,50 @@ class AlphaPiece:
     @cached_property
     def point(self) -> AlphaPiece:
         """The middle alone."""
-        return AlphaPiece(self.enclosure, self.middle, self.middle, self.units)
+        return self.point_at(self.middle)
 
-    def meets(self, codes: Sequence[int], given: AlphaProblem, curve: SolutionCurve, errors: float = 1.0) -> bool:
-        """Whether the roots of a leaf, one at every alpha, are an arc that is on a curve at the middle of the piece."""
-        if not isinstance(self.held(codes), SpaceRoot):
+    def wider(self, factor: int, interval: tuple[Fraction, Fraction]) -> AlphaPiece:
+        """The piece and so many times its length on both sides, as far as that is within an interval."""
+        more = factor * (self.high - self.low)
+        low, high = max(self.low - more, interval[0]), min(self.high + more, interval[1])
+        return AlphaPiece(self.enclosure, low, high, self.units) if factor else self
+
+    def point_at(self, alpha: Fraction) -> AlphaPiece:
+        """One alpha alone."""
+        return AlphaPiece(self.enclosure, alpha, alpha, self.units)
+
+    def arc(self, codes: Sequence[int], errors: float = 1.0, found: SpaceRoot | Open | None = None) -> LeafArc | None:
+        """The arc on which all roots of a leaf lie at all alpha of the piece, if it is proven that there is one.
+
+        ``found``: what the leaf holds, if it is known.
+        """
+        found = self.held(codes) if found is None else found
+        return None if found is None else arc_of(self.whole, codes, found, errors)
+
+    def meets(
+        self,
+        arc: LeafArc,
+        point: tuple[Fraction, Codes],
+        given: AlphaProblem,
+        curve: SolutionCurve,
+        errors: float = 1.0,
+    ) -> bool:
+        """Whether the only root of a leaf at some alpha of the piece is on an arc, and in the box of a curve."""
+        alpha, codes = point
+        if not self.low <= alpha <= self.high:
             return False
-        there = self.point.held(codes)
-        return isinstance(there, SpaceRoot) and lies_in(self.point.place(there, given), curve, errors)
+        at = self.point_at(alpha)
+        root = at.held(codes) if is_complete(at.whole, codes) else None
+        if not isinstance(root, SpaceRoot) or not arc.has(root, codes):
+            return False
+        return lies_in(at.place(root, given), curve, errors)
 
     def holds_all(
         self, codes: Sequence[int], given: AlphaProblem, curves: Sequence[SolutionCurve], errors: float = 1.0
     ) -> bool:
         """Whether all roots of a leaf are on the curve of some boxes, at every alpha of the piece."""
-        found = self.held(codes)
-        return found is None or any(lie_along(ends, curves, errors) for ends in self.places(found, given))
+        piece, found = self.narrowed(codes)
+        return found is None or any(lie_along(ends, curves, errors) for ends in piece.places(found, given))
 
     def place(self, found: SpaceRoot | Open, given: AlphaProblem) -> Ball | None:
         """Bounds of (zeta, alpha) of what a leaf holds, (3p + 1,); None where there are none."""
