@@ -73,7 +73,8 @@ def branch_graph(
         seconds at most.
     executor : concurrent.futures.Executor, optional
         Searches the pieces of the interval, and parts of large ones, in its workers. The graph and its proof are those
-        found without it. Must be None in 3D.
+        found without it. In 3D workers search parts of the tree; its proof may have other leaves than without them, but
+        does not depend on their number and timing, and the calling process follows the curves.
 
     Returns
     -------
@@ -83,7 +84,7 @@ def branch_graph(
     ------
     InvalidArgumentError
         The interval or another argument is out of range, friction is negative somewhere in the interval (the node
-        and the alpha are named), or a problem in 3D has an executor or another arithmetic than "verified".
+        and the alpha are named), or a problem in 3D has another arithmetic than "verified".
     TooLargeError
         Exact arithmetic was asked for and the problem is too large for it.
     MissingDependencyError
@@ -110,9 +111,7 @@ def branch_graph(
     started = time.perf_counter()
     limits = Deadline.after(started, time_limit)
     if not isinstance(problem, ContactProblem):
-        if executor is not None:
-            raise InvalidArgumentError("executor is given for a problem in 3D; expected None: one process follows it")
-        return _in_space(problem, (a, b), arithmetic, progress, max_nodes, limits)
+        return _in_space(problem, (a, b), arithmetic, progress, max_nodes, limits, executor)
     if problem.modes is not None:
         _check_floating(problem, arithmetic)
     _check_friction(problem, a, b)
@@ -162,6 +161,7 @@ def _in_space(
     progress: Callable[[str, float], object] | None,
     max_nodes: int | None,
     limits: Deadline,
+    executor: Executor | None,
 ) -> BranchGraph:
     """The graph of a problem in 3D."""
     from enumsol.branches.space.space_graph import space_graph  # continuation, and what only 3D needs
@@ -171,7 +171,7 @@ def _in_space(
         raise InvalidArgumentError(f'arithmetic is "{arithmetic}" for a problem in 3D; expected "verified"')
     for end in interval:
         problem.friction_at(end)
-    return space_graph(problem, interval, progress, max_nodes, limits)
+    return space_graph(problem, interval, progress, max_nodes, limits, executor)
 
 
 def _check_floating(problem: ContactProblem, arithmetic: Arithmetic) -> None:

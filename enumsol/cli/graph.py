@@ -129,13 +129,9 @@ def build(
     Raises
     ------
     InvalidArgumentError
-        Several processes are asked for in 3D, or as ``branch_graph``.
+        As ``branch_graph``.
     """
     from enumsol.branches import branch_graph
-    from enumsol.model.problem import ContactProblem
-
-    if jobs > 1 and not isinstance(problem, ContactProblem):
-        raise InvalidArgumentError(f"--jobs is {jobs} for a problem in 3D; expected 1: one process follows its curves")
 
     with workers(jobs) as executor, Display("branch graph") as display:
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from enumsol.proof.records import UndecidedRecord
 from enumsol.proof.space_records import CurveBoxRecord
 from enumsol.proof.writer import ProofWriter, unit_exponents
 from enumsol.roots.enumerate import enumerate_roots
+from enumsol.search.space.piece_parallel import spread_over
 from enumsol.search.space.piece_tree import OpenLeaf, PieceTree
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.support.deadlines import TimeOverError
@@ -26,6 +28,7 @@ from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+    from concurrent.futures import Executor
 
     from numpy.typing import NDArray
 
@@ -91,8 +94,13 @@ class SpaceCover:
         system = SpaceSolvers(self.problem, sum(self.interval) / 2, "verified").system
         return system.force, system.length
 
-    def search(self, max_nodes: int | None = None, progress: Callable[[str, float], object] | None = None) -> None:
-        """Search the tree; ``progress`` is called as by ``branch_graph``.
+    def search(
+        self,
+        max_nodes: int | None = None,
+        progress: Callable[[str, float], object] | None = None,
+        executor: Executor | None = None,
+    ) -> None:
+        """Search the tree; ``progress`` and ``executor`` as in ``branch_graph``.
 
         Raises
         ------
@@ -106,10 +114,10 @@ class SpaceCover:
             # what is left open costs as much at every further point of the same curve
             chain = None
             with suppress(TimeOverError):
-                if self.failed < _FAILURES:
-                    chain = chain_through(given, self.problem, x, self.interval)
+                chain = chain_through(given, self.problem, x, self.interval)
             if chain is None or not self._is_new(chain):
                 self.failed += 1
+                tree.more = None if self.failed == _FAILURES else more
                 return None
             self.chains.append(chain)
             return chain
@@ -118,9 +126,9 @@ class SpaceCover:
             self.problem.enclosure, self.interval, self._units(), more, max_nodes, tick, solutions=self._solutions
         )
         try:
-            self.records = tree.run()
+            tree.run(None if executor is None else partial(spread_over, executor))
         finally:
-            self.nodes, self.stopped = tree.nodes, tree.stopped
+            self.records, self.nodes, self.stopped = tree.records, tree.nodes, tree.stopped
 
     def _solutions(self, alpha: Fraction) -> list[Array]:
         """Forces of solutions at an alpha, as many as a short search finds."""

@@ -20,6 +20,7 @@ from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
+    from concurrent.futures import Executor
     from fractions import Fraction
 
     from enumsol.branches.elements import Arc, Vertex
@@ -35,6 +36,7 @@ def space_graph(
     progress: Callable[[str, float], object] | None,
     max_nodes: int | None,
     limits: Deadline,
+    executor: Executor | None = None,
 ) -> BranchGraph:
     """See ``branch_graph``.
 
@@ -49,7 +51,7 @@ def space_graph(
     reasons: list[str] = []
     try:
         with within(limits):
-            cover.search(max_nodes, progress)
+            cover.search(max_nodes, progress, executor)
         stop = None if cover.stopped is None else Stop(cover.stopped, cover.nodes)
     except NotEnclosedError as error:
         reasons.append(str(error))

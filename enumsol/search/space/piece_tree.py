@@ -55,6 +55,8 @@ if TYPE_CHECKING:
     from enumsol.trusted.space.solution_curve import SolutionCurve
 
     Array = NDArray[np.float64]
+    #: A subtree: its piece, partial assignment, what is known from above and how often it was cut; and its share.
+    Waiting = tuple[tuple[Any, ...], float]
 
 #: Pieces whose engines are kept.
 _KEPT = 32
@@ -79,6 +81,8 @@ _FACTORS, _PLACES, _POINTED = (0, 1), (0.5, 0.25, 0.75), 12
 _BESIDE = 1.5
 #: Leaves are tested from this level of their sectors on.
 _TRIED = 3
+#: Nodes that are examined before others than this process help.
+FIRST = 16
 #: Sectors above this level are halved, rather than alpha, where a leaf is settled in the middle only; by how many
 #: levels fewer sectors are halved than pieces.
 _WIDE, _NARROW = 6, 8
@@ -101,6 +105,31 @@ class OpenLeaf:
     high: Fraction
     codes: Codes
     forces: Array | None
+
+
+@dataclass(frozen=True)
+class Known:
+    """All that the search of a subtree depends on where no further curve is looked for.
+
+    Attributes
+    ----------
+    problem : (enclosure, interval, units, smallest), as PieceTree takes them
+    chains : sequence of CurveChain
+    sampled : whether solutions were sampled
+    sought : how often a curve through the middle of a piece was looked for
+    final : no further curve is to be followed
+    """
+
+    problem: tuple[CondensedEnclosure, tuple[Fraction, Fraction], tuple[Array, Array], float]
+    chains: tuple[CurveChain, ...]
+    sampled: bool
+    sought: int
+    final: bool
+
+    @property
+    def state(self) -> tuple[object, ...]:
+        """What of it changes during a search."""
+        return len(self.chains), self.sampled, self.sought == _SOUGHT, self.final
 
 
 def _slides(parts: CurveParts, codes: Codes) -> NDArray[np.bool_]:
@@ -190,8 +219,14 @@ class PieceTree:
     Attributes
     ----------
     curves : list of KnownCurve
+    records : list
+        Of the tree, in the order of a walk; what is open is an OpenLeaf.
     nodes : int
+    covered : float
+        The share of the tree that is done.
     stopped : StopReason or None
+    more : as given
+        None once no further curve is to be followed.
     """
 
     def __init__(
@@ -207,25 +242,38 @@ class PieceTree:
     ) -> None:
         self._solutions, self._sampled = solutions, False
         self._enclosure, self._units, self.interval = enclosure, units, interval
+        self._problem = enclosure, interval, units, smallest
         self._given = AlphaProblem.of(enclosure)
-        self._more, self._most, self._tick = more, max_nodes, tick
+        self.more, self._most, self._tick = more, max_nodes, tick
         self._least = Fraction(smallest) * (interval[1] - interval[0])
         self._pieces: OrderedDict[tuple[Fraction, Fraction], _Examined] = OrderedDict()
-        self.nodes = 0
+        self.records: list[Any] = []
+        self.nodes, self.covered = 0, 0.0
         #: Why the search ended early, if it did.
         self.stopped: StopReason | None = None
+        #: How often a curve through the middle of a piece was looked for.
+        self._sought = 0
         self.curves: list[KnownCurve] = []
         #: The curve of every box, numbered as in a proof.
         self._boxes: list[SolutionCurve] = []
         self._owner: list[int] = []
-        self._sought = 0
+
+    def known(self) -> Known:
+        """What the search of a subtree depends on."""
+        chains = tuple(known.chain for known in self.curves)
+        return Known(self._problem, chains, self._sampled, self._sought, self.more is None)
 
     def _follow(self, x: Array) -> bool:
         """Whether there is a new curve through a solution, which is not followed where a known one seems to have it."""
-        chain = None if self._more is None or self._is_known(x) else self._more(x)
-        if chain is None:
-            return False
-        self.curves.append(KnownCurve(self._given, chain))
+        chain = None if self.more is None or self._is_known(x) else self.more(x)
+        if chain is not None:
+            self._take(KnownCurve(self._given, chain))
+        return chain is not None
+
+    def _take(self, known: KnownCurve) -> None:
+        """Add a curve to those that are known."""
+        self.curves.append(known)
+        chain = known.chain
         self._boxes += [link.curve for link in chain.links]
         self._owner += [len(self.curves)] * len(chain.links)
         boxes = [curve.box for curve in self._boxes]
@@ -234,7 +282,6 @@ class PieceTree:
         )
         self._b = np.array([curve.reach for curve in self._boxes])
         self._h = np.array([box.half for box in boxes])
-        return True
 
     def _is_known(self, x: Array) -> bool:
         """Whether a solution seems to lie on a known curve; no claim."""
@@ -261,32 +308,58 @@ class PieceTree:
             self._pieces.move_to_end(key)
         return found
 
-    def run(self) -> list[Any]:
-        """Records of the tree, in the order of a walk; what is open is an OpenLeaf."""
-        records: list[Any] = []
-        stack: list[Any] = [(*self.interval, (UNDECIDED,) * self._enclosure.problem.p, None, -1, False, 0)]
-        sizes, done = [1.0], 0.0
-        while stack:
-            if self.stopped is None and self._most is not None and self.nodes >= self._most:
+    def run(self, spread: Callable[[PieceTree, list[Waiting]], object] | None = None) -> None:
+        """Search the tree; ``spread`` takes the place of ``examined`` for what waits after some nodes.
+
+        Raises
+        ------
+        KeyboardInterrupt
+            The records then say that what was not examined is open.
+        """
+        waiting = [((*self.interval, (UNDECIDED,) * self._enclosure.problem.p, None, -1, False, 0), 1.0)]
+        try:
+            self.examined(waiting, None if spread is None else FIRST)
+            if spread is not None and waiting:
+                spread(self, waiting)
+        finally:
+            self.leave(waiting)
+
+    def examined(self, waiting: list[Waiting], most: int | None = None) -> None:
+        """Examine what waits, the last first, until a limit is reached or so many nodes more are; the rest still waits.
+
+        Where a step raises an error, it waits as before.
+        """
+        last = None if most is None else self.nodes + most
+        while waiting and self.stopped is None and (last is None or self.nodes < last):
+            if self.left == 0:
                 self.stopped = StopReason.NODE_LIMIT
-            if self.stopped is None:
-                try:
-                    look()
-                except TimeOverError:
-                    self.stopped = StopReason.TIME_LIMIT
-            (low, high, codes, *others), size = stack.pop(), sizes.pop()
-            if self.stopped is not None:
-                records.append(OpenLeaf(low, high, codes, None))
-                continue
+                break
+            (low, high, codes, *others), share = waiting[-1]
+            try:
+                look()
+                record, below = self._step(low, high, codes, *others)
+            except TimeOverError:
+                self.stopped = StopReason.TIME_LIMIT
+                break
             self.nodes += 1
-            record, below = self._step(low, high, codes, *others)
-            records.append(record)
-            stack += below[::-1]
-            sizes += [size / len(below)] * len(below) if below else []
-            done += 0.0 if below else size
-            if self._tick is not None:
-                self._tick(min(done, 1.0))
-        return records
+            self.records.append(record)
+            waiting[-1:] = [(item, share / len(below)) for item in reversed(below)]
+            self.report(0.0 if below else share)
+
+    @property
+    def left(self) -> int | None:
+        """How many nodes may still be examined; None for any number."""
+        return None if self._most is None else max(self._most - self.nodes, 0)
+
+    def leave(self, waiting: Sequence[Waiting]) -> None:
+        """Leave open what still waits."""
+        self.records += [OpenLeaf(low, high, codes, None) for (low, high, codes, *_), _ in reversed(waiting)]
+
+    def report(self, share: float) -> None:
+        """Note that this share of the tree is done."""
+        self.covered += share
+        if self._tick is not None:
+            self._tick(min(self.covered, 1.0))
 
     def _step(
         self, low: Fraction, high: Fraction, codes: Codes, parent: Any, changed: int, last: bool, cuts: int
@@ -496,10 +569,13 @@ class PieceTree:
         at.curves = len(self.curves)
         if at.passages or self._sought == _SOUGHT or set(statuses) != {UNDECIDED}:
             return at.passages
+        return self._passages(at, statuses) if self._seek(at) else []
+
+    def _seek(self, at: _Examined) -> bool:
+        """Whether there is a new curve through a solution in the middle of a piece."""
         self._sought += 1
         forces = at.solution()
-        found = forces is not None and self._follow(np.append(forces, float(at.piece.middle)))
-        return self._passages(at, statuses) if found else []
+        return forces is not None and self._follow(np.append(forces, float(at.piece.middle)))
 
     def _leaf(self, at: _Examined, codes: Codes) -> tuple[Any, list[Any]] | None:
         """A leaf that is decided, or halved; None where statuses are to be split further."""
