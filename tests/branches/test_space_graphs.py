@@ -1,7 +1,6 @@
 """Branch graphs of problems in 3D (theory, sections 12.9 and 12.10)."""
 
 import re
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from fractions import Fraction
 from itertools import pairwise, product
@@ -183,8 +182,7 @@ def test_what_was_found_is_kept_when_the_time_is_over_or_somebody_interrupts():
 
 def test_what_is_refused():
     bad_argument('arithmetic is "fast" for a problem in 3D', enumsol.branch_graph, SLIDING, (1, 2), "fast")
-    with ThreadPoolExecutor(1) as workers:
-        bad_argument("executor is given for a problem in 3D", enumsol.branch_graph, SLIDING, (1, 2), executor=workers)
+    bad_argument("executor", enumsol.branch_graph, SLIDING, (1, 2), executor=3)
     bad_argument("expected F >= 0", enumsol.branch_graph, SLIDING, (-1, 2))
     refusal(enumsol.NotHeldError, "3D", enumsol.branch_graph, enumsol.gallery.block_on_table3d(), (0, 1))
 

@@ -178,6 +178,9 @@ def test_jobs_in_3d(capsys, tmp_path):
     assert out == run(capsys, "roots", "gallery:block3d-9", "--alpha", 0.5)[1]
     printed(capsys, "verify", "gallery:block3d-9", proof)
     assert run(capsys, *TABLE_3D, "--jobs", 2)[:2] == run(capsys, *TABLE_3D)[:2]
+    interval = ("--from", 0.5, "--to", 1)
+    graphs = [printed(capsys, "graph", "gallery:block3d-4", *interval, *jobs) for jobs in ((), ("--jobs", 2))]
+    assert graphs[0] == graphs[1]
 
 
 def test_help_and_version(capsys):
