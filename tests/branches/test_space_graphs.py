@@ -3,7 +3,7 @@
 import re
 from dataclasses import replace
 from fractions import Fraction
-from itertools import pairwise, product
+from itertools import count, pairwise, product
 from math import sqrt
 from types import SimpleNamespace
 
@@ -30,11 +30,12 @@ import enumsol
 from enumsol.arithmetic.balls import Ball
 from enumsol.branches.claims import uniqueness_bound
 from enumsol.branches.elements import VertexKind
-from enumsol.branches.space import chains, cover
+from enumsol.branches.space import chains, cover, pieces
 from enumsol.branches.space.chains import chain_through
 from enumsol.branches.space.make_curved import unordered
 from enumsol.branches.space.pieces import Run, Turn, orders, runs_and_turns
 from enumsol.continuation.path_data import PathStatus
+from enumsol.support.deadlines import TimeOverError
 from enumsol.trusted.space.curve_chains import leaves_interval
 from enumsol.trusted.space.curve_events import CurveMotion
 from enumsol.trusted.space.sector_rows import OPEN, STICK
@@ -178,6 +179,66 @@ def test_what_was_found_is_kept_when_the_time_is_over_or_somebody_interrupts():
     assert partial.stats.nodes > 0
     assert f"interrupted after {partial.stats.nodes} nodes" in partial.reasons[0]
     assert partial.proof is None
+
+
+@pytest.fixture(scope="module")
+def two_curves():
+    """A problem that has a curve through the whole interval and one that has a fold, and its graph."""
+    problem = random_over_alpha(2, 1)
+    return problem, whole_graph(problem, (0, 1))
+
+
+def check_part(part, whole):
+    """Arcs lie on those of the whole graph, each on one, and counts are lower bounds."""
+    assert len(part.arcs) > 0
+    for arc in part.arcs:
+        forces = [other.state(arc.sample)[0] for other in whole.arcs if other.lo <= arc.sample <= other.hi]
+        assert sum(bool(np.allclose(arc.state(arc.sample)[0], other, rtol=0, atol=1e-9)) for other in forces) == 1
+    for alpha in np.linspace(0.01, 0.99, 21).tolist():
+        over_alpha = [arc for arc in part.arcs if arc.lo < alpha < arc.hi]
+        assert len(over_alpha) <= part.at_least(alpha) <= whole.multiplicity_at(alpha)
+
+
+@pytest.mark.few(1)
+@pytest.mark.parametrize(
+    ("where", "call"),
+    [(chains, 30), (pieces, 20), (chains, 5), (pieces, 4)],
+    ids=["second curve", "its arcs", "first curve", "arcs"],
+)
+@pytest.mark.parametrize("over", [TimeOverError, KeyboardInterrupt])
+def test_what_is_known_of_a_curve_is_kept(where, call, over, two_curves, monkeypatch):
+    problem, whole = two_curves
+    calls = count()
+
+    def look():
+        if next(calls) >= call:
+            raise over
+
+    monkeypatch.setattr(where, "look", look)
+    if over is TimeOverError:
+        part = enumsol.branch_graph(problem, (0, 1))
+        assert "the time" in part.reasons[0]
+    else:
+        part = interrupted("kept", enumsol.branch_graph, problem, (0, 1))
+    assert not part.complete
+    # the tree is searched before curves are cut into arcs
+    assert (part.proof is None) == (where is chains or over is KeyboardInterrupt)
+    check_part(part, whole)
+    # an open end inside the interval is told
+    ends = [v.alpha for v in part.vertices if v.kind is VertexKind.UNSETTLED]
+    assert ends
+    assert any("not followed beyond" in reason and f"{ends[0]:.5g}"[:4] in reason for reason in part.reasons)
+
+
+@pytest.mark.slow
+def test_a_curve_that_is_not_proven_to_be_whole_is_kept_as_far_as_it_is(two_curves, monkeypatch):
+    problem, whole = two_curves
+    monkeypatch.setattr(cover.SpaceCover, "_is_new", lambda self, chain: False)
+    part = enumsol.branch_graph(problem, (0, 1), max_nodes=60)
+    assert not part.complete
+    assert len(part.components) == 2
+    assert part.at_least(0.6) == 3
+    check_part(part, whole)
 
 
 def test_what_is_refused():

@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from complete import only_root
-from problems3d import SLIDING, random_over_alpha, sliding_node
+from problems3d import SLIDING, OneNode, random_over_alpha, sliding_node
 
 from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space import chains
@@ -53,3 +53,36 @@ def test_a_point_where_a_curve_bends_beyond_its_box_is_on_it():
         beside += 1
         assert not apart(CurveChain([], [joint], True), chain)
     assert beside > 2
+
+
+def part_of(chain, first, last):
+    """Some links of a chain."""
+    return CurveChain(chain.links[first:last], chain.joints[first : last + 1], False)
+
+
+def test_parts_of_one_curve_share_what_they_share():
+    # the second one has boxes of its own, and other points
+    given, interval = AlphaProblem.of(SLIDING.enclosure), (Fraction(2, 5), Fraction(3, 5))
+    one, other = (
+        chain_through(given, SLIDING, np.append(sliding_node(alpha), alpha), interval) for alpha in (0.5, 0.55)
+    )
+    assert len(one.links) >= 4
+    begin, end = part_of(one, 0, 2), part_of(one, len(one.links) - 2, len(one.links))
+    assert apart(begin, end)
+    assert not apart(begin, part_of(one, 1, 3))
+    for part in (begin, end, one):
+        assert not apart(part, other)
+        assert not apart(other, part)
+
+
+def test_curves_of_different_solutions_apart():
+    node = OneNode(1, load=True)
+    given, phi = AlphaProblem.of(node.problem.enclosure), node.folds()[0]
+    found = []
+    for away in (0.02, -0.02):
+        alpha, n, t = node.at(phi + away)
+        reach = Fraction(abs(alpha - node.alpha(phi)) / 4)
+        interval = Fraction(alpha) - reach, Fraction(alpha) + reach
+        found.append(chain_through(given, node.problem, np.array([n, *t, alpha]), interval))
+    assert apart(*found)
+    assert not apart(found[0], found[0])

@@ -14,12 +14,12 @@ from enumsol.continuation.continuation_options import ContinuationOptions
 from enumsol.continuation.follow import follow
 from enumsol.continuation.path_data import PathStatus
 from enumsol.errors import EnumsolError
-from enumsol.support.deadlines import look, tell
+from enumsol.support.deadlines import TimeOverError, look, tell
 from enumsol.trusted.space.curve_chains import CurveChain, CurveLink, goes_on, link_between
 from enumsol.trusted.space.solution_curve import curve_around, curve_point
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Iterator, Sequence
     from fractions import Fraction
 
     from numpy.typing import NDArray
@@ -95,14 +95,27 @@ class _Corner:
 
 
 def chain_through(
-    given: AlphaProblem, problem: ContactProblem3D, x: Array, interval: tuple[Fraction, Fraction]
+    given: AlphaProblem,
+    problem: ContactProblem3D,
+    x: Array,
+    interval: tuple[Fraction, Fraction],
+    begun: Callable[[Chain], object] | None = None,
 ) -> Chain | None:
     """The curve through a regular root x, (3p + 1,), until it leaves the interval on both sides or is closed.
 
-    None where not even its beginning is proven; ``whole`` says whether all of it is.
+    None where not even its beginning is proven; ``whole`` says whether all of it is. ``begun`` is called with what
+    there is of it when the time is over or somebody interrupts.
     """
     skeleton = skeleton_through(problem, x, (float(interval[0]), float(interval[1])))
-    return None if skeleton is None else ChainBuilder(given).chain(skeleton)
+    if skeleton is None:
+        return None
+    builder = ChainBuilder(given)
+    try:
+        return builder.chain(skeleton)
+    except (TimeOverError, KeyboardInterrupt):
+        if begun is not None and (part := builder.begun) is not None:
+            begun(part)
+        raise
 
 
 def skeleton_through(problem: ContactProblem3D, x: Array, span: tuple[float, float]) -> Skeleton | None:
@@ -151,17 +164,24 @@ class ChainBuilder:
         self.problem = problem
         self.unit = np.append(problem.force, 1.0)
         self._ends: dict[int, tuple[Array, ...]] = {}
+        self._links: list[CurveLink] = []
+        self._joints: list[SolutionCurve] = []
+
+    @property
+    def begun(self) -> Chain | None:
+        """What is proven so far of the chain that is being made."""
+        count = min(len(self._links), len(self._joints) - 1)
+        return Chain(self._links[:count], self._joints[: count + 1], False, False) if count > 0 else None
 
     def chain(self, skeleton: Skeleton) -> Chain | None:
         """A chain along a skeleton, as far as it is proven."""
         skeleton = self._thinned(replace(skeleton, points=self.problem.placed(skeleton.points)))
         line = skeleton.points
-        self._ends = {}
+        self._ends, self._links, self._joints = {}, [], []
         first = self.joint(*self._at(line, 0.0))
         if first is None:
             return None
-        links: list[CurveLink] = []
-        joints = [first]
+        links, joints = self._links, self._joints = list[CurveLink](), [first]
         place, last = 0.0, len(line) - 1.0
         for corner in self._around(skeleton):
             if not self._filled(line, place, corner.low, links, joints, corner.start, closed=skeleton.closed):
@@ -196,10 +216,9 @@ class ChainBuilder:
         corners = [kept.index(corner) for corner in skeleton.corners]
         return Skeleton(skeleton.points[kept], corners, skeleton.closed)
 
-    def _around(self, skeleton: Skeleton) -> list[_Corner]:
+    def _around(self, skeleton: Skeleton) -> Iterator[_Corner]:
         """Places before and after every corner and what is proven between them, one box where that is possible."""
         line, last = skeleton.points, len(skeleton.points) - 1
-        found = []
         for corner in skeleton.corners:
             if not 0 < corner < last:
                 continue
@@ -210,8 +229,7 @@ class ChainBuilder:
                 if proven is not None:
                     break
                 share *= _NARROWER
-            found.append(_Corner(corner - share, corner + share, start, *(proven or (None, None))))
-        return found
+            yield _Corner(corner - share, corner + share, start, *(proven or (None, None)))
 
     def _filled(
         self,

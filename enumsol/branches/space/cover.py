@@ -5,7 +5,7 @@ The tree finds the curves (theory, section 12.9): at a solution that lies in no 
 
 from __future__ import annotations
 
-from contextlib import suppress
+import time
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
@@ -22,8 +22,8 @@ from enumsol.roots.enumerate import enumerate_roots
 from enumsol.search.space.piece_parallel import spread_over
 from enumsol.search.space.piece_tree import OpenLeaf, PieceTree
 from enumsol.search.space.space_setup import SpaceSolvers
-from enumsol.support.deadlines import TimeOverError
-from enumsol.trusted.space.curve_chains import apart, leaves_interval
+from enumsol.support.deadlines import current, look
+from enumsol.trusted.space.curve_chains import apart, leaves_interval, share_nothing
 from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
@@ -41,6 +41,8 @@ if TYPE_CHECKING:
 
 #: Nodes of a search at one alpha that is to find curves.
 _SAMPLED = 500
+#: Seconds that it has at least.
+_LEAST_TIME = 1e-3
 #: After so many curves that are not proven to be whole no further one is followed.
 _FAILURES = 3
 #: What the record of an open leaf says.
@@ -57,6 +59,8 @@ class SpaceCover:
     interval : first and last alpha
     chains : list of Chain
         Whole curves.
+    parts : list of Chain
+        Of other curves, which are not whole; no two have a solution in common.
     records : list
         Of the tree, in the order of a walk; open leaves among them.
     failed : int
@@ -69,6 +73,7 @@ class SpaceCover:
     problem: ContactProblem3D
     interval: tuple[Fraction, Fraction]
     chains: list[Chain] = field(default_factory=list)
+    parts: list[Chain] = field(default_factory=list)
     records: list[Any] = field(default_factory=list)
     failed: int = 0
     nodes: int = 0
@@ -111,16 +116,17 @@ class SpaceCover:
         tick = None if progress is None else lambda share: progress("search", share)
 
         def more(x: Array) -> Chain | None:
+            chain = chain_through(given, self.problem, x, self.interval, self._keep)
+            if chain is not None and self._is_new(chain):
+                self.parts = [part for part in self.parts if share_nothing(part, chain)]
+                self.chains.append(chain)
+                return chain
+            if chain is not None:
+                self._keep(chain)
             # what is left open costs as much at every further point of the same curve
-            chain = None
-            with suppress(TimeOverError):
-                chain = chain_through(given, self.problem, x, self.interval)
-            if chain is None or not self._is_new(chain):
-                self.failed += 1
-                tree.more = None if self.failed == _FAILURES else more
-                return None
-            self.chains.append(chain)
-            return chain
+            self.failed += 1
+            tree.more = None if self.failed == _FAILURES else more
+            return None
 
         tree = PieceTree(
             self.problem.enclosure, self.interval, self._units(), more, max_nodes, tick, solutions=self._solutions
@@ -130,9 +136,17 @@ class SpaceCover:
         finally:
             self.records, self.nodes, self.stopped = tree.records, tree.nodes, tree.stopped
 
+    def _keep(self, chain: Chain) -> None:
+        """Keep a part of a curve, if it has nothing in common with what is known."""
+        if all(share_nothing(chain, other) for other in (*self.chains, *self.parts)):
+            self.parts.append(chain)
+
     def _solutions(self, alpha: Fraction) -> list[Array]:
         """Forces of solutions at an alpha, as many as a short search finds."""
-        roots = enumerate_roots(self.problem, alpha, max_nodes=_SAMPLED)
+        look()
+        deadline = current()
+        left = None if deadline is None else max(deadline - time.perf_counter(), _LEAST_TIME)
+        roots = enumerate_roots(self.problem, alpha, max_nodes=_SAMPLED, time_limit=left)
         return [np.concatenate([root.lambda_n, *root.lambda_t.T]) for root in roots]
 
     def _is_new(self, chain: Chain) -> bool:

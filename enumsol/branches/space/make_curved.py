@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, cast
 
@@ -132,10 +132,20 @@ class CurvedGraph:
 
     # -- curves ----------------------------------------------------------------------------------------------------
 
-    def add(self, parts: Sequence[Run | Turn]) -> None:
-        """Take in a whole curve; only what lies over the interval."""
+    def add(self, parts: Sequence[Run | Turn], remedy: str | None = None) -> None:
+        """Take in a curve; only what lies over the interval.
+
+        ``remedy``: that it is not whole, and what may prove more of it. Its ends are then not settled.
+        """
         known: dict[int, int] = {}
+        ends: Sequence[Run | Turn] = ()
+        if remedy is not None and parts:
+            parts = _with_open_ends(parts)
+            ends = parts[0], parts[-1]
+            self._tell_ends([end.alphas for end in ends if isinstance(end, Turn)], remedy)
         for part in parts:
+            if part in ends:
+                continue
             if isinstance(part, Turn) and not part.settled and self._side(part.alphas) in (0, None):
                 low, high = (float(end) for end in part.alphas)
                 self.reasons.append(
@@ -145,6 +155,12 @@ class CurvedGraph:
         for k, part in enumerate(parts):
             if isinstance(part, Run):
                 self._take(parts, k, known)
+
+    def _tell_ends(self, ends: Sequence[Bounds], remedy: str) -> None:
+        """Say where a curve that is not whole ends inside the interval."""
+        inside = [f"{float(low):.8g}" for low, high in ends if self._side((low, high)) in (0, None)]
+        if inside:
+            self.reasons.append(f"a curve was not followed beyond its ends at alpha = {' and '.join(inside)}; {remedy}")
 
     def _take(self, parts: Sequence[Run | Turn], k: int, known: dict[int, int]) -> None:
         run = parts[k]
@@ -277,6 +293,18 @@ class CurvedGraph:
             border=place.border,
             settled=place.settled,
         )
+
+
+def _with_open_ends(parts: Sequence[Run | Turn]) -> list[Run | Turn]:
+    """With a turn that is not settled at both ends."""
+    first, last = parts[0], parts[-1]
+    begin = replace(first, settled=False) if isinstance(first, Turn) else _open_end(first, first.start, first.knots[0])
+    end = replace(last, settled=False) if isinstance(last, Turn) else _open_end(last, last.end, last.knots[-1])
+    return [begin, *parts[isinstance(first, Turn) : len(parts) - isinstance(last, Turn)], end]
+
+
+def _open_end(run: Run, alphas: Bounds, x: Floats) -> Turn:
+    return Turn(alphas, x, (run.codes,), settled=False)
 
 
 def unordered(vertices: Sequence[Vertex]) -> list[str]:

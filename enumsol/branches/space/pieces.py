@@ -133,12 +133,13 @@ class Turn:
     settled: bool
 
 
-def runs_and_turns(problem: AlphaProblem, chain: CurveChain) -> list[Run | Turn]:
-    """Those of a whole curve, in its order; runs and turns alternate.
+def runs_and_turns(problem: AlphaProblem, chain: CurveChain, found: list[Run | Turn] | None = None) -> list[Run | Turn]:
+    """Those of a curve, in its order; runs and turns alternate.
 
     Begins and ends with a run, but for a curve that is closed and has a turn: it begins with that and ends with a run.
+    ``found`` is filled on the way, so that it has what there is when the time is over.
     """
-    found: list[Run | Turn] = []
+    found = [] if found is None else found
     for k, (link, start, end) in enumerate(zip(chain.links, chain.joints[:-1], chain.joints[1:], strict=True)):
         look()
         tell("boxes of a curve cut into arcs", k, len(chain.links))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from enumsol.branches.graph import BranchGraph
 from enumsol.branches.graph_data import GraphStats
-from enumsol.branches.remedies import ANOTHER_INTERVAL, SHORT_INTERVAL
+from enumsol.branches.remedies import ANOTHER_INTERVAL, MORE_TIME, SHORT_INTERVAL
 from enumsol.branches.space.cover import SpaceCover
 from enumsol.branches.space.make_curved import CurvedGraph
 from enumsol.branches.space.pieces import runs_and_turns
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
     from enumsol.branches.elements import Arc, Vertex
+    from enumsol.branches.space.pieces import Run, Turn
     from enumsol.model.problem3d import ContactProblem3D
 
 #: Gaps that are named one by one.
@@ -61,7 +62,7 @@ def space_graph(
         stop = Stop(StopReason.INTERRUPTED, cover.nodes)
     searched = time.perf_counter()
     with within(limits.extended(started)):
-        vertices, arcs, open_parts, whole = _elements(cover, interval, progress)
+        vertices, arcs, open_parts, whole = _elements(cover, interval, progress, stop)
     if not whole:
         stop = Stop(StopReason.INTERRUPTED, cover.nodes)
     reasons += [] if stop is None else [str(stop)]
@@ -88,26 +89,37 @@ def space_graph(
 
 
 def _elements(
-    cover: SpaceCover, interval: tuple[Fraction, Fraction], progress: Callable[[str, float], object] | None
+    cover: SpaceCover,
+    interval: tuple[Fraction, Fraction],
+    progress: Callable[[str, float], object] | None,
+    stop: Stop | None,
 ) -> tuple[Sequence[Vertex], Sequence[Arc], Sequence[str], bool]:
     """Vertices and arcs of the curves, what stayed open about them, and whether nobody interrupted."""
-    if not cover.chains:
+    remedy = ANOTHER_INTERVAL if stop is None else MORE_TIME
+    curves = [*((chain, None) for chain in cover.chains), *((part, remedy) for part in cover.parts)]
+    if not curves:
         return (), (), (), True
     given = AlphaProblem.of(cover.problem.enclosure)
     made = CurvedGraph(cover.problem, given, interval)
     whole = True
-    try:
-        for k, chain in enumerate(cover.chains):
+    for k, (chain, more) in enumerate(curves):
+        found: list[Run | Turn] = []
+        try:
             if progress is not None:
-                progress("arcs", k / len(cover.chains))
-            try:
-                made.add(runs_and_turns(given, chain))
-            except TimeOverError:
-                made.reasons.append(f"the time was over before curve {k + 1} of {len(cover.chains)} was cut into arcs")
+                progress("arcs", k / len(curves))
+            made.add(runs_and_turns(given, chain, found), more)
+        except TimeOverError:
+            made.reasons.append(
+                f"the time was over before curve {k + 1} of {len(curves)} was cut into arcs; {MORE_TIME}"
+            )
+            made.add(found, MORE_TIME)
+        except KeyboardInterrupt:
+            made.add(found, MORE_TIME)
+            whole = False
+            break
+    else:
         if progress is not None:
             progress("arcs", 1.0)
-    except KeyboardInterrupt:
-        whole = False
     vertices, arcs = made.made()
     return vertices, arcs, made.reasons, whole
 
