@@ -30,6 +30,11 @@ if TYPE_CHECKING:
 
     from enumsol.model.problem3d import ContactProblem3D
 
+    Range = tuple[Fraction, Fraction]
+
+#: Ranges of alpha that a text names.
+_SHOWN = 6
+
 
 @dataclass
 class _Tally:
@@ -326,6 +331,8 @@ class Claims:
     standing : Standing
     held : bool
         The body is held, so that the indices of all solutions add up to +1.
+    open_ranges : sequence of (Fraction, Fraction), optional
+        Of a graph with gaps, in order: at all other alphas nothing is missing. Default: the interval.
     """
 
     def __init__(
@@ -336,9 +343,13 @@ class Claims:
         standing: Standing,
         *,
         held: bool = True,
+        open_ranges: Sequence[Range] | None = None,
     ) -> None:
         self._vertices, self._arcs, self._interval = vertices, arcs, interval
         self.standing, self._held = standing, held
+        self.open_ranges: tuple[Range, ...] = () if self.whole else (interval,)
+        if not self.whole and open_ranges is not None:
+            self.open_ranges = tuple(open_ranges)
 
     def __repr__(self) -> str:
         low, high = map(float, self._interval)
@@ -350,6 +361,15 @@ class Claims:
         """Whether nothing is known to be missing: counts are then exact and not lower bounds."""
         return self.standing is not Standing.INCOMPLETE
 
+    def knows(self, alpha: Fraction) -> bool:
+        """Whether nothing is known to be missing at this alpha."""
+        return not any(low <= alpha <= high for low, high in self.open_ranges)
+
+    @property
+    def partly(self) -> bool:
+        """Whether something is missing, but not everywhere."""
+        return not self.whole and self.open_ranges != (self._interval,)
+
     def multiplicity(self, alpha: Fraction) -> Multiplicity:
         """Number of solutions at an alpha of the interval, or its lower bound.
 
@@ -357,7 +377,7 @@ class Claims:
         """
         point = CriticalAlpha.rational(rational(alpha))
         at = [v.exact for v in self._vertices if v.exact.compare(point) == 0]
-        if not self.whole or not all(place.is_rational for place in at):
+        if not self.knows(alpha) or not all(place.is_rational for place in at):
             return Multiplicity(least_at(alpha, self._vertices, self._arcs, held=self._held), exact=False)
         over = sum(arc.passes_over(point) for arc in self._arcs)
         return Multiplicity(over + len(at), exact=True)
@@ -435,11 +455,20 @@ class Claims:
         if self.standing is Standing.NOT_PROVEN:
             line += ", not proven"
         lines = [line]
+        if self.partly:
+            lines.append(f"all solutions are known but for {ranges_text(self.open_ranges)}")
         if bound is not None:
             lines.append(
                 f"up to alpha = {bound:.8g} the stiffness alone rules out a second solution (estimate in floats)"
             )
         return lines
+
+
+def ranges_text(ranges: Sequence[Range]) -> str:
+    """Ranges of alpha in words, of many the first."""
+    shown = [f"[{float(low):.8g}, {float(high):.8g}]" for low, high in ranges[:_SHOWN]]
+    more = len(ranges) - len(shown)
+    return "alpha in " + ", ".join(shown) + (f" and {counted(more, 'more range')}" if more else "")
 
 
 def uniqueness_bound(problem: ContactProblem | ContactProblem3D, interval: tuple[float, float]) -> float | None:

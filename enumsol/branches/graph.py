@@ -29,8 +29,8 @@ class BranchGraph(GraphData):
 
     A graph with ``reasons`` is not complete. It shows what was found, and every part of it is true: arcs are solutions,
     and a vertex has a kind only where everything that meets there is known (it is "unsettled" otherwise). What needs
-    the whole graph (``multiplicity_at``, ``steps``, ``uniqueness_limit``) raises IncompleteGraphError then;
-    ``at_least`` and ``claims`` give what is known.
+    the whole graph (``steps``, ``uniqueness_limit``; ``multiplicity_at`` in ``open_ranges``) raises
+    IncompleteGraphError then; ``at_least`` and ``claims`` give what is known.
 
     Attributes
     ----------
@@ -55,6 +55,8 @@ class BranchGraph(GraphData):
         Number of the branch of every arc, by the arc's number.
     reasons : tuple of str
         Why the graph is not complete: what was left out, stayed undecided or contradicts the balance of degrees.
+    open_ranges : tuple of (Fraction, Fraction)
+        Ranges of alpha in which solutions may be missing; at every other alpha all are known.
     stats : GraphStats
     pieces : tuple of SearchedPiece
         The search's leaves with their multipliers, piece by piece of the interval (empty after ``load``).
@@ -71,9 +73,9 @@ class BranchGraph(GraphData):
     (3.0, 5, 3)
     """
 
-    def _whole(self, name: str, instead: str) -> None:
-        """Refuse a statement about all solutions unless nothing is known to be missing."""
-        if not self.claims.whole:
+    def _whole(self, name: str, instead: str, alpha: Fraction | None = None) -> None:
+        """Refuse a statement about all solutions, at one alpha or all, unless nothing is known to be missing."""
+        if not (self.claims.whole if alpha is None else self.claims.knows(alpha)):
             raise IncompleteGraphError(f"{name} is not known: the graph is not complete ({self.reasons[0]}); {instead}")
 
     # -- parts -----------------------------------------------------------------------------------------------------
@@ -157,11 +159,11 @@ class BranchGraph(GraphData):
         InvalidArgumentError
             alpha is outside the interval.
         IncompleteGraphError
-            The graph has gaps; ``at_least`` gives a lower bound.
+            The graph has gaps, and this alpha is in one of ``open_ranges``; ``at_least`` gives a lower bound.
         """
         found = self._multiplicity(alpha)
         where = f"there are {found} at alpha = {float(alpha_value(alpha)):.8g}"
-        self._whole("the number of solutions", where)
+        self._whole("the number of solutions", where, self.inside(alpha))
         if not found.exact:
             raise IncompleteGraphError(f"the number of solutions is not known so close to a vertex; {where}")
         return found.count
@@ -178,7 +180,7 @@ class BranchGraph(GraphData):
 
     def _multiplicity(self, alpha: AlphaLike) -> Multiplicity:
         found = self.claims.multiplicity(self.inside(alpha))
-        if self.claims.whole and not found.exact:
+        if self.claims.knows(self.inside(alpha)) and not found.exact:
             # only the side on which a vertex lies is not known
             roots = self.roots_at(alpha)
             return Multiplicity(max(roots.at_least, found.count), exact=roots.whole)
@@ -272,6 +274,7 @@ class BranchGraph(GraphData):
             "complete": self.complete,
             "standing": self.claims.standing.value,
             "reasons": list(self.reasons),
+            "open_ranges": [[float(end) for end in ends] for ends in self.open_ranges],
             "components": len(self.components),
             "branches": len(self.branches),
             "arcs": len(self.arcs),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from enumsol.arithmetic.algebraic import CriticalAlpha
 from enumsol.arithmetic.rationals import rational
-from enumsol.branches.claims import Claims, Standing
+from enumsol.branches.claims import Claims, Standing, ranges_text
 from enumsol.branches.elements import VertexKind, make_branches, make_components, multigraph
 from enumsol.errors import InvalidArgumentError
 from enumsol.roots.root_set import by_axis
@@ -78,6 +78,9 @@ class GraphData(Immutable):
         Not kept in files.
     make_proof : callable or None
         Makes the proof; not kept in files.
+    left_open : tuple of (Fraction, Fraction), or None
+        Ranges of alpha, in order, outside of which nothing of what is undecided is missing; None where that is not
+        known.
     """
 
     problem: Any
@@ -90,6 +93,7 @@ class GraphData(Immutable):
     stats: GraphStats
     pieces: tuple[SearchedPiece, ...] = ()
     make_proof: Callable[[], Proof | None] | None = None
+    left_open: tuple[tuple[Fraction, Fraction], ...] | None = None
 
     def __post_init__(self) -> None:
         self._freeze()
@@ -129,7 +133,19 @@ class GraphData(Immutable):
         """What is known about the number of solutions: exact counts, or lower bounds for a graph with gaps."""
         whole = Standing.PROVEN if self.complete else Standing.NOT_PROVEN
         standing = Standing.INCOMPLETE if self.reasons else whole
-        return Claims(self.vertices, self.arcs, self.exact_interval, standing, held=self.problem.modes is None)
+        # what contradicts itself may be wrong anywhere
+        known = None if self.gaps else self.left_open
+        held = self.problem.modes is None
+        return Claims(self.vertices, self.arcs, self.exact_interval, standing, held=held, open_ranges=known)
+
+    @property
+    def open_ranges(self) -> tuple[tuple[Fraction, Fraction], ...]:
+        """Ranges of alpha in which solutions may be missing, in order; of a graph without gaps none.
+
+        At every other alpha all solutions are known, so that ``multiplicity_at`` and ``roots_at`` give all of them. In
+        2D, and where nothing is known about where something is missing, a graph with gaps has one: the interval.
+        """
+        return self.claims.open_ranges
 
     def completeness(self) -> str:
         """The closing line of the printed summary: whether the graph is complete, and of what, or why not."""
@@ -224,6 +240,7 @@ def graph_text(data: GraphData) -> str:
     lines = [*_heading(data), *map(_branch_line, data.branches[:_PRINTED_BRANCHES])]
     if len(data.branches) > _PRINTED_BRANCHES:
         lines.append(f"  ... {len(data.branches) - _PRINTED_BRANCHES} more branches")
+    lines += _left_open(data)
     return "\n".join([*lines, data.completeness()])
 
 
@@ -241,7 +258,7 @@ def graph_html(data: GraphData) -> str:
     ]
     more = len(data.branches) - _PRINTED_BRANCHES
     table = html_table(("branch", "shape", "arcs", "alpha from", "to", "folds at"), rows) if rows else ""
-    closing = [*([f"... {more} more branches"] if more > 0 else []), data.completeness()]
+    closing = [*([f"... {more} more branches"] if more > 0 else []), *_left_open(data), data.completeness()]
     return html_lines(_heading(data)) + table + html_lines(closing)
 
 
@@ -255,6 +272,10 @@ def _heading(data: GraphData) -> list[str]:
         f"  components {len(data.components)}, branches {len(data.branches)}, arcs {len(data.arcs)}",
         f"  vertices {len(data.vertices)}" + (f": {numbers}" if numbers else ""),
     ]
+
+
+def _left_open(data: GraphData) -> list[str]:
+    return [f"  left open: {ranges_text(data.open_ranges)}"] if data.claims.partly else []
 
 
 def _branch_line(branch: Branch) -> str:

@@ -63,6 +63,7 @@ def save_graph(data: GraphData, file: str | Path) -> None:
         "interval": [str(end) for end in data.exact_interval],
         "arithmetic": data.arithmetic,
         "reasons": list(data.undecided),
+        **({} if data.left_open is None else {"left_open": [list(map(str, ends)) for ends in data.left_open]}),
         "stats": asdict(data.stats),
         "vertices": [_vertex_record(v) for v in data.vertices],
         "arcs": [_arc_record(arc, data.vertices) for arc in data.arcs],
@@ -108,7 +109,11 @@ def _from_record(kind: type[_Graph], record: dict[str, Any]) -> _Graph:
     vertices = tuple(_vertex(k, item, balls=balls) for k, item in enumerate(record["vertices"]))
     arcs = tuple(_arc(k, item, vertices, values(item)) for k, item in enumerate(record["arcs"]))
     reasons, stats = tuple(record["reasons"]), GraphStats(**record["stats"])
-    return kind(problem, exact, (first, last), record["arithmetic"], vertices, arcs, reasons, stats)
+    left_open = None
+    if "left_open" in record:
+        left_open = tuple((_fraction(low), _fraction(high)) for low, high in record["left_open"])
+    named = record["arithmetic"]
+    return kind(problem, exact, (first, last), named, vertices, arcs, reasons, stats, left_open=left_open)
 
 
 def _values(

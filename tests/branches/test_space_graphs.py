@@ -241,6 +241,66 @@ def test_a_curve_that_is_not_proven_to_be_whole_is_kept_as_far_as_it_is(two_curv
     check_part(part, whole)
 
 
+# -- what is left open -------------------------------------------------------------------------------------------------
+
+
+def loaded_by_alpha():
+    """One node under alpha times a load: it rests without load at alpha = 0, and slips everywhere else."""
+    rows = np.eye(3)
+    data = np.diag([1.0, 0.5, 0.25]), rows[:1], rows[1:2], rows[2:]
+    return enumsol.ContactProblem3D(*data, np.zeros(3), friction=0.5, load_slope=np.array([1.0, 0.75, 0.25]))
+
+
+@pytest.fixture(scope="module")
+def through_zero():
+    """Where no load acts it is left open what the curve does."""
+    return enumsol.branch_graph(loaded_by_alpha(), (-0.25, 0.125))
+
+
+def test_outside_of_ranges_that_are_left_open_all_solutions_are_known(through_zero):
+    ((low, high),) = through_zero.open_ranges
+    assert -0.01 < low < 0 < high < 0.01
+    assert not through_zero.complete
+    for alpha in (-0.25, -0.1, float(low) - 1e-9, float(high) + 1e-9, 0.125):
+        known, found = enumsol.enumerate_roots(loaded_by_alpha(), alpha), through_zero.roots_at(alpha)
+        assert known.complete
+        assert found.complete
+        assert through_zero.multiplicity_at(alpha) == len(found) == len(known) == 1
+        assert found[0].statuses == known[0].statuses
+    for alpha in (low, 0, high):
+        assert through_zero.at_least(alpha) == 1
+        refusal(enumsol.IncompleteGraphError, "at least 1", through_zero.multiplicity_at, alpha)
+        assert not through_zero.roots_at(alpha).complete
+    refusal(enumsol.IncompleteGraphError, "not complete", getattr, through_zero, "steps")
+
+
+def test_ranges_that_are_left_open_are_told(through_zero, tmp_path):
+    ((low, high),) = through_zero.open_ranges
+    words = f"alpha in [{float(low):.8g}, {float(high):.8g}]"
+    assert f"left open: {words}" in repr(through_zero)
+    assert f"left open: {words}" in through_zero._repr_html_()
+    assert f"all solutions are known but for {words}" in through_zero.claims.sentences(None)
+    assert through_zero.summary()["open_ranges"] == [[float(low), float(high)]]
+    read = read_back(through_zero, tmp_path / "graph.json")
+    assert read.open_ranges == through_zero.open_ranges
+    assert read.multiplicity_at(0.1) == 1
+
+
+def test_a_graph_without_gaps_leaves_nothing_open_and_one_cut_short_all(graph):
+    assert graph.open_ranges == ()
+    part = enumsol.branch_graph(SLIDING, (1.78, 1.82), max_nodes=1)
+    assert part.open_ranges == (part.exact_interval,)
+    assert "left open" not in repr(part)
+
+
+def test_an_arc_that_is_too_short_leaves_no_solution_at_the_border():
+    part = enumsol.branch_graph(loaded_by_alpha(), (0.0, 0.125))
+    assert any("shorter than its ends are known" in reason for reason in part.reasons)
+    assert part.at_least(0) == 1
+    assert [v.alpha for v in part.vertices if v.border] == [0.125]
+    assert part.claims.uniqueness().several_by is None
+
+
 def test_what_is_refused():
     bad_argument('arithmetic is "fast" for a problem in 3D', enumsol.branch_graph, SLIDING, (1, 2), "fast")
     bad_argument("executor", enumsol.branch_graph, SLIDING, (1, 2), executor=3)
@@ -299,7 +359,9 @@ def test_vertices_of_the_same_bounds_are_not_in_an_order(graph):
     vertex = graph.transitions[0]
     fold = replace(vertex, kind=VertexKind.FOLD)
     assert unordered([vertex, vertex]) == unordered([vertex, fold]) == unordered([fold]) == []
-    assert len(unordered([fold, vertex, fold])) == 1
+    ((reason, *ranges),) = unordered([fold, vertex, fold])
+    assert "stayed open" in reason
+    assert ranges == [vertex.enclosure] * 2
 
 
 def test_counts_along_random_graphs_are_those_of_searches():

@@ -27,7 +27,7 @@ from enumsol.trusted.space.curve_chains import apart, leaves_interval, share_not
 from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
     from concurrent.futures import Executor
 
     from numpy.typing import NDArray
@@ -82,13 +82,7 @@ class SpaceCover:
     @property
     def gaps(self) -> list[tuple[Fraction, Fraction]]:
         """Pieces of alpha over which something is not decided, in order, those that touch as one."""
-        found: list[tuple[Fraction, Fraction]] = []
-        for low, high in sorted((leaf.low, leaf.high) for leaf in self.records if isinstance(leaf, OpenLeaf)):
-            if found and low <= found[-1][1]:
-                found[-1] = found[-1][0], max(high, found[-1][1])
-            else:
-                found.append((low, high))
-        return found
+        return in_order((leaf.low, leaf.high) for leaf in self.records if isinstance(leaf, OpenLeaf))
 
     def unexplained(self, low: Fraction, high: Fraction) -> bool:
         """Whether a solution was met over a gap through which no whole curve is known."""
@@ -185,6 +179,17 @@ class SpaceCover:
             writer.write((UndecidedRecord(_OPEN) if is_open else record).write())
         writer.write({"curves": len(self.chains), "leaves": leaves, "gaps": gaps})
         return writer.close()
+
+
+def in_order(ranges: Iterable[tuple[Fraction, Fraction]]) -> list[tuple[Fraction, Fraction]]:
+    """Ranges in their order, those that touch as one."""
+    found: list[tuple[Fraction, Fraction]] = []
+    for low, high in sorted(ranges):
+        if found and low <= found[-1][1]:
+            found[-1] = found[-1][0], max(high, found[-1][1])
+        else:
+            found.append((low, high))
+    return found
 
 
 def _box(box: CurveBox) -> list[Any]:

@@ -100,6 +100,7 @@ class _Place:
     selections: tuple[Codes, ...]
     border: bool
     settled: bool
+    missing: bool = False
 
 
 @dataclass
@@ -121,12 +122,15 @@ class CurvedGraph:
     problem : ContactProblem3D
     given : AlphaProblem
     interval : first and last alpha
+    reasons : what stayed open
+    left_open : ranges of alpha outside of which nothing of that is missing
     """
 
     problem: ContactProblem3D
     given: AlphaProblem
     interval: Bounds
     reasons: list[str] = field(default_factory=list)
+    left_open: list[Bounds] = field(default_factory=list)
     _places: list[_Place] = field(default_factory=list)
     _pieces: list[_Piece] = field(default_factory=list)
 
@@ -148,13 +152,19 @@ class CurvedGraph:
                 continue
             if isinstance(part, Turn) and not part.settled and self._side(part.alphas) in (0, None):
                 low, high = (float(end) for end in part.alphas)
-                self.reasons.append(
+                self._leave_open(
                     f"between alpha = {low!r} and {high!r} it stayed open how a curve changes its statuses or turns, "
-                    f"for it was not shown that one condition alone changes its sign there; {TOLD_APART}"
+                    f"for it was not shown that one condition alone changes its sign there; {TOLD_APART}",
+                    part.alphas,
                 )
         for k, part in enumerate(parts):
             if isinstance(part, Run):
                 self._take(parts, k, known)
+
+    def _leave_open(self, reason: str, *alphas: Bounds) -> None:
+        """Note what is open, and between which alphas."""
+        self.reasons.append(reason)
+        self.left_open.append((min(low for low, _ in alphas), max(high for _, high in alphas)))
 
     def _tell_ends(self, ends: Sequence[Bounds], remedy: str) -> None:
         """Say where a curve that is not whole ends inside the interval."""
@@ -185,6 +195,9 @@ class CurvedGraph:
                 known[number] = self._turn(turn, settled=turn.settled and side == 0)
             numbers.append(known[number])
             settled = self._places[known[number]].settled
+            if not settled:
+                # the arc may end beside it
+                self.left_open.append((min(beyond[0], turn.alphas[0]), max(beyond[1], turn.alphas[1])))
             # beside what is open an arc is known to hold up to its last point
             reach = beyond if not turn.settled else turn.alphas
             inner.append(None if settled else reach[way < 0])
@@ -192,9 +205,16 @@ class CurvedGraph:
         if begin < end:
             self._pieces.append(_Piece(run, (numbers[0], numbers[1]), inner[0], inner[1]))
         else:
-            self.reasons.append(
-                f"an arc near alpha = {float(begin)!r} is shorter than its ends are known; {TOLD_APART}"
+            self._leave_open(
+                f"an arc near alpha = {float(begin)!r} is shorter than its ends are known; {TOLD_APART}",
+                run.start,
+                run.end,
+                *(self._places[number].alphas for number in numbers),
             )
+            for number in numbers:
+                # an arc is missing there; that the curve has a solution at the border is not known
+                place = self._places[number]
+                place.settled, place.missing = False, place.border
 
     def _limits(self, number: int, inner: Fraction | None) -> Fraction:
         return sum(self._places[number].alphas, Fraction(0)) / 2 if inner is None else inner
@@ -223,9 +243,10 @@ class CurvedGraph:
         alphas = turn.alphas if settled else (max(turn.alphas[0], a), min(turn.alphas[1], b))
         if not settled and turn.settled:
             low, high = (float(end) for end in turn.alphas)
-            self.reasons.append(
+            self._leave_open(
                 f"whether a change between alpha = {low!r} and {high!r} lies inside the interval stayed open; "
-                f"{END_ELSEWHERE}"
+                f"{END_ELSEWHERE}",
+                turn.alphas,
             )
         self._places.append(_Place(alphas, self.given.unplaced(turn.x), turn.selections, border=False, settled=settled))
         return len(self._places) - 1
@@ -239,7 +260,8 @@ class CurvedGraph:
 
     def made(self) -> tuple[list[Vertex], list[Arc]]:
         """Vertices in the order of alpha, and arcs."""
-        order = sorted(range(len(self._places)), key=lambda k: self._places[k].alphas)
+        there = (k for k, place in enumerate(self._places) if not place.missing)
+        order = sorted(there, key=lambda k: self._places[k].alphas)
         number = {old: new for new, old in enumerate(order)}
         places = [self._places[k] for k in order]
         exact = [EnclosedAlpha(*map(rational, place.alphas)) for place in places]
@@ -247,7 +269,8 @@ class CurvedGraph:
         arcs = [self._arc(k, piece, number, exact) for k, piece in enumerate(pieces)]
         sides = sides_of(arcs, len(places))
         vertices = [self._vertex(k, place, exact[k], sides[k]) for k, place in enumerate(places)]
-        self.reasons += unordered(vertices)
+        for reason, *alphas in unordered(vertices):
+            self._leave_open(reason, *alphas)
         return vertices, arcs
 
     def _arc(self, number: int, piece: _Piece, numbers: dict[int, int], exact: Sequence[EnclosedAlpha]) -> Arc:
@@ -307,12 +330,16 @@ def _open_end(run: Run, alphas: Bounds, x: Floats) -> Turn:
     return Turn(alphas, x, (run.codes,), settled=False)
 
 
-def unordered(vertices: Sequence[Vertex]) -> list[str]:
-    """Vertices at which the number of solutions changes and which bounds of alpha do not put in an order."""
+def unordered(vertices: Sequence[Vertex]) -> list[tuple[str, Bounds, Bounds]]:
+    """Vertices at which the number of solutions changes and which bounds of alpha do not put in an order, in pairs."""
     changing = [v for v in vertices if not v.border and v.kind not in (VertexKind.TRANSITION, VertexKind.UNSETTLED)]
     return [
-        f"which of the vertices {one.number} and {other.number} is at the smaller alpha stayed open, near "
-        f"{one.alpha!r}; {TOLD_APART}"
+        (
+            f"which of the vertices {one.number} and {other.number} is at the smaller alpha stayed open, near "
+            f"{one.alpha!r}; {TOLD_APART}",
+            one.enclosure,
+            other.enclosure,
+        )
         for k, one in enumerate(changing)
         for other in changing[k + 1 :]
         if one.exact.compare(other.exact) == 0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -61,7 +62,8 @@ def roots_on_arcs(
     undecided += [Undecided(v.statuses, _CLOSE, "another alpha, or enumerate_roots there") for v in near]
     roots = [enumeration.root(codes, root) for codes, root in distinct]
     roots.sort(key=lambda root: (-float(np.sum(root.lambda_n)), root.lambda_n.tolist(), root.lambda_t.tolist()))
-    whole = not undecided and not data.reasons
+    known = data.claims.knows(Fraction(alpha))
+    whole = not undecided and known
     return RootSet(
         alpha=alpha,
         roots=roots,
@@ -69,7 +71,7 @@ def roots_on_arcs(
         undecided=undecided,
         arithmetic="verified",
         method="graph",
-        stopped=str(Stop(StopReason.GRAPH_INCOMPLETE)) if data.reasons else None,
+        stopped=None if known else str(Stop(StopReason.GRAPH_INCOMPLETE)),
         stats=SearchStats(selections=len(arcs)),
         node_ids=data.problem.node_ids,
         at_least=None if whole else max(len(roots) - len(doubtful), data.claims.multiplicity(data.inside(alpha)).count),

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from enumsol.branches.graph import BranchGraph
 from enumsol.branches.graph_data import GraphStats
 from enumsol.branches.remedies import ANOTHER_INTERVAL, MORE_TIME, SHORT_INTERVAL
-from enumsol.branches.space.cover import SpaceCover
+from enumsol.branches.space.cover import SpaceCover, in_order
 from enumsol.branches.space.make_curved import CurvedGraph
 from enumsol.branches.space.pieces import runs_and_turns
 from enumsol.condensation.enclosure import NotEnclosedError
@@ -62,8 +63,8 @@ def space_graph(
         stop = Stop(StopReason.INTERRUPTED, cover.nodes)
     searched = time.perf_counter()
     with within(limits.extended(started)):
-        vertices, arcs, open_parts, whole = _elements(cover, interval, progress, stop)
-    if not whole:
+        made = _elements(cover, interval, progress, stop)
+    if made.interrupted:
         stop = Stop(StopReason.INTERRUPTED, cover.nodes)
     reasons += [] if stop is None else [str(stop)]
     graph = BranchGraph(
@@ -71,21 +72,40 @@ def space_graph(
         exact=None,
         exact_interval=interval,
         arithmetic="verified",
-        vertices=tuple(vertices),
-        arcs=tuple(arcs),
-        undecided=(*reasons, *([] if reasons else _gaps(cover)), *open_parts),
+        vertices=tuple(made.vertices),
+        arcs=tuple(made.arcs),
+        undecided=(*reasons, *([] if reasons else _gaps(cover)), *made.reasons),
         stats=GraphStats(
             pieces=1 + sum(isinstance(record, CutPiece) for record in cover.records),
             nodes=cover.nodes,
-            selections=len({arc.selections for arc in arcs}),
+            selections=len({arc.selections for arc in made.arcs}),
             search_seconds=searched - started,
             seconds=time.perf_counter() - started,
         ),
         make_proof=None if reasons else cover.proof,
+        left_open=_left_open(cover, made),
     )
     if stop is not None and stop.interrupted:
         raise Interrupted("branch_graph was interrupted; the curves found so far are kept", graph)
     return graph
+
+
+@dataclass
+class _Elements:
+    """Vertices and arcs of the curves.
+
+    Attributes
+    ----------
+    reasons : what stayed open about the curves
+    left_open : ranges of alpha outside of which nothing of that is missing; None where that is not known
+    interrupted : whether somebody did that
+    """
+
+    vertices: Sequence[Vertex] = ()
+    arcs: Sequence[Arc] = ()
+    reasons: Sequence[str] = ()
+    left_open: Sequence[tuple[Fraction, Fraction]] | None = ()
+    interrupted: bool = False
 
 
 def _elements(
@@ -93,15 +113,14 @@ def _elements(
     interval: tuple[Fraction, Fraction],
     progress: Callable[[str, float], object] | None,
     stop: Stop | None,
-) -> tuple[Sequence[Vertex], Sequence[Arc], Sequence[str], bool]:
-    """Vertices and arcs of the curves, what stayed open about them, and whether nobody interrupted."""
+) -> _Elements:
+    """Those of all curves that were found."""
     remedy = ANOTHER_INTERVAL if stop is None else MORE_TIME
     curves = [*((chain, None) for chain in cover.chains), *((part, remedy) for part in cover.parts)]
     if not curves:
-        return (), (), (), True
+        return _Elements()
     given = AlphaProblem.of(cover.problem.enclosure)
-    made = CurvedGraph(cover.problem, given, interval)
-    whole = True
+    made, whole, interrupted = CurvedGraph(cover.problem, given, interval), True, False
     for k, (chain, more) in enumerate(curves):
         found: list[Run | Turn] = []
         try:
@@ -109,19 +128,28 @@ def _elements(
                 progress("arcs", k / len(curves))
             made.add(runs_and_turns(given, chain, found), more)
         except TimeOverError:
-            made.reasons.append(
-                f"the time was over before curve {k + 1} of {len(curves)} was cut into arcs; {MORE_TIME}"
-            )
-            made.add(found, MORE_TIME)
-        except KeyboardInterrupt:
+            cut = f"the time was over before curve {k + 1} of {len(curves)} was cut into arcs"
+            made.reasons.append(f"{cut}; {MORE_TIME}")
             made.add(found, MORE_TIME)
             whole = False
+        except KeyboardInterrupt:
+            made.add(found, MORE_TIME)
+            whole, interrupted = False, True
             break
     else:
         if progress is not None:
             progress("arcs", 1.0)
     vertices, arcs = made.made()
-    return vertices, arcs, made.reasons, whole
+    return _Elements(vertices, arcs, made.reasons, made.left_open if whole else None, interrupted)
+
+
+def _left_open(cover: SpaceCover, made: _Elements) -> tuple[tuple[Fraction, Fraction], ...] | None:
+    """Ranges of alpha outside of which nothing is missing; None where that is not known."""
+    if not cover.records or made.left_open is None:
+        return None
+    low, high = cover.interval
+    ranges = ((max(begin, low), min(end, high)) for begin, end in (*cover.gaps, *made.left_open))
+    return tuple(in_order(ends for ends in ranges if ends[0] <= ends[1]))
 
 
 def _gaps(cover: SpaceCover) -> list[str]:

@@ -135,8 +135,8 @@ class _Spread:
     def run(self, waiting: list[Waiting]) -> None:
         """Examine what waits; what no worker has examined when a limit is reached is open."""
         stack = self._parts((), [_sent(item) for item in waiting])[::-1]
-        waiting.clear()
         try:
+            waiting.clear()
             self._hand_out(stack)
             while stack and self._tree.stopped is None:
                 self._next(stack)
@@ -191,9 +191,10 @@ class _Spread:
         """Take the answer of the next part, in whose place are the parts that follow from it."""
         answer = stack[-1].answer
         assert answer is not None
-        stack[-1:] = stack[-1].further[::-1]
+        # whenever somebody interrupts, what is not on the stack is in the records
         self._tree.records += answer.records
         self._tree.nodes += answer.nodes
+        stack[-1:] = stack[-1].further[::-1]
         self._tree.report(answer.covered)
 
     def _leave(self, stack: list[_Part]) -> None:
@@ -203,7 +204,8 @@ class _Spread:
             if timely and stack[-1].answer is not None:
                 self._take(stack)
             else:
-                self._tree.leave(stack.pop().roots)
+                self._tree.leave(stack[-1].roots)
+                stack.pop()
 
     def _parts(self, place: tuple[int, ...], roots: list[Waiting], *, wanted: bool = False) -> list[_Part]:
         """In the order of the tree; of the subtrees the last ones are near its root, and so large."""
