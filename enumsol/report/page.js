@@ -104,10 +104,20 @@ function sheetShapes() {
   }));
 }
 
+// where solutions may be missing, narrow ranges as a line
+function openShapes() {
+  return data.open_ranges.map(([low, high]) => ({
+    type: "rect", xref: "x", yref: "paper", x0: low, x1: high, y0: 0, y1: 1,
+    fillcolor: "rgba(194, 59, 75, 0.2)", line: { color: "#c23b4b", width: 0.8 }, layer: "below",
+  }));
+}
+
 const cursor = () => ({
   type: "line", xref: "x", yref: "paper", x0: state.alpha, x1: state.alpha, y0: 0, y1: 1,
   line: { color: "#d9730d", width: 1.5, dash: "dot" },
 });
+
+const shapes = () => [...sheetShapes(), ...openShapes(), cursor()];
 
 function drawDiagram() {
   const traces = [...data.arcs.filter((arc) => arc.a).map(arcTrace), ...vertexTraces(), ...stepTraces()];
@@ -118,7 +128,7 @@ function drawDiagram() {
     xaxis: { ...grid, title: { text: "alpha" }, range: data.interval, anchor: "y2" },
     yaxis: { ...grid, title: { text: axisName() }, domain: [0.3, 1] },
     yaxis2: { ...grid, title: { text: data.exact_counts ? "solutions" : "at least" }, domain: [0, 0.22], rangemode: "tozero", tickformat: "d", dtick: Math.max(1, Math.ceil(Math.max(0, ...data.steps.between, ...data.steps.at) / 4)) },
-    shapes: [...sheetShapes(), cursor()],
+    shapes: shapes(),
   };
   const config = { responsive: true, displaylogo: false, displayModeBar: window.innerWidth < 560 ? false : "hover", modeBarButtons: [["toImage", "zoom2d", "pan2d", "zoomIn2d", "zoomOut2d", "resetScale2d"]] };
   const target = byId("diagram");
@@ -129,7 +139,7 @@ function drawDiagram() {
         if (Object.keys(change).some((key) => key.startsWith("yaxis") || key === "autosize")) separate();
       });
       plotted = target;
-      Plotly.relayout(target, { shapes: [...sheetShapes(), cursor()] });
+      Plotly.relayout(target, { shapes: shapes() });
     }
     separate();
   });
@@ -166,6 +176,7 @@ function drawKey(beside = false) {
   });
   if (beside) entries.push(element("span", {}, "branches that coincide are drawn side by side"));
   if (data.arcs.some((arc) => arc.dimension > 0)) entries.push(element("span", {}, "shaded: a sheet, a continuum over an interval"));
+  if (data.open_ranges.length) entries.push(element("span", {}, "red: ranges of alpha in which solutions may be missing"));
   byId("key").replaceChildren(...entries);
 }
 

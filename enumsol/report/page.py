@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.branches import BranchGraph
+from enumsol.branches.claims import ranges_text
 from enumsol.branches.figures.graph_plots import checked_units
 from enumsol.errors import InvalidArgumentError
 from enumsol.loading.history import History
@@ -142,7 +143,7 @@ def report_page(
         "plotly": packed_plotly(),
         "badge": "yes" if graph.complete else "no",
         "completeness": escape(graph.completeness()),
-        "reasons": _reasons(graph.reasons),
+        "reasons": _reasons(graph),
         "facts": _facts(graph, units),
         "given": given_section(scene, units),
         "answers": "".join(f"<li>{escape(line)}</li>" for line in graph.claims.sentences(graph.uniqueness_bound)),
@@ -153,13 +154,14 @@ def report_page(
     return filled_page("graph", (*DRAWING, "page.js", "page.solutions.js"), content, words)
 
 
-def _reasons(reasons: Sequence[str]) -> str:
-    if not reasons:
+def _reasons(graph: BranchGraph) -> str:
+    if not graph.reasons:
         return ""
+    where = f" for {ranges_text(graph.open_ranges)}, and only there" if graph.claims.partly else ""
     return warning_list(
-        "This graph is not complete. Everything shown is a solution, but solutions may be missing: numbers of "
+        f"This graph is not complete. Everything shown is a solution, but solutions may be missing{where}: numbers of "
         "solutions are lower bounds. Why:",
-        reasons,
+        graph.reasons,
     )
 
 
@@ -262,6 +264,11 @@ def _certified(graph: BranchGraph, commands: Sequence[str]) -> str:
         lines.append(
             f"<p>It is proven that every solution for every alpha of the interval lies on the arcs shown here. This is "
             f"about {about}.</p>"
+        )
+    elif graph.claims.partly:
+        lines.append(
+            f"<p>It is proven that every solution lies on the arcs shown here, for every alpha of the interval but for "
+            f"{escape(ranges_text(graph.open_ranges))}. This is about {about}.</p>"
         )
     elif graph.reasons:
         lines.append("<p>Nothing is claimed about solutions that are not shown here.</p>")

@@ -38,7 +38,7 @@ function showAlpha(alpha) {
   data.slider.forEach((x, k) => { if (Math.abs(x - state.alpha) < Math.abs(data.slider[nearest] - state.alpha)) nearest = k; });
   byId("slider").value = String(Math.min(nearest, last));
   byId("alpha").value = String(state.alpha);
-  if (plotted !== null) Plotly.relayout("diagram", { shapes: [...sheetShapes(), cursor()] });
+  if (plotted !== null) Plotly.relayout("diagram", { shapes: shapes() });
   drawCards();
 }
 

@@ -286,6 +286,24 @@ def test_ranges_that_are_left_open_are_told(through_zero, tmp_path):
     assert read.multiplicity_at(0.1) == 1
 
 
+def test_figures_and_pages_show_ranges_that_are_left_open(through_zero, graph, tmp_path):
+    shown = {}
+    for name, found in (("open", through_zero), ("whole", graph)):
+        figure = found.plot(zoom=False)
+        labels = [text.get_text() for text in figure.legends[0].get_texts()]
+        shown[name] = "solutions may be missing" in labels, [len(axis.patches) > 0 for axis in figure.axes[:1]]
+        enumsol.write_report(found, tmp_path / f"{name}.html")
+    assert shown == {"open": (True, [True]), "whole": (False, [False])}
+    ((low, high),) = through_zero.open_ranges
+    page = (tmp_path / "open.html").read_text(encoding="utf-8")
+    words = f"alpha in [{float(low):.8g}, {float(high):.8g}]"
+    assert f"may be missing for {words}, and only there" in page
+    assert f"but for {words}" in page
+    assert f'"open_ranges":[[{float(low)!r},{float(high)!r}]]' in page.replace(" ", "")
+    page = (tmp_path / "whole.html").read_text(encoding="utf-8")
+    assert '"open_ranges":[]' in page.replace(" ", "")
+
+
 def test_a_graph_without_gaps_leaves_nothing_open_and_one_cut_short_all(graph):
     assert graph.open_ranges == ()
     part = enumsol.branch_graph(SLIDING, (1.78, 1.82), max_nodes=1)

@@ -18,7 +18,14 @@ from enumsol.branches.figures.curves import (
     state_columns,
 )
 from enumsol.branches.figures.marks import GREY, MARKERS, STATUS_STYLES, colour_of, handles, index_style, narrow_changes
-from enumsol.branches.figures.panels import draw_numbers, draw_steps, drawn_range, family_range, sheet_range
+from enumsol.branches.figures.panels import (
+    draw_numbers,
+    draw_open_ranges,
+    draw_steps,
+    drawn_range,
+    family_range,
+    sheet_range,
+)
 from enumsol.branches.roots_at import roots_at
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.arguments import alpha_interval, positive_number, shown
@@ -114,15 +121,18 @@ def plot_graph(
     else:
         figure, axes = figure_of(ax), [[ax]]
     columns = [graph.interval, *windows]
-    panels, dots = [], False
+    panels, others = [], set[str]()
     for column, window in zip(axes, columns, strict=True):
         drawn = _drawn(graph, style, None if column is axes[0] else window)
         panels += [_panel(axis, graph, style, row, drawn, window) for axis, row in zip(column, rows, strict=False)]
-        if multiplicity and ax is None:
-            dots |= draw_steps(column[-1], graph.claims.steps(), window)
+        if multiplicity and ax is None and draw_steps(column[-1], graph.claims.steps(), window):
+            others.add("dots")
+        for axis in column:
+            if draw_open_ranges(axis, graph.claims, window):
+                others.add("open")
         column[-1].set_xlabel("alpha")
     _mark_windows(axes, windows)
-    _words(figure, axes[0][0], graph, chosen, title, {"dots"} if dots else set(), alone=ax is not None)
+    _words(figure, axes[0][0], graph, chosen, title, others, alone=ax is not None)
     draw_numbers(figure, panels, None if ax is None else ax)
     if file is not None:
         figure.savefig(file, dpi=150)

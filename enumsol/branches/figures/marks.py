@@ -29,6 +29,8 @@ STATUS_STYLES: dict[ContactStatus, Any] = {
 }
 #: Of overviews, by the index of the arc.
 INDEX_STYLES: dict[int | None, Any] = {1: "-", -1: (0, (5, 2.5)), None: (0, (1.2, 1.6))}
+#: Ranges of alpha in which solutions may be missing, narrow ones as a line.
+OPEN_RANGE: dict[str, Any] = {"facecolor": "#f3d3d6", "edgecolor": "#c23b4b", "linewidth": 0.6}
 MARKERS = {
     VertexKind.TRANSITION: ("o", "white", "transition"),
     VertexKind.FOLD: ("s", "white", "fold"),
@@ -55,7 +57,7 @@ def index_style(index: int | None) -> Any:
 def handles(
     kinds: Iterable[VertexKind], statuses: Iterable[ContactStatus], indices: Iterable[int | None], others: set[str]
 ) -> list[Any]:
-    """Entries of a legend for what a figure shows; ``others`` are among "continuum", "sheet", "dots"."""
+    """Entries of a legend for what a figure shows; ``others`` are among "continuum", "sheet", "open", "dots"."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -80,6 +82,8 @@ def handles(
         found.append(Line2D([], [], color=GREY, linewidth=2.4, label="continuum"))
     if "sheet" in others:
         found.append(Patch(color=GREY, alpha=0.25, linewidth=0, label="sheet"))
+    if "open" in others:
+        found.append(Patch(**OPEN_RANGE, label="solutions may be missing"))
     if "dots" in others:
         found.append(Line2D([], [], linestyle="", marker=".", color=GREY, label="number at that alpha alone"))
     return found

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.branches.figures.curves import Curve, CurvePlace, Quantity, columns, state_columns
-from enumsol.branches.figures.marks import GREY, Label, colour_of, dense, place_labels
+from enumsol.branches.figures.marks import GREY, OPEN_RANGE, Label, colour_of, dense, place_labels
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
-    from enumsol.branches.claims import MultiplicitySteps
+    from enumsol.branches.claims import Claims, MultiplicitySteps
     from enumsol.branches.elements import Arc, Vertex
     from enumsol.model.problem import ContactProblem
     from enumsol.roots.root import RootFamily
@@ -99,6 +99,16 @@ def draw_steps(axis: Any, steps: MultiplicitySteps, window: tuple[float, float])
     axis.spines[["top", "right"]].set_visible(False)
     axis.set_xlim(*window)
     return bool(special)
+
+
+def draw_open_ranges(axis: Any, claims: Claims, window: tuple[float, float]) -> bool:
+    """Shade where solutions may be missing, if that is not everywhere; returns whether some of it is seen."""
+    seen = [(float(low), float(high)) for low, high in claims.open_ranges if low <= window[1] and window[0] <= high]
+    if not claims.partly:
+        return False
+    for low, high in seen:
+        axis.axvspan(max(low, window[0]), min(high, window[1]), zorder=0.4, **OPEN_RANGE)
+    return bool(seen)
 
 
 def draw_numbers(figure: Any, panels: Sequence[Panel], alone: Any) -> None:
