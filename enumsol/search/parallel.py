@@ -1,14 +1,11 @@
 """A search of the tree by the workers of a concurrent.futures executor, its proof put together in the tree's order.
 
-A task is a part of the tree. It ends after a number of nodes and gives back the subtrees that it did not reach, which
-are new tasks: so no part is long, however uneven the tree. The result of a task depends on it alone, and results are
-taken in the order of the tree: roots and proof depend neither on timing nor on the number of workers.
+The result of a task (``search/parts.py``) depends on it alone, and results are taken in the order of the tree: roots
+and proof depend neither on timing nor on the number of workers.
 """
 
 from __future__ import annotations
 
-import hashlib
-import heapq
 import pickle
 import threading
 import time
@@ -17,8 +14,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from enumsol.proof.writer import KeptRecords, Part, Recorder
 from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
+from enumsol.search.parts import PartCrew, TreePart
 from enumsol.search.tree import TreeNode, TreeSearch
-from enumsol.support.workers import Crew, Job
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -30,8 +27,6 @@ if TYPE_CHECKING:
 
 #: Nodes of a task, and those that are examined here before there are any.
 NODES, FIRST = 512, 64
-#: Of the subtrees that a task gives back, so many become tasks of their own: those nearest to the root of the tree.
-ALONE = 4
 
 
 class Searchable(Protocol):
@@ -86,12 +81,10 @@ class _Sent:
     form: Any
     sliding: dict[int, int]
     data: bytes
-    key: bytes
 
     @classmethod
     def of(cls, remake: Callable[[], Searchable], form: Any, sliding: dict[int, int], known: Any) -> _Sent:
-        data = pickle.dumps((remake, form, sliding, known))
-        return cls(form, dict(sliding), data, hashlib.sha256(data).digest())
+        return cls(form, dict(sliding), pickle.dumps((remake, form, sliding, known)))
 
 
 @dataclass(frozen=True)
@@ -103,19 +96,6 @@ class _Answer:
     certified: Certified
     covered: float
     rest: list[TreeNode]
-
-
-@dataclass(eq=False)
-class _Part:
-    """A part of the tree: subtrees that follow on each other, the first one last."""
-
-    place: tuple[int, ...]
-    roots: Sequence[TreeNode]
-    answer: _Answer | None = None
-    further: Sequence[_Part] = ()
-
-    def __lt__(self, other: _Part) -> bool:
-        return self.place < other.place
 
 
 class Spread:
@@ -130,13 +110,10 @@ class Spread:
     """
 
     def __init__(self, executor: Executor, solvers: Searchable, search: TreeSearch) -> None:
-        self._crew, self._search = Crew(executor), search
+        self._crew, self._search = PartCrew(executor, _search_part, NODES, search.limits.remaining), search
         self._remake = solvers.remake()
-        #: What workers make their solvers from, and whether some have it.
+        #: What workers make their solvers from.
         self._sent: _Sent | None = None
-        self._known = False
-        self._waiting: list[_Part] = []
-        self._out: dict[Job, _Part] = {}
 
     def run(self, waiting: Iterable[Any], until: Callable[[], bool] | None = None) -> list[Any]:
         """Examine what waits, the last first; what still waits when it is time to stop."""
@@ -148,7 +125,7 @@ class Spread:
             if search.must_stop(0):
                 break
             part = stack.pop()
-            if not self._answered(part):
+            if not self._crew.answered(part):
                 stack.append(part)
                 outcome.stopped = Stop(StopReason.TIME_LIMIT, unexamined=0)
                 break
@@ -160,72 +137,32 @@ class Spread:
         """Cancel what has not begun."""
         self._search.outcome.redone = self._crew.redone
         self._crew.cancel()
-        self._out.clear()
-        self._waiting.clear()
 
     # -- parts -----------------------------------------------------------------------------------------------------
 
-    def _begin(self, waiting: list[Any]) -> list[_Part]:
+    def _begin(self, waiting: list[Any]) -> list[TreePart]:
         """Parts of what waits, which are these already where the search goes on as before."""
         form = None if self._search.forms is None else self._search.forms.form
-        afresh = not all(isinstance(item, _Part) for item in waiting)
+        afresh = not all(isinstance(item, TreePart) for item in waiting)
         sliding = self._search.certifier.sliding
         if self._sent is None or self._sent.form is not form or (afresh and self._sent.sliding != sliding):
             known = None if self._search.closer is None else self._search.closer.known
-            self._sent, self._known = _Sent.of(self._remake, form, sliding, known), False
+            self._sent = _Sent.of(self._remake, form, sliding, known)
+            self._crew.use(self._sent.data)
         elif not afresh:
             return waiting
         self.cancel()
         items: list[TreeNode] = []
         for item in waiting:
-            items += item.roots if isinstance(item, _Part) else [item]
+            items += item.roots if isinstance(item, TreePart) else [item]
         limits, done = self._search.limits, self._search.outcome.nodes
         first = FIRST if limits.max_nodes is None else min(FIRST, limits.max_nodes - done)
         rest = self._search.examined(items, first, limits.deadline)
-        parts = self._parts((), [item.sent() for item in rest])
-        for part in parts:
-            heapq.heappush(self._waiting, part)
-        self._hand_out()
+        parts = self._crew.parts((), [item.sent() for item in rest])
+        self._crew.hand_out(parts)
         return parts[::-1]
 
-    def _parts(self, place: tuple[int, ...], roots: list[TreeNode]) -> list[_Part]:
-        """In the order of the tree; of the subtrees the last ones are near its root, and so large."""
-        groups = [[root] for root in roots[:ALONE][::-1]]
-        if roots[ALONE:]:
-            groups.insert(0, roots[ALONE:])
-        return [_Part((*place, k), group) for k, group in enumerate(groups)]
-
-    def _hand_out(self) -> None:
-        """Keep the workers busy with what comes first in the tree."""
-        while self._waiting and self._crew.room > 0:
-            self._send(heapq.heappop(self._waiting), whole=not self._known)
-
-    def _send(self, part: _Part, *, whole: bool) -> None:
-        """Hand out a part; ``whole``: with all that a worker needs, which may be much."""
-        assert self._sent is not None
-        data, seconds = self._sent.data if whole else None, self._search.limits.remaining()
-        self._out[self._crew.submit(_search_part, self._sent.key, data, part.roots, NODES, seconds)] = part
-
-    def _answered(self, part: _Part) -> bool:
-        """Wait for the answer of a part; False when the time is over."""
-        limits = self._search.limits
-        while part.answer is None:
-            remaining = limits.remaining()
-            job = self._crew.next(None if remaining is None else max(remaining, 0.0))
-            if job is None:
-                return False
-            done = self._out.pop(job)
-            if job.result is None:
-                self._send(done, whole=True)  # it went to a worker that had nothing yet
-                continue
-            self._known, done.answer = True, job.result
-            done.further = self._parts(done.place, job.result.rest)
-            for another in done.further:
-                heapq.heappush(self._waiting, another)
-            self._hand_out()
-        return True
-
-    def _take(self, part: _Part) -> Sequence[_Part]:
+    def _take(self, part: TreePart) -> Sequence[TreePart]:
         """Take the answer of a part; gives those that follow from it."""
         search, answer, most = self._search, part.answer, self._search.limits.max_nodes
         assert answer is not None
@@ -233,7 +170,7 @@ class Spread:
         if rest is not None and answer.outcome.nodes > rest:
             # the last part before the limit is shorter
             left = search.examined(part.roots, rest)
-            return self._parts(part.place, [item.sent() for item in left])
+            return self._crew.parts(part.place, [item.sent() for item in left])
         search.outcome.add(answer.outcome)
         search.certifier.add(answer.certified)
         if answer.records is not None:
@@ -242,7 +179,7 @@ class Spread:
         search.report(search.covered)
         return part.further
 
-    def _leave(self, stack: list[_Part]) -> None:
+    def _leave(self, stack: list[TreePart]) -> None:
         """What is left after a limit: undecided, but for parts that are there when the time is over."""
         search = self._search
         timely = search.outcome.stopped is not None and search.outcome.stopped.reason is StopReason.TIME_LIMIT

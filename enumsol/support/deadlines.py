@@ -88,6 +88,12 @@ def current() -> float | None:
     return None if limits is None else limits.deadline
 
 
+def remaining() -> float | None:
+    """The seconds that are left here."""
+    deadline = current()
+    return None if deadline is None else deadline - time.perf_counter()
+
+
 def over() -> bool:
     """Whether the time is over."""
     deadline = current()

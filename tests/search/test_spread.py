@@ -46,7 +46,7 @@ def test_no_part_is_long_and_no_worker_waits(small_parts, monkeypatch, wedge):
 
     def watched(self, seconds=None):
         # when the search waits either the workers have enough to do, or there is no more
-        seen.append((self.room, len(spread._waiting)))
+        seen.append((self.room, len(spread._crew._waiting)))
         return before(self, seconds)
 
     def made(*arguments):

@@ -5,7 +5,6 @@ The tree finds the curves (theory, section 12.9): at a solution that lies in no 
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
@@ -22,7 +21,7 @@ from enumsol.roots.enumerate import enumerate_roots
 from enumsol.search.space.piece_parallel import spread_over
 from enumsol.search.space.piece_tree import OpenLeaf, PieceTree
 from enumsol.search.space.space_setup import SpaceSolvers
-from enumsol.support.deadlines import current, look
+from enumsol.support.deadlines import look, remaining
 from enumsol.trusted.space.curve_chains import apart, leaves_interval, share_nothing
 from enumsol.trusted.space.solution_curve import AlphaProblem
 
@@ -138,8 +137,8 @@ class SpaceCover:
     def _solutions(self, alpha: Fraction) -> list[Array]:
         """Forces of solutions at an alpha, as many as a short search finds."""
         look()
-        deadline = current()
-        left = None if deadline is None else max(deadline - time.perf_counter(), _LEAST_TIME)
+        seconds = remaining()
+        left = None if seconds is None else max(seconds, _LEAST_TIME)
         roots = enumerate_roots(self.problem, alpha, max_nodes=_SAMPLED, time_limit=left)
         return [np.concatenate([root.lambda_n, *root.lambda_t.T]) for root in roots]
 

@@ -1,15 +1,13 @@
 """The tree over alpha searched by the workers of a concurrent.futures executor, put together in the tree's order.
 
-A task is a part of the tree with the curves that are known. It depends on nothing else, ends after a number of nodes,
-and gives back the subtrees that it did not reach, which are new tasks. Where it would look for another curve it ends as
-well: that is done by the calling process when the walk through the tree comes to it, and what lies behind is searched
-again if a curve was found. So curves and proof depend neither on timing nor on the number of workers.
+A task (``search/parts.py``) is a part of the tree with the curves that are known, and depends on nothing else. Where it
+would look for another curve it ends: that is done by the calling process when the walk through the tree comes to it,
+and what lies behind is searched again if a curve is found. So curves and proof depend neither on timing nor on the
+number of workers.
 """
 
 from __future__ import annotations
 
-import hashlib
-import heapq
 import pickle
 import threading
 import time
@@ -17,9 +15,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from enumsol.search.outcome import StopReason
+from enumsol.search.parts import PartCrew, TreePart
 from enumsol.search.space.piece_tree import PieceTree
-from enumsol.support.deadlines import Deadline, TimeOverError, current, within
-from enumsol.support.workers import Crew, Job
+from enumsol.support.deadlines import Deadline, remaining, within
 from enumsol.trusted.space.curve_runs import KnownCurve
 from enumsol.trusted.space.solution_curve import AlphaProblem
 
@@ -31,8 +29,8 @@ if TYPE_CHECKING:
 
 #: Nodes of a task.
 NODES = 16
-#: Of the subtrees that a task gives back, so many become tasks of their own: those nearest to the root of the tree.
-ALONE = 4
+#: In place of the answer of a part that is to look for a curve.
+WANTED = "a curve is wanted"
 
 
 class CurveWantedError(Exception):
@@ -88,172 +86,100 @@ class _Answer:
     wanted: bool
 
 
-@dataclass(eq=False)
-class _Part:
-    """A part of the tree: subtrees that follow on each other, the first one last.
-
-    Attributes
-    ----------
-    place : where it is in the tree, for an order
-    roots : sequence of Waiting
-    wanted : whether the first of them is to look for a curve
-    """
-
-    place: tuple[int, ...]
-    roots: Sequence[Waiting]
-    wanted: bool = False
-    answer: _Answer | None = None
-    further: Sequence[_Part] = ()
-
-    def __lt__(self, other: _Part) -> bool:
-        return self.place < other.place
-
-
 def spread_over(executor: Executor, tree: PieceTree, waiting: list[Waiting]) -> None:
     """Examine what waits with the help of an executor, as ``PieceTree.examined`` does without; see there."""
-    spread = _Spread(executor, tree)
-    try:
-        spread.run(waiting)
-    finally:
-        spread.cancel()
+    _Spread(executor, tree).run(waiting)
+
+
+class _Crew(PartCrew):
+    """Workers; a part whose first root is to look for a curve has ``WANTED`` in place of an answer."""
+
+    def further(self, part: TreePart) -> list[TreePart]:
+        """What an answer leaves, the root that is to look for a curve in a part of its own."""
+        rest, place = part.answer.rest, part.place
+        if not part.answer.wanted:
+            return self.parts(place, rest)
+        return [TreePart((*place, -1), rest[-1:], WANTED), *self.parts(place, rest[:-1])]
 
 
 class _Spread:
     """See ``spread_over``."""
 
     def __init__(self, executor: Executor, tree: PieceTree) -> None:
-        self._crew, self._tree = Crew(executor), tree
+        self._crew, self._tree = _Crew(executor, _search_part, NODES, remaining), tree
         self._use(tree.known())
-        self._heap: list[_Part] = []
-        self._out: dict[Job, _Part] = {}
 
     def _use(self, known: Known) -> None:
         """Have workers know these curves."""
-        self._known, self._data, self._told = known, pickle.dumps(known), False
-        self._key = hashlib.sha256(self._data).digest()
+        self._known = known
+        self._crew.use(pickle.dumps(known))
 
     def run(self, waiting: list[Waiting]) -> None:
         """Examine what waits; what no worker has examined when a limit is reached is open."""
-        stack = self._parts((), [_sent(item) for item in waiting])[::-1]
+        stack = self._crew.parts((), [_sent(item) for item in waiting])[::-1]
         try:
             waiting.clear()
-            self._hand_out(stack)
+            self._crew.hand_out(stack)
             while stack and self._tree.stopped is None:
                 self._next(stack)
         finally:
             self._leave(stack)
+            self._crew.cancel()
 
-    def cancel(self) -> None:
-        """Cancel what has not begun."""
-        self._crew.cancel()
-        self._out.clear()
-        self._heap.clear()
-
-    def _next(self, stack: list[_Part]) -> None:
+    def _next(self, stack: list[TreePart]) -> None:
         """Take the next part of the tree."""
         tree, part, left = self._tree, stack[-1], self._tree.left
         if left == 0:
             tree.stopped = StopReason.NODE_LIMIT
-        elif part.wanted:
+        elif part.answer is WANTED:
             self._look_for_curve(stack)
+        elif not self._crew.answered(part) or not (part.answer.records or part.answer.wanted):
+            # the time is over, or was so for the worker
+            tree.stopped = StopReason.TIME_LIMIT
         else:
-            try:
-                answer = self._answer(part)
-            except TimeOverError:
-                tree.stopped = StopReason.TIME_LIMIT
-                return
-            if left is not None and answer.nodes > left:
+            if left is not None and part.answer.nodes > left:
                 # the last part before the limit is shorter
-                part.answer = answer = _examined(FixedTree(self._known, tree.curves), part.roots, left)
-                part.further = [_Part(part.place, answer.rest)]
+                part.answer = _examined(FixedTree(self._known, tree.curves), part.roots, left)
+                part.further = [TreePart(part.place, part.answer.rest)]
             self._take(stack)
 
-    def _look_for_curve(self, stack: list[_Part]) -> None:
+    def _look_for_curve(self, stack: list[TreePart]) -> None:
         """Examine here the node that may need another curve, and search again what was searched without it."""
         tree, part = self._tree, stack[-1]
         waiting = list(part.roots)
         tree.examined(waiting, 1)
         if tree.stopped is not None:
             return
-        parts = self._parts(part.place, [_sent(item) for item in waiting])
+        parts = self._crew.parts(part.place, [_sent(item) for item in waiting])
         stack[-1:] = parts[::-1]
         known = tree.known()
         if known.state == self._known.state:
-            self._hand_out(parts)
+            self._crew.hand_out(parts)
             return
-        self.cancel()
+        self._crew.cancel()
         self._use(known)
         for other in stack:
-            other.answer, other.further, other.wanted = None, (), False
-        self._hand_out(stack)
+            other.answer, other.further = None, ()
+        self._crew.hand_out(stack)
 
-    def _take(self, stack: list[_Part]) -> None:
+    def _take(self, stack: list[TreePart]) -> None:
         """Take the answer of the next part, in whose place are the parts that follow from it."""
-        answer = stack[-1].answer
-        assert answer is not None
+        part, tree = stack[-1], self._tree
         # whenever somebody interrupts, what is not on the stack is in the records
-        self._tree.records += answer.records
-        self._tree.nodes += answer.nodes
-        stack[-1:] = stack[-1].further[::-1]
-        self._tree.report(answer.covered)
+        tree.records += part.answer.records
+        tree.nodes += part.answer.nodes
+        stack[-1:] = part.further[::-1]
+        tree.report(part.answer.covered)
 
-    def _leave(self, stack: list[_Part]) -> None:
+    def _leave(self, stack: list[TreePart]) -> None:
         """What is left after a limit is open, but for parts that are there when the time is over."""
         timely = self._tree.stopped is StopReason.TIME_LIMIT
         while stack:
-            if timely and stack[-1].answer is not None:
+            if timely and stack[-1].answer not in (None, WANTED):
                 self._take(stack)
             else:
                 self._tree.leave(stack[-1].roots)
                 stack.pop()
-
-    def _parts(self, place: tuple[int, ...], roots: list[Waiting], *, wanted: bool = False) -> list[_Part]:
-        """In the order of the tree; of the subtrees the last ones are near its root, and so large."""
-        first = [roots.pop()] if wanted else []
-        groups = [[root] for root in roots[:ALONE][::-1]]
-        if roots[ALONE:]:
-            groups.insert(0, roots[ALONE:])
-        found = [_Part((*place, k + 1), group) for k, group in enumerate(groups)]
-        return [_Part((*place, 0), first, wanted=True), *found] if wanted else found
-
-    def _hand_out(self, parts: Sequence[_Part]) -> None:
-        """Hand out parts, those that come first in the tree before others, as many as keep the workers busy."""
-        for part in parts:
-            if not part.wanted:
-                heapq.heappush(self._heap, part)
-        while self._heap and self._crew.room > 0:
-            self._send(heapq.heappop(self._heap))
-
-    def _send(self, part: _Part, *, whole: bool = False) -> None:
-        """Hand out a part; ``whole``: with all that a worker needs, which may be much."""
-        deadline = current()
-        seconds = None if deadline is None else deadline - time.perf_counter()
-        data = self._data if whole or not self._told else None
-        self._out[self._crew.submit(_search_part, self._key, data, part.roots, seconds)] = part
-
-    def _answer(self, part: _Part) -> _Answer:
-        """Wait for the answer of a part.
-
-        Raises
-        ------
-        TimeOverError
-            The time is over before it is there.
-        """
-        while part.answer is None:
-            deadline = current()
-            job = self._crew.next(None if deadline is None else max(deadline - time.perf_counter(), 0.0))
-            if job is None:
-                raise TimeOverError
-            done = self._out.pop(job)
-            if job.result is None:
-                self._send(done, whole=True)  # it went to a worker that had nothing yet
-                continue
-            self._told, done.answer = True, job.result
-            done.further = self._parts(done.place, list(job.result.rest), wanted=job.result.wanted)
-            self._hand_out(done.further)
-        if not part.answer.records and not part.answer.wanted:
-            raise TimeOverError  # it was over for the worker
-        return part.answer
 
 
 def _sent(item: Waiting) -> Waiting:
@@ -265,7 +191,9 @@ def _sent(item: Waiting) -> Waiting:
 _local = threading.local()
 
 
-def _search_part(key: bytes, data: bytes | None, roots: Sequence[Waiting], seconds: float | None) -> _Answer | None:
+def _search_part(
+    key: bytes, data: bytes | None, roots: Sequence[Waiting], nodes: int, seconds: float | None
+) -> _Answer | None:
     """Search a part, in a worker; every thread makes what it needs once. None where it was not given that yet."""
     if getattr(_local, "key", None) != key:
         if data is None:
@@ -275,7 +203,7 @@ def _search_part(key: bytes, data: bytes | None, roots: Sequence[Waiting], secon
         _local.known, _local.curves = known, [KnownCurve(given, chain) for chain in known.chains]
         _local.key = key
     with within(Deadline.after(time.perf_counter(), seconds)):
-        return _examined(FixedTree(_local.known, _local.curves), roots, NODES)
+        return _examined(FixedTree(_local.known, _local.curves), roots, nodes)
 
 
 def _examined(tree: FixedTree, roots: Sequence[Waiting], most: int) -> _Answer:
