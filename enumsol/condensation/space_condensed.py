@@ -377,8 +377,10 @@ def _references(problem: Any, alpha: Fraction) -> tuple[Floats, Floats]:
     pairs = zip(*(part.tolist() for part in (*problem.friction, *problem.friction_slope)), strict=True)
     for i, (one, other, one_slope, other_slope) in enumerate(pairs):
         first, second = (_affine(one, one_slope), _affine(other, other_slope))
-        if first[0] * second[1] != second[0] * first[1] or (any(first) != any(second) and (one_slope or other_slope)):
+        if first[0] * second[1] != second[0] * first[1]:
             raise NotEnclosedError(_RATIO.format(problem.node_ids[i]))
+        if any(first) != any(second) and (one_slope or other_slope):
+            raise NotEnclosedError(_ONE_AXIS.format(problem.node_ids[i]))
         at = [part[0] + alpha * part[1] for part in (first, second)]
         reference, k = (Fraction(float(at[0])), 0) if at[0] else (Fraction(float(at[1])), 1)
         found[0, i, k] = float(reference)
@@ -389,7 +391,11 @@ def _references(problem: Any, alpha: Fraction) -> tuple[Floats, Floats]:
     return found[0], found[1]
 
 
+#: What is said of a node that is refused.
 _RATIO = "the ratio of the coefficients of friction of contact node {} changes with alpha; expected a constant one"
+_ONE_AXIS = (
+    "contact node {} has friction along one axis only, which changes with alpha; expected both, or a constant one"
+)
 
 
 def _affine(value: float, slope: float) -> tuple[Fraction, Fraction]:

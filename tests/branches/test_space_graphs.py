@@ -326,6 +326,18 @@ def test_what_is_refused():
     refusal(enumsol.NotHeldError, "3D", enumsol.branch_graph, enumsol.gallery.block_on_table3d(), (0, 1))
 
 
+def test_friction_that_curves_cannot_take_is_named_by_its_node():
+    problem = enumsol.gallery.block3d(1, 1, 1)  # its nodes are 1 and 3
+    for coefficients, slopes, why in (
+        ((0.1, 0.2), (0.5, 0.1), "the ratio of the coefficients of friction of contact node 1 changes with alpha"),
+        ((0.0, 0.2), (0.0, 0.1), "contact node 1 has friction along one axis only, which changes with alpha"),
+    ):
+        graph = enumsol.branch_graph(problem.replace(friction=coefficients, friction_slope=slopes), (0, 1))
+        assert (len(graph.arcs), graph.complete) == (0, False)
+        assert [reason.split(";")[0] for reason in graph.reasons] == [why]
+        assert graph.open_ranges == (graph.exact_interval,)
+
+
 # -- what happens along a curve ----------------------------------------------------------------------------------------
 
 

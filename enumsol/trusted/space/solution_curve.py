@@ -135,7 +135,10 @@ class AlphaProblem:
                 (Fraction(float(coefficients[k, i])), Fraction(float(slopes[k, i]))) for k in range(2)
             ]
             if one * other_slope != other * one_slope:
-                raise NotEnclosedError(f"the ratio of both coefficients of node {i} changes with alpha")
+                raise NotEnclosedError(
+                    f"the ratio of the coefficients of friction of contact node {problem.node_ids[i]} changes with "
+                    "alpha; expected a constant one"
+                )
             q = other / one if one else other_slope / one_slope
             exact = Fraction(float(q)) == q
             ratio.mid[2 * p + i], ratio.rad[2 * p + i] = float(q), 0.0 if exact else 2 * UNIT * abs(float(q))
