@@ -25,6 +25,7 @@ from enumsol.continuation.transitions import (
     turning_point,
 )
 from enumsol.errors import Interrupted, InvalidArgumentError, TooLargeError
+from enumsol.support.deadlines import look
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
@@ -97,6 +98,7 @@ class Follower(Generic[_Path]):
         try:
             stop = None
             while stop is None:
+                look()
                 stop = self._advance()
         except KeyboardInterrupt as interruption:
             message = f"interrupted at alpha = {self._alpha():g}; path.resume() continues"

@@ -35,7 +35,7 @@ from enumsol.branches.space.chains import chain_through
 from enumsol.branches.space.make_curved import unordered
 from enumsol.branches.space.pieces import Run, Turn, orders, runs_and_turns
 from enumsol.continuation.path_data import PathStatus
-from enumsol.support.deadlines import TimeOverError
+from enumsol.support.deadlines import TimeOverError, within
 from enumsol.trusted.space.curve_chains import leaves_interval
 from enumsol.trusted.space.curve_events import CurveMotion
 from enumsol.trusted.space.sector_rows import OPEN, STICK
@@ -228,6 +228,30 @@ def test_what_is_known_of_a_curve_is_kept(where, call, over, two_curves, monkeyp
     ends = [v.alpha for v in part.vertices if v.kind is VertexKind.UNSETTLED]
     assert ends
     assert any("not followed beyond" in reason and f"{ends[0]:.5g}"[:4] in reason for reason in part.reasons)
+
+
+def test_an_interruption_of_continuation_interrupts_the_graph(monkeypatch):
+    def follow(*_):
+        raise enumsol.Interrupted("follow was interrupted", None)
+
+    monkeypatch.setattr(chains, "follow", follow)
+    partial = interrupted("curves found so far", enumsol.branch_graph, SLIDING, (1.78, 1.82), max_nodes=60)
+    assert (len(partial.arcs), partial.at_least(1.8)) == (0, 1)
+    assert partial.open_ranges == (partial.exact_interval,)
+
+
+def test_the_time_may_be_over_during_continuation(monkeypatch):
+    deadline = SimpleNamespace(deadline=None)
+
+    def end_time(*arguments):
+        deadline.deadline = -1.0
+        return follow(*arguments)
+
+    follow = chains.follow
+    monkeypatch.setattr(chains, "follow", end_time)
+    given, interval = AlphaProblem.of(SLIDING.enclosure), (Fraction(49, 100), Fraction(51, 100))
+    with within(deadline), pytest.raises(TimeOverError):
+        chain_through(given, SLIDING, np.append(sliding_node(0.5), 0.5), interval)
 
 
 @pytest.mark.slow

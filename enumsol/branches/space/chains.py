@@ -13,7 +13,7 @@ import numpy as np
 from enumsol.continuation.continuation_options import ContinuationOptions
 from enumsol.continuation.follow import follow
 from enumsol.continuation.path_data import PathStatus
-from enumsol.errors import EnumsolError
+from enumsol.errors import EnumsolError, Interrupted
 from enumsol.support.deadlines import TimeOverError, look, tell
 from enumsol.trusted.space.curve_chains import CurveChain, CurveLink, goes_on, link_between
 from enumsol.trusted.space.solution_curve import curve_around, curve_point
@@ -126,6 +126,8 @@ def skeleton_through(problem: ContactProblem3D, x: Array, span: tuple[float, flo
         ahead = _path(problem, start, 1, span)
         closed = ahead.status == PathStatus.CLOSED
         paths = [ahead] if closed else [_path(problem, start, -1, span), ahead]
+    except Interrupted:
+        raise
     except EnumsolError:
         return None
     lines = [
@@ -224,6 +226,7 @@ class ChainBuilder:
                 continue
             share, start, proven = _WIDEST, None, None
             while share > _SHORTEST:
+                look()
                 start = self.joint(*self._at(line, corner - share))
                 proven = None if start is None else self._link(line, corner - share, corner + share, start, None)
                 if proven is not None:

@@ -172,10 +172,10 @@ class _Spread:
         tree.report(part.answer.covered)
 
     def _leave(self, stack: list[TreePart]) -> None:
-        """What is left after a limit is open, but for parts that are there when the time is over."""
-        timely = self._tree.stopped is StopReason.TIME_LIMIT
+        """What is left is open, but for parts that are there when the time is over or somebody interrupts."""
+        kept = self._tree.stopped is not StopReason.NODE_LIMIT  # as many as without workers
         while stack:
-            if timely and stack[-1].answer not in (None, WANTED):
+            if kept and stack[-1].answer not in (None, WANTED):
                 self._take(stack)
             else:
                 self._tree.leave(stack[-1].roots)
