@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from fractions import Fraction
+from functools import partial
 from itertools import count, pairwise, product
 from math import sqrt
 from types import SimpleNamespace
@@ -326,6 +327,28 @@ def test_figures_and_pages_show_ranges_that_are_left_open(through_zero, graph, t
     assert f'"open_ranges":[[{float(low)!r},{float(high)!r}]]' in page.replace(" ", "")
     page = (tmp_path / "whole.html").read_text(encoding="utf-8")
     assert '"open_ranges":[]' in page.replace(" ", "")
+
+
+@pytest.mark.few(0, 3)
+@pytest.mark.parametrize(
+    ("p", "seed"), [(2, 1), (2, 2), (1, 9), (2, 3), (1, 28), (2, 6), (2, 9), (2, 14), (1, 26), (2, 27), (2, 31)]
+)
+def test_counts_of_random_graphs_with_gaps_are_those_of_searches_elsewhere(p, seed, monkeypatch):
+    """Pieces that are left open although shorter ones would decide them."""
+    monkeypatch.setattr(cover, "PieceTree", partial(cover.PieceTree, smallest=2.0**-5))
+    problem = random_over_alpha(p, seed) if seed % 2 else in_space(random_plane_over_alpha(p, seed))
+    graph = enumsol.branch_graph(problem, (0, 1), max_nodes=250)
+    assert graph.reasons[0].startswith("solutions may be missing")
+    assert 0 < sum(high - low for low, high in graph.open_ranges) < Fraction(1, 2)
+    compared = 0
+    for alpha in np.linspace(0.013, 0.987, 9).tolist():
+        if not any(low <= alpha <= high for low, high in graph.open_ranges):
+            known, found = enumsol.enumerate_roots(problem, alpha, max_nodes=3000), graph.roots_at(alpha)
+            assert known.complete
+            assert graph.multiplicity_at(alpha) == len(known) == len(found)
+            assert found.complete
+            compared += 1
+    assert compared > 3
 
 
 def test_a_graph_without_gaps_leaves_nothing_open_and_one_cut_short_all(graph):
