@@ -118,12 +118,13 @@ class SpaceCover:
                 self._keep(chain)
             # what is left open costs as much at every further point of the same curve
             self.failed += 1
-            tree.more = None if self.failed == _FAILURES else more
+            tree.more = more if self.failed < _FAILURES else None
             return None
 
         tree = PieceTree(
             self.problem.enclosure, self.interval, self._units(), more, max_nodes, tick, solutions=self._solutions
         )
+        tree.more = more if self.failed < _FAILURES else None
         try:
             tree.run(None if executor is None else partial(spread_over, executor))
         finally:
