@@ -70,28 +70,6 @@ def enclosed_once(monkeypatch):
     monkeypatch.setattr(CondensedEnclosure, "from_problem", staticmethod(from_problem))
 
 
-#: Random cases in great number, judged by exact oracles. Other tests run the same lines, and under the tracer of
-#: coverage these take several times as long.
-UNTRACED = {
-    "test_active_set",
-    "test_against_enumeration",
-    "test_arc_mutants",
-    "test_arcs",
-    "test_cut_short_results",
-    "test_hostile_proofs",
-    "test_degenerate_problems",
-    "test_graph_mutants",
-    "test_precise",
-    "test_random_problems",
-    "test_rational_arcs",
-    "test_root_counts",
-    "test_singular_selections",
-    "test_space_coupled",
-    "test_space_one_node",
-    "test_traced_graphs",
-}
-
-
 def spread(items, count):
     """So many of the items, at even distances."""
     return [items[len(items) * k // count] for k in range(min(count, len(items)))]
@@ -99,7 +77,7 @@ def spread(items, count):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
-    """What is slow or long, and in what coverage is not measured: that, and the tests of `UNTRACED`."""
+    """What is slow or long; coverage is not measured in that, which the tracer would slow down several times."""
     cases = defaultdict(list)
     for item in items:
         if item.get_closest_marker("few"):
@@ -113,5 +91,5 @@ def pytest_collection_modifyitems(config, items):
             item.add_marker("long")
     if config.pluginmanager.hasplugin("_cov"):
         for item in items:
-            if item.get_closest_marker("slow") or item.path.stem in UNTRACED:
+            if item.get_closest_marker("slow") or item.get_closest_marker("long"):
                 item.add_marker("no_cover")
