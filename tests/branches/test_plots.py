@@ -144,10 +144,24 @@ def test_a_spike_is_shown_larger(graphs):
     assert bottom < min(ends) < max(ends) < top
     assert max(ends) - min(ends) > 0.5 * (top - bottom)
     assert counts.get_ylim()[1] == zoomed_counts.get_ylim()[1] > 5
+
+
+def test_a_part_is_shown_larger_where_that_is_asked_for(graphs):
     square = graphs["square"]
     assert len(square.plot().axes) == len(square.plot(zoom=False).axes) == 2
-    assert square.plot(zoom=(2.9, 4.0)).axes[2].get_xlim() == (2.9, 4.0)
-    bad_argument("overlaps", square.plot, zoom=(20, 30))
+    figure = square.plot("lambda_n", [0], zoom=(2.9, 20), multiplicity=False)
+    main, part = figure.axes
+    assert part.get_xlim() == (2.9, 10)
+    assert part.get_title("left").startswith("A: alpha from 2.9, width 7.1;")
+    assert [text.get_text() for text in main.texts if text.get_gid() is None] == ["A"]
+    # as high as the arcs that end inside, with as much room above as below
+    ending = [arc for arc in square.arcs if 2.9 < arc.lo < 10 or 2.9 < arc.hi < 10]
+    assert 0 < len(ending) < len(square.arcs)
+    values = [arc.values(alpha)[0][0] for arc in ending for alpha in arc.sampled(200) if alpha >= 2.9]
+    room = 0.15 * (max(values) - min(values))
+    assert part.get_ylim() == pytest.approx((min(values) - room, max(values) + room), rel=1e-2, abs=1e-2 * room)
+    # where none ends, or all keep their value, the height is that of everything
+    assert square.plot("lambda_n", [0], zoom=(8, 9), multiplicity=False).axes[1].get_xlim() == (8, 9)
 
 
 @pytest.mark.parametrize("window", [None, (2.9, 4.0)])
@@ -215,6 +229,9 @@ def test_title_units_and_other_axes(graphs):
         ({"units": "N"}, "units is 'N'"),
         ({"ax": 3}, "ax is a int"),
         ({"nodes": [0, 1], "ax": "axes"}, "expected one label"),
+        ({"quantity": "u_n", "nodes": [0, 2]}, r"nodes is \[0, 2\]; expected labels among \[0, 1\]"),
+        ({"quantity": "u_n", "nodes": 0}, "nodes is 0; expected labels"),
+        ({"zoom": (20, 30)}, r"expected an interval that overlaps \[0, 10\]"),
     ],
 )
 def test_what_cannot_be_drawn_is_refused(graphs, options, message):

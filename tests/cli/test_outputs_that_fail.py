@@ -15,6 +15,7 @@ import enumsol
 from enumsol import gallery
 from enumsol.cli.app import app
 from enumsol.cli.output import deliver
+from enumsol.cli.streams import guarded_streams
 
 FULL = "/dev/full"
 GALLERY = "gallery:one-node-6.1"
@@ -148,6 +149,37 @@ def test_stdout_on_a_full_disk_from_a_shell(place, name):
     assert done.returncode == 74
 
 
+@pytest.mark.parametrize("binary", [False, True])
+def test_a_stream_that_failed_says_so_of_all_that_follows_but_not_at_exit(monkeypatch, binary):
+    # as at exit, what is left in the buffer is written when the file is closed
+    with open(FULL, "w") as full:
+        monkeypatch.setattr(sys, "stdout", full)
+        with guarded_streams():
+            stream, text = (sys.stdout.buffer, b"text") if binary else (sys.stdout, "text")
+            assert stream.write(text[:0]) == 0
+            assert stream.write(text) == len(text)
+            for call in (stream.flush, lambda: stream.write(text), lambda: stream.write(text)):
+                refusal(enumsol.OutputError, r"stdout cannot be written \(No space left on device\)", call)
+
+
+def test_a_stream_that_nobody_reads_any_more(monkeypatch):
+    reading, writing = os.pipe()
+    os.close(reading)
+    with os.fdopen(writing, "w", buffering=1) as unread:
+        monkeypatch.setattr(sys, "stdout", unread)
+        with guarded_streams():
+            message = "stdout was closed by its reader before everything was written"
+            refusal(enumsol.OutputError, message, sys.stdout.write, "a line" + os.linesep)
+
+
+def test_nothing_is_said_of_a_full_stderr(monkeypatch):
+    with open(FULL, "w", buffering=1) as full:
+        monkeypatch.setattr(sys, "stderr", full)
+        with guarded_streams():
+            assert [sys.stderr.write(text) for text in ("one" + os.linesep, "two")] == [4, 3]
+            sys.stderr.flush()
+
+
 def closing(*streams):
     """For a new process: some of its streams are closed before it begins."""
 
@@ -248,6 +280,13 @@ def test_a_place_that_is_gone_after_the_search_keeps_no_other_back(tmp_path):
     message = r"gone/r\.json cannot be written"
     refusal(enumsol.OutputError, message, deliver, json_file=str(gone), csv_file=str(file), **made)
     assert file.exists()
+
+
+def test_all_places_that_are_gone_are_named(tmp_path):
+    files = [str(tmp_path / "gone" / name) for name in ("r.json", "r.csv")]
+    made = {"text": lambda: "", "content": lambda: "{}", "frame": pd.DataFrame}
+    message = r"gone/r\.json cannot be written .*; .*gone/r\.csv cannot be written"
+    refusal(enumsol.OutputError, message, deliver, json_file=files[0], csv_file=files[1], **made)
 
 
 @pytest.mark.slow

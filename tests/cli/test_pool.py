@@ -4,14 +4,17 @@ import errno
 import multiprocessing.popen_spawn_posix
 import subprocess
 import sys
+import threading
+from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
 
 import pytest
 from command_line import assert_refused, run
 from effort import some
 from loky import ProcessPoolExecutor
 
-from enumsol.cli import common
+from enumsol.cli import common, pool
 from enumsol.cli.pool import RenewedPool
+from enumsol.support.deadlines import heard_by, tell
 
 SCRIPT = """
 import time
@@ -72,6 +75,55 @@ def test_what_a_worker_is_at_is_heard_if_it_takes_long(tmp_path):
     what, count = output_of(tmp_path / "script.py", TOLD).rsplit(" ", 1)
     assert what == "{('columns in a worker', 3, 40)}"
     assert 1 <= int(count) <= 3
+
+
+class Threads(ThreadPoolExecutor):
+    """A pool of threads in the place of one of processes; what it is given at first dies, if so told."""
+
+    def __init__(self, size, context, initializer, initargs):
+        super().__init__(size, initializer=initializer, initargs=initargs)
+        self.died = False
+
+    def submit(self, function, /, *arguments, **named):
+        if function is int and not self.died:
+            self.died = True
+            raise BrokenExecutor("a process died")
+        return super().submit(function, *arguments, **named)
+
+    def shutdown(self, wait, *, kill_workers):
+        super().shutdown(wait, cancel_futures=kill_workers)
+
+
+def at_columns(count):
+    """A task that tells what it is at."""
+    for k in range(count):
+        tell("columns " * 100, k, count)
+    return count
+
+
+def test_what_tasks_tell_is_heard_by_whoever_listened_when_they_were_submitted(monkeypatch):
+    monkeypatch.setattr("loky.ProcessPoolExecutor", Threads)
+    monkeypatch.setattr(pool, "_to_parent", [])
+    monkeypatch.setattr(pool, "_QUIET", 0.0)
+    monkeypatch.setattr(pool, "_PAUSE", 0.0)
+    heard, all_heard = [], threading.Event()
+
+    def listener(*told):
+        heard.append(told)
+        if len(heard) == 3:
+            all_heard.set()
+
+    with RenewedPool(2) as tasks:
+        with pytest.raises(BrokenExecutor, match="there are no processes"):
+            tasks.submit(at_columns, 1)
+        # one that died at once is left to the search, which starts others
+        tasks.renew()
+        assert tasks.submit(at_columns, count=2).result() == 2
+        with heard_by(listener):
+            assert tasks.submit(at_columns, 3).result() == 3
+        assert all_heard.wait(60)
+    # a message is not longer than what a pipe takes at once
+    assert heard == [(("columns " * 100)[:200] + " in a worker", k, 3) for k in range(3)]
 
 
 def test_a_system_that_starts_no_more_processes(monkeypatch):

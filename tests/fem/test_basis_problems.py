@@ -6,7 +6,7 @@ import skfem
 from alike import assert_close
 from complete import only_root
 from parted_meshes import grid
-from refusals import bad_argument
+from refusals import bad_argument, bad_problem
 from skfem.helpers import dot
 from skfem.models.elasticity import lame_parameters, linear_elasticity
 
@@ -105,10 +105,15 @@ def test_three_dimensions():
     assert_close(*found, "lambda_t", order=places, rtol=1e-6, atol=1e-9)
 
 
-@pytest.mark.slow
-def test_what_is_refused():
+@pytest.fixture(scope="module")
+def good():
+    """Arguments that are taken."""
     basis, K = basis_of(skfem.ElementTriP1())
-    good = {"basis": basis, "stiffness": K, "contact": "bottom", "held": basis.get_dofs("top")}
+    return {"basis": basis, "stiffness": K, "contact": "bottom", "held": basis.get_dofs("top")}
+
+
+def test_what_is_refused(good):
+    basis = good["basis"]
 
     def refused(message, **changes):
         bad_argument(message, fem.basis_contact_problem, **(good | changes))
@@ -126,8 +131,22 @@ def test_what_is_refused():
     refused("contact node 0 is held or displaced in some components only", held=basis.get_dofs("bottom").all(["u^2"]))
     refused(r"forces has shape \(3,\); expected \(50,\)", forces=[1, 2, 3])
     refused("normals row 0 is zero", normals=(0, 0))
+
+
+def test_what_else_is_taken(good):
+    """A mask of what is held, nothing of it, and normals as a function of places: the same problem."""
+    held = np.zeros(50, dtype=bool)
+    held[good["held"].flatten()] = True
+    one = fem.basis_contact_problem(**good, friction=0.4)
+    two = fem.basis_contact_problem(**good | {"held": held}, normals=lambda place: (0.0, place[1] - 2.0), friction=0.4)
+    assert_close(one, two, "A", "Bn", "Bt", "f", rtol=1e-12)
+    bad_problem("free to move as a rigid body", fem.basis_contact_problem, **good | {"held": []})
+
+
+@pytest.mark.slow
+def test_elements_whose_corners_a_pressure_pulls_at_are_refused():
     solid, matrix = basis_of(skfem.ElementHexS2(), skfem.MeshHex())
-    refused(
-        "a uniform pressure pulls at contact node .*the corners of ElementHexS2", basis=solid, stiffness=matrix,
-        held=solid.get_dofs("top"),
+    bad_argument(
+        "a uniform pressure pulls at contact node .*the corners of ElementHexS2", fem.basis_contact_problem, solid,
+        matrix, contact="bottom", held=solid.get_dofs("top"),
     )  # fmt: skip
