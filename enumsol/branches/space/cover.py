@@ -22,7 +22,7 @@ from enumsol.search.space.piece_parallel import spread_over
 from enumsol.search.space.piece_tree import OpenLeaf, PieceTree
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.support.deadlines import look, remaining
-from enumsol.trusted.space.curve_chains import apart, leaves_interval, share_nothing
+from enumsol.trusted.space.curve_chains import apart, leaves_interval
 from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
@@ -111,7 +111,7 @@ class SpaceCover:
         def more(x: Array) -> Chain | None:
             chain = chain_through(given, self.problem, x, self.interval, self._keep)
             if chain is not None and self._is_new(chain):
-                self.parts = [part for part in self.parts if share_nothing(part, chain)]
+                self.parts = [part for part in self.parts if apart(part, chain)]
                 self.chains.append(chain)
                 return chain
             if chain is not None:
@@ -132,7 +132,7 @@ class SpaceCover:
 
     def _keep(self, chain: Chain) -> None:
         """Keep a part of a curve, if it has nothing in common with what is known."""
-        if all(share_nothing(chain, other) for other in (*self.chains, *self.parts)):
+        if all(apart(chain, other) for other in (*self.chains, *self.parts)):
             self.parts.append(chain)
 
     def _solutions(self, alpha: Fraction) -> list[Array]:
