@@ -107,6 +107,9 @@ class SpaceChecker(TreeChecker):
         positive = sector_margin(self.system, codes, said.rows, said.values) > 0
         return None if positive else "its multipliers do not exclude it"
 
+    def _flush(self, *, last: bool) -> None:
+        """Nothing waits: every leaf is checked as it is read."""
+
     def _declare(self, record: list[Any]) -> None:
         system = self.system
         try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -32,7 +33,7 @@ _END = object()
 
 
 @dataclass
-class TreeChecker:
+class TreeChecker(ABC):
     """Checks one proof: its header, then the tree alone, then every leaf.
 
     Whatever does not fit together is found before anything is computed, which may take long.
@@ -108,36 +109,37 @@ class TreeChecker:
     def _read_header(self, header: Any) -> None:
         raise NotImplementedError
 
+    @abstractmethod
     def _covers(self, node: int, code: int, children: list[int]) -> bool:
         """Whether codes, in any order, cover a partial one of a node."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _limits(self, codes: Codes, kind: type[Record]) -> Limits:
         """What a record of this kind may say that stands at this assignment."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _tests(self) -> dict[type[Record], Test]:
         """How the other leaves are checked, by their kinds."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _at_rest(self) -> None:
         """Count the root of the unloaded body."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _declare(self, record: list[Any]) -> None:
         """Take note of what later leaves refer to."""
-        raise RefusedError(f"a record {quoted(record)} that no leaf of this proof can refer to")
 
+    @abstractmethod
     def _flush(self, *, last: bool) -> None:
         """Check what waits, at the end or when it has become much."""
 
+    @abstractmethod
     def _count(self) -> tuple[int, int]:
         """Isolated roots besides ``regular``, and families."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _claim(self, isolated: int, families: int) -> dict[str, int]:
         """The footer that fits the leaves."""
-        raise NotImplementedError
 
     # -- the tree --------------------------------------------------------------------------------------------------
 

@@ -57,11 +57,6 @@ class RootComponent:
     whole: bool
 
     @property
-    def point(self) -> Any:
-        """The root (of an isolated one)."""
-        return self.solutions[0].vertices[0]
-
-    @property
     def regular(self) -> bool:
         """One selection holds, strictly, and is not singular."""
         first = self.solutions[0]

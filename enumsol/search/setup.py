@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Any
 
 from enumsol.errors import InvalidArgumentError
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from enumsol.search.outcome import SearchLimits, SearchProgress
 
 
-class SearchSetup:
+class SearchSetup(ABC):
     """Base of the solvers of one problem at one alpha: a search is made of their parts.
 
     Attributes
@@ -46,17 +47,17 @@ class SearchSetup:
             forms=self._forms(),
         )
 
+    @abstractmethod
     def _splitting(self, certifier: Certifier) -> Any:
         """How a partial assignment is split, and which rows it imposes."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _closer(self, certifier: Certifier) -> Any:
         """What decides the problem, or subtrees, by an only solution; None where nothing does."""
-        raise NotImplementedError
 
+    @abstractmethod
     def _forms(self) -> Any:
         """What a long search may bound with in place of the energy, or None."""
-        raise NotImplementedError
 
 
 class HeldByNothing:

@@ -75,11 +75,6 @@ class FloatSelections:
         scale = 1.0 / self._length_scale[rows]
         return scale[:, None] * (self.system.S[rows] @ E), scale * self.system.g[rows], E
 
-    def condition(self, codes: Codes) -> float:
-        """Condition number of the scaled matrix."""
-        M, b, _ = self.matrix(codes)
-        return float(np.linalg.cond(M)) if len(b) else 1.0
-
     def solve(self, codes: Codes) -> SelectionSolution | None:
         """All roots in the selection, or None."""
         M, b, E = self.matrix(codes)

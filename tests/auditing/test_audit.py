@@ -148,6 +148,30 @@ def test_follow_all_with_the_closed_form(graph):
     assert result.stats.accepted > 0
 
 
+def test_follow_all_makes_its_own_graph_and_tells_how_many_arcs_it_has_visited():
+    told = []
+    result = follow_all(gallery.one_node_triangle(), (0, 20), progress=lambda *at: told.append(at))
+    assert result.complete
+    assert [of for _, of in told] == [len(result.graph.arcs)] * len(result.paths)
+    assert told[-1][0] == len(result.graph.arcs)
+    assert sorted(told) == told
+
+
+def test_follow_all_keeps_what_failed(graph):
+    result = follow_all(graph.problem, (0, 20), ContinuationOptions(max_steps=2), graph=graph)
+    # every arc is on some path all the same: paths begin again on those that are missing
+    assert result.complete
+    assert result.reseeded > 0
+    assert len(result.failures) == sum(path.status.value == "step limit" for path in result.paths) > 0
+    bad_argument(
+        "graph has 1 contact nodes; expected the problem's 2",
+        follow_all,
+        gallery.two_node_square(),
+        (0, 20),
+        graph=graph,
+    )
+
+
 @pytest.mark.parametrize(
     ("source", "message"), [(3, "path is a int"), ("missing.csv", "CSV"), ("frame", "no column 'lambda_t_0'")]
 )

@@ -9,6 +9,7 @@ from command_line import assert_refused, printed, run
 from complete import complete_report
 
 from enumsol import History, Proof, verify, write_problem
+from enumsol.report import history_page
 
 NODE = ("history", "gallery:one-node-6.1")
 
@@ -44,6 +45,23 @@ def test_everything_is_written(capsys, wedge, tmp_path, pulled_wedge):
     assert (tmp_path / "out.png").stat().st_size > 10_000
 
 
+def test_one_node_is_pressed_and_released(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr(history_page, "_image", lambda figure, words: f"<p>Picture of {words}.</p>")
+    files = {name: tmp_path / f"out.{name}" for name in ("report", "json", "csv")}
+    options = [part for name, path in files.items() for part in (f"--{name}", path)]
+    printed(capsys, *NODE, "--steps", "1,1/2", *options, "--arithmetic", "fast", "--title", "Pressed & released")
+    content = json.loads(files["json"].read_text())
+    assert content["steps"] == ["LoadStep(alpha=1)", "LoadStep(alpha=0.5)"]
+    assert (content["arithmetic"], content["complete"], content["unique_until"]) == ("fast", False, 0)
+    assert (content["histories"], content["ends"], content["increments"]) == ([1, 1], [[2, 0]], None)
+    assert [row["step"] for row in content["roots"]] == [1, 2]
+    page = files["report"].read_text()
+    assert "Pressed &amp; released" in page
+    assert "Nothing is proven: the result rests on floating-point arithmetic." in page
+    # four pairs of quantities, and the bodies of each of two steps
+    assert page.count("Picture of ") == 6
+
+
 def test_steps_stand_in_the_toml_file_of_a_mesh(capsys, tmp_path):
     cells = [("quad", [[0, 1, 2, 3]]), ("line", [[0, 1], [2, 3]])]
     mesh = meshio.Mesh([[0, 0], [1, 0], [1, 1], [0, 1]], cells, cell_data={"part": [[0], [1, 2]]})
@@ -76,6 +94,8 @@ def test_what_is_left_open_is_an_exit_status(capsys, wedge):
 
 def test_bad_input_is_one_sentence(capsys, tmp_path):
     assert_refused(*run(capsys, *NODE), "--steps is missing; expected a CSV file")
+    (tmp_path / "no.toml").write_text("steps = [1")
+    assert_refused(*run(capsys, "history", tmp_path / "no.toml"), "--steps is missing; expected a CSV file")
     assert_refused(*run(capsys, *NODE, "--steps", "1,x"), "step 2: alpha is 'x'")
     assert_refused(*run(capsys, *NODE, "--steps", tmp_path / "none.csv"), "cannot be read")
     table = tmp_path / "steps.csv"

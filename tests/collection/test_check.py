@@ -1,6 +1,7 @@
 """What the check says of answers that are right, inaccurate, repeated, missing or wrong, in every format."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -266,6 +267,31 @@ def test_the_list_and_the_export(tmp_path, capsys):
     assert run(capsys, "verify", place / "problems" / "node-3d-3.npz", proof)[0] == 0
     assert run(capsys, "verify", "collection:node-3d-3", proof)[0] == 0
     assert run(capsys, "verify", "collection:node-3d-1", proof)[0] == 2
+
+
+def test_one_problem_is_listed_and_written(tmp_path, capsys):
+    found = json.loads(printed(capsys, "collection", "list", "--json", "-"))
+    assert [entry["roots"] for entry in found] == [entry.roots for entry in collection.COLLECTION.values()]
+    lines = printed(capsys, "collection", "list").splitlines()
+    assert [line.split()[0] for line in lines] == list(collection.COLLECTION)
+    out = printed(capsys, "collection", "export", tmp_path, "collection:node-3d-3", "--json", tmp_path / "said.json")
+    assert out.startswith(f"wrote 1 problems to {tmp_path}/problems, ")
+    assert json.loads((tmp_path / "said.json").read_text()) == {"folder": str(tmp_path), "names": ["node-3d-3"]}
+    assert {path.name for path in tmp_path.rglob("node-3d-3.*")} == {
+        f"node-3d-3.{x}" for x in ("npz", "h5", "json", "proof")
+    }
+
+
+@pytest.mark.parametrize("width", [60, 200])
+def test_at_a_terminal_the_list_is_a_table_that_is_no_wider(capsys, monkeypatch, width):
+    monkeypatch.setenv("COLUMNS", str(width))
+    monkeypatch.setattr("sys.stdout.isatty", lambda: True)
+    lines = [re.sub(r"\x1b\[[0-9;]*m", "", line) for line in printed(capsys, "collection", "list").splitlines()]
+    assert max(map(len, lines)) <= width
+    names = [line.split()[0] for line in lines if line and not line.startswith(" ")]
+    assert names[: len(collection.COLLECTION) + 1] == ["NAME", *collection.COLLECTION]
+    words = "".join(" ".join(lines).split())
+    assert words.endswith("Writethemalltoafolder:enumsolcollectionexportFOLDER")
 
 
 TWO_AND_THREE = {"lambda_n": np.zeros((2, 8)), "lambda_t": np.zeros((3, 8))}

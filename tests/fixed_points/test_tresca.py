@@ -76,6 +76,29 @@ def test_newton_that_fails_hands_over_to_clarabel(rng, monkeypatch):
     np.testing.assert_allclose(found.forces, expected.forces, atol=1e-9)
 
 
+@pytest.mark.parametrize("make", [random_2d, random_3d])
+def test_the_proximal_point_method_converges_to_the_same_from_far_away(rng, make, monkeypatch):
+    """Also where Newton's method fails with its first weights: these grow until it does not."""
+    whole, weights = tresca.TrescaData.newton, []
+
+    def newton(data, start):
+        weights.append(data.system.compliance)
+        return (start, np.inf) if 0 < data.system.compliance < 0.05 and len(weights) < 4 else whole(data, start)
+
+    monkeypatch.setattr(tresca.TrescaData, "newton", newton)
+    for _ in range(5):
+        problem, bound = make(rng)
+        system = tresca.ContactSystem.at(problem, 0)
+        data = tresca.TrescaData(system, bound / system.force, system.coefficients(np.zeros(problem.p)))
+        expected, _ = data.newton(np.zeros(system.m))
+        weights.clear()
+        found, residual = data.proximal(100.0 * rng.normal(size=system.m))
+        assert residual <= tresca.ACCEPTED
+        np.testing.assert_allclose(found, expected, atol=1e-9)
+        assert weights[:4] == [0.001, 0.008, 0.064, 0.008]
+        assert np.all(np.diff(weights[2:]) < 0)
+
+
 def test_no_solver_is_an_error(rng, monkeypatch):
     problem, bound = random_3d(rng)
     monkeypatch.setattr(tresca.TrescaData, "newton", lambda data, start: (start, np.inf))

@@ -1,5 +1,6 @@
 """The page of a report against the graph it was made of: numbers, words, tables; what is escaped; what is refused."""
 
+import base64
 import json
 import re
 import sys
@@ -18,6 +19,7 @@ from enumsol.model.shapes import body_shape
 from enumsol.report import body as bodies, content, history_page
 from enumsol.report.body import body_record
 from enumsol.report.content import rounded_list, slider_alphas
+from enumsol.support.plotting import new_figure
 
 pytest.importorskip("plotly")
 HOSTILE = '</script><script>alert("2")</script>'
@@ -364,6 +366,15 @@ def test_no_outline_is_as_wide_as_a_body_is_long():
 
 
 # -- the page of a history ---------------------------------------------------------------------------------------------
+
+
+def test_pictures_are_within_the_page():
+    figure = new_figure(figsize=(2, 1))
+    text = history_page._image(figure, "u < v")
+    found = re.fullmatch(r'<figure><img src="data:image/png;base64,(.+)" alt="u &lt; v"></figure>', text)
+    data = base64.b64decode(found[1], validate=True)
+    assert data.startswith(b"\x89PNG")
+    assert [int.from_bytes(data[k : k + 4]) for k in (16, 20)] == [2 * 96, 96]
 
 
 def test_an_incomplete_history_says_so(tmp_path, monkeypatch):

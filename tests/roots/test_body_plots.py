@@ -11,6 +11,7 @@ import enumsol
 from enumsol import BodyMesh, fem
 from enumsol.model.cells import boundary_facets, facet_outlines, outline_edges
 from enumsol.model.shapes import body_shape, own_scales, round_scale, slip_directions
+from enumsol.roots.body_plots import draw_bodies
 from enumsol.support.plotting import new_figure
 
 
@@ -100,7 +101,6 @@ def test_in_space():
     (ax,) = roots[0].plot_body().axes
     assert ax.name == "3d"
     assert len(roots.plot_bodies().axes) == len(roots)
-    bad_argument("projection '3d'", roots[0].plot_body, new_figure().subplots())
 
 
 @pytest.mark.parametrize(("kind", "nodes"), [(4, 3), (8, 4), (10, 6), (27, 8)])
@@ -152,6 +152,20 @@ def test_bodies_in_space_are_compared_in_one_view():
         assert np.all((low <= moved) & (moved <= high))
     entries = {text.get_text() for text in figure.legends[0].get_texts()}
     assert entries == {"open", "stick", "slip", "contact force on the body", "direction of slip", "undeformed"}
+
+
+def test_two_states_of_a_solid_are_drawn_in_one_view():
+    problem = enumsol.gallery.block3d(1, 1, 1)
+    roots = [enumsol.enumerate_roots(problem, alpha)[0] for alpha in (0.5, 1.0)]
+    figure = draw_bodies(roots, scale=3.0)
+    (limits,) = {(ax.get_xlim(), ax.get_ylim(), ax.get_zlim()) for ax in figure.axes}
+    low, high = np.array(limits).T
+    for root in roots:
+        moved = problem.mesh.points + 3.0 * problem.mesh.displacements(root.u)
+        assert np.all((low <= moved) & (moved <= high))
+    assert "displacements times 3" in figure.get_suptitle()
+    bad_argument("ax is plane and the body is not; .* projection '3d'", roots[0].plot_body, new_figure().subplots())
+    bad_argument("there are no isolated roots to draw", draw_bodies, [])
 
 
 @pytest.mark.slow

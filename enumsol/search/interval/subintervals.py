@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 import time
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
@@ -86,7 +87,7 @@ class SearchedPiece:
     numbers: PieceNumbers | None = None
 
 
-class IntervalCertifier:
+class IntervalCertifier(ABC):
     """Base of certifiers, which decide in one arithmetic whether multipliers prove a leaf empty on the whole piece."""
 
     #: Whether leaves may be excluded by forms other than the energy.
@@ -96,9 +97,9 @@ class IntervalCertifier:
     #: Whether a checker can repeat what was accepted so far, so that it makes a proof.
     checkable: bool = False
 
+    @abstractmethod
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
         """Whether the dual bounds at both ends of the piece are positive."""
-        raise NotImplementedError
 
     def convex(self, piece: Piece, system: IntervalSystem, form: Floats) -> bool:
         """Whether the form of these multipliers is proven convex on the piece."""
