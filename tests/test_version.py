@@ -1,10 +1,11 @@
 """`enumsol.__version__`."""
 
+import runpy
 import shutil
 import subprocess
 import sys
 import tomllib
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from command_line import run
 from test_imports import modules_after
 
 import enumsol
+from enumsol import _version
 
 PACKAGE = Path(enumsol.__file__).parent
 
@@ -53,6 +55,23 @@ def test_a_file_of_something_else_is_not_believed(copied, text):
     assert version_of(copied) != "7.8.9"
 
 
+def test_without_metadata_it_is_not_known(tmp_path, monkeypatch):
+    def missing(name):
+        raise PackageNotFoundError(name)
+
+    monkeypatch.setattr(_version, "__file__", str(tmp_path / "enumsol" / "_version.py"))
+    assert _version.find_version() != "0+unknown" or not _installed()
+    monkeypatch.setattr(_version, "version", missing)
+    assert _version.find_version() == "0+unknown"
+
+
+def _installed():
+    try:
+        return bool(version("enumsol"))
+    except PackageNotFoundError:
+        return False
+
+
 def test_it_is_found_when_it_is_asked_for_and_then_kept():
     needed = {"importlib.metadata", "tomllib", "enumsol._version"}
     before, after = modules_after("import enumsol"), modules_after("import enumsol; enumsol.__version__")
@@ -63,3 +82,10 @@ def test_it_is_found_when_it_is_asked_for_and_then_kept():
 
 def test_the_command_says_the_same(capsys):
     assert run(capsys, "--version") == (0, f"enumsol {enumsol.__version__}\n", "")
+
+
+def test_so_does_the_module(capsys, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["enumsol", "--version"])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_module("enumsol", run_name="__main__")
+    assert (ended.value.code, capsys.readouterr().out) == (0, f"enumsol {enumsol.__version__}\n")

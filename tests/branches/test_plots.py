@@ -12,6 +12,7 @@ from enumsol import branch_graph, gallery
 from enumsol.branches.claims import MultiplicitySteps
 from enumsol.branches.figures.curves import QUANTITIES, Curve, curves, side_by_side
 from enumsol.branches.figures.marks import MARKERS, STATUS_STYLES, narrow_changes
+from enumsol.branches.figures.panels import _names, ranges
 from enumsol.model.statuses import ContactStatus
 from enumsol.support.plotting import new_figure
 
@@ -249,6 +250,23 @@ def test_a_sheet_is_shaded_from_end_to_end():
     assert corners[:, 1].max() == pytest.approx(5**0.5)
     low, high = axis.get_ylim()
     assert low < 0 < 5**0.5 < high
+
+    # displacements of a sheet are not drawn
+    assert not branch_graph(sheet_of_one_node(), (-1, 1)).plot("u_n", [0]).axes[0].collections
+
+
+def test_it_is_said_where_there_is_no_room_for_numbers(graphs):
+    axis = new_figure(figsize=(2.4, 1.8)).subplots()
+    graphs["chain"].plot("lambda_n", [0], ax=axis)
+    written = {text.get_text() for text in numbers_of(axis)}
+    assert len(written) < len(graphs["chain"].branches)
+    assert axis.get_xlabel().startswith("alpha\n")
+    assert "no room for the numbers of branches " in axis.get_xlabel()
+
+
+def test_many_numbers_in_short():
+    assert ranges([1, 4, 5, 6, 9, 10]) == "1, 4-6, 9, 10"
+    assert [_names(list(range(2, last))) for last in (3, 6, 9)] == ["2", "2, 3, 4, 5", "2, 3, .. 8 (7)"]
 
 
 # -- polygons of arcs --------------------------------------------------------------------------------------------------

@@ -190,6 +190,25 @@ def test_without_an_interval_friction_bounds_alpha():
     assert (path.status, path.alpha[-1]) == ("interval left", 0)
 
 
+def test_smooth_path_that_is_none_is_named():
+    problem, start = gallery.one_node_triangle(), (2.0, [0.0], [0.0])
+    bad_argument("has neither F nor f", SmoothPath)
+    for given in ({"F": abs}, {"df": abs}, {"F": abs, "dF": abs, "f": abs}):
+        bad_argument("has a function without its derivative", SmoothPath, **given)
+    negative = SmoothPath(F=lambda a: 1 - a, dF=lambda a: -1.0)
+    message = r"SmoothPath\.F gives -1 for contact node 0 at alpha = 2; expected F >= 0"
+    bad_argument(message, follow, problem, start, 1, (1, 3), smooth_path=negative)
+
+
+def test_derivatives_are_not_compared_at_the_border_of_the_domain():
+    """Friction sqrt(alpha) from 0 on, beyond which there is none."""
+    root = lambda a: np.sqrt(a) if a >= 0 else np.nan  # noqa: E731
+    smooth = SmoothPath(F=root, dF=lambda a: 0.5 / np.sqrt(max(a, 1e-12)))
+    problem = gallery.one_node_triangle()
+    path = follow(problem, (0.0, [0.0], [0.0]), 1, (0, 3), smooth_path=smooth)
+    assert (path.status, path.alpha[-1]) == ("interval left", 3)
+
+
 def test_smooth_path_wrong_derivative_is_named():
     problem = gallery.one_node_triangle()
     smooth = SmoothPath(F=lambda a: a * a, dF=lambda a: a)

@@ -228,6 +228,14 @@ def test_files_tables_pictures_and_resumed_paths(tmp_path):
     assert start_tangents(problem, root)[0].dlambda.shape == (2, 3)
 
 
+def test_a_smooth_path_frozen_at_an_alpha_is_a_problem():
+    problem = random_path_problem(1, p=2)
+    smooth = SmoothPath(F=lambda alpha: [[alpha, 1.0], [2.0, alpha**2]], dF=lambda alpha: [[1, 0], [0, 2 * alpha]])
+    frozen = smooth.problem_at(problem, 3)
+    assert frozen.friction_at(7).tolist() == [[3.0, 1.0], [2.0, 9.0]]
+    np.testing.assert_array_equal(frozen.load_at(7), problem.load_at(3))
+
+
 def test_what_is_not_offered_in_3d_is_refused():
     problem = random_path_problem(1, p=1)
     graph = enumsol.branch_graph(enumsol.gallery.one_node_triangle(), (0, 1), "fast")

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from fractions import Fraction
 
 import numpy as np
 import pandas as pd
@@ -13,6 +14,7 @@ from refusals import bad_argument
 
 import enumsol
 from enumsol import ContactProblem, History, LoadStep, enumerate_roots, histories
+from enumsol.loading.history_data import Refinement
 from enumsol.model.restart import SlipStart, restarted
 
 
@@ -252,6 +254,8 @@ def test_increments_that_matter_are_told():
         ([np.zeros(3)], r"step 1: load has shape \(3,\); expected \(n,\) = \(2,\)"),
         ([-1], "step 1: friction at alpha = -1 is -1 at contact node 0"),
         ([LoadStep(load=[0, 0])], "step 1 has no alpha, on which the problem's friction or load depends"),
+        ([1, object()], "step 2 is <object object at"),
+        ([[[1, 2], [3]]], "step 1 is "),
         ([LoadStep(1, friction=-1)], "step 1: friction is -1; expected F >= 0"),
         ([LoadStep(1, friction=[1, 2])], "step 1: friction has shape"),
         (pd.DataFrame({"alpha": [1], "frction": [2]}), "steps has the columns alpha, frction; expected"),
@@ -260,6 +264,48 @@ def test_increments_that_matter_are_told():
 )
 def test_steps_that_cannot_be_used(steps, message):
     bad_argument(message, histories, enumsol.gallery.one_node_triangle(), steps)
+
+
+def test_steps_in_words():
+    steps = [LoadStep("1/4"), LoadStep(2, friction=[0.5, 0.25]), LoadStep(friction=0.5, load=[3.0, -4.0])]
+    words = ["alpha=0.25", "alpha=2, friction in [0.25, 0.5]", "friction=0.5, load up to 4"]
+    assert [repr(step) for step in steps] == [f"LoadStep({said})" for said in words]
+
+
+def test_between_a_step_with_a_load_and_one_without_there_is_none():
+    one, other = LoadStep(1, load=[1.0, 2.0]), LoadStep(2)
+    bad_argument("of two steps one has a load or a friction and the other has none", one.between, other, Fraction(1, 2))
+    middle = one.between(LoadStep(2, load=[3.0, 0.0]), Fraction(1, 2))
+    assert (middle.alpha, middle.load.tolist(), middle.friction) == (Fraction(3, 2), [2.0, 1.0], None)
+
+
+def test_a_pair_of_coefficients_of_a_step_in_space():
+    """The first one differs from node to node, the second one does not: slip along the axes stops at F lambda_n."""
+    rows = np.eye(6)
+    problem = enumsol.ContactProblem3D(np.eye(6), rows[:2], rows[2:4], rows[4:], [1, 1, 3, 0, 0, 3], friction=(9, 9))
+    history = histories(problem, [LoadStep(friction=([0.5, 0.25], 2.0)), LoadStep(friction=[0.5, 0.25])])
+    first, second = (history.root((k, 0)).lambda_t for k in (1, 2))
+    np.testing.assert_allclose(first, [[0.5, 0.0], [0.0, 2.0]], atol=1e-9)
+    np.testing.assert_allclose(second, [[0.5, 0.0], [0.0, 0.25]], atol=1e-9)
+
+
+def test_what_a_notebook_shows_of_a_history():
+    shown = histories(enumsol.gallery.one_node_triangle(), [1, 5], refine=True)._repr_html_()
+    assert "<td>4</td><td>5</td><td>1</td>" in shown  # both increments were halved once
+    assert ">4.0 open</p>" in shown
+    assert "increments: the last of " in shown
+    assert shown.endswith("complete: yes (proven), unique until step 4</p>")
+
+
+def test_what_halving_the_increments_has_shown_in_words():
+    assert str(Refinement(2, settled=False, changed_at=(3, 2))) == (
+        "after 2 halvings the statuses still depend on the increments, from step 2 on"
+    )
+    assert (
+        str(Refinement(1, False, (0,), "too many roots"))
+        == "not known whether they matter, 1 halving done: too many roots"
+    )
+    assert "which changed until then, from step 2 on" in str(Refinement(3, settled=True, changed_at=(4, 2, 0)))
 
 
 def test_tables_and_arrays_are_steps():

@@ -2,11 +2,12 @@
 
 import copy
 import dataclasses
+import re
 
 import numpy as np
 import pytest
 from complete import accepted_report, complete_report
-from proof_tools import of_kind, proof_of, records_of
+from proof_tools import of_kind, proof_of, put, records_of
 
 import enumsol
 from enumsol import histories, verify
@@ -140,6 +141,68 @@ def test_a_changed_proof_is_not_complete(change, out_again, pulled_wedge):
     assert not report.complete
     assert report.ok == (change in _LESS), report
     assert report.unique_until <= 2
+
+
+@pytest.fixture(scope="module")
+def pressed():
+    """A problem of one node and the records of a history of two steps, in each of which it has one root."""
+    problem = enumsol.gallery.one_node_triangle()
+    return problem, records_of(histories(problem, [1, 5]).proof)
+
+
+def test_what_is_said_of_a_verified_history_and_of_a_refused_one(pressed):
+    problem, records = pressed
+    report = complete_report(problem, proof_of(records))
+    lines = [
+        "proof: verified for a history of 2 steps",
+        "  step 1: 1 root from 1 start",
+        "  step 2: 1 root from 1 start",
+    ]
+    assert repr(report).splitlines() == [*lines, "  complete: yes, unique until step 2"]
+    assert all(line.strip() in report._repr_html_() for line in lines)
+    said = repr(verify(problem, proof_of(records[:-1])))
+    assert said.startswith("proof: REFUSED for a history")
+    assert "checked until then: 2 searches, which show nothing" in said
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "why"),
+    [
+        ((0, "steps"), [], "the header has no steps"),
+        ((0, "stages"), True, "the header has no steps"),
+        ((0, "steps", 0), ["1"], "the header cannot be read"),
+        ((0, "steps", 0, 0), "1/0", "the header cannot be read"),
+        ((1,), ["s", 1, [0.0]], "search 0 cannot be read"),
+        ((1, 2), ["0"], "search 0 cannot be read: .* .expected 1 numbers"),
+        ((6, "alpha"), "4", "search 1 .step 2. is about another alpha than its step"),
+        ((7, 4), [1.0, 0.0], r"search 1 .step 2.: leaf 1: its only solution is not proven to be a root|search 1"),
+    ],
+)
+def test_it_is_said_what_is_wrong_with_a_history(pressed, path, value, why):
+    problem, records = pressed
+    report = verify(problem, proof_of(put(records, path, value)))
+    assert not report.ok
+    assert re.search(why, " ".join(report.failures)), report.failures
+
+
+def test_a_step_is_followed_by_the_next_one_only():
+    problem = enumsol.gallery.one_node_triangle()
+    records = records_of(histories(problem, [1, 5, 1]).proof)
+    first = of_kind(records, "s")[0]
+    assert records[first][4] == [1]
+    report = verify(problem, proof_of(put(records, (first, 4), [2])))
+    assert report.failures == ("search 0 is followed by one of another step than the next",)
+
+
+def test_the_check_of_a_history_ends_after_many_failures(pressed):
+    problem, records = pressed
+    leaves = [["b", 0, [0, 5]], ["x", "", ""], ["b", 0, [1, 2, 3]], *[["x", "", ""]] * 3]
+    claim = {"roots": 0, "families": 0, "undecided": 0, "leaves": 4}
+    search = [*records[1:3], *leaves, claim]
+    following = [put(search, (0, 4), [])] * 9
+    report = verify(problem, proof_of([put(records[0], ("stages",), 10), *sum(following, search), {"stages": 10}]))
+    assert len(report.failures) == 21
+    assert report.failures[-1] == "the check ends after 20 failures"
 
 
 def test_a_start_that_is_proven_and_too_narrow_is_not_believed(pulled_wedge):
