@@ -6,8 +6,10 @@ import pandas as pd
 import pytest
 from command_line import assert_refused, on_terminal, printed, run
 from path_problems import closed_branch
+from problems3d import OneNode
 
 from enumsol import Interrupted, branch_graph, enumerate_roots, follow, gallery, write_problem
+from enumsol.cli.follow import _passes
 
 FOLLOW = ("follow", "gallery:one-node-6.1", "--from", 0, "--to", 20, "--start", 5)
 
@@ -251,6 +253,19 @@ def test_two_node_branches_end_to_end(capsys, tmp_path):
     write_problem(gallery.get("two-node-6.4").build(), tmp_path / "p.npz")
     printed(capsys, "follow", tmp_path / "p.npz", "--from", 0, "--to", 10, "--start", 3.5, "--csv", file)
     printed(capsys, "audit", tmp_path / "p.npz", file, "--arithmetic", "exact")
+
+
+def test_a_path_in_3d_passes_the_roots_that_lie_on_it_and_no_others():
+    """Of three roots of a node two slip, as one branch does before and after its fold."""
+    node = OneNode(1, load=True)
+    fold = node.alpha(node.folds()[0])
+    roots = enumerate_roots(node.problem, fold - 0.01)
+    assert [root.statuses[0].value for root in roots] == ["stick", "slip", "slip"]
+    before = {way: follow(node.problem, roots[1], way, (fold - 0.015, fold + 0.005)) for way in (1, -1)}
+    around = next(path for path in before.values() if path.folds)
+    straight = next(path for path in before.values() if not path.folds)
+    passed = [[_passes(path, root, node.problem) for root in roots] for path in (straight, around)]
+    assert passed == [[False, True, False], [False, True, True]]
 
 
 def test_follow_takes_problems_in_3d(capsys, tmp_path):

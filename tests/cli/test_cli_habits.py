@@ -11,7 +11,7 @@ from cli.test_outputs_that_fail import PRINTING
 from command_line import assert_refused, call, printed, run
 
 from enumsol import gallery
-from enumsol.cli import main
+from enumsol.cli import main, progress
 from enumsol.cli.app import app
 from enumsol.cli.common import ExitStatus
 from enumsol.cli.graph import build
@@ -215,6 +215,19 @@ def shown(monkeypatch):
     monkeypatch.setattr("enumsol.cli.progress._PROGRESS_DELAY", 0.0)
     monkeypatch.setattr("enumsol.cli.progress._progress_bar", lambda *_: (Bar(), 0))
     return shown
+
+
+def test_what_stands_in_a_bar(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    said = iter(["2 of 8 nodes  1 s", "6 of 8 nodes  3 s"])
+    bar, task = progress._progress_bar("searching", lambda: next(said))
+    bar.update(task, completed=0.25)
+    for text in ("25.00% 2 of 8 nodes  1 s", "75.00% 6 of 8 nodes  3 s"):
+        bar.console.print(bar.get_renderable())
+        line = capsys.readouterr().err
+        assert line.startswith("searching ")
+        assert line.rstrip().endswith(text)
+        bar.update(task, completed=0.75)
 
 
 def test_a_bar_appears_although_nothing_is_told(monkeypatch, shown):

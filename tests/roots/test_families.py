@@ -92,16 +92,17 @@ def test_family_and_isolated_root_apart(arithmetic, method):
     assert_all_roots(problem, family)
 
 
+@pytest.mark.parametrize("method", ["tree", "exhaustive"])
 @pytest.mark.parametrize("limit", [1, 8, 4096])
-def test_index_where_very_many_selections_hold(monkeypatch, limit):
-    # above the limit the index comes from a search on the perturbed problem
+def test_index_where_very_many_selections_hold(monkeypatch, limit, method):
+    # above the limit the index comes from the reduced problem, or from a search on the perturbed one
     monkeypatch.setattr(components, "MAX_LOCAL_SELECTIONS", limit)
     for loads, frictions, indices in (
         ([(1, -2), (0, 0), (0, 0)], [2, 1, 1], {1}),  # a family with two bystanders
         ([(1.5, -4), (0, 0), (0, 0)], [5, 1, 1], {1, -1}),  # three roots with two bystanders
         ([(1, -2), (1.5, -4)], [2, 5], {1, -1}),
     ):
-        roots = enumsol.enumerate_roots(separate_nodes(loads, frictions), 0.0, "fast")
+        roots = enumsol.enumerate_roots(separate_nodes(loads, frictions), 0.0, "fast", method)
         assert {item.index for item in (*roots, *roots.families)} == indices
         assert roots.index_sum == 1
 

@@ -15,6 +15,8 @@ import pytest
 import scipy.sparse as sp
 from compare import differences
 from complete import accepted_report, all_roots, proven_roots
+from floating_bodies import pushed_block
+from floating_space import known_body
 from generators import from_condensed, integer_problem, named
 from hypothesis import HealthCheck, given, settings, strategies as st
 from problems3d import forces
@@ -39,7 +41,7 @@ import enumsol
 from enumsol import ContactProblem, Interrupted, InvalidArgumentError, Proof, enumerate_roots, gallery, verify
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.proof.begun import BegunProof
-from enumsol.proof.records import LEAVES
+from enumsol.proof.records import FLOATING_LEAVES, LEAVES
 from enumsol.proof.writer import BESIDE, FLUSH_EVERY
 from enumsol.search import form_policy as policy
 from enumsol.search.resume import Replay
@@ -77,6 +79,9 @@ PROBLEMS = {
     "alone": lambda: named("wedge-8-5"),
     "in space": lambda: (gallery.get("one-node-3d-3").build(), 0),
     "block in space": lambda: (gallery.get("block3d-4").build(), 0.5),
+    "on a table": lambda: (pushed_block(), 0.5),
+    "pushed away": lambda: (pushed_block(), 1.5),
+    "held by nothing in space": lambda: (known_body(9).problem, 0),
     "closed in space": lambda: (gallery.get("block3d-9").build(), 0.5),
 }
 
@@ -125,7 +130,7 @@ def resumed(name, data, path, **options):
 @pytest.mark.slow
 def test_the_problems_have_all_kinds_of_records():
     kinds = {kind for name in PROBLEMS for kind in kinds_of(known(name)[2].proof)}
-    assert kinds == {*LEAVES, "b", "q"} - {"X"}  # "X": below
+    assert kinds == {*LEAVES, *FLOATING_LEAVES, "b", "q"} - {"X"}  # "X": below
 
 
 def test_exclusions_in_rationals(tmp_path, monkeypatch):
