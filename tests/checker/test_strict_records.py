@@ -11,6 +11,7 @@ import zlib
 from contextlib import nullcontext
 from fractions import Fraction
 from functools import reduce
+from itertools import groupby
 from operator import getitem
 from unittest import mock
 
@@ -191,6 +192,16 @@ def test_values_of_other_types_and_texts_are_refused(name):
     said = [(what, accepted(problem, proof_of(lines))) for lines, what in variants(records)]
     assert [what for what, ok in said if ok] == []
     assert len(said) > 100
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_at_every_place_one_value_of_another_type_is_refused(name):
+    """Of all such values another one at every place."""
+    problem, records = case(name)
+    by_place = [list(group) for _, group in groupby(variants(records), key=lambda variant: variant[1][:2])]
+    said = [group[number % len(group)] for number, group in enumerate(by_place)]
+    assert [what for lines, what in said if accepted(problem, proof_of(lines))] == []
+    assert len(said) > 15
 
 
 @pytest.mark.slow
