@@ -1,0 +1,97 @@
+"""What the entries of a record may not be, each refused with a reason of its own."""
+
+import base64
+import re
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from refusals import bad_argument
+
+from enumsol.model.statuses import CONTACT, FORWARD, OPEN, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.proof import reading, records
+from enumsol.proof.records import Limits, table_of
+
+
+def texts(rows, values):
+    """Multipliers as two texts."""
+    return [
+        base64.b64encode(np.array(part, dtype).tobytes()).decode() for part, dtype in ((rows, "<u4"), (values, "<f8"))
+    ]
+
+
+FORM = ["q", "66", [1.0, 2.0], [0.0, 1.0], [0.5, 0.0], [0.0, 0.0], 1.5]
+DECLARED = records.DeclaredForm.read(FORM, Limits((UNDECIDED,) * 2))
+IN_CONTACT = records.DeclaredForm.read(["q", "65", *FORM[2:]], Limits((UNDECIDED,) * 2))
+LIMITS = Limits((UNDECIDED, STICK), friction=[True, True], declared=[DECLARED, IN_CONTACT])
+#: One weight for every free node, and four more where it has friction.
+WEIGHTS = [1.0] * 5
+
+
+@pytest.mark.parametrize(
+    ("kind", "entries", "why"),
+    [
+        (records.Excluded, [1, ""], "its multipliers are not two texts"),
+        (records.Excluded, texts([0, 1], [1.0]), "2 rows and 1 multipliers"),
+        (records.Excluded, texts([0] * 15, [1.0] * 15), "it has 15 multipliers, and there are 14 rows"),
+        (records.Excluded, texts([14], [1.0]), "row 14 does not exist; there are 14"),
+        (records.Excluded, texts([0], [np.inf]), "a multiplier is not finite"),
+        (records.DeclaredForm, ["6", *FORM[2:]], "a form cannot be read: expected status codes as texts of 2 digits"),
+        (records.DeclaredForm, ["6\u0661", *FORM[2:]], "a form cannot be read: a status code is not a digit"),
+        (records.DeclaredForm, ["67", *FORM[2:]], "a form cannot be read: a status code is not among 0 to 6"),
+        (records.DeclaredForm, [*FORM[1:6], float("inf")], "a form cannot be read: a number is not finite"),
+        (records.DeclaredForm, [*FORM[1:6], -1.0], "a multiplier of a form is negative"),
+        (records.DeclaredForm, [*FORM[1:4], [-0.5, 0.0], *FORM[5:]], "a multiplier of a form is negative"),
+        (records.ExcludedByForm, [3, *texts([0], [1.0])], "its form was not declared"),
+        (records.ExcludedByForm, [0, *texts([0], [1.0])], "its form was not declared"),
+        (records.ExcludedByForm, [True, *texts([0], [1.0])], "its form was not declared"),
+        (records.Closed, [[OPEN], [0], WEIGHTS, [0.0] * 4], "its selection is not a list of 2 codes"),
+        (records.Closed, [[OPEN, 9], [0], WEIGHTS, [0.0] * 4], "a node cannot have the code"),
+        (records.Closed, [[FORWARD, STICK], [0], WEIGHTS, [0.0] * 4], "a node cannot have the code"),
+        (records.Closed, [[OPEN, STICK], [2], WEIGHTS, [0.0] * 4], "its free nodes are not a list of nodes"),
+        (records.Closed, [[OPEN, STICK], [1, 0], WEIGHTS, [0.0] * 4], "its free nodes are not ascending"),
+        (records.Closed, [[OPEN, STICK], [0], WEIGHTS[1:], [0.0] * 4], "expected 5 numbers"),
+        (records.Closed, [[OPEN, OPEN], [0], WEIGHTS, [0.0] * 4], "a node that has a status in its proof has another"),
+        (records.ClosedInRationals, [[OPEN, SLIP_PLUS], WEIGHTS, 1], "its selection does not lie below its assignment"),
+    ],
+)
+def test_what_an_entry_may_not_be(kind, entries, why):
+    with pytest.raises(ValueError, match=re.escape(why)):
+        kind.read([kind.kind, *entries], LIMITS)
+
+
+@pytest.mark.parametrize(("point", "why"), [(["1/1"] * 3, "points of 4 fractions"), (["1/1"] * 3 + [1], "not a text")])
+def test_what_a_point_may_not_be(point, why):
+    final = Limits((OPEN, STICK), friction=[True, True])
+    with pytest.raises(ValueError, match=why):
+        records.RootSetRecord.read(["D", [["1/1"] * 4, point], 1], final)
+
+
+def test_a_form_serves_what_is_below_its_assignment():
+    """The second form before was declared where all is undecided, the last one where a node is in contact."""
+    entries = texts([0], [1.0])
+    assert records.ExcludedByForm.read(["f", 2, *entries], LIMITS).back == 2
+    assert records.ExcludedByForm.read(["f", 1, *entries], LIMITS).back == 1
+    above = Limits((UNDECIDED, UNDECIDED), friction=[True, True], declared=[DECLARED, IN_CONTACT])
+    with pytest.raises(ValueError, match="its form was made for another assignment"):
+        records.ExcludedByForm.read(["f", 1, *entries], above)
+    below = Limits((UNDECIDED, CONTACT), friction=[True, True], declared=[DECLARED, IN_CONTACT])
+    assert records.ExcludedByForm.read(["f", 1, *entries], below).terms.values.tolist() == [1.0]
+
+
+def test_forms_that_say_the_same():
+    again = records.DeclaredForm.read(DECLARED.write(), Limits((UNDECIDED,) * 2))
+    assert again.same(DECLARED)
+    assert not IN_CONTACT.same(DECLARED)
+    assert not records.DeclaredForm.read([*FORM[:5], [0.0, 1.0], 1.5], Limits((UNDECIDED,) * 2)).same(DECLARED)
+
+
+def test_no_two_kinds_begin_alike():
+    with pytest.raises(AssertionError, match="two of the kinds x, x begin alike"):
+        table_of(records.Excluded, records.Excluded)
+
+
+def test_a_proof_holds_no_longer_fractions():
+    last = Fraction(10**reading.MOST_DIGITS - 1, 10 ** (reading.MOST_DIGITS - 1))
+    assert reading.rational_from(reading.rational_text(last, "alpha")) == last
+    bad_argument("alpha is a fraction of more than 4000 digits", reading.rational_text, last + 1, "alpha")
