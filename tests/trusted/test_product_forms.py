@@ -138,19 +138,51 @@ def test_trees_below_assignments_hold_what_newton_finds(seed):
     for y in solutions:
         codes = codes_of(solvers, y, 2)
         tree = search.closed(codes, 40)
-        if tree is None or not any(code > SECTORS for code in codes):
-            continue
-        leaves = leaves_of(codes, tree)
-        for below, leaf in leaves:
-            assert refines(below, leaf.ellipsoid.codes)
-            assert isinstance(leaf, Missed) == leaf.ellipsoid.misses(below) or isinstance(leaf, Enclosed)
-        boxes = [leaf.found for _, leaf in leaves if isinstance(leaf, Enclosed)]
-        for other in solutions:
-            inside = [one for one in boxes if np.all(np.abs(one.y.mid - other) <= one.y.rad + 1e-7)]
-            assert inside or not refines(codes_of(solvers, other, 12), codes)
-        for one in boxes:
-            assert is_inside(one.y, one.w, one.box)
-            assert any(np.all(np.abs(one.y.mid - other) <= one.y.rad + 1e-6) for other in solutions)
+        if tree is not None and any(code > SECTORS for code in codes):
+            check_tree(codes, tree, solvers, solutions)
+
+
+def check_tree(codes, tree, solvers, solutions):
+    """What is missed and enclosed in a tree below an assignment, against all solutions of the problem."""
+    leaves = leaves_of(codes, tree)
+    for below, leaf in leaves:
+        assert refines(below, leaf.ellipsoid.codes)
+        assert isinstance(leaf, Missed) == leaf.ellipsoid.misses(below) or isinstance(leaf, Enclosed)
+    boxes = [leaf.found for _, leaf in leaves if isinstance(leaf, Enclosed)]
+    for other in solutions:
+        inside = [one for one in boxes if np.all(np.abs(one.y.mid - other) <= one.y.rad + 1e-7)]
+        assert inside or not refines(codes_of(solvers, other, 12), codes)
+    for one in boxes:
+        assert is_inside(one.y, one.w, one.box)
+        assert any(np.all(np.abs(one.y.mid - other) <= one.y.rad + 1e-6) for other in solutions)
+
+
+@pytest.mark.parametrize(("seed", "p"), [(29, 3), (38, 3), (40, 3), (5, 2)])
+def test_sectors_are_split_where_an_ellipsoid_cuts_off_no_more(seed, p):
+    solvers, solutions = known(seed, p)
+    search, split = ProductSearch(solvers.enclosed), 0
+    for y in solutions:
+        for level in (0, 2):
+            fine = codes_of(solvers, y, 2)
+            codes = fine if level else tuple(CONTACT if code > SECTORS else code for code in fine)
+            tree = search.closed(codes, 40)
+            if tree is None or not any(code > SECTORS or code == CONTACT for code in codes):
+                continue
+            check_tree(codes, tree, solvers, solutions)
+            # beside what is cut off, which is missed, there is one part; here each of both is examined further
+            after = zip(tree, tree[1:], tree[2:], strict=False)
+            split += sum(isinstance(one, Branched) and not isinstance(two, Missed) for one, two, _ in after)
+    assert split
+
+
+@pytest.mark.parametrize("seed", [7, 47])
+def test_a_tree_that_takes_too_many_programs_is_given_up(seed):
+    solvers, solutions = known(seed, 3)
+    for most in (1, 5, 40):
+        search = ProductSearch(solvers.enclosed)
+        trees = [search.closed(tuple(min(code, CONTACT) for code in codes_of(solvers, y, 2)), most) for y in solutions]
+        assert search.programs <= most * len(solutions)
+        assert None in trees
 
 
 @pytest.mark.few(1, 4)
