@@ -242,7 +242,9 @@ def test_what_cannot_be_drawn_is_refused(graphs, options, message):
 
 
 def test_a_sheet_is_shaded_from_end_to_end():
-    axis = branch_graph(sheet_of_one_node(), (-1, 1)).plot().axes[0]
+    graph = branch_graph(sheet_of_one_node(), (-1, 1))
+    assert ": sheet, 1 arc, alpha in [0, 1]" in repr(graph)
+    axis = graph.plot().axes[0]
     (band,) = [part for part in axis.collections if part.get_label() != "A"]
     corners = band.get_paths()[0].vertices
     # the load (1, -2) grows like alpha, and so does the largest force, (1, -2) itself at alpha = 1
@@ -252,7 +254,7 @@ def test_a_sheet_is_shaded_from_end_to_end():
     assert low < 0 < 5**0.5 < high
 
     # displacements of a sheet are not drawn
-    assert not branch_graph(sheet_of_one_node(), (-1, 1)).plot("u_n", [0]).axes[0].collections
+    assert not graph.plot("u_n", [0]).axes[0].collections
 
 
 def test_it_is_said_where_there_is_no_room_for_numbers(graphs):

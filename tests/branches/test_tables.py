@@ -108,7 +108,9 @@ def test_linked_samples_follow_the_branches(square):
 
 def test_links_follow_a_transition_by_a_vanishing_test_function():
     problem = gallery.get("one-node-6.2").build()
-    linked = link_samples(problem, [4.0, 4.5, 4.9, 5.5])
+    told = []
+    linked = link_samples(problem, [4.0, 4.5, 4.9, 5.5], progress=lambda *at: told.append(at))
+    assert told == [(k, 4) for k in (1, 2, 3, 4)]
     assert [data["rule"] for *_, data in linked.graph.edges(data=True)] == ["selection", "flip", "selection"]
     assert len(linked.branches) == 1
 

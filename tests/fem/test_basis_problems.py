@@ -12,6 +12,7 @@ from skfem.models.elasticity import lame_parameters, linear_elasticity
 
 import enumsol
 from enumsol import fem
+from enumsol.fem.restrained import axes_of
 
 LAME = lame_parameters(2.0, 0.3)
 
@@ -141,6 +142,16 @@ def test_what_else_is_taken(good):
     two = fem.basis_contact_problem(**good | {"held": held}, normals=lambda place: (0.0, place[1] - 2.0), friction=0.4)
     assert_close(one, two, "A", "Bn", "Bt", "f", rtol=1e-12)
     bad_problem("free to move as a rigid body", fem.basis_contact_problem, **good | {"held": []})
+
+
+def test_axes_that_are_not_at_right_angles_are_refused():
+    up = np.array([[0.0, 0.0, 1.0]])
+    bad_argument("expected a pair of directions", axes_of, (1, 0, 0), up)
+    skew = "tangents are not perpendicular to each other and to the normals"
+    for pair in (((1, 0, 0), (1, 1, 0)), ((1, 0, 1), (0, 1, 0))):
+        bad_argument(skew, axes_of, pair, up)
+    one, two = axes_of(((3, 4, 0), (4, -3, 0)), up)
+    np.testing.assert_allclose([one[0], two[0]], [[0.6, 0.8, 0], [0.8, -0.6, 0]], rtol=1e-15)
 
 
 @pytest.mark.slow

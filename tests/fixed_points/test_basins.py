@@ -1,6 +1,7 @@
 """In 2D the fixed points of Psi are the enumerated roots; which of them iterations reach."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from effort import some
 from generators import FRICTION, dense_compliance, fe_compliance, from_condensed
@@ -92,7 +93,18 @@ def test_given_starts_and_their_errors():
     bad_argument("roots has 0 roots", enumsol.basin_table, problem, [], 5)
     other = enumsol.enumerate_roots(problem, 4.0)[0]
     bad_argument("all at the same alpha", enumsol.basin_table, problem, [roots[0], other])
+    bad_argument("roots is 3; expected a RootSet", enumsol.basin_table, problem, 3, 5)
     bad_argument("table lacks", plot_basins, table[["start"]])
+
+
+def test_starts_that_reach_no_root_are_crosses():
+    rows = [("converged", 5, 1.0, 0), ("converged", 30, 0.0, 0), ("cycle", 40, 2.0, pd.NA), ("cycle", 7, 3.0, pd.NA)]
+    table = pd.DataFrame(rows, columns=["outcome", "iterations", "size", "root"])
+    (ax,) = plot_basins(table).axes
+    assert [line.get_label() for line in ax.lines] == ["root 0: 2 starts", "no root (cycle): 2 starts"]
+    assert ax.lines[1].get_marker() == "x"
+    assert ax.lines[1].get_xydata().tolist() == [[2.0, 40.0], [3.0, 7.0]]
+    assert (ax.get_xscale(), ax.get_yscale()) == ("symlog", "log")
 
 
 def test_interrupted_keeps_the_rows(monkeypatch):

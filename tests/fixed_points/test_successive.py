@@ -14,7 +14,7 @@ from refusals import bad_argument, bad_problem
 from scipy.optimize import brentq
 
 import enumsol
-from enumsol.fixed_points import FixedPoint, Outcome
+from enumsol.fixed_points import FixedPoint, Outcome, TrescaNotSolved, successive
 from enumsol.fixed_points.successive import AndersonMixing
 
 # a public test of the contact community: u = W r + q, normal first, r_n >= 0, u_n >= 0; here w = -u, so g = -q, S = W
@@ -198,6 +198,31 @@ def test_the_limit_of_iterations_is_told():
     assert (found.outcome, found.iterations) == (Outcome.ITERATION_LIMIT, 2)
     assert "not converged within 2 iterations" in found.why
     assert "not converged" in repr(found)
+
+
+def test_what_was_reached_is_kept_where_a_tresca_problem_is_not_solved(monkeypatch):
+    solved, calls = successive.solve_scaled, []
+
+    def until_the_third(data, start, *more):
+        calls.append(start)
+        if len(calls) == 3:
+            raise TrescaNotSolved("the residual is 1")
+        return solved(data, start, *more)
+
+    two = enumsol.successive_approximations(PUBLIC, 0, max_iterations=2)
+    monkeypatch.setattr(successive, "solve_scaled", until_the_third)
+    found = enumsol.successive_approximations(PUBLIC, 0)
+    assert (found.outcome, found.converged, found.iterations) == (Outcome.NOT_SOLVED, False, 2)
+    assert "stopped after 2 iterations: a Tresca problem was not solved" in found.why
+    np.testing.assert_array_equal(found.forces, two.forces)
+
+
+def test_mixing_takes_slips_where_friction_depends_on_them():
+    table = enumsol.FrictionTable([0, 0.1], [0.5, 0.3])
+    problem = enumsol.gallery.block3d(2, 2, 1, friction=table)
+    plain, mixed = (limit_of(problem, 0, anderson=depth) for depth in (0, 3))
+    np.testing.assert_allclose(mixed.forces, plain.forces, atol=1e-7 * np.max(plain.lambda_n))
+    np.testing.assert_allclose(mixed.slip, plain.slip, rtol=1e-6, atol=1e-12)
 
 
 @pytest.mark.parametrize("start", [None, 0.5, [0.5, 0.1], (np.ones(2), np.zeros(2))])

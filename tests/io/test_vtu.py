@@ -101,6 +101,19 @@ def test_contact_nodes_alone(tmp_path):
     assert "contact_force" not in picture.point_data
 
 
+def test_contact_nodes_of_a_plane_body_alone(tmp_path):
+    wedge = gallery.wedge(2, 2)
+    problem = wedge.replace(mesh=None)
+    root = enumsol.enumerate_roots(problem, 0.0)[0]
+    picture = written(problem, root, tmp_path)
+    assert [block.type for block in picture.cells] == ["vertex"]
+    assert np.array_equal(picture.points, np.pad(problem.coordinates, ((0, 0), (0, 1))))
+    assert np.array_equal(picture.point_data["lambda_n"], root.lambda_n)
+    nowhere = problem.replace(coordinates=None)
+    bad_argument("problem has neither mesh nor coordinates", write_vtu, nowhere, root, tmp_path / "q.vtu")
+    bad_argument("state is empty; expected at least one", write_vtu, problem, [], tmp_path / "q.vtu")
+
+
 def test_directions_that_the_rows_do_not_tell_are_left_out(tmp_path):
     mesh = fem.box(2, 2, 1)
     problem = on_bottom(mesh, held=held_in_part(mesh), multipliers="elements", axes=(0.6, 0.8, 0))

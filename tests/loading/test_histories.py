@@ -111,11 +111,17 @@ def test_the_slip_offset_moves_no_more_than_it_has_to():
 
 
 @pytest.mark.parametrize("arithmetic", ["verified", "exact"])
-def test_a_continuum_is_listed_and_not_followed(arithmetic):
+def test_a_continuum_is_listed_and_not_followed(arithmetic, tmp_path):
     history = histories(enumsol.gallery.one_node_triangle(f=(1, -2)), [2, 3], arithmetic=arithmetic)
     assert history.reasons == ("step 1: 1 family of solutions, which are not followed",)
     assert (history.counts, history.complete, history.unique_until) == ((0, 0), False, 0)
     assert "none reaches the last step" in repr(history)
+    again = read_back(history, tmp_path / "h.json", history.problem)
+    (one,), (other,) = (h.data.stages[0].roots.families for h in (history, again))
+    assert_same(one, other, "alpha", "index", "vertices_proven", "dimension", "vertices")
+    assert [part.statuses for part in one.polytopes] == [part.statuses for part in other.polytopes]
+    for node in ((1, 5), "1.0", (0, 0)):
+        bad_argument("expected a pair .step, root. of this history", history.root, node)
 
 
 # -- choices and limits ------------------------------------------------------------------------------------------------

@@ -151,6 +151,15 @@ def test_what_is_not_done_is_said(over_gap):
     assert (partial.values, partial.complete) == ((0.0,), False)
 
 
+def test_what_cannot_be_asked():
+    node = enumsol.gallery.one_node_triangle()
+    found = multiplicity_map(node, (0, 1), {"gap": [0.0]})
+    assert found.multiplicity_at(0.0, 1) == 1
+    bad_argument("value is 0.5; expected one of the values of the map", found.multiplicity_at, 0.5, 1)
+    bad_argument(r"alpha is 2; expected it in the interval", found.multiplicity_at, 0.0, 2)
+    bad_argument("are not options here", multiplicity_map, node, (0, 1), {"gap": [0.0]}, interval=(0, 2))
+
+
 def test_the_picture_has_a_line_for_every_range(over_gap, tmp_path):
     figure = over_gap.plot(file=tmp_path / "map.png")
     assert (tmp_path / "map.png").stat().st_size > 5_000
