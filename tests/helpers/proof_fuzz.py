@@ -191,8 +191,9 @@ def _numbers(rng, records, _):
     """Multipliers."""
     changed = copied(records)
     lists = [k for k, record in enumerate(changed) if isinstance(record, list) and record]
-    # those of 3D are lists of numbers, which the mutations of fields reach
-    places = [k for k in lists if changed[k][0] in ("x", "X") and isinstance(changed[k][-1], str)]
+    # the rows of those of 3D are a list, which the mutations of fields reach
+    texts = {k: [isinstance(part, str) for part in changed[k][-2:]] for k in lists}
+    places = [k for k in lists if changed[k][0] in ("x", "X") and all(texts[k])]
     if not places:
         return _nudge(rng, records, _)
     at = _pick(rng, places)
