@@ -1,0 +1,137 @@
+"""Proofs of graphs in 3D leaf by leaf: every kind of leaf is accepted, and forged ones, curves and headers are not."""
+
+import functools
+from fractions import Fraction
+
+import pytest
+from complete import accepted_report, all_roots
+from problems3d import random_over_alpha
+from proof_tools import of_kind, proof_of, put, records_of, replaced, why_refused
+
+from enumsol import verify
+from enumsol.branches.space.cover import SpaceCover
+from enumsol.search.space.piece_certificates import PieceProposals
+
+INTERVAL = Fraction(0), Fraction(1)
+
+
+@functools.cache
+def leaf_by_leaf(p, seed):
+    """A problem and the records of its proof without certificates for a piece: every selection is a leaf."""
+    cover = SpaceCover(random_over_alpha(p, seed), INTERVAL)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(PieceProposals, "numbers", lambda *_: None)
+        patch.setattr(PieceProposals, "is_hopeful", lambda *_: False)
+        cover.search(max_nodes=100)
+    return cover.problem, records_of(cover.proof())
+
+
+#: Problems whose leaves are of these kinds: arcs, no roots and exclusions, or boxes in a row.
+ARCS, ROWS = (2, 7), (1, 5)
+
+
+@pytest.mark.parametrize(("name", "kinds"), [(ARCS, "abnrx"), (ROWS, "abkx")])
+def test_leaves_say_that_all_solutions_lie_on_a_curve(name, kinds):
+    problem, records = leaf_by_leaf(*name)
+    assert {record[0] for record in records if isinstance(record, list)} == {"w", *kinds}
+    told = []
+    report = verify(problem, proof_of(records), progress=told.append)
+    assert (report.complete, report.curves, report.open) == (True, 1, 0)
+    assert told == [report.leaves] == [records[-1]["leaves"]]
+    counts = [len(all_roots(problem, alpha)) for alpha in (0.1, 0.5, 0.9)]
+    assert counts == [1, 1, 1]
+
+
+def test_open_leaves_are_gaps():
+    problem, records = leaf_by_leaf(*ROWS)
+    k = of_kind(records, "k")[0]
+    report = accepted_report(problem, proof_of(put(replaced(records, k, ["u", "no time"]), (-1, "gaps"), 1)))
+    assert not report.complete
+    assert (report.curves, report.open) == (1, 1)
+    assert "1 curve; left open in 1 piece of alpha" in repr(report)
+    assert repr(report).endswith("complete: no")
+
+
+def test_a_curve_alone_says_nothing():
+    problem, records = leaf_by_leaf(*ROWS)
+    place = records.index({"tree": True}) + 1
+    claim = {"curves": 1, "leaves": 1, "gaps": 0}
+    assert "claimed where statuses are still open" in why_refused(problem, [*records[:place], ["n"], claim])
+    assert "tree over alpha ends before all of it is decided" in why_refused(problem, records[:place])
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "forged", "why"),
+    [
+        (ARCS, "r", lambda record: ["r", record[1] - 3], "not proven to be an arc through its box"),
+        (ARCS, "r", lambda record: ["r", 1000], "there is no box 1000"),
+        (ARCS, "r", lambda record: ["r", True], "there is no box True"),
+        (ARCS, "r", lambda _: ["n"], "not proven to hold no root"),
+        (ARCS, "n", lambda _: ["r", 0], "not proven to be an arc through its box"),
+        (ARCS, "n", lambda _: ["q"], "unknown kind of record 'q'"),
+        (ARCS, "n", lambda _: [], "unknown kind of record None"),
+        (ARCS, "x", lambda _: ["x", [], ""], "its multipliers do not exclude it"),
+        (ARCS, "x", lambda record: ["x", record[1][1:], record[2]], "rows and"),
+        (ARCS, "x", lambda record: ["x", record[2], record[2]], "not a list of rows and a text"),
+        (ROWS, "k", lambda _: ["n"], "not proven to hold no root"),
+        (ROWS, "k", lambda record: ["k", record[2], record[2]], "not proven to lie in its boxes"),
+        (ROWS, "k", lambda record: ["k", record[2], record[1]], "not proven to lie in its boxes"),
+        (ROWS, "k", lambda record: ["k", record[1], -1], "there is no box -1"),
+        (ROWS, "k", lambda record: ["m", [1.0], *record[1:]], "a form over a piece cannot be read: expected"),
+        (ROWS, "a", lambda _: ["a", "1"], "a piece is not cut within"),
+        (ROWS, "a", lambda _: ["a", "1/0"], "a piece is cut nowhere"),
+        (ROWS, "a", lambda _: ["a", 0.5], "a piece is cut nowhere"),
+        (ROWS, "b", lambda record: ["b", 0, record[2][1:]], "does not cover the assignment"),
+    ],
+)
+def test_forged_leaves_are_refused(name, kind, forged, why):
+    problem, records = leaf_by_leaf(*name)
+    k = of_kind(records, kind)[0]
+    assert why in why_refused(problem, replaced(records, k, forged(records[k])))
+
+
+def test_the_check_ends_after_many_failures():
+    problem, records = leaf_by_leaf(*ROWS)
+    place, parts, nothing = records.index({"tree": True}) + 1, 64, ["x", [], ""]
+    cuts = [part for k in range(1, parts) for part in (["a", f"{k}/{parts}"], nothing)]
+    claim = {"curves": 1, "leaves": parts, "gaps": 0}
+    said = why_refused(problem, [*records[:place], *cuts, nothing, claim])
+    assert said.count("its multipliers do not exclude it") == 20
+    assert "the check ends after 20 failures" in said
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "why"),
+    [
+        ((0, "data"), "condensed", "certifies the problem's own data only"),
+        ((0, "interval"), ["0"], "there is no interval"),
+        ((0, "interval"), ["1", "0"], "an interval is empty"),
+        ((0, "interval"), ["-1000", "1"], "friction is negative in the interval"),
+        ((0, "length"), lambda length: [length[0] + 1, *length[1:]], "no common scaling of energy"),
+        ((0, "force"), None, "the units are not 2 binary exponents"),
+        ((0, "steps"), lambda steps: [0, *steps[1:]], "a step is not positive"),
+        ((0, "steps"), lambda steps: steps[1:], "expected 6 numbers"),
+        ((1, "curve"), 0, "curve 1 has 0 boxes"),
+        ((1, "curve"), True, "curve 1 has True boxes"),
+        ((1, "curve"), 1, "curve 1 is not proven to be one from end to end"),
+        ((1, "curve"), lambda count: count + 1, "is no box"),
+        ((2, 1), [0.0], "a box around a curve cannot be read"),
+        ((3, 2), lambda direction: [-x for x in direction], "curve 1 is not proven to be one"),
+        ((3, 6), lambda half: 0.5 * half, "curve 1 is not proven to be one"),
+        ((-1, "curves"), 2, "the counts at the end"),
+        ((-1, "leaves"), True, "the counts at the end"),
+        ((-1,), None, "the counts at the end are None"),
+    ],
+)
+def test_forged_headers_curves_and_counts_are_refused(path, value, why):
+    problem, records = leaf_by_leaf(*ARCS)
+    assert why in why_refused(problem, put(records, path, value))
+
+
+def test_what_belongs_to_no_tree_or_curve_is_refused():
+    problem, records = leaf_by_leaf(*ROWS)
+    place = records.index({"tree": True})
+    assert "the tree over alpha is missing" in why_refused(problem, replaced(records, place))
+    assert "records follow after the end" in why_refused(problem, [*records, records[-1]])
+    twice = put([records[0], *records[1:place], *records[1:]], (-1, "curves"), 2)
+    assert "two curves may be the same" in why_refused(problem, twice)
