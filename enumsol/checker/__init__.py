@@ -50,8 +50,9 @@ What checker and search share
       the same, with the derivatives of ``trusted.space.natural_map``; over an interval of alpha
       ``trusted.space.solution_curve``, the test that a box holds one curve of solutions,
       ``trusted.space.curve_chains``, that boxes hold one whole curve, ``trusted.space.pieces``, what holds over a
-      piece of alpha, ``trusted.space.curve_runs``, bounds of a curve there, and ``trusted.space.piece_forms``, the test
-      that it has all solutions with some statuses (where such a curve changes its statuses or turns back is a matter of
+      piece of alpha, ``trusted.space.leaf_arcs``, that the solutions of an assignment there are one arc,
+      ``trusted.space.curve_runs``, bounds of a curve there, and ``trusted.space.piece_forms``, the test that it has
+      all solutions with some statuses (where such a curve changes its statuses or turns back is a matter of
       ``trusted.space.curve_events``: a proof does not hold that, and it is not checked);
       ``model.sectors``, the ends of sectors; ``condensation.space_condensed``, balls for S and g in the
       variables in which friction is isotropic; of bodies that nothing holds the same with G and h,

@@ -65,6 +65,7 @@ SHARED = {
     "trusted.status_rows": None,
     "trusted.space.sector_rows": None,
     "trusted.space.slip_forms": {"SlipForm"},
+    "trusted.space.leaf_arcs": {"LeafArc"},
     "trusted.space.leaves": None,
     "trusted.space.resultants": None,
     "trusted.space.turning": {"turned_by"},

@@ -33,7 +33,7 @@ def claimed(chains, low, high):
     """What the checker says of these curves over an interval, with a tree that leaves all of it open."""
     ends = Fraction(low), Fraction(high)
     tree = [OpenLeaf(*ends, (6,) * problem().p, None)]
-    return verify(problem(), SpaceCover(problem(), ends, list(chains), tree).proof())
+    return verify(problem(), SpaceCover(problem(), ends, chains=list(chains), records=tree).proof())
 
 
 @pytest.mark.slow

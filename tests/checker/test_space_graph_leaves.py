@@ -64,6 +64,17 @@ def test_a_curve_alone_says_nothing():
     ("name", "kind", "forged", "why"),
     [
         (ARCS, "r", lambda record: ["r", record[1] - 3, *record[2:]], "not proven to be an arc through its box"),
+        (ARCS, "r", lambda record: [*record[:4], record[2], record[5]], "not proven to be an arc through its box"),
+        (
+            ARCS,
+            "r",
+            lambda record: [*record[:2], *[record[4]] * 3, record[5]],
+            "not proven to be an arc through its box",
+        ),
+        (ARCS, "r", lambda record: [*record[:5], [0] * len(record[5])], "not proven to be an arc through its box"),
+        (ARCS, "r", lambda record: [*record[:4], "7", record[5]], "a point of an arc is not over its piece"),
+        (ARCS, "r", lambda record: [*record[:4], 0.5, record[5]], "an arc is over no piece"),
+        (ARCS, "r", lambda record: [*record[:5], [6] * len(record[5])], "the leaf of a point of an arc is none"),
         (ARCS, "r", lambda record: ["r", 1000, *record[2:]], "there is no box 1000"),
         (ARCS, "r", lambda record: ["r", True, *record[2:]], "there is no box True"),
         (ARCS, "r", lambda _: ["n"], "not proven to hold no root"),

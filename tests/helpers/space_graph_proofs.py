@@ -84,11 +84,17 @@ class Parts:
         for k in self.places("k", "r", "m"):
             record = self.tree[k]
             boxes = [number(box) for box in _boxes_of(record)]
-            self.tree[k] = ["n"] if None in boxes else [*record[: len(record) - len(boxes)], *boxes]
+            self.tree[k] = ["n"] if None in boxes else copied(record)
+            if None not in boxes:
+                self.tree[k][_BOXES[record[0]]] = boxes
+
+
+#: Where records have the numbers of boxes.
+_BOXES = {"k": slice(1, 3), "r": slice(1, 2), "m": slice(2, 4)}
 
 
 def _boxes_of(record):
-    return record[{"k": 1, "r": 1, "m": 2}[record[0]] :]
+    return record[_BOXES[record[0]]]
 
 
 # -- mutants of the tree -----------------------------------------------------------------------------------------------
@@ -104,8 +110,37 @@ def _leaf(rng, parts, near=None):
         first = int(rng.integers(count))
         return ["k", first, min(first + int(rng.integers(4)), count - 1)]
     if kind == "r" and rng.random() < 0.6:
-        return ["r", int(rng.integers(count))]
+        return _arc(rng, parts, int(rng.integers(count)))
     return copied(_pick(rng, donors)) if donors and kind not in "nu" else ["n"] if kind != "u" else ["u", ""]
+
+
+def _arc(rng, parts, box):
+    """A leaf whose roots are said to be an arc through a box, with the numbers of another one."""
+    known = parts.places("r")
+    if known:
+        return ["r", box, *copied(parts.tree[_pick(rng, known)][2:])]
+    low, high = parts.header["interval"]
+    return ["r", box, low, high, low, [1] * parts.header["p"]]
+
+
+def _arc_numbers(rng, parts):
+    """Another piece, alpha, or leaf of an arc."""
+    places = parts.places("r")
+    if places:
+        record = parts.tree[_pick(rng, places)]
+        low, high, alpha = (Fraction(number) for number in record[2:5])
+        way = int(rng.integers(4))
+        if way == 0:
+            ends = (Fraction(end) for end in parts.header["interval"])
+            low, high = (max(low, min(ends)), high) if rng.random() < 0.5 else (low - (high - low), high + (high - low))
+        elif way == 1:
+            low, high = sorted((alpha, low + (high - low) * int(rng.integers(0, 9)) / 8))
+        elif way == 2:
+            alpha = low + (high - low) * int(rng.integers(0, 9)) / 8
+        else:
+            k = int(rng.integers(len(record[5])))
+            record[5][k] = int(_pick(rng, (record[5][k] + int(rng.integers(-2, 3)), *range(4), 6)))
+        record[2:5] = [str(number) for number in (low, high, alpha)]
 
 
 def _prune(rng, parts):
@@ -135,7 +170,9 @@ def _same_leaf(rng, parts):
         k = _pick(rng, places)
         boxes = _boxes_of(parts.tree[k])
         first, last = boxes[0], boxes[-1]
-        parts.tree[k] = _pick(rng, (["k", first, last], ["k", last, last], ["r", first], ["n"], ["x", [], ""]))
+        parts.tree[k] = _pick(
+            rng, (["k", first, last], ["k", last, last], _arc(rng, parts, first), ["n"], ["x", [], ""])
+        )
 
 
 def _no_child(rng, parts):
@@ -209,7 +246,7 @@ def _box_numbers(rng, parts):
     places = parts.places("k", "r", "m")
     if places:
         record = parts.tree[_pick(rng, places)]
-        j = int(rng.integers(len(record) - len(_boxes_of(record)), len(record)))
+        j = int(_pick(rng, range(len(record))[_BOXES[record[0]]]))
         record[j] = int(_pick(rng, (record[j] + int(rng.integers(-3, 4)), rng.integers(parts.first_boxes()[-1]))))
 
 
@@ -375,6 +412,7 @@ _TREE = (
     _multipliers,
     _fewer_rows,
     _box_numbers,
+    _arc_numbers,
     _form,
 )
 _CURVES = (_no_curve, _again, _round, _shorter, _spliced, _closed, _box)

@@ -1,6 +1,5 @@
 """What is concluded of leaves in 3D over pieces of alpha: where their roots are, and whether these are one arc."""
 
-from collections import Counter
 from fractions import Fraction
 
 import numpy as np
@@ -8,13 +7,15 @@ import pytest
 from problems3d import random_over_alpha
 
 import enumsol
+from enumsol.branches.space.chains import chain_through
 from enumsol.model.sectors import DEEPEST, SECTORS, places
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space.leaves import SpaceRoot
 from enumsol.trusted.space.pieces import AlphaPiece
+from enumsol.trusted.space.solution_curve import AlphaProblem
 
 CODES = {"open": 0, "stick": 1}
-#: Problems with a fold or a change of statuses in [0, 1], and an alpha near it.
+#: Random problems over [0, 1], with folds and changes of statuses.
 NEAR = [(1, 3), (1, 7), (2, 1), (2, 3), (2, 6)]
 
 
@@ -46,7 +47,9 @@ def has(codes, root, problem):
                 return False
             continue
         level = (code - SECTORS).bit_length() - 1
-        if status.value in CODES or int(place_of(root, problem, i)) >> (DEEPEST + 2 - level) != code - SECTORS - (1 << level):
+        if status.value in CODES or int(place_of(root, problem, i)) >> (DEEPEST + 2 - level) != code - SECTORS - (
+            1 << level
+        ):
             return False
     return True
 
@@ -58,7 +61,11 @@ def cases(p, seed, count):
     graph = enumsol.branch_graph(problem, (0, 1), max_nodes=400)
     inner = [v.alpha for v in graph.vertices if 0.01 < float(v.alpha) < 0.99]
     for _ in range(count):
-        about = Fraction(float(rng.choice(inner))) if inner and rng.random() < 0.8 else Fraction(int(rng.integers(1, 64)), 64)
+        about = (
+            Fraction(float(rng.choice(inner)))
+            if inner and rng.random() < 0.8
+            else Fraction(int(rng.integers(1, 64)), 64)
+        )
         length = Fraction(1, 2 ** int(rng.integers(3, 9)))
         low = max(Fraction(0), about - length * int(rng.integers(0, 8)) / 8)
         high = min(Fraction(1), low + length)
@@ -72,32 +79,34 @@ def cases(p, seed, count):
 @pytest.mark.parametrize(("p", "seed"), NEAR)
 def test_a_piece_is_narrowed_to_all_alpha_of_a_leafs_roots(p, seed):
     """Roots at single alphas of the piece are in the part that is left."""
-    met = Counter()
-    for problem, piece, codes in cases(p, seed, 12):
+    narrower = 0
+    for problem, piece, codes in cases(p, seed, 8):
         narrowed, found = piece.narrowed(codes)
-        met["none" if found is None else "less" if narrowed.high - narrowed.low < piece.high - piece.low else "all"] += 1
+        narrower += found is None or narrowed.high - narrowed.low < piece.high - piece.low
         for k in range(17):
             alpha = piece.low + (piece.high - piece.low) * k / 16
             if any(has(codes, root, problem) for root in enumsol.enumerate_roots(problem, alpha)):
                 assert found is not None
                 assert narrowed.low <= alpha <= narrowed.high
-    assert met["less"] + met["none"], met
+    assert narrower
 
 
-def way_to(path, x):
-    """The distance of a point from a polygon."""
-    line = np.column_stack([path.lambda_n, path.lambda_t.reshape(len(path.alpha), -1), path.alpha])
-    start, edge = line[:-1], np.diff(line, axis=0)
-    t = np.clip(np.sum((x - start) * edge, axis=1) / np.maximum(np.sum(edge * edge, axis=1), 1e-300), 0.0, 1.0)
-    return float(np.min(np.linalg.norm(start + t[:, None] * edge - x, axis=1)))
+def is_on(chain, given, root):
+    """Whether a root lies in a box of a curve, or as near to it as solutions of the box are."""
+    x = given.placed(np.concatenate([root.lambda_n, *root.lambda_t.T, [float(root.alpha)]]))
+    for curve in (link.curve for link in chain.links):
+        t = float(curve.box.border @ (x - curve.box.centre))
+        beside = np.abs(x - curve.box.centre - t * curve.box.direction)
+        if abs(t) <= curve.box.half and np.all(beside <= np.maximum(curve.spread, curve.box.radius)):
+            return True
+    return False
 
 
 @pytest.mark.parametrize(("p", "seed"), NEAR)
-def test_roots_on_an_arc_are_on_one_path(p, seed):
-    """Continuation from one root of an arc comes to all others that are found at single alphas."""
+def test_roots_on_an_arc_are_on_one_curve(p, seed):
+    """The curve through one root of an arc, which is proven in another way, goes through all others."""
     arcs = 0
-    options = enumsol.ContinuationOptions(h_max=2e-3)
-    for problem, piece, codes in cases(p, seed, 12):
+    for problem, piece, codes in cases(p, seed, 8):
         arc = piece.arc(codes)
         if arc is None:
             continue
@@ -105,22 +114,17 @@ def test_roots_on_an_arc_are_on_one_path(p, seed):
         for k in range(9):
             alpha = piece.low + (piece.high - piece.low) * k / 8
             for root in enumsol.enumerate_roots(problem, alpha):
-                leaf = tuple(CODES.get(s.value, SECTORS) for s in root.statuses)
                 narrow = leaf_of(root, problem, 14, NoTurn())
-                there = piece.point_at(alpha).held(narrow) if leaf == arc.statuses else None
+                there = piece.point_at(alpha).held(narrow)
                 if isinstance(there, SpaceRoot) and arc.has(there, narrow):
                     on_it.append(root)
         if len(on_it) < 2:
             continue
         arcs += 1
-        first = on_it[0]
-        start = float(first.alpha), first.lambda_n, first.lambda_t
-        low, high = float(piece.low), float(piece.high)
-        span = max(0.0, low - 1e-3), min(1.0, high + 1e-3)
-        paths = [enumsol.follow(problem, start, way, span, options) for way in (1, -1)]
-        for root in on_it[1:]:
-            x = np.concatenate([root.lambda_n, root.lambda_t.ravel(), [float(root.alpha)]])
-            assert min(way_to(path, x) for path in paths) < 1e-3 * (1.0 + np.max(np.abs(x))), (codes, root)
+        given, first = AlphaProblem.of(problem.enclosure), on_it[len(on_it) // 2]
+        x = np.concatenate([first.lambda_n, *first.lambda_t.T, [float(first.alpha)]])
+        chain = chain_through(given, problem, x, (Fraction(0), Fraction(1)))
+        assert all(is_on(chain, given, root) for root in on_it), codes
     assert arcs
 
 

@@ -13,22 +13,14 @@ import numpy as np
 
 from enumsol.arithmetic.balls import Ball
 from enumsol.condensation.space_condensed import SpaceSystem
-from enumsol.model.sectors import (
-    DEEPEST,
-    SECTORS,
-    level_of,
-    parts_around,
-    places,
-    span,
-    width_level,
-    width_of,
-)
+from enumsol.model.sectors import DEEPEST, SECTORS, level_of, parts_around, places, span, width_level, width_of
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.proof.records import Branching, NoRoot
 from enumsol.proof.space_records import CutPiece, ExcludedInSpace, InCurveBoxes, OnlyOnCurve, ThroughCurveBox
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.outcome import StopReason
+from enumsol.search.space.piece_arcs import beside, points_on, slides
 from enumsol.search.space.piece_certificates import ERRORS, Passage, PieceProposals, runs_over
 from enumsol.search.space.piece_multipliers import balanced
 from enumsol.search.space.space_fathoming import without_sectors
@@ -39,7 +31,7 @@ from enumsol.support.deadlines import TimeOverError, look
 from enumsol.trusted.space.curve_runs import CurveParts, KnownCurve, Run
 from enumsol.trusted.space.leaves import Open, SpaceRoot
 from enumsol.trusted.space.pieces import AlphaPiece, lie_along
-from enumsol.trusted.space.solution_curve import AlphaProblem, curve_point
+from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -50,7 +42,6 @@ if TYPE_CHECKING:
     from enumsol.relaxation.space_relaxation import SpaceRelaxation
     from enumsol.selections.solution import Codes
     from enumsol.trusted.space.curve_chains import CurveChain
-    from enumsol.trusted.space.leaf_arcs import LeafArc
     from enumsol.trusted.space.sector_rows import Row
     from enumsol.trusted.space.solution_curve import SolutionCurve
 
@@ -74,9 +65,8 @@ _SHORT = 2.0**-6
 #: Pieces of undecided statuses at most at which a first curve is sought; where solutions are sampled, as shares of the
 #: interval, if more than one curve may be needed.
 _SOUGHT, _SAMPLED = 8, (Fraction(15, 16), Fraction(1, 2), Fraction(1, 16))
-#: By so many times their lengths pieces are made longer on both sides for arcs; where points of these are taken from
-#: known curves, as shares of their parts in a leaf, and the level of the sectors around them.
-_FACTORS, _PLACES, _POINTED = (0, 1), (0.5, 0.25, 0.75), 12
+#: By so many times their lengths pieces are made longer on both sides for arcs.
+_FACTORS = 0, 1
 #: Arcs are sought where a known curve has directions in a leaf, or beside it by this factor.
 _BESIDE = 1.5
 #: Leaves are tested from this level of their sectors on.
@@ -130,19 +120,6 @@ class Known:
     def state(self) -> tuple[object, ...]:
         """What of it changes during a search."""
         return len(self.chains), self.sampled, self.sought == _SOUGHT, self.final
-
-
-def _slides(parts: CurveParts, codes: Codes) -> NDArray[np.bool_]:
-    """In which parts of a curve the statuses of a leaf hold, and those in sectors do not stick all the time, (N,)."""
-    nodes = [i for i, code in enumerate(codes) if code > SECTORS]
-    return np.asarray(parts.held(without_sectors(codes)) & ~np.any(parts.sticking[:, nodes], axis=1))
-
-
-def _beside(parts: CurveParts, codes: Codes, centre: Array, angle: Array | float, radius: Array) -> NDArray[np.intp]:
-    """Which parts of a curve have the statuses of a leaf, and directions within angles from those at its middle."""
-    theta = parts.thetas[0][:, [i for i, code in enumerate(codes) if code > SECTORS]]
-    turned = np.arctan2(centre[:, 0] * theta[:, :, 1] - centre[:, 1] * theta[:, :, 0], np.sum(centre * theta, axis=2))
-    return np.flatnonzero(_slides(parts, codes) & np.all(np.abs(turned - angle) < radius, axis=1))
 
 
 def _is_excluded(relaxation: SpaceRelaxation) -> bool:
@@ -449,7 +426,7 @@ class PieceTree:
     def _around_curve(self, at: _Examined, codes: Codes) -> tuple[int, Sequence[int]] | None:
         """A node in a sector, and the part of that around the directions of known curves, then what is left of it."""
         nodes = [i for i, code in enumerate(codes) if code > SECTORS]
-        towards = [parts.thetas[0][_slides(parts, codes)][:, nodes] for _, parts in at.along(self.curves)]
+        towards = [parts.thetas[0][slides(parts, codes)][:, nodes] for _, parts in at.along(self.curves)]
         where = np.concatenate([places(theta) for theta in towards]) if nodes and towards else np.zeros((0, 0))
         spans = np.array([span(codes[i] - SECTORS) for i in nodes], dtype=float).reshape(-1, 2)
         where = where[np.all((where >= spans[:, 0]) & (where < spans[:, 1]), axis=1)] if len(where) else where
@@ -616,40 +593,19 @@ class PieceTree:
         for factor in _FACTORS:
             whole = settled[0].wider(factor, self.interval)
             runs = at.along(self.curves, whole)
-            if not any(len(_beside(parts, codes, centre, 0.0, _BESIDE * half)) for _, parts in runs):
+            if not any(len(beside(parts, codes, centre, 0.0, _BESIDE * half)) for _, parts in runs):
                 continue
             arc = whole.arc(codes, 2.0, None if factor else settled[1])
             if arc is None:
                 continue
             for known, parts in runs:
-                for point in self._points(arc, known, parts, codes):
-                    there = whole.point_at(point[0])
-                    root = there.held(point[1])
-                    number = self._box(there, root) if isinstance(root, SpaceRoot) else None
+                for point in points_on(arc, known, parts, codes):
+                    there, root = whole.root_at(*point)
+                    number = None if root is None else self._box(there, root)
                     if number is not None and whole.meets(arc, point, self._given, self._boxes[number], 2.0):
                         ends = str(whole.low), str(whole.high)
                         return ThroughCurveBox(number, *ends, str(point[0]), point[1]), []
         return None
-
-    def _points(self, arc: LeafArc, known: KnownCurve, parts: CurveParts, codes: Codes) -> list[tuple[Fraction, Codes]]:
-        """Points of a curve that seem to be on an arc, as alphas and leaves of narrow sectors."""
-        nodes = [i for i, code in enumerate(codes) if code > SECTORS]
-        chosen, found = _beside(parts, codes, arc.centre, arc.angle, arc.radius), []
-        for k in [chosen[int(share * (len(chosen) - 1))] for share in _PLACES] if len(chosen) else []:
-            box = known.chain.links[parts.links[k]].curve.box
-            near = curve_point(self._given, box.centre + parts.t.mid[k] * box.direction, box.border)
-            if near is not None:
-                found.append(self._pointed(near.x, codes, nodes))
-        return found
-
-    def _pointed(self, x: Array, codes: Codes, nodes: Sequence[int]) -> tuple[Fraction, Codes]:
-        """Alpha of a solution, in the units of boxes, and a leaf of narrow sectors around it."""
-        leaf, p = list(codes), len(codes)
-        y = (self._given.unplaced(x)[:-1] / self._given.ratio.mid)[p:].reshape(2, p)
-        for i in nodes:
-            up = DEEPEST + 2 - max(_POINTED, level_of(codes[i] - SECTORS))
-            leaf[i] = SECTORS + (1 << (DEEPEST + 2 - up)) + (int(places(y[:, i])) >> up)
-        return Fraction(float(x[-1])), tuple(leaf)
 
     def _run(self, piece: AlphaPiece, found: SpaceRoot | Open) -> tuple[int, int] | None:
         """The first and the last of the boxes in which forces lie."""

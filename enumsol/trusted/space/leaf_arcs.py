@@ -15,8 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.condensation.space_condensed import EnclosedSpace
-    from enumsol.selections.solution import Codes
-    from enumsol.support.array_types import Floats
+    from enumsol.support.array_types import Codes, Floats
 
 #: How often the box of an arc is made wider, and by how much more than is needed.
 _WIDENINGS, _ROOM = 6, 1.125

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.enclosure import CondensedEnclosure
-    from enumsol.selections.solution import Codes
+    from enumsol.support.array_types import Codes
     from enumsol.trusted.space.curve_runs import KnownCurve, Run
     from enumsol.trusted.space.sector_rows import Row
     from enumsol.trusted.space.solution_curve import AlphaProblem, SolutionCurve
@@ -196,14 +196,16 @@ class AlphaPiece:
         errors: float = 1.0,
     ) -> bool:
         """Whether the only root of a leaf at some alpha of the piece is on an arc, and in the box of a curve."""
-        alpha, codes = point
-        if not self.low <= alpha <= self.high:
-            return False
+        at, root = self.root_at(*point)
+        return root is not None and arc.has(root, point[1]) and lies_in(at.place(root, given), curve, errors)
+
+    def root_at(self, alpha: Fraction, codes: Codes) -> tuple[AlphaPiece, SpaceRoot | None]:
+        """The only root of a leaf at some alpha of the piece, and that alpha as a piece; None where there is none."""
         at = self.point_at(alpha)
-        root = at.held(codes) if is_complete(at.whole, codes) else None
-        if not isinstance(root, SpaceRoot) or not arc.has(root, codes):
-            return False
-        return lies_in(at.place(root, given), curve, errors)
+        # beyond the piece nothing is known of friction, and it may vanish at an end
+        held = self.low <= alpha <= self.high and is_complete(at.whole, codes)
+        found = at.held(codes) if held else None
+        return at, found if isinstance(found, SpaceRoot) else None
 
     def holds_all(
         self, codes: Sequence[int], given: AlphaProblem, curves: Sequence[SolutionCurve], errors: float = 1.0
