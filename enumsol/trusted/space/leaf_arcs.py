@@ -9,7 +9,7 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
 from enumsol.model.sectors import SECTORS
-from enumsol.trusted.space.leaves import ROUNDED_ANGLE, Leaf, Open, SpaceRoot, State, turned
+from enumsol.trusted.space.leaves import ROUNDED_ANGLE, Leaf, Open, SpaceRoot, turned
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -137,17 +137,6 @@ class _ArcLeaf(Leaf):
         if not np.all(holding | (np.abs(mid) > rad * errors * SAFE)):
             return None
         return LeafArc(_pattern(self.codes), self.centre, angle, radius)
-
-    def _around(
-        self, Y: Floats, k: int, angle: Floats, radius: Floats, state: State, point: State
-    ) -> tuple[Ball, Ball, Ball]:
-        """I - Y J_u, -Y J_k and -Y G(c) of (12.22d)."""
-        q = len(angle)
-        if not q:
-            return Ball.exact(np.zeros((0, 0))), Ball.exact(np.zeros(0)), Ball.exact(np.zeros(0))
-        slope = self._slope(Y, angle, radius, state, point)
-        others = np.delete(np.arange(q + 1), k)
-        return Ball.exact(np.eye(q)) - slope[:, others], -slope[:, k], -(Ball.exact(Y) @ point.G)
 
     def _rates(self, along: _Along, angle: Floats, radius: Floats) -> tuple[Floats, Floats]:
         """Bounds of how the conditions of ``_slacks`` change along the arc."""

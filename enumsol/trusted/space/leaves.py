@@ -385,16 +385,21 @@ class Leaf:
 
     def _along(self, Y: Floats, k: int, angle: Floats, radius: Floats, state: State, point: State) -> tuple[Ball, Ball]:
         """Balls u and v over a piece: for all zeros z = (psi - angle, s) in a box z without z_k is in u + z_k v."""
-        q = len(angle)
-        others, reach = np.delete(np.arange(q + 1), k), np.r_[radius, 1.0]
-        slope = self._slope(Y, angle, radius, state, point)
-        span = Ball(np.zeros(q), reach[others])
-        return (Ball.exact(np.eye(q)) - slope[:, others]) @ span - Ball.exact(Y) @ point.G, -slope[:, k]
+        left, along, middle = self._around(Y, k, angle, radius, state, point)
+        others = np.delete(np.r_[radius, 1.0], k)
+        return left @ Ball(np.zeros(len(angle)), others) + middle, along
 
-    def _slope(self, Y: Floats, angle: Floats, radius: Floats, state: State, point: State) -> Ball:
-        """Y dG/d(psi, s) over a box and a piece."""
+    def _around(
+        self, Y: Floats, k: int, angle: Floats, radius: Floats, state: State, point: State
+    ) -> tuple[Ball, Ball, Ball]:
+        """I - Y J_u, -Y J_k and -Y G(c) of (12.22d) over a box and a piece."""
+        q = len(angle)
+        if not q:
+            return Ball.exact(np.zeros((0, 0))), Ball.exact(np.zeros(0)), Ball.exact(np.zeros(0))
         inverse, second = Ball.exact(Y), self._second(state, angle, radius)
-        return self._preconditioned(inverse, point.whole_J, state.whole_J, second, np.r_[radius, 1.0])
+        slope = self._preconditioned(inverse, point.whole_J, state.whole_J, second, np.r_[radius, 1.0])
+        others = np.delete(np.arange(q + 1), k)
+        return Ball.exact(np.eye(q)) - slope[:, others], -slope[:, k], -(inverse @ point.G)
 
     def _swept(self, angle: Floats, radius: Floats, *, by_alpha: bool = False) -> _Sweep | None:
         """y, w and all unknowns z = (psi, s) at solutions in a box over a piece of alpha, to first order in one of z.
