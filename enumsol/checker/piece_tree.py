@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.condensation.data import exactly_at
+from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.proof.reading import RefusedError, quoted
 from enumsol.proof.records import Branching, Limits, NoRoot, RecordError, UndecidedRecord, kind_of
 from enumsol.proof.space_records import (
@@ -87,11 +88,12 @@ class PieceTreeChecker:
         #: The curve of every box, and which one of its links it is.
         self._boxes = [(known, k) for known in self.curves for k in range(len(known.chain.links))]
         waiting: list[tuple[Fraction, Fraction, Codes]] = [(low, high, (UNDECIDED,) * problem.p)]
-        piece = AlphaPiece(self.enclosure, low, high, self.units)
+        space = AlphaSpace(self.enclosure, (low + high) / 2, self.units)
+        piece = AlphaPiece(space, low, high)
         while waiting:
             low, high, codes = waiting.pop()
             if (low, high) != (piece.low, piece.high):
-                piece = AlphaPiece(self.enclosure, low, high, self.units)
+                piece = AlphaPiece(space, low, high)
             record = next(records, None)
             if not isinstance(record, list):
                 raise RefusedError("the tree over alpha ends before all of it is decided")
@@ -151,7 +153,7 @@ class PieceTreeChecker:
         (a, b), (low, high) = self._interval, leaf.piece
         if not a <= low <= narrowed.low <= narrowed.high <= high <= b:
             return False
-        whole = AlphaPiece(self.enclosure, low, high, self.units)
+        whole = AlphaPiece(narrowed.space, low, high)
         arc = whole.arc(codes)
         return arc is not None and whole.meets(arc, leaf.point, self.given, self._curve(leaf.box))
 

@@ -154,18 +154,35 @@ class CondensedEnclosure(Sealed):
         NotEnclosedError
             Something over- or underflows.
         """
-        if np.any(np.frexp(np.concatenate([force, length]))[0] != 0.5):
-            raise AssertionError("units of force and length must be powers of two")
+        g, g_rad = self.load_in_units(alpha, length)
+        if np.any(np.frexp(force)[0] != 0.5):
+            raise AssertionError(_POWERS)
+        with np.errstate(over="ignore", invalid="ignore"):
+            # scaling rounds nothing but what underflows
+            pair = force[:, None] / length[None, :]
+            S, S_rad = self.S * pair, self.S_rad * pair + TINY
+        if not np.all(pair >= _LEAST_PAIR) or not all(np.all(np.isfinite(array)) for array in (S, S_rad)):
+            raise NotEnclosedError(_OVERFLOW)
+        return S, S_rad, g, g_rad
+
+    def load_in_units(self, alpha: Fraction, length: Floats) -> tuple[Floats, Floats]:
+        """g(alpha) with radii, likewise.
+
+        Raises
+        ------
+        NotEnclosedError
+            Something over- or underflows.
+        """
+        if np.any(np.frexp(length)[0] != 0.5):
+            raise AssertionError(_POWERS)
         value, slack = float_at(alpha)
         with np.errstate(over="ignore", invalid="ignore"):
             g = self.g0 + value * self.g1
             size = np.abs(value * self.g1)
             g_rad = (self.g0_rad + (abs(value) + slack) * self.g1_rad + slack * np.abs(self.g1)) * SAFE
             g_rad = (g_rad + 4 * UNIT * (size + np.abs(g))) * SAFE + TINY
-            # scaling rounds nothing but what underflows
-            pair = force[:, None] / length[None, :]
-            arrays = (self.S * pair, self.S_rad * pair + TINY, g / length, g_rad / length + TINY)
-        if not np.all(pair >= _LEAST_PAIR) or not all(np.all(np.isfinite(array)) for array in arrays):
+            arrays = g / length, g_rad / length + TINY
+        if not all(np.all(np.isfinite(array)) for array in arrays):
             raise NotEnclosedError(_OVERFLOW)
         return arrays
 
@@ -173,6 +190,7 @@ class CondensedEnclosure(Sealed):
 #: Smallest quotient of units, far above underflow.
 _LEAST_PAIR = 2.0**-1000
 _OVERFLOW = "the condensed problem over- or underflows float64; expected data in other units"
+_POWERS = "units of force and length must be powers of two"
 
 
 def nearest_floats(exact: Sequence[Fraction]) -> tuple[Floats, Mask]:

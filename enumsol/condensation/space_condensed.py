@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 _NEAR_ONE = 8
 #: Smaller coefficients than this, but for 0, would make tau overflow float64.
 LEAST_FRICTION = 2.0**-900
+#: Points of an interval whose data are kept.
+_KEPT = 256
 
 
 class FrictionUnits:
@@ -282,11 +284,14 @@ class PieceSpace(EnclosedSpace):
         See ``discs``.
     along : PieceTurn or None
         See ``turn``.
+    at_once : EnclosedSpace
+        With the same S: what follows from that alone is computed once.
     """
 
     disc: Floats
     disc_rad: Floats
     along: PieceTurn | None
+    at_once: EnclosedSpace
 
     @property
     def turn(self) -> PieceTurn | None:
@@ -314,55 +319,163 @@ class PieceSpace(EnclosedSpace):
             found[has] = self.F[has, k] / self.unit[self.tau[has, k]]
         return found
 
-    @classmethod
-    def over(
-        cls,
-        enclosure: CondensedEnclosure,
-        piece: tuple[Fraction, Fraction],
-        alpha: Fraction,
-        units: tuple[Floats, Floats],
-    ) -> PieceSpace:
-        """Balls for the exact data over a piece, a point perhaps, with F the float next to that at ``alpha``.
+    @property
+    def inverse(self) -> Floats:
+        """Approximate inverse of S; no claim rests on its accuracy."""
+        return self.at_once.inverse
 
-        Parameters
-        ----------
-        enclosure : CondensedEnclosure of a problem whose nodes have coefficients of constant ratios
-        piece : from where to where
-        alpha : where F is taken
-        units : force and length, (p,) arrays of powers of two (see SpaceSystem)
+    @property
+    def smallest_eigenvalue(self) -> float:
+        """Proven lower bound on the smallest eigenvalue of every S in the enclosure (see EnclosedSystem)."""
+        return self.at_once.smallest_eigenvalue
+
+    @property
+    def form_error(self) -> float:
+        """By how much a computed x'S x may be off, as a factor of |x|^2."""
+        return self.at_once.form_error
+
+    @property
+    def largest_norm(self) -> float:
+        """Upper bound on the norm of every S in the enclosure."""
+        return self.at_once.largest_norm
+
+    @property
+    def product_error(self) -> Floats:
+        """By how much a computed S y may be off, as a factor of |y|."""
+        return self.at_once.product_error
+
+
+@dataclass(frozen=True, eq=False)
+class AlphaSpace:
+    """A problem over an interval of alpha, in variables that do not depend on alpha (theory, section 12.9).
+
+    lambda_t is F tau with the float F next to the coefficients at ``reference``.
+
+    Attributes
+    ----------
+    enclosure : CondensedEnclosure of a problem whose nodes have coefficients of constant ratios
+    reference : Fraction
+        An alpha at which every node with friction somewhere on the interval has it.
+    units : force and length, (p,) arrays of powers of two (see SpaceSystem)
+
+    Raises
+    ------
+    NotEnclosedError
+        Something over- or underflows, or a ratio changes with alpha.
+    """
+
+    enclosure: CondensedEnclosure
+    reference: Fraction
+    units: tuple[Floats, Floats]
+
+    @cached_property
+    def _rows(self) -> tuple[Ball, Indices]:
+        """By what the rows that y takes are multiplied, and where they are among 3p."""
+        F, F_rad, scale, (_, rows, node, axis) = self._friction
+        p = self.enclosure.problem.p
+        ones, none = np.ones(p), np.zeros(p)
+        return Ball(np.r_[ones, (F * scale)[node, axis]], np.r_[none, (F_rad * scale)[node, axis]]), rows
+
+    @cached_property
+    def _friction(self) -> tuple[Floats, Floats, Floats, tuple[Indices, Indices, Indices, Indices]]:
+        """F with radii, the powers of two that take it to a size near one, and the ``places`` of tau."""
+        F, F_rad = _references(self.enclosure.problem, self.reference)
+        if (why := _out_of_range(F)) is not None:
+            raise NotEnclosedError(why)
+        return F, F_rad, friction_units(F), places(F > 0)
+
+    @cached_property
+    def at_once(self) -> EnclosedSpace:
+        """S, F and the places of tau, which do not depend on alpha, with g at ``reference``."""
+        F, F_rad, scale, (tau, _, node, axis) = self._friction
+        weight, rows = self._rows
+        force, length = self.units
+        S, S_rad, g, g_rad = self.enclosure.in_units(self.reference, np.tile(force, 3), np.tile(length, 3))
+        with np.errstate(over="ignore", invalid="ignore"):
+            scaled = Ball(S, S_rad)[np.ix_(rows, rows)] * weight[:, None] * weight
+            load = weight * Ball(g, g_rad)[rows]
+        if not (scaled.finite and load.finite):
+            raise NotEnclosedError(_OVERFLOW)
+        # the exact S is symmetric
+        S_rad = np.maximum(scaled.rad, scaled.rad.T) + np.abs(scaled.mid - scaled.mid.T)
+        S = np.tril(scaled.mid) + np.tril(scaled.mid, -1).T
+        unit = np.concatenate([np.ones(len(F)), scale[node, axis]])
+        return EnclosedSpace(S, S_rad * SAFE, load.mid, load.rad, F * scale, F_rad * scale, tau, unit)
+
+    @cached_property
+    def _quotients(self) -> list[tuple[Fraction, Fraction]]:
+        """Coefficients over F as affine functions of alpha, of every node; 1 and 0 without any."""
+        found = []
+        for by, *values in self._nodes:
+            axis = 0 if by[0] else 1
+            reference = Fraction(by[axis])
+            value, slope = values[axis]
+            found.append((value / reference, slope / reference) if reference else (Fraction(1), Fraction(0)))
+        return found
+
+    @cached_property
+    def _nodes(self) -> list[tuple[list[float], tuple[Fraction, Fraction], tuple[Fraction, Fraction]]]:
+        """F of every node, and both its coefficients as affine functions of alpha."""
+        problem, F = self.enclosure.problem, self._friction[0]
+        given = zip(*(part.tolist() for part in (*problem.friction, *problem.friction_slope)), strict=True)
+        return [
+            (by, _affine(one, one_slope), _affine(other, other_slope))
+            for by, (one, other, one_slope, other_slope) in zip(F.tolist(), given, strict=True)
+        ]
+
+    def discs(self, alpha: Fraction, change: Fraction = Fraction(1)) -> Ball:
+        """Coefficients at alpha over F, (p,)."""
+        return _nearest([change * value + alpha * slope for value, slope in self._quotients])
+
+    def at(self, alpha: Fraction) -> PieceSpace:
+        """The data at a point, the last of which are kept."""
+        found = self._points.get(alpha)
+        if found is None:
+            found = self._points[alpha] = self.over(alpha, alpha)
+            if len(self._points) > _KEPT:
+                del self._points[next(iter(self._points))]
+        return found
+
+    @cached_property
+    def _points(self) -> dict[Fraction, PieceSpace]:
+        return {}
+
+    def over(self, low: Fraction, high: Fraction) -> PieceSpace:
+        """Balls for the exact data over a piece, or at a point.
 
         Raises
         ------
         NotEnclosedError
-            Something over- or underflows.
+            Something over- or underflows, or a coefficient is negative there, or positive where F is 0.
         """
-        problem, (force, length) = enclosure.problem, units
-        F, F_rad = _references(problem, alpha)
-        if (why := _out_of_range(F)) is not None:
-            raise NotEnclosedError(why)
-        scale = friction_units(F)
-        discs = _quotients(problem, piece, F)
-        F, F_rad = F * scale, F_rad * scale
-        tau, rows, node, axis = places(F > 0)
-        unit = np.concatenate([np.ones(problem.p), scale[node, axis]])
-        weight = Ball(np.r_[np.ones(problem.p), F[node, axis]], np.r_[np.zeros(problem.p), F_rad[node, axis]])
-        middle, half = (piece[0] + piece[1]) / 2, (piece[1] - piece[0]) / 2
-        S, S_rad, g, g_rad = enclosure.in_units(middle, np.tile(force, 3), np.tile(length, 3))
+        for by, *values in self._nodes:
+            ends = [value + end * slope for value, slope in values for end in (low, high)]
+            if min(ends) < 0 or (not any(by) and max(ends) > 0):
+                raise NotEnclosedError("a coefficient of friction is negative, or begins to be positive, over a piece")
+        middle, half = (low + high) / 2, (high - low) / 2
+        (weight, rows), length, held = self._rows, np.tile(self.units[1], 3), self.at_once
+        g, g_rad = self.enclosure.load_in_units(middle, length)
+        disc, disc_turn = self.discs(middle), self.discs(half, Fraction(0))
         with np.errstate(over="ignore", invalid="ignore"):
-            scaled = Ball(S, S_rad)[np.ix_(rows, rows)] * weight[:, None] * weight
-            load = weight * Ball(g, g_rad)[rows]
-            turn = Ball(enclosure.g1 / np.tile(length, 3), enclosure.g1_rad / np.tile(length, 3) * SAFE + TINY)[rows]
-            turn = weight * (turn * Ball(np.array(float(half)), np.array(2 * UNIT * float(half))))
-            whole = Ball(load.mid, (load.rad + turn.size) * SAFE) if half else load
-        if not (scaled.finite and whole.finite):
+            whole = load = weight * Ball(g, g_rad)[rows]
+            along = None
+            if half:
+                turn = Ball(self.enclosure.g1 / length, self.enclosure.g1_rad / length * SAFE + TINY)[rows]
+                turn = weight * (turn * Ball(np.array(float(half)), np.array(2 * UNIT * float(half))))
+                whole = Ball(load.mid, (load.rad + turn.size) * SAFE)
+                along = PieceTurn(load, turn, disc, disc_turn)
+        if not whole.finite:
             raise NotEnclosedError(_OVERFLOW)
-        disc, disc_turn = discs
-        along = PieceTurn(load, turn, disc, disc_turn) if half else None
         rad = (disc.rad + disc_turn.size) * SAFE
-        # the exact S is symmetric
-        S_rad = np.maximum(scaled.rad, scaled.rad.T) + np.abs(scaled.mid - scaled.mid.T)
-        S = np.tril(scaled.mid) + np.tril(scaled.mid, -1).T
-        return cls(S, S_rad * SAFE, whole.mid, whole.rad, F, F_rad, tau, unit, disc.mid, rad, along)
+        data = held.S, held.S_rad, whole.mid, whole.rad, held.F, held.F_rad, held.tau, held.unit
+        return PieceSpace(*data, disc.mid, rad, along, held)
+
+
+def _nearest(exact: Sequence[Fraction]) -> Ball:
+    """Balls around the floats next to numbers."""
+    mid = np.array([float(number) for number in exact])
+    same = np.array([Fraction(near) == number for near, number in zip(mid.tolist(), exact, strict=True)], dtype=bool)
+    return Ball(mid, np.where(same, 0.0, UNIT * np.abs(mid) * SAFE + TINY))
 
 
 def _references(problem: Any, alpha: Fraction) -> tuple[Floats, Floats]:
@@ -400,33 +513,6 @@ _ONE_AXIS = (
 
 def _affine(value: float, slope: float) -> tuple[Fraction, Fraction]:
     return Fraction(value), Fraction(slope)
-
-
-def _quotients(problem: Any, piece: tuple[Fraction, Fraction], F: Floats) -> tuple[Ball, Ball]:
-    """The coefficients in the middle of a piece and half their changes, over those of ``F``; 1 and 0 without any.
-
-    Raises
-    ------
-    NotEnclosedError
-        One is negative, or is positive where that of ``F`` is zero.
-    """
-    ends = [
-        [exactly_at(end, *pair) for end in piece] for pair in zip(problem.friction, problem.friction_slope, strict=True)
-    ]
-    mid, rad = np.zeros((2, problem.p)), np.zeros((2, problem.p))
-    for i, (by, *values) in enumerate(zip(F.tolist(), *ends[0], *ends[1], strict=True)):
-        if min(values) < 0 or (not any(by) and max(values) > 0):
-            raise NotEnclosedError("a coefficient of friction is negative, or begins to be positive, within a piece")
-        one, other = values[:2] if by[0] else values[2:]
-        reference = Fraction(by[0] or by[1])
-        exact = (
-            ((one + other) / 2 / reference, (other - one) / 2 / reference) if reference else (Fraction(1), Fraction(0))
-        )
-        for k, number in enumerate(exact):
-            mid[k, i] = float(number)
-            rad[k, i] = 0.0 if Fraction(mid[k, i]) == number else UNIT * abs(mid[k, i]) * SAFE + TINY
-    disc, turn = (Ball(mid[k], rad[k]) for k in (0, 1))
-    return disc, turn
 
 
 @dataclass(frozen=True)

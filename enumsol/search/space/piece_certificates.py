@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from enumsol.arithmetic.balls import Ball
+from enumsol.condensation.space_condensed import SpaceSystem
 from enumsol.model.statuses import UNDECIDED
 from enumsol.search.space.space_fathoming import DefiniteForm
 from enumsol.trusted.space.curve_runs import CurveParts, KnownCurve, Run
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
     from enumsol.selections.solution import Codes
     from enumsol.trusted.space.pieces import AlphaPiece
 
@@ -65,14 +65,12 @@ class PieceProposals:
     Parameters
     ----------
     piece : AlphaPiece
-    system : SpaceSystem
-        At the middle of the piece.
-    middle : EnclosedSpace
-        The same as balls.
     """
 
-    def __init__(self, piece: AlphaPiece, system: SpaceSystem, middle: EnclosedSpace) -> None:
-        self._piece, self._system, self._middle = piece, system, middle
+    def __init__(self, piece: AlphaPiece) -> None:
+        self._piece, self._middle = piece, piece.space.at(piece.middle)
+        held = self._middle
+        self._system = SpaceSystem(held.S, held.g, held.F, held.tau, held.unit, *piece.space.units)
 
     def numbers(self, codes: Codes, parts: CurveParts) -> Array | None:
         """Those of a form that seems to serve all over the piece, or None."""
@@ -94,9 +92,10 @@ class PieceProposals:
     def is_hopeful(self, codes: Codes, parts: CurveParts) -> bool:
         """Whether a shorter piece may have such a form: the middle has one, by the parts of the curve there."""
         with np.errstate(all="ignore"):
-            apart = self._apart(parts)
+            apart, discs = self._apart(parts), self._middle.discs.mid
             turn, off = self._turn(parts, apart)
-            form = DefiniteForm(self._system, [turn], apart, ERRORS * off, None, self._rows(codes))
+            turns, most = [turn * discs[:, None]], self._middle.largest_discs
+            form = DefiniteForm(self._system, turns, apart, ERRORS * off * discs, most, self._rows(codes))
             return form.best(_DEFINITE, better=self._system.p >= _MANY) is not None
 
     def _rows(self, codes: Codes) -> Array | None:

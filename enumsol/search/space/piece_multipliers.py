@@ -1,23 +1,32 @@
 """Multipliers that may exclude a partial assignment over a piece of alpha in 3D (theory, section 12.9).
 
-Those of the middle alone often fail at the ends of a piece. What is proposed here proves nothing.
+Relaxations are those of one alpha. Their multipliers serve around it; what does not serve all of a piece may serve
+together with that of others. What is proposed here proves nothing.
 """
 
 from __future__ import annotations
 
+import math
+from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.optimize import nnls
 
-from enumsol.trusted.space.sector_rows import FREE, OF_DISCS, Row, row_sign, sector_row_terms
+from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
+from enumsol.relaxation.space_relaxation import SpaceEngine
+from enumsol.search.space.space_newton import Isotropic
+from enumsol.search.space.space_search import SpaceSplitting
+from enumsol.search.splitting import ImposedRows
+from enumsol.trusted.space.sector_rows import FORCE, FREE, GAP, OF_DISCS, TAU, Row, row_sign, sector_row_terms
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.condensation.space_condensed import EnclosedSpace
-    from enumsol.support.array_types import Floats
+    from enumsol.condensation.space_condensed import AlphaSpace
+    from enumsol.relaxation.space_relaxation import SpaceRelaxation
+    from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.space.pieces import AlphaPiece
 
 
@@ -25,6 +34,115 @@ if TYPE_CHECKING:
 _RIDGE = 1e-12
 #: How often the share of an end in the bound that is made as large as possible is halved.
 _HALVINGS = 4
+#: What is used of the alphas, on either side of a relaxation's, at which its multipliers seem to serve.
+_USED = Fraction(15, 16), Fraction(63, 64)
+#: Errors are counted so often by a writer of proofs.
+ERRORS = 2.0
+
+
+class AlphaPoint:
+    """The problem at one alpha, for relaxations.
+
+    Parameters
+    ----------
+    space : AlphaSpace
+    alpha : Fraction
+    """
+
+    def __init__(self, space: AlphaSpace, alpha: Fraction) -> None:
+        self.alpha = alpha
+        enclosed = EnclosedSpace.of_problem(space.enclosure, alpha, *space.units)
+        self.system = SpaceSystem(enclosed.S, enclosed.g, enclosed.F, enclosed.tau, enclosed.unit, *space.units)
+        self.engine = SpaceEngine(self.system)
+        self.splitting = SpaceSplitting(self.engine)
+        self.rows = ImposedRows(self.splitting, self.system.p)
+        self._discs = space.discs(alpha).mid
+
+    def root(self, codes: Codes) -> SpaceRelaxation:
+        """The relaxation of an assignment."""
+        return self.engine.root(*self.rows.over(codes, range(self.system.p)))
+
+    def multipliers(self, relaxation: SpaceRelaxation) -> tuple[list[Row], Floats]:
+        """Those of a relaxation, in the variables of a space: tau is less there by the discs' radii, v is more."""
+        numbers, values = relaxation.multipliers()
+        rows = [self.engine.rows[number] for number in numbers.tolist()]
+        return rows, values * np.array([self._factor(row) for row in rows])
+
+    def _factor(self, row: Row) -> float:
+        kind, node, _ = row
+        disc = float(self._discs[node])
+        return 1.0 if kind in (GAP, FORCE) else 1.0 / disc if kind == TAU or kind in OF_DISCS else disc
+
+    def imposed(self, codes: Codes) -> list[Row]:
+        """The rows that an assignment imposes."""
+        return [self.engine.rows[number] for number in self.rows.over(codes, range(self.system.p))[0]]
+
+    def solution(self) -> Floats | None:
+        """Forces of a solution in the units of the problem, (3p,), by Newton's method; no claim."""
+        system = self.system
+        with np.errstate(all="ignore"):
+            y = Isotropic.of(system).solution()
+        if y is None:
+            return None
+        F = system.F / np.where(system.tau >= 0, system.unit[system.tau], 1.0)
+        return np.concatenate([y[:, 0], *(F * y[:, 1:]).T]) * np.tile(system.force, 3)
+
+
+def simplest(low: Fraction, high: Fraction) -> Fraction:
+    """The number with the smallest power of two as its denominator from one number to another, larger one."""
+    step = Fraction(2) ** math.ceil(math.log2(high - low))
+    while True:
+        number = math.ceil(low / step) * step
+        if number <= high:
+            return number
+        step /= 2
+
+
+def excluded_part(
+    piece: AlphaPiece, alpha: Fraction, codes: Codes, rows: Sequence[Row], values: Floats
+) -> tuple[Fraction, Fraction] | None:
+    """The part of a piece at which multipliers that serve one alpha of it exclude an assignment; None if there is none.
+
+    The bound is a concave square in alpha.
+    """
+
+    def bound(at: Fraction) -> float:
+        return piece.margin_at(at, codes, rows, values, ERRORS)
+
+    found = [bound(end) for end in (piece.low, piece.high)]
+    if min(found) > 0:
+        return piece.low, piece.high
+    here = bound(alpha)
+    if not here > 0 or not np.all(np.isfinite(found)) or not piece.low < alpha < piece.high:
+        return None
+    t = float((alpha - piece.low) / (piece.high - piece.low))
+    # of the bound at alpha + u times the length of the piece
+    before, after = (found[0] - here) / -t, (found[1] - here) / (1.0 - t)
+    bend = after - before
+    slope = after - bend * (1.0 - t)
+    ends = []
+    for end, value in zip((piece.low, piece.high), found, strict=True):
+        if value > 0:
+            ends.append(end)
+            continue
+        zero = _zero(here, slope, bend, -1.0 if end < alpha else 1.0)
+        far = Fraction(zero) * (piece.high - piece.low)
+        near = simplest(*sorted(alpha + share * far for share in _USED))
+        if not zero or not bound(near) > 0:
+            return None
+        ends.append(near)
+    return ends[0], ends[1]
+
+
+def _zero(value: float, slope: float, bend: float, side: float) -> float:
+    """The zero of value + slope u + bend u^2 next to 0 on a side; 0 if there is none."""
+    root = slope * slope - 4.0 * bend * value
+    if not root >= 0 or not np.isfinite(root):
+        return 0.0
+    # value > 0 and bend <= 0: one zero on every side
+    below = slope * side - np.sqrt(root)
+    found = -2.0 * value / below if below else 0.0
+    return float(side * found) if found > 0 else 0.0
 
 
 def balanced(piece: AlphaPiece, codes: Sequence[int], rows: Sequence[Row]) -> Floats | None:

@@ -6,31 +6,29 @@ import math
 from collections import OrderedDict
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.arithmetic.balls import Ball
-from enumsol.condensation.space_condensed import SpaceSystem
+from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of, parts_around, places, span, width_level, width_of
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.proof.records import Branching, NoRoot
 from enumsol.proof.space_records import CutPiece, ExcludedInSpace, InCurveBoxes, OnlyOnCurve, ThroughCurveBox
 from enumsol.relaxation.engine import PRUNE_MARGIN
-from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.outcome import StopReason
 from enumsol.search.space.piece_arcs import beside, points_on, slides
 from enumsol.search.space.piece_certificates import ERRORS, Passage, PieceProposals, runs_over
-from enumsol.search.space.piece_multipliers import balanced
+from enumsol.search.space.piece_multipliers import ERRORS as COUNTED
+from enumsol.search.space.piece_multipliers import AlphaPoint, balanced, excluded_part, simplest
 from enumsol.search.space.space_fathoming import without_sectors
-from enumsol.search.space.space_newton import Isotropic
-from enumsol.search.space.space_search import SpaceSplitting
-from enumsol.search.splitting import ImposedRows
 from enumsol.support.deadlines import TimeOverError, look
 from enumsol.trusted.space.curve_runs import CurveParts, KnownCurve, Run
 from enumsol.trusted.space.leaves import Open, SpaceRoot
 from enumsol.trusted.space.pieces import AlphaPiece, lie_along
+from enumsol.trusted.space.sector_rows import sector_children
 from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
@@ -49,12 +47,12 @@ if TYPE_CHECKING:
     #: A subtree: its piece, partial assignment, what is known from above and how often it was cut; and its share.
     Waiting = tuple[tuple[Any, ...], float]
 
-#: Pieces whose engines are kept.
-_KEPT = 32
+#: Pieces, and points with their relaxations, that are kept.
+_KEPT = 64
 #: Pieces are cut down to this share of the interval where only their length stands in the way of a certificate.
 _ALONE = 2.0**-5
 #: Pieces are cut so often at most between two branchings where multipliers fail at their ends only.
-_CUTS = 2
+_CUTS = 3
 #: Around the directions of known curves sectors get more room by this share of what these turn by, and are no narrower
 #: than those of a level; a sector is cut so if no more than this share of it is left.
 _ROOM, _NARROWEST, _LEFT = 0.5, 9, 0.5
@@ -69,8 +67,10 @@ _SOUGHT, _SAMPLED = 8, (Fraction(15, 16), Fraction(1, 2), Fraction(1, 16))
 _FACTORS = 0, 1
 #: Arcs are sought where a known curve has directions in a leaf, or beside it by this factor.
 _BESIDE = 1.5
-#: Leaves are tested from this level of their sectors on.
-_TRIED = 3
+#: Leaves are tested from this level of their sectors on; where more than two nodes slip, from the second one on.
+_TRIED = 3, 8
+#: Pieces are cut where multipliers cease to serve if they do so over more than this share.
+_USEFUL = Fraction(1, 8)
 #: Nodes that are examined before others than this process help.
 FIRST = 16
 #: Sectors above this level are halved, rather than alpha, where a leaf is settled in the middle only; by how many
@@ -122,6 +122,16 @@ class Known:
         return len(self.chains), self.sampled, self.sought == _SOUGHT, self.final
 
 
+def _kept(known: OrderedDict[Any, Any], key: Any, make: Callable[[], Any]) -> Any:
+    """What is known under a key, or is made now; what was not asked for lately goes."""
+    if key not in known:
+        known[key] = make()
+        if len(known) > _KEPT:
+            known.popitem(last=False)
+    known.move_to_end(key)
+    return known[key]
+
+
 def _is_excluded(relaxation: SpaceRelaxation) -> bool:
     return relaxation.pruned and relaxation.bound > PRUNE_MARGIN
 
@@ -131,14 +141,6 @@ class _Examined:
 
     def __init__(self, piece: AlphaPiece) -> None:
         self.piece = piece
-        middle = piece.at(piece.middle, piece.middle)
-        self.point = middle
-        self.system = SpaceSystem(middle.S, middle.g, middle.F, middle.tau, middle.unit, *piece.units)
-        self.engine = SpaceEngine(self.system)
-        self.splitting = SpaceSplitting(self.engine)
-        self.rows = ImposedRows(self.splitting, self.system.p)
-
-        self.proposals = PieceProposals(piece, self.system, middle)
         #: Runs of known curves that pass the piece, of so many curves.
         self.passages: list[Passage] = []
         self.curves = 0
@@ -146,6 +148,10 @@ class _Examined:
         self.parts: dict[tuple[Fraction, Fraction], list[CurveParts]] = {}
         #: Assignments of statuses for which no form is definite.
         self.hopeless: set[tuple[int, ...]] = set()
+
+    @cached_property
+    def proposals(self) -> PieceProposals:
+        return PieceProposals(self.piece)
 
     def along(
         self, curves: Sequence[KnownCurve], piece: AlphaPiece | None = None
@@ -157,22 +163,6 @@ class _Examined:
             whole = Run(0, len(known.chain.links) - 1)
             parts.append(known.over(whole, piece.low, piece.high))
         return list(zip(curves, parts, strict=True))
-
-    def solution(self) -> Array | None:
-        """Forces of a solution at the middle, in the units of the problem, by Newton's method; no claim."""
-        with np.errstate(all="ignore"):
-            y = Isotropic.of(self.system).solution()
-        if y is None:
-            return None
-        tau, found = self.system.tau, np.zeros(len(self.system.g))
-        found[: len(tau)] = y[:, 0]
-        for k in (0, 1):
-            has = tau[:, k] >= 0
-            found[tau[has, k]] = y[has, 1 + k] / self.system.unit[tau[has, k]]
-        return np.asarray(self.piece.forces(Ball.exact(found)).mid)
-
-    def root(self, codes: Codes) -> SpaceRelaxation:
-        return self.engine.root(*self.rows.over(codes, range(self.system.p)))
 
 
 class PieceTree:
@@ -218,12 +208,14 @@ class PieceTree:
         solutions: Callable[[Fraction], Sequence[Array]] | None = None,
     ) -> None:
         self._solutions, self._sampled = solutions, False
-        self._enclosure, self._units, self.interval = enclosure, units, interval
+        self._enclosure, self.interval = enclosure, interval
+        self._space = AlphaSpace(enclosure, sum(interval, Fraction(0)) / 2, units)
         self._problem = enclosure, interval, units, smallest
         self._given = AlphaProblem.of(enclosure)
         self.more, self._most, self._tick = more, max_nodes, tick
         self._least = Fraction(smallest) * (interval[1] - interval[0])
         self._pieces: OrderedDict[tuple[Fraction, Fraction], _Examined] = OrderedDict()
+        self._points: OrderedDict[Fraction, AlphaPoint] = OrderedDict()
         self.records: list[Any] = []
         self.nodes, self.covered = 0, 0.0
         #: Why the search ended early, if it did.
@@ -275,15 +267,10 @@ class PieceTree:
         return np.asarray((along <= self._h[boxes]) & np.all(beside <= self._b[boxes], axis=1))
 
     def _examined(self, low: Fraction, high: Fraction) -> _Examined:
-        key = low, high
-        found = self._pieces.get(key)
-        if found is None:
-            found = self._pieces[key] = _Examined(AlphaPiece(self._enclosure, low, high, self._units))
-            if len(self._pieces) > _KEPT:
-                self._pieces.popitem(last=False)
-        else:
-            self._pieces.move_to_end(key)
-        return found
+        return _kept(self._pieces, (low, high), lambda: _Examined(AlphaPiece(self._space, low, high)))
+
+    def _point(self, alpha: Fraction) -> AlphaPoint:
+        return _kept(self._points, alpha, lambda: AlphaPoint(self._space, alpha))
 
     def run(self, spread: Callable[[PieceTree, list[Waiting]], object] | None = None) -> None:
         """Search the tree; ``spread`` takes the place of ``examined`` for what waits after some nodes.
@@ -341,80 +328,92 @@ class PieceTree:
     def _step(
         self, low: Fraction, high: Fraction, codes: Codes, parent: Any, changed: int, last: bool, cuts: int
     ) -> tuple[Any, list[Any]]:
-        at = self._examined(low, high) if parent is None else parent[0]
+        at = self._examined(low, high)
+        if parent is None:
+            third = (high - low) / 3
+            point = self._point(simplest(low + third, high - third))
+            relaxation = point.root(codes)
+        else:
+            point, relaxation = parent
+            if changed >= 0:
+                relaxation = relaxation.child(*point.rows.of(changed, codes[changed]), last=last)
+        final = not {CONTACT, UNDECIDED} & set(codes)
+        if _is_excluded(relaxation):
+            done = self._excluded(at, codes, point, relaxation, cuts)
+            if done is None and final and self._is_due(codes):
+                done = self._settled(at, codes, at.piece.narrowed(codes))
+            return self._undecided(at, codes, cuts) if done is None else done
         done = self._certified(at, codes)
         if done is None and not self._sampled and self._sample():
             done = self._certified(at, codes)
         if done is not None:
             return done
-        final = not {CONTACT, UNDECIDED} & set(codes)
-        if final and parent is None:
+        if final and self._is_due(codes):
             done = self._leaf(at, codes)
             if done is not None:
                 return done
-        if parent is None:
-            relaxation = at.root(codes)
-        else:
-            relaxation = parent[1].child(*at.rows.of(changed, codes[changed]), last=last)
-        if _is_excluded(relaxation):
-            done = self._excluded(at, codes, relaxation)
-            if done is None and final:
-                done = self._settled(at, codes, at.piece.narrowed(codes))
-            return self._undecided(at, codes, cuts) if done is None else done
-        if final and all(code < SECTORS or width_level(code - SECTORS) >= _TRIED for code in codes):
-            done = self._leaf(at, codes) if parent is not None else None
-            if done is not None:
-                return done
             if (parts := self._around_curve(at, codes)) is not None:
-                return self._branched(at, codes, parts[0], relaxation, children=parts[1])
+                return self._branched(at, codes, parts[0], (point, relaxation), children=parts[1])
             node = self._widest(codes)
         else:
             node = relaxation.most_promising(codes, relaxation.violations(codes))
             node = self._widest(codes) if node < 0 else node
         if node < 0:
-            return self._halved(at, codes)
-        return self._branched(at, codes, node, relaxation)
-
-    def _excluded(self, at: _Examined, codes: Codes, relaxation: Any) -> tuple[Any, list[Any]] | None:
-        """By multipliers of the middle, or else by some that serve both ends of the piece."""
-        rows, values = self._multipliers(at, relaxation)
-        if at.piece.margin(codes, rows, values, 2.0) > 0:
-            return ExcludedInSpace(rows, values), []
-        for end, other in self._ends(at, codes):
-            if not _is_excluded(other):
-                return None
-            rows += self._multipliers(end, other)[0]
-        imposed = [at.engine.rows[k] for i, code in enumerate(codes) for k in at.engine.imposed(i, code)[0]]
-        rows = list(dict.fromkeys([*rows, *imposed]))
-        both = balanced(at.piece, codes, rows)
-        if both is None or not at.piece.margin(codes, rows, both, 2.0) > 0:
-            return None
-        used = np.flatnonzero(both)
-        return ExcludedInSpace([rows[k] for k in used], both[used]), []
+            return self._leaf(at, codes) or self._halved(at, codes)
+        return self._branched(at, codes, node, (point, relaxation))
 
     @staticmethod
-    def _multipliers(at: _Examined, relaxation: SpaceRelaxation) -> tuple[list[Row], Array]:
-        numbers, values = relaxation.multipliers()
-        return [at.engine.rows[number] for number in numbers.tolist()], values
+    def _is_due(codes: Codes) -> bool:
+        """Whether a leaf is to be tested: where sectors are wide that is of no use."""
+        levels = [width_level(code - SECTORS) for code in codes if code > SECTORS]
+        return not levels or min(levels) >= _TRIED[len(levels) > 2]
 
-    def _ends(self, at: _Examined, codes: Codes) -> list[tuple[_Examined, SpaceRelaxation]]:
+    def _excluded(
+        self, at: _Examined, codes: Codes, point: AlphaPoint, relaxation: SpaceRelaxation, cuts: int
+    ) -> tuple[Any, list[Any]] | None:
+        """By multipliers of one alpha, where they serve, or else by some that serve both ends of the piece."""
+        piece = at.piece
+        rows, values = point.multipliers(relaxation)
+        part = excluded_part(piece, point.alpha, codes, rows, values)
+        if part == (piece.low, piece.high):
+            return ExcludedInSpace(rows, values), []
+        ends = self._ends(at, codes)
+        if len(ends) == 2 and all(_is_excluded(other) for _, other in ends):
+            for end, other in ends:
+                rows += end.multipliers(other)[0]
+            rows = list(dict.fromkeys([*rows, *point.imposed(codes)]))
+            both = balanced(piece, codes, rows)
+            if both is not None and piece.margin(codes, rows, both, COUNTED) > 0:
+                used = np.flatnonzero(both)
+                return ExcludedInSpace([rows[k] for k in used], both[used]), []
+        if part is None or cuts >= _CUTS or part[1] - part[0] < _USEFUL * (piece.high - piece.low):
+            return None
+        # first what is below, then what is above
+        alpha = part[0] if part[0] > piece.low else part[1]
+        known = (piece.low, alpha) if alpha == part[1] else (alpha, piece.high)
+        return CutPiece(str(alpha)), [
+            (*ends, codes, (point, relaxation) if ends == known else None, -1, False, cuts + (ends != known))
+            for ends in ((piece.low, alpha), (alpha, piece.high))
+        ]
+
+    def _ends(self, at: _Examined, codes: Codes) -> list[tuple[AlphaPoint, SpaceRelaxation]]:
         """The relaxations of an assignment at the ends of a piece; not at one where friction vanishes."""
-        ends = [self._examined(alpha, alpha) for alpha in (at.piece.low, at.piece.high)]
-        return [(end, end.root(codes)) for end in ends if np.array_equal(end.system.tau, at.system.tau)]
+        ends = [self._point(alpha) for alpha in (at.piece.low, at.piece.high)]
+        return [(end, end.root(codes)) for end in ends if np.array_equal(end.system.tau, self._space.at_once.tau)]
 
     def _undecided(self, at: _Examined, codes: Codes, cuts: int) -> tuple[Any, list[Any]]:
-        """An assignment that the middle excludes and the piece does not: cut, or branched where an end is possible."""
+        """An assignment that one alpha excludes and the piece does not: cut, or branched where an end is possible."""
         if cuts >= _CUTS:
-            for end, relaxation in self._ends(at, codes):
+            for point, relaxation in self._ends(at, codes):
                 if _is_excluded(relaxation):
                     continue
                 node = relaxation.most_promising(codes, relaxation.violations(codes))
                 node = self._widest(codes) if node < 0 else node
                 if node >= 0:
-                    return self._branched(end, codes, node, relaxation, piece=at)
+                    return self._branched(at, codes, node, (point, relaxation))
             node = next((i for i, code in enumerate(codes) if code in (CONTACT, UNDECIDED)), self._widest(codes))
             if node >= 0:
-                return self._branched(at, codes, node, at.root(codes), piece=at)
+                return self._branched(at, codes, node, None)
         return self._halved(at, codes, cuts=cuts + 1)
 
     @staticmethod
@@ -453,21 +452,19 @@ class PieceTree:
         at: _Examined,
         codes: Codes,
         node: int,
-        relaxation: Any,
-        piece: _Examined | None = None,
+        parent: tuple[AlphaPoint, SpaceRelaxation] | None,
         children: Sequence[int] | None = None,
     ) -> tuple[Any, list[Any]]:
-        """Children of a node, by default as the relaxation has them.
-
-        ``piece``: that of the children, where their relaxations do not go on from this one.
-        """
-        children = at.splitting.children(codes, node, relaxation) if children is None else children
-        parent = (at, relaxation) if piece is None else None
-        at = at if piece is None else piece
+        """Children of a node, by default as the relaxation has them, which go on from that."""
+        if children is None and parent is not None:
+            children = parent[0].splitting.children(codes, node, parent[1])
+        elif children is None:
+            children = sector_children(codes[node], int(np.sum(self._space.at_once.tau[node] >= 0)))
         below = []
         for k, child in enumerate(children):
             there = (*codes[:node], child, *codes[node + 1 :])
-            below.append((at.piece.low, at.piece.high, there, parent, node, k + 1 == len(children), 0))
+            changed = -1 if parent is None else node
+            below.append((at.piece.low, at.piece.high, there, parent, changed, k + 1 == len(children), 0))
         return Branching(node, list(children)), below
 
     def _halved(self, at: _Examined, codes: Codes, forces: Array | None = None, cuts: int = 0) -> tuple[Any, list[Any]]:
@@ -551,7 +548,7 @@ class PieceTree:
     def _seek(self, at: _Examined) -> bool:
         """Whether there is a new curve through a solution in the middle of a piece."""
         self._sought += 1
-        forces = at.solution()
+        forces = self._point(at.piece.middle).solution()
         return forces is not None and self._follow(np.append(forces, float(at.piece.middle)))
 
     def _leaf(self, at: _Examined, codes: Codes) -> tuple[Any, list[Any]] | None:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
-from enumsol.condensation.space_condensed import PieceSpace
 from enumsol.trusted.space.leaf_arcs import LeafArc, arc_of
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
 from enumsol.trusted.space.piece_forms import only_on_curve
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from enumsol.condensation.enclosure import CondensedEnclosure
+    from enumsol.condensation.space_condensed import AlphaSpace, PieceSpace
     from enumsol.support.array_types import Codes
     from enumsol.trusted.space.curve_runs import KnownCurve, Run
     from enumsol.trusted.space.sector_rows import Row
@@ -45,34 +44,28 @@ class AlphaPiece:
 
     Attributes
     ----------
-    enclosure : CondensedEnclosure
+    space : AlphaSpace
     low, high : Fraction
-    units : force and length, (p,) arrays of powers of two
     """
 
-    enclosure: CondensedEnclosure
+    space: AlphaSpace
     low: Fraction
     high: Fraction
-    units: tuple[Array, Array]
 
     @property
     def middle(self) -> Fraction:
-        """Where the float F is taken that makes tau of lambda_t."""
+        """Of the piece."""
         return (self.low + self.high) / 2
-
-    def at(self, low: Fraction, high: Fraction) -> PieceSpace:
-        """A part of the piece, or a point of it, in the variables of the whole."""
-        return PieceSpace.over(self.enclosure, (low, high), self.middle, self.units)
 
     @cached_property
     def whole(self) -> PieceSpace:
-        """All of it."""
-        return self.at(self.low, self.high)
+        """The data over all of it."""
+        return self.space.over(self.low, self.high)
 
     @cached_property
     def ends(self) -> tuple[PieceSpace, PieceSpace]:
-        """Both ends."""
-        return self.at(self.low, self.low), self.at(self.high, self.high)
+        """The data at both ends."""
+        return self.space.at(self.low), self.space.at(self.high)
 
     def margin(self, codes: Sequence[int], rows: Sequence[Row], values: Array, errors: float = 1.0) -> float:
         """Proven lower bound on the energy over a partial assignment and the piece; positive: there is no solution.
@@ -80,15 +73,21 @@ class AlphaPiece:
         With fixed multipliers the bound is concave in alpha, so that it is least at an end.
         """
         least = np.inf
-        for end in self.ends:
-            least = min(least, sector_margin(end, codes, rows, values, errors))
+        for end in (self.low, self.high):
+            least = min(least, self.margin_at(end, codes, rows, values, errors))
             if not least > 0:
                 break
         return least
 
+    def margin_at(
+        self, alpha: Fraction, codes: Sequence[int], rows: Sequence[Row], values: Array, errors: float = 1.0
+    ) -> float:
+        """The same at one alpha."""
+        return sector_margin(self.space.at(alpha), codes, rows, values, errors)
+
     def forces(self, y: Ball) -> Ball:
         """Forces in the units of the problem, (3p,), all normals first, of scaled ones."""
-        system, (force, _), p = self.whole, self.units, len(self.units[0])
+        system, (force, _), p = self.space.at_once, self.space.units, len(self.space.units[0])
         found = Ball(np.zeros(3 * p), np.zeros(3 * p))
         # powers of two but for F: what is rounded besides is less than TINY
         found[:p] = Ball(y.mid[:p] * force, y.rad[:p] * force + TINY)
@@ -100,7 +99,7 @@ class AlphaPiece:
 
     def displacements(self, y: Ball, w: Ball, alpha: Ball) -> Ball:
         """The same of displacements w, (3p,), at all alpha of a ball."""
-        system, (_, length), p = self.whole, self.units, len(self.units[0])
+        system, (_, length), p = self.space.at_once, self.space.units, len(self.space.units[0])
         found = Ball(np.zeros(3 * p), np.zeros(3 * p))
         found[:p] = Ball(w.mid[:p] * length, w.rad[:p] * length + TINY)
         for k in (0, 1):
@@ -112,7 +111,7 @@ class AlphaPiece:
         # where there is no friction they follow from the forces
         missing = np.concatenate([(1 + k) * p + np.flatnonzero(system.tau[:, k] < 0) for k in (0, 1)])
         if len(missing):
-            data = self.enclosure
+            data = self.space.enclosure
             S, g0, g1 = Ball(data.S, data.S_rad), Ball(data.g0, data.g0_rad), Ball(data.g1, data.g1_rad)
             pushed = (S[missing] @ self.forces(y)[:, None])[:, 0]
             found[missing] = g0[missing] + alpha * g1[missing] - pushed
@@ -145,7 +144,7 @@ class AlphaPiece:
             ends = middle + max(low, Fraction(-1)) * half, middle + min(high, Fraction(1)) * half
             if ends[0] == ends[1]:
                 break
-            piece = AlphaPiece(self.enclosure, *ends, self.units)
+            piece = AlphaPiece(self.space, *ends)
             found = piece.held(codes)
         return piece, found
 
@@ -173,11 +172,11 @@ class AlphaPiece:
         """The piece and so many times its length on both sides, as far as that is within an interval."""
         more = factor * (self.high - self.low)
         low, high = max(self.low - more, interval[0]), min(self.high + more, interval[1])
-        return AlphaPiece(self.enclosure, low, high, self.units) if factor else self
+        return AlphaPiece(self.space, low, high) if factor else self
 
     def point_at(self, alpha: Fraction) -> AlphaPiece:
         """One alpha alone."""
-        return AlphaPiece(self.enclosure, alpha, alpha, self.units)
+        return AlphaPiece(self.space, alpha, alpha)
 
     def arc(self, codes: Sequence[int], errors: float = 1.0, found: SpaceRoot | Open | None = None) -> LeafArc | None:
         """The arc on which all roots of a leaf lie at all alpha of the piece, if it is proven that there is one.
