@@ -110,6 +110,7 @@ class SpaceEngine:
     Parameters
     ----------
     system : SpaceSystem
+    rows : how many of them a program may have
 
     Attributes
     ----------
@@ -126,12 +127,12 @@ class SpaceEngine:
 
     name = "active-set"
 
-    def __init__(self, system: SpaceSystem) -> None:
+    def __init__(self, system: SpaceSystem, rows: int = _ROWS) -> None:
         from enumsol.relaxation import _active_set  # compiled
 
         self.system = system
         p = system.p
-        self.slots = _ROWS // p
+        self.slots = rows // p
         self._state, self._programs = _active_set.QPState, _active_set.QPData
         self.data = self._bounded(system.S, system.g)
         #: The form that relaxations bound; None for the energy.

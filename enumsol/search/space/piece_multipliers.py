@@ -34,10 +34,10 @@ if TYPE_CHECKING:
 _RIDGE = 1e-12
 #: How often the share of an end in the bound that is made as large as possible is halved.
 _HALVINGS = 4
+#: Rows of a program at one alpha.
+_ROWS = 4096
 #: What is used of the alphas, on either side of a relaxation's, at which its multipliers seem to serve.
 _USED = Fraction(15, 16), Fraction(63, 64)
-#: Errors are counted so often by a writer of proofs.
-ERRORS = 2.0
 
 
 class AlphaPoint:
@@ -53,7 +53,7 @@ class AlphaPoint:
         self.alpha = alpha
         enclosed = EnclosedSpace.of_problem(space.enclosure, alpha, *space.units)
         self.system = SpaceSystem(enclosed.S, enclosed.g, enclosed.F, enclosed.tau, enclosed.unit, *space.units)
-        self.engine = SpaceEngine(self.system)
+        self.engine = SpaceEngine(self.system, _ROWS)
         self.splitting = SpaceSplitting(self.engine)
         self.rows = ImposedRows(self.splitting, self.system.p)
         self._discs = space.discs(alpha).mid
@@ -98,49 +98,40 @@ def simplest(low: Fraction, high: Fraction) -> Fraction:
         step /= 2
 
 
-def excluded_part(
-    piece: AlphaPiece, alpha: Fraction, codes: Codes, rows: Sequence[Row], values: Floats
+def served(
+    piece: AlphaPiece, alpha: Fraction, rows: Sequence[Row], values: Floats
 ) -> tuple[Fraction, Fraction] | None:
-    """The part of a piece at which multipliers that serve one alpha of it exclude an assignment; None if there is none.
+    """The part of a piece, around one alpha of it, at which multipliers seem to exclude; None if there is none.
 
-    The bound is a concave square in alpha.
+    The bound (12.21) is a concave square in alpha.
     """
-
-    def bound(at: Fraction) -> float:
-        return piece.margin_at(at, codes, rows, values, ERRORS)
-
-    found = [bound(end) for end in (piece.low, piece.high)]
-    if min(found) > 0:
-        return piece.low, piece.high
-    here = bound(alpha)
-    if not here > 0 or not np.all(np.isfinite(found)) or not piece.low < alpha < piece.high:
+    low, high = piece.ends
+    columns = [_columns(end, rows) for end in (low, high)]
+    loads = np.array([end.g + A @ values for end, (A, _) in zip((low, high), columns, strict=True)])
+    squares = -0.25 * loads @ low.inverse @ loads.T
+    first, last = (float(-own @ values) for _, own in columns)
+    # of t from 0 to 1: value + slope t + bend t^2
+    value = float(squares[0, 0]) + first
+    slope = 2.0 * float(squares[0, 1] - squares[0, 0]) + last - first
+    bend = float(squares[0, 0] - 2.0 * squares[0, 1] + squares[1, 1])
+    length = piece.high - piece.low
+    t = float((alpha - piece.low) / length) if length else 0.0
+    here = value + (slope + bend * t) * t
+    if not here > 0:
         return None
-    t = float((alpha - piece.low) / (piece.high - piece.low))
-    # of the bound at alpha + u times the length of the piece
-    before, after = (found[0] - here) / -t, (found[1] - here) / (1.0 - t)
-    bend = after - before
-    slope = after - bend * (1.0 - t)
     ends = []
-    for end, value in zip((piece.low, piece.high), found, strict=True):
-        if value > 0:
-            ends.append(end)
-            continue
-        zero = _zero(here, slope, bend, -1.0 if end < alpha else 1.0)
-        far = Fraction(zero) * (piece.high - piece.low)
-        near = simplest(*sorted(alpha + share * far for share in _USED))
-        if not zero or not bound(near) > 0:
+    for end, bound, side in ((piece.low, value, -1.0), (piece.high, value + slope + bend, 1.0)):
+        far = _zero(here, slope + 2.0 * bend * t, bend, side) if not bound > 0 else 0.0
+        if not bound > 0 and not far:
             return None
-        ends.append(near)
+        ends.append(simplest(*sorted(alpha + share * Fraction(far) * length for share in _USED)) if far else end)
     return ends[0], ends[1]
 
 
 def _zero(value: float, slope: float, bend: float, side: float) -> float:
-    """The zero of value + slope u + bend u^2 next to 0 on a side; 0 if there is none."""
+    """The zero of value + slope u + bend u^2 next to 0 on a side, with value > 0; 0 if there is none."""
     root = slope * slope - 4.0 * bend * value
-    if not root >= 0 or not np.isfinite(root):
-        return 0.0
-    # value > 0 and bend <= 0: one zero on every side
-    below = slope * side - np.sqrt(root)
+    below = slope * side - np.sqrt(root) if 0 <= root < np.inf else 0.0
     found = -2.0 * value / below if below else 0.0
     return float(side * found) if found > 0 else 0.0
 

@@ -21,8 +21,7 @@ from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.outcome import StopReason
 from enumsol.search.space.piece_arcs import beside, points_on, slides
 from enumsol.search.space.piece_certificates import ERRORS, Passage, PieceProposals, runs_over
-from enumsol.search.space.piece_multipliers import ERRORS as COUNTED
-from enumsol.search.space.piece_multipliers import AlphaPoint, balanced, excluded_part, simplest
+from enumsol.search.space.piece_multipliers import AlphaPoint, balanced, served, simplest
 from enumsol.search.space.space_fathoming import without_sectors
 from enumsol.support.deadlines import TimeOverError, look
 from enumsol.trusted.space.curve_runs import CurveParts, KnownCurve, Run
@@ -48,7 +47,7 @@ if TYPE_CHECKING:
     Waiting = tuple[tuple[Any, ...], float]
 
 #: Pieces, and points with their relaxations, that are kept.
-_KEPT = 64
+_KEPT = 256
 #: Pieces are cut down to this share of the interval where only their length stands in the way of a certificate.
 _ALONE = 2.0**-5
 #: Pieces are cut so often at most between two branchings where multipliers fail at their ends only.
@@ -67,6 +66,8 @@ _SOUGHT, _SAMPLED = 8, (Fraction(15, 16), Fraction(1, 2), Fraction(1, 16))
 _FACTORS = 0, 1
 #: Arcs are sought where a known curve has directions in a leaf, or beside it by this factor.
 _BESIDE = 1.5
+#: How often a writer of proofs counts errors.
+_COUNTED = 2.0
 #: Leaves are tested from this level of their sectors on; where more than two nodes slip, from the second one on.
 _TRIED = 3, 8
 #: Pieces are cut where multipliers cease to serve if they do so over more than this share.
@@ -374,8 +375,8 @@ class PieceTree:
         """By multipliers of one alpha, where they serve, or else by some that serve both ends of the piece."""
         piece = at.piece
         rows, values = point.multipliers(relaxation)
-        part = excluded_part(piece, point.alpha, codes, rows, values)
-        if part == (piece.low, piece.high):
+        part = served(piece, point.alpha, rows, values)
+        if part == (piece.low, piece.high) and piece.margin(codes, rows, values, _COUNTED) > 0:
             return ExcludedInSpace(rows, values), []
         ends = self._ends(at, codes)
         if len(ends) == 2 and all(_is_excluded(other) for _, other in ends):
@@ -383,10 +384,10 @@ class PieceTree:
                 rows += end.multipliers(other)[0]
             rows = list(dict.fromkeys([*rows, *point.imposed(codes)]))
             both = balanced(piece, codes, rows)
-            if both is not None and piece.margin(codes, rows, both, COUNTED) > 0:
+            if both is not None and piece.margin(codes, rows, both, _COUNTED) > 0:
                 used = np.flatnonzero(both)
                 return ExcludedInSpace([rows[k] for k in used], both[used]), []
-        if part is None or cuts >= _CUTS or part[1] - part[0] < _USEFUL * (piece.high - piece.low):
+        if part in (None, (piece.low, piece.high)) or cuts >= _CUTS or part[1] - part[0] < _USEFUL * (piece.high - piece.low):
             return None
         # first what is below, then what is above
         alpha = part[0] if part[0] > piece.low else part[1]
