@@ -28,7 +28,7 @@ from enumsol.arithmetic.balls import (
 )
 from enumsol.model.sectors import SECTORS, direction, end_number
 from enumsol.trusted.space.sector_rows import OPEN, SLIP_PLUS, STICK
-from enumsol.trusted.space.turning import LIBRARY, Box, Turning, turned_by
+from enumsol.trusted.space.turning import LIBRARY, Box, Combined, Turning, turned_by
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -371,16 +371,14 @@ class Leaf:
         inverse, span = Ball.exact(Y), Ball(np.zeros(q), radius)
         if self.free:
             return (Ball.exact(np.eye(q)) - inverse @ state.J) @ span - inverse @ point.G, None
-        slope = self._preconditioned(inverse, point.J, state.J, self._bends(state, angle, radius), radius)
+        slope = self._preconditioned(inverse, point.J, state.J, self._bends(Y, (state, point), angle, radius), radius)
         return (Ball.exact(np.eye(q)) - slope) @ span - inverse @ point.G, None
 
     @staticmethod
     def _preconditioned(inverse: Ball, point: Ball, box: Ball, second: Ball, reach: Floats) -> Ball:
-        """Y dG over a box: Y times the second derivatives first, which are large where Y is small."""
-        rows, columns = box.mid.shape
-        wide = (inverse @ Ball(second.mid.reshape(rows, -1), second.rad.reshape(rows, -1))).size
+        """Y dG over a box, by Y times the second derivatives there."""
         middle = inverse @ point
-        beside = upper_sum(wide.reshape(rows, columns, columns) * reach, axis=2)
+        beside = upper_sum(second.size * reach, axis=2)
         return smaller(Ball(middle.mid, (middle.rad + beside) * SAFE), inverse @ box)
 
     def _along(self, Y: Floats, k: int, angle: Floats, radius: Floats, state: State, point: State) -> tuple[Ball, Ball]:
@@ -396,7 +394,7 @@ class Leaf:
         q = len(angle)
         if not q:
             return Ball.exact(np.zeros((0, 0))), Ball.exact(np.zeros(0)), Ball.exact(np.zeros(0))
-        inverse, second = Ball.exact(Y), self._second(state, angle, radius)
+        inverse, second = Ball.exact(Y), self._second(Y, (state, point), angle, radius)
         slope = self._preconditioned(inverse, point.whole_J, state.whole_J, second, np.r_[radius, 1.0])
         others = np.delete(np.arange(q + 1), k)
         return Ball.exact(np.eye(q)) - slope[:, others], -slope[:, k], -(inverse @ point.G)
@@ -498,12 +496,12 @@ class Leaf:
         if state is None or not state.J.finite:
             return self._state(angle, radius, still=True) is not None
         try:
-            Y = np.abs(np.linalg.inv(point.J.mid))
+            Y = np.asarray(np.linalg.inv(point.J.mid), dtype=np.float64)
         except np.linalg.LinAlgError:
             return False
-        second = self._second(state, angle, radius).size
+        second = self._second(Y, (state, point), angle, radius).size
         bends, mixed = second[:, :-1, :-1] @ radius, second[:, :-1, -1]
-        turned, swept = (np.max(Y @ part @ radius / radius) for part in (bends, mixed))
+        turned, swept = (np.max(part @ radius / radius) for part in (bends, mixed))
         return bool(swept > turned)
 
     def _refined(self, angle: Floats, radius: Floats, reach: Floats) -> SpaceRoot | Open | None:
@@ -668,40 +666,44 @@ class Leaf:
             J = Ball.beside(along, across)
         return State(box.y, box.w, G, J, box)
 
-    def _bends(self, state: State, angle: Floats, radius: Floats) -> Ball:
-        """Second derivatives of G over a box, (q, q, q)."""
-        box, (d, turned), own = state.box, self._directions(angle, radius), np.arange(len(angle))
-        (b1, b2), (dv1, dv2), (v1, v2) = (self._slips(part) for part in (box.bends(), box.dw, box.w))
-        d1, d2 = d[:, 0], d[:, 1]
-        bends = b1 * d2[:, None, None] - b2 * d1[:, None, None]
-        turn = dv1 * turned[:, 1][:, None] - dv2 * turned[:, 0][:, None]
-        # psi_i turns d_i itself, in both orders, and d_i'' = -d_i
-        for part, add in (
-            ((own, slice(None), own), turn),
-            ((own, own, slice(None)), turn),
-            ((own, own, own), v2 * d1 - v1 * d2),
-        ):
-            there = bends[part] + add
-            bends.mid[part], bends.rad[part] = there.mid, there.rad
-        return bends
+    def _bends(self, Y: Floats, over: tuple[State, State], angle: Floats, radius: Floats) -> Ball:
+        """Y times the second derivatives of G over a box, (q, q, q), by what is known there and in its middle."""
+        return self._curved(Y, over, angle, radius)[1]
 
-    def _second(self, state: State, angle: Floats, radius: Floats) -> Ball:
-        """Second derivatives of G with respect to (psi, s) over a box and a piece of alpha, (q, q + 1, q + 1)."""
-        q, box, (d, turned), own = len(angle), state.box, self._directions(angle, radius), np.arange(len(angle))
-        (m1, m2), (s1, s2), (t1, t2) = (self._slips(part) for part in (box.mixed(), box.ds[:, 0], box.twice()))
-        d1, d2 = d[:, 0], d[:, 1]
-        mixed = m1 * d2[:, None] - m2 * d1[:, None]
-        there = mixed[own, own] + (s1 * turned[:, 1] - s2 * turned[:, 0])
-        mixed.mid[own, own], mixed.rad[own, own] = there.mid, there.rad
+    def _second(self, Y: Floats, over: tuple[State, State], angle: Floats, radius: Floats) -> Ball:
+        """The same with respect to (psi, s) over a box and a piece of alpha, (q, q + 1, q + 1)."""
+        (w, bends), q, (_, turned), own = (
+            self._curved(Y, over, angle, radius),
+            len(angle),
+            self._directions(angle, radius),
+            np.arange(len(angle)),
+        )
+        s1, s2 = self._slips(over[0].box.ds[:, 0])
+        pushed = s1 * turned[:, 1] - s2 * turned[:, 0]
+        mixed = w.mixed() + Ball.exact(Y) * pushed
         second = Ball(np.zeros((q, q + 1, q + 1)), np.zeros((q, q + 1, q + 1)))
-        for part, value in (
-            ((slice(None), slice(0, q), slice(0, q)), self._bends(state, angle, radius)),
-            ((slice(None), slice(0, q), q), mixed),
-            ((slice(None), q, slice(0, q)), mixed),
-            ((slice(None), q, q), t1 * d2 - t2 * d1),
-        ):
-            second.mid[part], second.rad[part] = value.mid, value.rad
+        second[:, :q, :q], second[:, :q, q], second[:, q, :q], second[:, q, q] = bends, mixed, mixed, w.twice()
         return second
+
+    def _curved(
+        self, Y: Floats, over: tuple[State, State], angle: Floats, radius: Floats
+    ) -> tuple[Combined, Ball]:
+        """What Y G takes of w for directions that are held, and Y times the second derivatives of G, (q, q, q)."""
+        (state, point), (d, turned), own = over, self._directions(angle, radius), np.arange(len(angle))
+        # v_i1 d_i2 - v_i2 d_i1
+        rows = Ball(np.zeros((len(own), len(state.box.w.mid))), np.zeros((len(own), len(state.box.w.mid))))
+        scale = Ball.exact(Y), Ball.exact(self.slip_scale)
+        for k, part in enumerate((d[:, 1], -d[:, 0])):
+            rows[:, self.t[:, k]] = scale[0] * (scale[1][:, k] * part)
+        w = state.box.combined(rows, point.box, radius[: len(own)], 1.0)
+        bends = w.bends()
+        # psi_i turns d_i itself, in both orders, and d_i'' = -d_i
+        (dv1, dv2), (v1, v2) = (self._slips(part) for part in (state.box.dw, state.box.w))
+        turn = scale[0][:, :, None] * (dv1 * turned[:, 1][:, None] - dv2 * turned[:, 0][:, None])
+        bent = scale[0] * (v2 * d[:, 0] - v1 * d[:, 1])
+        bends = bends + turn + Ball(turn.mid.transpose(0, 2, 1), turn.rad.transpose(0, 2, 1))
+        bends[:, own, own] = bends[:, own, own] + bent
+        return w, bends
 
     def _slips(self, w: Ball) -> tuple[Ball, Ball]:
         """Both components of v at the nodes in sectors, times ``slip_scale`` of FrictionUnits; ``w`` by rows."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, UNIT, Ball, Inverse, determinant_sign, smaller
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, Inverse, determinant_sign, gamma, smaller
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 #: Cosine and sine of numerical libraries, and what is made of two of them here, are off by no more.
 LIBRARY = 64 * UNIT
+#: How often derivatives over a box are bounded by their own derivatives.
+_ROUNDS = 2
 
 
 def turned_by(centre: Floats, angle: Floats) -> tuple[Floats, Floats]:
@@ -40,12 +42,11 @@ class Box:
         Derivatives of y, then of w, with respect to the angles and to the free unknowns.
     x : Ball of shape (q,)
         The turning nodes' normal forces.
-    z : Ball of shape (q, q)
-        -dx_i / dpsi_j is z_ij x_j.
-    along : Ball of shape (m, q)
-        Change of w with forces of size one along d.
-    across : Ball of shape (m, q)
-        The same a quarter turn further, so that dw_j is across_j x_j.
+    pushed : Ball of shape (q + 2 m, q)
+        z, where -dx_i / dpsi_j is z_ij x_j; then changes of y and w with forces of size one a quarter turn further than
+        d, so that d(y, w)_j is x_j times these.
+    led : Ball of shape (q + 2 m, q)
+        The same with forces along d.
     lag : Ball of shape (q, k)
         -dx with respect to the free unknowns.
     share : Ball of shape (q,), or None
@@ -57,11 +58,25 @@ class Box:
     slope: Ball
     lone: Ball
     x: Ball
-    z: Ball
-    along: Ball
-    across: Ball
+    pushed: Ball
+    led: Ball
     lag: Ball
     share: Ball | None
+
+    @property
+    def z(self) -> Ball:
+        """See ``pushed``."""
+        return self.pushed[: len(self.x.mid)]
+
+    @property
+    def across(self) -> Ball:
+        """Changes of w with forces of size one a quarter turn further than d, (m, q)."""
+        return self.pushed[-len(self.w.mid) :]
+
+    @property
+    def along(self) -> Ball:
+        """Changes of w with forces of size one along d, (m, q)."""
+        return self.led[-len(self.w.mid) :]
 
     @property
     def dw(self) -> Ball:
@@ -73,34 +88,61 @@ class Box:
         """Derivatives of w with respect to the free unknowns."""
         return self.lone[len(self.w.mid) :]
 
+    def combined(self, rows: Ball, point: Box, radius: Floats, swept: float) -> Combined:
+        """Rows times w: what is known over the box, given what is known in its middle.
+
+        Combined first and bounded then, so that what cancels in the middle does so over the box, too.
+
+        Parameters
+        ----------
+        rows : Ball of shape (k, m)
+        point : the middle
+        radius : (q,) array
+            Of the box.
+        swept : how far s goes, over a piece of alpha
+        """
+        q = len(self.x.mid)
+        over, middle = (
+            tuple(Ball.joined(part[:q], rows @ part[-len(self.w.mid) :]) for part in (box.pushed, box.led))
+            for box in (self, point)
+        )
+        by_alpha = None if self.share is None else grown_share(self.share).size * swept
+        across, along = (part[q:] for part in _nearer(over, middle, radius, by_alpha))
+        return Combined(self, across, along)
+
+
+class Combined(NamedTuple):
+    """Combinations of w over a box, k of them: ``across`` and ``along``, (k, q), are as those of w (see Box)."""
+
+    box: Box
+    across: Ball
+    along: Ball
+
     def bends(self) -> Ball:
-        """Second derivatives of w with respect to the angles, (m, q, q)."""
-        across, q = self.across, len(self.x.mid)
+        """Second derivatives with respect to the angles, (k, q, q)."""
+        across, (x, z) = self.across, (self.box.x, self.box.z)
         # d^2 w / dpsi_j dpsi_k = -(across_k z_kj x_j + across_j z_jk x_k), and -along_j x_j more where j = k
-        moved = self.z * self.x
-        half = across[:, None, :] * Ball(moved.mid.T, moved.rad.T)
+        moved = z * x
+        half = across[:, None, :] * moved.T
         bends = half + Ball(half.mid.transpose(0, 2, 1), half.rad.transpose(0, 2, 1))
-        diagonal = np.arange(q)
-        own = bends[:, diagonal, diagonal] + self.along * self.x
-        bends.mid[:, diagonal, diagonal], bends.rad[:, diagonal, diagonal] = own.mid, own.rad
-        return Ball(-bends.mid, bends.rad)
+        diagonal = np.arange(len(x.mid))
+        bends[:, diagonal, diagonal] = bends[:, diagonal, diagonal] + self.along * x
+        return -bends
 
     def mixed(self) -> Ball:
-        """Over a piece of alpha, second derivatives of w with respect to the angles and to s, (m, q).
+        """Over a piece of alpha, second derivatives with respect to the angles and to s, (k, q).
 
         With x_s = -lag, and across_j,s = across_j share_j / (1 + s share_j) - sum_k along_k share_k z_kj.
         """
-        assert self.share is not None
-        size = self.share.size
-        # share / (1 + s share), |s| <= 1
-        grown = Ball(self.share.mid, (self.share.rad + size * size / np.where(size < 1, 1.0 - size, 0.0)) * SAFE)
-        turned = self.across * grown - self.along @ (self.share[:, None] * self.z)
-        return turned * self.x - self.across * self.lag[:, 0]
+        box = self.box
+        assert box.share is not None
+        turned = self.across * grown_share(box.share) - self.along @ (box.share[:, None] * box.z)
+        return turned * box.x - self.across * box.lag[:, 0]
 
     def twice(self) -> Ball:
-        """Over a piece of alpha, second derivatives of w with respect to s, (m,): x_ss is 2 straight share lag."""
-        assert self.share is not None
-        moved = self.share * self.lag[:, 0]
+        """Over a piece of alpha, second derivatives with respect to s, (k,): x_ss is 2 straight share lag."""
+        assert self.box.share is not None
+        moved = self.box.share * self.box.lag[:, 0]
         return -(self.along @ (moved + moved)[:, None])[:, 0]
 
 
@@ -299,18 +341,56 @@ class Turning:
                 moves = (z * x) @ span
                 lag = shift if self.share is None else shift + (straight @ (share * x)[:, None])
                 x = smaller(x, point.x - (moves + lag @ beside if len(free.mid) else moves)[:, 0])
+        pushed, led = Ball.joined(z, push - moved @ z), Ball.joined(straight, ahead - moved @ straight)
+        if point is not None and q:
+            # alpha changes forces in T by so much, relatively
+            swept = None if self.share is None else grown_share(self.share).size * free.rad
+            pushed, led = _nearer((pushed, led), (point.pushed, point.led), radius, swept)
+        (z, across), (straight, along) = ((part[:q], part[q:]) for part in (pushed, led))
         lag = shift if self.share is None else shift + straight @ (share * x)[:, None]
-        across, along = push - moved @ z, ahead - moved @ straight
         value, slope, lone = start + (moved @ x[:, None])[:, 0], across * x, lone - moved @ shift
-        if self.share is not None:
-            lone = lone + along @ (share * x)[:, None]
         if point is not None:
             moves = slope @ span
             moves = moves + lone @ beside if len(free.mid) else moves
             value = smaller(value, Ball.joined(point.y, point.w) + moves[:, 0])
         w = value[m:]
         w.mid[self.rows], w.rad[self.rows] = 0.0, 0.0
-        return Box(value[:m], w, slope, lone, x, z, along[m:], across[m:], lag, self.share)
+        return Box(value[:m], w, slope, lone, x, pushed, led, lag, self.share)
+
+
+def grown_share(share: Ball) -> Ball:
+    """share / (1 + s share) for all s from -1 to 1."""
+    size = share.size
+    return Ball(share.mid, (share.rad + size * size / np.where(size < 1, 1.0 - size, 0.0)) * SAFE)
+
+
+def _nearer(
+    over: tuple[Ball, Ball], point: tuple[Ball, Ball], radius: Floats, swept: Floats | None
+) -> tuple[Ball, Ball]:
+    """``pushed`` and ``led`` over a box by their derivatives, from those in its middle, where that is nearer.
+
+    With p and l for them, z for the first rows of p, t for those of l and g = share / (1 + s share):
+
+        dp_j / dpsi_k = -p_k z_kj (and -l_k where j = k),   dp_j / ds = p_j g_j - sum l_k g_k z_kj,
+        dl_j / dpsi_k = -p_k t_kj (and +p_k where j = k),   dl_j / ds = l_j g_j - sum l_k g_k t_kj.
+
+    ``swept``: bounds of g s.
+    """
+    q = len(radius)
+    more = (1.0 + gamma(q + 4)) * SAFE
+    for _ in range(_ROUNDS):
+        p, t = (part.size for part in over)
+        both = np.hstack([p[:q], t[:q]])
+        turned = p * radius
+        moves = turned @ both + np.hstack([t * radius, turned])
+        if swept is not None:
+            moves += np.hstack([p * swept, t * swept]) + (t * swept) @ both
+        moves = moves * more * SAFE + TINY
+        over = tuple(
+            smaller(part, Ball(middle.mid, (middle.rad + by) * SAFE))
+            for part, middle, by in zip(over, point, (moves[:, :q], moves[:, q:]), strict=True)
+        )
+    return over
 
 
 def _quotient_error(one: Ball, other: Ball) -> Floats:
