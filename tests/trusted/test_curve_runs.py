@@ -13,6 +13,7 @@ from scipy.optimize import linprog
 from enumsol import enumerate_roots
 from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space.cover import SpaceCover
+from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.search.space.piece_certificates import runs_over
 from enumsol.search.space.piece_tree import _Examined
 from enumsol.trusted.space.curve_runs import KnownCurve, Run
@@ -38,7 +39,7 @@ def known_curves(p, seed):
 
 
 def piece_over(cover, low, high):
-    return AlphaPiece(cover.problem.enclosure, low, high, cover._units())
+    return AlphaPiece(AlphaSpace(cover.problem.enclosure, (low + high) / 2, cover._units()), low, high)
 
 
 #: Which of their names a node may have by its code.

@@ -8,6 +8,7 @@ from problems3d import random_over_alpha
 
 import enumsol
 from enumsol.branches.space.chains import chain_through
+from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import DEEPEST, SECTORS, places
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space.leaves import SpaceRoot
@@ -21,7 +22,7 @@ NEAR = [(1, 3), (1, 7), (2, 1), (2, 3), (2, 6)]
 
 def piece_of(problem, low, high):
     system = SpaceSolvers(problem, (low + high) / 2, "verified").system
-    return AlphaPiece(problem.enclosure, low, high, (system.force, system.length))
+    return AlphaPiece(AlphaSpace(problem.enclosure, (low + high) / 2, (system.force, system.length)), low, high)
 
 
 def place_of(root, problem, i):

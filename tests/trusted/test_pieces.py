@@ -10,6 +10,7 @@ from space_proofs import random_problem
 from enumsol import enumerate_roots
 from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space.chains import chain_through
+from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import SECTORS, nearest, start_of
 from enumsol.search.space.piece_multipliers import balanced
 from enumsol.search.space.space_setup import SpaceSolvers
@@ -34,7 +35,7 @@ def changing_problem(p, seed, isotropic=False):
 
 def piece_of(problem, low=LOW, high=HIGH):
     system = SpaceSolvers(problem, (low + high) / 2, "verified").system
-    return AlphaPiece(problem.enclosure, low, high, (system.force, system.length))
+    return AlphaPiece(AlphaSpace(problem.enclosure, (2 * low + high) / 3, (system.force, system.length)), low, high)
 
 
 def sector_at(tau, level):
@@ -68,8 +69,8 @@ def rows_of(codes, rng):
 
 def least_at(problem, piece, alpha, rows, values):
     """The minimum over all forces of the energy less the rows, in floats, from S, g and F of the problem."""
-    p, (force, length) = problem.p, piece.units
-    middle, at = problem.friction_at(piece.middle), problem.friction_at(alpha)
+    p, (force, length) = problem.p, piece.space.units
+    middle, at = problem.friction_at(piece.space.reference), problem.friction_at(alpha)
     disc = at[:, 0] / middle[:, 0]
     size = np.concatenate([force, middle[:, 0] * force, middle[:, 1] * force])
     work = float(force[0] * length[0])
@@ -147,12 +148,14 @@ def test_second_derivatives_over_a_piece_hold_differences(p, seed):
         state = leaf._state(np.zeros(p), leaf.half)
         if state is None:
             continue
-        second = leaf._second(state, np.zeros(p), leaf.half)
+        point = leaf._state(np.zeros(p), 0.0 * leaf.half, still=True)
+        Y = rng.standard_normal((p, p))
+        second = leaf._second(Y, (state, point), np.zeros(p), leaf.half)
         half = (piece.high - piece.low) / 2
 
-        def at(z, codes=codes, half=half):
+        def at(z, codes=codes, half=half, Y=Y):
             alpha = piece.middle + Fraction(float(z[-1])) * half
-            return Leaf(piece.at(alpha, alpha), codes)._state(z[:-1], np.zeros(p), still=True).G.mid
+            return Y @ Leaf(piece.space.at(alpha), codes)._state(z[:-1], np.zeros(p), still=True).G.mid
 
         steps = np.diag(np.append(0.4 * leaf.half, 0.4))
         z = np.append(rng.uniform(-0.2, 0.2, p) * leaf.half, rng.uniform(-0.2, 0.2))
@@ -233,7 +236,7 @@ def test_a_root_over_a_piece_is_one_at_every_alpha(seed):
         whole = piece.forces(piece.held(codes).y)
         for k in range(5):
             at = alpha + width * Fraction(k - 2, 2)
-            point = AlphaPiece(problem.enclosure, at, at, piece.units)
+            point = AlphaPiece(piece.space, at, at)
             there = point.held(codes)
             assert isinstance(there, SpaceRoot)
             forces = point.forces(there.y)
@@ -251,7 +254,7 @@ def test_displacements_of_nodes_without_friction_follow_from_the_forces():
     forces = piece.forces(Ball.exact(y)).mid
     assert np.all(forces.reshape(3, 2)[1:, 0] == 0)
     for alpha in (piece.low, piece.middle, piece.high):
-        scaled = piece.at(alpha, alpha)
+        scaled = piece.space.at(alpha)
         w = piece.displacements(Ball.exact(y), Ball.exact(scaled.g - scaled.S @ y), piece.alphas)
         moved = problem.condensed.free_displacements(float(alpha)) - problem.condensed.S @ forces
         assert np.all(np.abs(w.mid - moved) <= w.rad + 1e-12 * np.max(np.abs(moved)))

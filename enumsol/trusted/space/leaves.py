@@ -672,15 +672,9 @@ class Leaf:
 
     def _second(self, Y: Floats, over: tuple[State, State], angle: Floats, radius: Floats) -> Ball:
         """The same with respect to (psi, s) over a box and a piece of alpha, (q, q + 1, q + 1)."""
-        (w, bends), q, (_, turned), own = (
-            self._curved(Y, over, angle, radius),
-            len(angle),
-            self._directions(angle, radius),
-            np.arange(len(angle)),
-        )
-        s1, s2 = self._slips(over[0].box.ds[:, 0])
-        pushed = s1 * turned[:, 1] - s2 * turned[:, 0]
-        mixed = w.mixed() + Ball.exact(Y) * pushed
+        (w, bends), q = self._curved(Y, over, angle, radius), len(angle)
+        (s1, s2), (_, turned) = self._slips(over[0].box.ds[:, 0]), self._directions(angle, radius)
+        mixed = w.mixed() + Ball.exact(Y) * (s1 * turned[:, 1] - s2 * turned[:, 0])
         second = Ball(np.zeros((q, q + 1, q + 1)), np.zeros((q, q + 1, q + 1)))
         second[:, :q, :q], second[:, :q, q], second[:, q, :q], second[:, q, q] = bends, mixed, mixed, w.twice()
         return second

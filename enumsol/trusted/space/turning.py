@@ -342,10 +342,6 @@ class Turning:
                 lag = shift if self.share is None else shift + (straight @ (share * x)[:, None])
                 x = smaller(x, point.x - (moves + lag @ beside if len(free.mid) else moves)[:, 0])
         pushed, led = Ball.joined(z, push - moved @ z), Ball.joined(straight, ahead - moved @ straight)
-        if point is not None and q:
-            # alpha changes forces in T by so much, relatively
-            swept = None if self.share is None else grown_share(self.share).size * free.rad
-            pushed, led = _nearer((pushed, led), (point.pushed, point.led), radius, swept)
         (z, across), (straight, along) = ((part[:q], part[q:]) for part in (pushed, led))
         lag = shift if self.share is None else shift + straight @ (share * x)[:, None]
         value, slope, lone = start + (moved @ x[:, None])[:, 0], across * x, lone - moved @ shift
