@@ -10,15 +10,21 @@ from proof_tools import of_kind, proof_of, put, records_of, replaced, why_refuse
 
 from enumsol import verify
 from enumsol.branches.space.cover import SpaceCover
+from enumsol.gallery import wedge3d
 from enumsol.search.space.piece_certificates import PieceProposals
 
 INTERVAL = Fraction(0), Fraction(1)
+#: Of a wedge, with leaves that only their equations show to be without a root.
+WEDGED = Fraction(3, 2), Fraction(2)
 
 
 @functools.cache
 def leaf_by_leaf(p, seed):
-    """A problem and the records of its proof without certificates for a piece: every selection is a leaf."""
-    cover = SpaceCover(random_over_alpha(p, seed), INTERVAL)
+    """A problem and the records of its proof without certificates for a piece: every selection is a leaf.
+
+    With no node of a random problem it is that of a wedge.
+    """
+    cover = SpaceCover(random_over_alpha(p, seed), INTERVAL) if p else SpaceCover(wedge3d(2, 1, 2), WEDGED)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(PieceProposals, "numbers", lambda *_: None)
         patch.setattr(PieceProposals, "is_hopeful", lambda *_: False)
@@ -27,7 +33,7 @@ def leaf_by_leaf(p, seed):
 
 
 #: Problems with leaves of these kinds: arcs, boxes in a row, and selections without roots.
-ARCS, ROWS, NONE = (2, 7), (1, 5), (2, 11)
+ARCS, ROWS, NONE = (2, 7), (1, 5), (0, 0)
 
 
 @pytest.mark.parametrize(("name", "kinds"), [(ARCS, "abrx"), (ROWS, "abkx"), (NONE, "abknx")])
@@ -36,10 +42,11 @@ def test_leaves_say_that_all_solutions_lie_on_a_curve(name, kinds):
     assert {record[0] for record in records if isinstance(record, list)} >= {"w", *kinds}
     told = []
     report = verify(problem, proof_of(records), progress=told.append)
-    assert (report.complete, report.curves, report.open) == (True, 1, 0)
+    curves, alphas = (1, (0.1, 0.5, 0.9)) if name != NONE else (3, (1.55, 1.75, 1.95))
+    assert (report.complete, report.curves, report.open) == (True, curves, 0)
     assert told == [report.leaves] == [records[-1]["leaves"]]
-    counts = [len(all_roots(problem, alpha)) for alpha in (0.1, 0.5, 0.9)]
-    assert counts == [1, 1, 1]
+    counts = [len(all_roots(problem, alpha)) for alpha in alphas]
+    assert counts == [curves] * 3
 
 
 def test_open_leaves_are_gaps():
