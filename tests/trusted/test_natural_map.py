@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from enumsol.arithmetic.balls import Ball
-from enumsol.trusted.space.natural_map import Discs
+from enumsol.trusted.space.natural_map import Discs, Extent
 
 #: Nodes with two tangents, and with one of either direction.
 TAU = np.array([[4, 8], [5, 9], [6, -1], [-1, 7]])
@@ -47,7 +47,7 @@ def test_derivatives_lie_in_the_hull_of_their_box(seed):
         box = Ball(z, width * rng.uniform(0, 1, M))
         reach = 0.1 * width
         F = Ball(F0 + alpha * F1, np.abs(F1) * reach + 1e-15)
-        found = Discs(TAU, F, Ball.exact(F1)).corners(box)
+        found = Discs(TAU, F, F1).corners(box)
         if found is None:
             continue
         kinds += 1
@@ -79,3 +79,49 @@ def test_directions_of_a_narrow_box_are_bounded_to_first_order(seed):
     assert np.max(core.rad[1:, 0]) <= 1.01 * most
     # beta = 1 / |z_t| changes as well
     assert np.max(core.rad[1:, 1:]) <= 1.01 * (0.5 * most + 0.5 * most)
+
+
+@pytest.mark.few(2, 4)
+@pytest.mark.parametrize("seed", range(20))
+def test_derivatives_of_nodes_that_slip_turn_as_their_rates_say(seed):
+    """At z + t along + moves b + s they are the middle, t rates and no more than what else is bounded."""
+    rng = np.random.default_rng([seed, 123])
+    F0, F1, alpha, width = (
+        rng.uniform(-0.1, 0.5, 4),
+        rng.normal(size=4),
+        rng.uniform(0, 0.3),
+        10.0 ** rng.uniform(-3, -1),
+    )
+    z = np.append(rng.normal(size=M), alpha)
+    z[:4] = rng.uniform(0.2, 1.0, 4)
+    z[4:M] *= 3
+    along, moves = rng.normal(size=M + 1), rng.normal(size=(M + 1, 5))
+    half, radius, side = width, 0.3 * width * rng.uniform(0, 1, 5), 0.1 * width * rng.uniform(0, 1, M + 1)
+    extent = Extent(Ball.exact(z), Ball.exact(along), half, Ball.exact(moves), radius, side)
+    near = extent.near
+    found = Discs(TAU, Ball.exact(F0) + near[M] * Ball.exact(F1), F1).corners(near[:M], extent)
+    turns, slipping = found.turns, [i for i in range(4) if i in found.turns.rows[:, 0]]
+    assert slipping
+    rest = found.still.rad + np.zeros((M, M + 1))
+    rates = np.zeros((M, M + 1))
+    for q, i in enumerate(slipping):
+        rows, columns = turns.rows[q], turns.columns[q]
+        assert rows[0] == i
+        there = np.ix_(rows >= 0, columns >= 0)
+        to = np.ix_(rows[rows >= 0], columns[columns >= 0])
+        rest[to] += np.sum(turns.rest[q][:, None, None] * np.abs(turns.matrices[q]), axis=0)[there]
+        rates[to] += np.sum(turns.rates[q][:, None, None] * turns.matrices[q], axis=0)[there]
+    Y, Z, d = rng.normal(size=(7, M)), rng.normal(size=(M + 1, 6)), rng.normal(size=6)
+    most, most_along = turns.bounds(Y, Z, d)
+    for _ in range(20):
+        t, b = half * rng.uniform(-1, 1), radius * rng.uniform(-1, 1, 5)
+        at = z + t * along + moves @ b + side * rng.uniform(-1, 1, M + 1)
+        off = derivative(at[:M], at[M], F0, F1) - found.still.mid
+        own = np.array([k for i in slipping for k in (i, *TAU[i][TAU[i] >= 0])])
+        assert np.all((np.abs(off - t * rates) <= rest + 1e-7)[own])
+        D = np.zeros((M, M + 1))
+        D[own] = off[own]
+        # what is left of the second order is not in the bounds
+        lost = np.abs(Y) @ (found.still.rad + 1e-7) @ np.abs(Z)
+        assert np.all(np.abs(Y @ D @ Z) <= most + lost)
+        assert np.all(np.abs(Y @ D @ Z @ d) <= most_along + lost @ np.abs(d))

@@ -190,7 +190,7 @@ class KnownCurve:
                 t = 0.5 * (begin + end), 0.5 * (end - begin) * SAFE + 4 * UNIT * (abs(begin) + abs(end))
                 m, wide = len(near.c) - 1, upper_product(near.Z.size, radius) * SAFE
                 along = near.zd[:m]
-                numbers = near.z.mid, near.z.rad, along.mid, along.rad, wide[:m], self.problem.rho * near.rho
+                numbers = near.z.mid[:m], near.z.rad[:m], along.mid, along.rad, wide[:m], self.problem.rho * near.rho
                 found.append((*t, near.c[m], near.d[m], radius[m], *numbers))
         t_mid, t_rad, alpha, rate, reach, *rest = map(np.array, zip(*found, strict=True))
         z_mid, z_rad, slope, slope_rad, wides, steps = rest

@@ -11,7 +11,7 @@ from typing import Self
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, upper_norm, upper_sum
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, upper_norm, upper_sum
 from enumsol.support.array_types import Floats, Indices, Mask
 
 #: What a writer of proofs asks for beyond what a checker does.
@@ -21,12 +21,127 @@ _BOTH = [[1], [2]], [[1], [2]]
 
 
 @dataclass(frozen=True)
-class Corners:
-    """Derivatives of P in a box: those in ``core`` plus sum t_k u_k v_k', |t_k| <= 1/2, u_k and v_k columns."""
+class Extent:
+    """Points z + t along + moves b + s with |t| <= half, |b| <= radius and |s| <= side.
 
-    core: Ball
+    Attributes
+    ----------
+    z, along : Balls of shape (n,)
+    half : float
+    moves : Ball of shape (n, k)
+    radius, side : (k,) and (n,) arrays
+    """
+
+    z: Ball
+    along: Ball
+    half: float
+    moves: Ball
+    radius: Floats
+    side: Floats
+
+    @classmethod
+    def around(cls, z: Ball) -> Self:
+        """All points of a ball."""
+        nothing = np.zeros(len(z.mid))
+        return cls(
+            Ball.exact(z.mid), Ball.exact(nothing), 0.0, Ball.exact(np.zeros((len(nothing), 0))), nothing[:0], z.rad
+        )
+
+    @cached_property
+    def near(self) -> Ball:
+        """A ball of all these points."""
+        wide = self.along.size * self.half + upper_product(self.moves.size, self.radius) + self.side
+        return Ball(self.z.mid, (self.z.rad + wide) * SAFE)
+
+    @cached_property
+    def _padded(self) -> tuple[Floats, Floats, Floats]:
+        """Middles of ``along`` and ``moves``, and what is added to products with both, with zeros at the end."""
+        k = gamma(16)
+        blurred = upper_product(self.moves.rad + k * np.abs(self.moves.mid), self.radius)
+        added = self.z.rad + self.side + blurred + (self.along.rad + k * np.abs(self.along.mid)) * self.half
+        none = np.zeros((1, len(self.radius)))
+        return np.append(self.along.mid, 0.0), np.vstack([self.moves.mid, none]), np.append(added * SAFE, 0.0)
+
+    def products(self, rows: Floats, places: Indices) -> tuple[Floats, Floats]:
+        """Numbers r and bounds of a (x - z) - t r for rows a, where x is a point with t, both (p, K).
+
+        Parameters
+        ----------
+        rows : (p, K, l) array
+        places : (p, l) array of int
+            Of their entries, -1 where there is none.
+        """
+        along, moves, added = self._padded
+        rates = np.sum(rows * along[places][:, None, :], axis=2)
+        beside = upper_sum(np.abs(rows @ moves[places]) * self.radius, axis=2)
+        return rates, (beside + upper_sum(np.abs(rows) * added[places][:, None, :], axis=2)) * SAFE
+
+
+@dataclass(frozen=True)
+class Turns:
+    """Sums over nodes and k of (t rates + s) times a matrix, |t| <= half and |s| <= rest, the same t in all of them.
+
+    Attributes
+    ----------
+    rows, columns : (q, 3) and (q, 4) arrays of int
+        Places of the matrices of every node, -1 where there is none.
+    matrices : (q, K, 3, 4) array
+    rates, rest : (q, K) arrays
+    half : float
+    """
+
+    rows: Indices
+    columns: Indices
+    matrices: Floats
+    rates: Floats
+    rest: Floats
+    half: float
+
+    @cached_property
+    def size(self) -> Floats:
+        """Bounds of the sums of every node, (q, 3, 4)."""
+        most = (np.abs(self.rates) * self.half + self.rest) * SAFE
+        return np.asarray(upper_sum(most[:, :, None, None] * np.abs(self.matrices), axis=1))
+
+    def bounds(self, Y: Floats, Z: Floats, d: Floats | None = None) -> tuple[Floats, Floats]:
+        """Of |Y D Z| and |Y D Z d| for all these D, up to rounding, for which ``size`` times gamma serves."""
+        left = np.hstack([Y, np.zeros((len(Y), 1))])[:, self.rows].transpose(1, 0, 2)[:, None]
+        right = np.vstack([Z, np.zeros((1, Z.shape[1]))])[self.columns][:, None]
+        products = left @ (self.matrices @ right)
+        out = []
+        for one in (products, (products @ (np.zeros(Z.shape[1]) if d is None else d))[..., None]):
+            rates, rest = self.rates[:, :, None, None], self.rest[:, :, None, None]
+            out.append(np.abs(np.sum(rates * one, axis=(0, 1))) * self.half + np.sum(rest * np.abs(one), axis=(0, 1)))
+        return out[0] * SAFE, out[1][:, 0] * SAFE
+
+
+@dataclass(frozen=True)
+class Corners:
+    """Derivatives of P in a set: those in ``still``, plus ``turns``, plus sum t_k u_k v_k', |t_k| <= 1/2.
+
+    u_k and v_k are columns. ``still`` has room for the rounding of ``turns.bounds``.
+    """
+
+    still: Ball
+    turns: Turns
     u: Floats
     v: Floats
+
+    @property
+    def core(self) -> Ball:
+        """A ball of all of them without the sum."""
+        return Ball(self.still.mid, (self.still.rad + self.wide) * SAFE)
+
+    @cached_property
+    def wide(self) -> Floats:
+        """Bounds of what ``turns`` adds."""
+        out, turns = np.zeros_like(self.still.rad), self.turns
+        there = (
+            (turns.rows >= 0)[:, :, None] & (turns.columns >= 0)[:, None, :] & (turns.columns < out.shape[1])[:, None]
+        )
+        to = tuple(np.broadcast_to(x, there.shape)[there] for x in (turns.rows[:, :, None], turns.columns[:, None, :]))
+        out[to] = turns.size[there]
+        return out
 
 
 @dataclass(frozen=True)
@@ -41,13 +156,13 @@ class Discs:
         Places of the tau of every node in y, -1 where there is none.
     F : Ball of shape (p,)
         All that occur.
-    slope : Ball of shape (p,), or None
+    slope : (p,) array or None
         The derivative of F with respect to the last argument; None where there is no such argument.
     """
 
     tau: Indices
     F: Ball
-    slope: Ball | None = None
+    slope: Floats | None = None
 
     def projected(self, z: Ball) -> Ball:
         """P of a ball of arguments."""
@@ -75,18 +190,19 @@ class Discs:
         has = self.tau >= 0
         return Ball(np.where(has, z.mid[self.tau], 0.0), np.where(has, z.rad[self.tau], 0.0))
 
-    def corners(self, z: Ball, past: Ball | None = None) -> Corners | None:
+    def corners(self, z: Ball, extent: Extent | None = None) -> Corners | None:
         """All derivatives of P at points of a box, and their convex hull; None where there is no bound.
 
-        ``past``: bounds of |z_t| - F z_n of every node at these points, if more is known than the box tells.
+        ``extent``: these points and the argument of F, if more is known than the box and ``F`` tell.
 
-        ``core`` has a column more than rows, for the derivative with respect to the argument of F, if there is one.
+        ``still`` has a column more than rows, for the derivative with respect to the argument of F, if there is one.
         """
         if not z.finite:
             return None
         m, width = len(z.mid), len(z.mid) + (self.slope is not None)
         core = Ball(np.zeros((m, width)), np.zeros((m, width)))
-        found = _Blocks.of(self, z, past)
+        nothing = Ball.exact(np.zeros(1))
+        found = _Blocks.of(_Slips(self, Extent.around(Ball.joined(z, nothing)) if extent is None else extent))
         if found is None:
             return None
         block, u, v = found.middle, found.u, found.v
@@ -94,13 +210,123 @@ class Discs:
         columns = rows if self.slope is None else np.column_stack([rows, np.full(len(rows), m)])
         there = (rows >= 0)[:, :, None] & (columns >= 0)[:, None, :]
         to = tuple(np.broadcast_to(x, there.shape)[there] for x in (rows[:, :, None], columns[:, None, :]))
-        core.mid[to], core.rad[to] = block.mid[there], block.rad[there]
+        core.mid[to], core.rad[to] = (part[:, :, : columns.shape[1]][there] for part in (block.mid, block.rad))
         k = np.flatnonzero(found.paired)
         U, V = np.zeros((m, len(k))), np.zeros((width, len(k)))
         for matrix, places, vectors in ((U, rows[k], u[k]), (V, columns[k], v[k])):
             number, part = np.nonzero(places >= 0)
             matrix[places[number, part], number] = vectors[number, part]
-        return Corners(core, U, V)
+        return Corners(core, found.turns, U, V)
+
+
+class _Slips:
+    """How the directions in which nodes slip, and the sizes of their friction, change over a set.
+
+    To first order these are products with rows, in which changes cancel (theory, section 12.8).
+
+    Parameters
+    ----------
+    discs : Discs
+    extent : Extent
+        Of z and the argument of F.
+
+    Attributes
+    ----------
+    at : Directions
+    gap : Ball of shape (p,)
+        |z_t| - F z_n; without bounds where none are known.
+    """
+
+    def __init__(self, discs: Discs, extent: Extent) -> None:
+        self.discs, self.extent, p = discs, extent, len(discs.tau)
+        self.z = extent.near
+        last = len(self.z.mid) - 1
+        self.places = np.column_stack([np.arange(p), discs.tau, np.full(p, last)])
+        self.change = np.zeros(p) if discs.slope is None else discs.slope
+        tangent = discs.tangents(self.z)
+        self.length, self.e, self.side = _middle(tangent)
+        rows = np.zeros((p, 4, 4))
+        rows[:, 0, 1:3], rows[:, 1, 1:3], rows[:, 2, 0], rows[:, 3, 3] = self.e, self.side, 1.0, 1.0
+        self.rates, self.rest = extent.products(rows, self.places)
+        away = self._most(self.rates, self.rest)
+        self.at = Directions.of(tangent, away[:, :2])
+        self.wide = np.append(self.z.rad, 0.0)[self.places]
+        # of F in the middle: the radius of F holds what its argument changes, too
+        self.rounded = np.maximum(discs.F.rad * SAFE - np.abs(self.change) * self.z.rad[last], 0.0) * SAFE
+        self.gap = self._gap()
+
+    def _most(self, rates: Floats, rest: Floats) -> Floats:
+        return np.asarray((np.abs(rates) * self.extent.half + rest) * SAFE)
+
+    def _gap(self) -> Ball:
+        at, F, normal, change = self.at, self.discs.F, self.z.mid[: len(self.e)], self.change
+        row = np.column_stack([-F.mid, self.e, -change * normal])
+        off = np.column_stack([F.rad, at.turn, np.abs(change) * self.wide[:, 0]]) + 8 * UNIT * np.abs(row)
+        rates, rest = self.extent.products(row[:, None], self.places)
+        disc = F.mid * normal
+        rad = self._most(rates, rest)[:, 0] + upper_sum(off * self.wide, axis=1) + self.rounded * np.abs(normal)
+        rad = (rad + 16 * UNIT * (self.length + np.abs(disc))) * SAFE
+        known = (at.least > 0) & (F.mid > F.rad * SAFE) & np.isfinite(rad)
+        return Ball(np.where(known, self.length - disc, 0.0), np.where(known, rad, np.inf))
+
+    def turns(self, k: Indices, ratios: tuple[Floats, Floats]) -> tuple[Turns, Floats, Floats]:
+        """Derivatives of nodes k, which only slip: what turns, their middles, and bounds of the rest, (q, 3, 4).
+
+        ``ratios``: bounds of that of the disc's radius and |tau|, of all nodes.
+        """
+        at, half, wide = self.at, self.extent.half, self.wide[k]
+        e, side, turn, length, change = self.e[k], self.side[k], at.turn[k], self.length[k], self.change[k]
+        F, F_rad, normal = self.discs.F.mid[k], self.discs.F.rad[k], self.z.mid[k]
+        low, high = ratios[0][k], ratios[1][k]
+        least, most = at.least[k], at.most[k]
+        # of 1 / |z_t|, relative to that of the middle
+        bent = np.maximum(most - length, length - least) / least * (1.0 + 8 * UNIT)
+        beta = F * normal / length
+        off = np.maximum(np.maximum(high - beta, beta - low), 0.0) + 16 * UNIT * np.abs(beta)
+        size, F_size = np.maximum(np.abs(low), np.abs(high)), np.abs(F) + F_rad
+        row = np.column_stack([F, -beta[:, None] * e, change * normal]) / length[:, None]
+        more = np.column_stack(
+            [
+                (F_rad + F_size * bent),
+                off[:, None] * np.abs(e) + size[:, None] * (turn + bent[:, None] * (np.abs(e) + turn)),
+                np.abs(change) * (wide[:, 0] + np.abs(normal) * bent),
+            ]
+        )
+        own, rest = self.extent.products(row[:, None], self.places[k])
+        lost = upper_sum((more / length[:, None] + 16 * UNIT * np.abs(row)) * wide, axis=1)
+        lost = lost + 32 * UNIT * np.abs(beta) + self.rounded[k] * np.abs(normal) / length
+        turned = self.rates[k, 1] / length
+        beside = self.rest[k, 1] / least + (bent + 8 * UNIT) * np.abs(turned) * half + 32 * UNIT
+        rates = np.column_stack([turned, own[:, 0], change * self.rates[k, 3], self.rates[k, 2]])
+        rests = np.column_stack(
+            [
+                beside,
+                rest[:, 0] + lost,
+                np.abs(change) * self.rest[k, 3] + self.rounded[k],
+                self.rest[k, 2],
+            ]
+        )
+        rests = (rests + 8 * UNIT * np.abs(rates) * half) * SAFE
+        both = side[:, :, None] * e[:, None, :] + e[:, :, None] * side[:, None, :]
+        M = np.zeros((len(k), 4, 3, 4))
+        M[:, 0, 1:, 0], M[:, 0, 1:, 1:3] = F[:, None] * side, -beta[:, None, None] * both
+        M[:, 0, 1:, 3], M[:, 1, 1:, 1:3] = (change * normal)[:, None] * side, at.across[k]
+        M[:, 2, 1:, 0], M[:, 3, 1:, 3] = e, change[:, None] * e
+        middle, left = np.zeros((len(k), 3, 4)), np.zeros((len(k), 3, 4))
+        middle[:, 0, 0], middle[:, 1:, 0], middle[:, 1:, 3] = 1.0, F[:, None] * e, (change * normal)[:, None] * e
+        middle[:, 1:, 1:3] = beta[:, None, None] * at.across[k]
+        # to second order
+        sine, off, F_off, off_n = np.minimum(self._most(rates, rests), np.array([1.0, *[np.inf] * 3])).T
+        a, b, c = np.abs(e), np.abs(side), np.abs(both)
+        pushed = np.abs(change) * (np.abs(normal) + wide[:, 0])
+        left[:, 1:, 0] = (F_size * sine**2)[:, None] * a + (F_off * sine)[:, None] * b
+        left[:, 1:, 3] = (pushed * sine**2)[:, None] * a + (np.abs(change) * off_n * sine)[:, None] * b
+        straight = a[:, :, None] * a[:, None, :] + b[:, :, None] * b[:, None, :]
+        left[:, 1:, 1:3] = (size * sine**2)[:, None, None] * (straight + sine[:, None, None] * c)
+        left[:, 1:, 1:3] += (off * sine)[:, None, None] * c
+        found = Turns(self.places[k, :3], self.places[k], M, rates, rests, half)
+        left = left + gamma(8 * len(self.e) + 64) * (found.size + np.abs(middle))
+        return found, middle, left * SAFE
 
 
 @dataclass(frozen=True)
@@ -111,9 +337,11 @@ class _Blocks:
 
     Attributes
     ----------
-    mid, rad : (p, 3, 3 or 4) arrays
-    u, v : (p, 3) and (p, 3 or 4) arrays
+    mid, rad : (p, 3, 4) arrays
+    u, v : (p, 3) and (p, 4) arrays
     paired : (p,) bool array
+    turns : Turns
+        Of nodes that only slip.
     """
 
     mid: Floats
@@ -121,6 +349,7 @@ class _Blocks:
     u: Floats
     v: Floats
     paired: Mask
+    turns: Turns
 
     @property
     def middle(self) -> Ball:
@@ -130,58 +359,67 @@ class _Blocks:
         return Ball(mid, self.rad + 2 * UNIT * np.abs(mid) * (added != 0))
 
     @classmethod
-    def of(cls, discs: Discs, z: Ball, past: Ball | None = None) -> Self | None:
-        """Of all points of a box; None where there is no bound. ``past`` as for ``Discs.corners``."""
-        p, width = len(discs.tau), 3 if discs.slope is None else 4
+    def of(cls, slips_of: _Slips) -> Self | None:
+        """Of all points of a set; None where there is no bound."""
+        z, F, at, change = slips_of.z, slips_of.discs.F, slips_of.at, np.abs(slips_of.change)
+        p, tau = len(F.mid), slips_of.discs.tau
         low, high = _outwards(z.mid[:p], z.rad[:p])
-        F_low, F_high = _outwards(discs.F.mid, discs.F.rad)
+        F_low, F_high = _outwards(F.mid, F.rad)
         # of the discs' radii
         least = F_low * np.where(F_low >= 0, np.maximum(low, 0.0), high) - TINY
         least, most = np.where(least > 0, least / SAFE, least * SAFE), np.maximum(F_high, 0.0) * high * SAFE + TINY
-        at = Directions.of(discs.tangents(z))
-        touches, loose, sticks, slips = high >= 0, low <= 0, at.least <= most, at.most >= least
-        if past is not None:
-            sticks &= ~(past.mid > past.rad * SAFE)
-            slips &= ~(past.mid < -past.rad * SAFE)
-        rubs = np.any(discs.tau >= 0, axis=1) & touches
+        gap_low, gap_high = _outwards(slips_of.gap.mid, slips_of.gap.rad)
+        touches, loose = high >= 0, low <= 0
+        sticks, slips = (at.least <= most) & (gap_low <= 0), (at.most >= least) & (gap_high >= 0)
+        rubs = np.any(tau >= 0, axis=1) & touches
         unknown = rubs & slips & (~(at.least > 0) | (loose & sticks))
         if np.any(unknown & (F_low < 0)):
             return None
         sliding = rubs & slips & ~unknown
+        ratio_low = np.where(least >= 0, least / at.most / SAFE, least / at.least * SAFE)
+        ratio_high = np.minimum(1.0, most / at.least * SAFE)
+        # the ratio is 1 - (|z_t| - F z_n) / |z_t|, and where the node slips this is less than one
+        known = np.isfinite(slips_of.gap.rad)
+        lost = (np.maximum(gap_high, 0.0) / np.where(known, at.least, 1.0) + 4 * UNIT) * SAFE
+        kept = np.maximum(gap_low, 0.0) / np.where(known, at.most, 1.0) / SAFE - 4 * UNIT
+        ratio_low = np.where(known, np.maximum(ratio_low, 1.0 - lost), ratio_low)
+        ratio_high = np.where(known, np.minimum(ratio_high, 1.0 - kept), ratio_high)
+        turns, middle, left = slips_of.turns(
+            only := np.flatnonzero(sliding & ~sticks & ~loose), (ratio_low, ratio_high)
+        )
         blocks = cls(
-            np.zeros((p, 3, width)),
-            np.zeros((p, 3, width)),
+            np.zeros((p, 3, 4)),
+            np.zeros((p, 3, 4)),
             np.zeros((p, 3)),
-            np.zeros((p, width)),
+            np.zeros((p, 4)),
             (touches & loose & ~unknown) | (sliding & sticks),
+            turns,
         )
         blocks.mid[:, 0, 0] = touches & ~loose
         blocks.mid[rubs & ~slips, *_BOTH] = 1.0
         blocks.u[:, 0], blocks.v[:, 0] = touches & loose, 1.0
         F_size = np.maximum(np.abs(F_low), np.abs(F_high))
-        change = Ball.exact(np.zeros(p)) if discs.slope is None else discs.slope
-        widest = (change.size * high * SAFE)[:, None]
+        widest = (change * high * SAFE)[:, None]
         if np.any(unknown):
             # any mixture of 0, of the unit matrix and of slips in any direction
             blocks.mid[unknown & loose, 0, 0] = blocks.rad[unknown & loose, 0, 0] = 0.5
             blocks.rad[unknown, 1:, 0] = F_size[unknown, None]
             blocks.rad[unknown, 1:, 1:3] = 0.5
-            blocks.rad[unknown, 1:, 3:] = widest[unknown, None]
+            blocks.rad[unknown, 1:, 3] = widest[unknown]
             blocks.mid[unknown, *_BOTH] = 0.5
-        if not np.any(sliding):
-            return blocks
-        # times the direction, by lambda_n and by the argument of F where the node slips
-        normal, normal_rad = 0.5 * (np.maximum(low, 0.0) + high), 0.5 * (high - np.maximum(low, 0.0)) * SAFE
-        pushed = change * Ball(normal, normal_rad + 4 * UNIT * normal)
-        along, also = (
-            (x[:, None] * (at.turn + 4 * UNIT) + rad[:, None] * np.abs(at.e)) * SAFE
-            for x, rad in ((F_size, discs.F.rad), (pushed.size, pushed.rad))
-        )
-        blocks.rad[sliding, 1:, 0] = along[sliding]
-        blocks.rad[sliding, 1:, 3:] = np.where(loose[:, None], widest, also)[sliding, :, None]
-        ratio_low = np.where(least >= 0, least / at.most / SAFE, least / at.least * SAFE)
-        ratio_high = np.minimum(1.0, most / at.least * SAFE)
-        blocks.slide(at, (ratio_low, ratio_high), (discs.F.mid, pushed.mid), sliding, sticks, loose)
+        blocks.mid[only], blocks.rad[only] = middle, left
+        cornered = sliding & (sticks | loose)
+        if np.any(cornered):
+            # times the direction, by lambda_n and by the argument of F where the node slips
+            normal, normal_rad = 0.5 * (np.maximum(low, 0.0) + high), 0.5 * (high - np.maximum(low, 0.0)) * SAFE
+            pushed = Ball.exact(slips_of.change) * Ball(normal, normal_rad + 4 * UNIT * normal)
+            along, also = (
+                (x[:, None] * (at.turn + 4 * UNIT) + rad[:, None] * np.abs(at.e)) * SAFE
+                for x, rad in ((F_size, F.rad), (pushed.size, pushed.rad))
+            )
+            blocks.rad[cornered, 1:, 0] = along[cornered]
+            blocks.rad[cornered, 1:, 3] = np.where(loose[:, None], widest, also)[cornered]
+            blocks.slide(at, (ratio_low, ratio_high), (F.mid, pushed.mid), sliding & sticks, sliding & loose)
         return blocks
 
     def slide(
@@ -189,44 +427,34 @@ class _Blocks:
         at: Directions,
         ratios: tuple[Floats, Floats],
         factors: tuple[Floats, Floats],
-        sliding: Mask,
-        sticks: Mask,
-        loose: Mask,
+        limit: Mask,
+        graze: Mask,
     ) -> None:
-        """Fill in nodes whose tau has a direction and that slip at some points of the box.
+        """Fill in nodes whose tau has a direction and that slip at some points, but not at all of them.
 
         Parameters
         ----------
         ratios : bounds of that of the disc's radius and |tau| where they slip
         factors : what the direction is multiplied by where they slip, by lambda_n and by the argument of F
-        sticks, loose : nodes that may stick, or be open, too
+        limit, graze : nodes that may stick, or be open, too
         """
         low, high = (ratio[:, None, None] for ratio in ratios)
         across, size = np.abs(at.across), np.maximum(np.abs(low), np.abs(high))
         rounded = 16 * UNIT * (1.0 + size)
         F, pushed = factors
         # or stick: 1 - t (e e' + (1 - ratio) (1 - e e')), and t F e for lambda_n
-        limit = sliding & sticks
         if np.any(limit):
             self.mid[limit, *_BOTH] = 1.0
             lost = (at.bent + (1.0 - low) * (across + at.bent) + rounded) * SAFE
             self.rad[limit, 1:, 1:3] = lost[limit]
             self.u[limit, 1:], self.v[limit, 1:3], self.v[limit, 0] = at.e[limit], -at.e[limit], F[limit]
-            self.v[limit, 3:] = pushed[limit, None]
+            self.v[limit, 3] = pushed[limit]
         # or open: t times those of slip
-        graze = sliding & loose
         if np.any(graze):
             spread = 0.5 * np.abs(high) + np.maximum(-low, 0.0)
             self.mid[graze, 1:, 1:3] = (0.5 * high * at.across)[graze]
             self.rad[graze, 1:, 1:3] = ((spread * across + size * at.bent + rounded) * SAFE)[graze]
             self.u[graze, 1:] = (F[:, None] * at.e)[graze]
-        # or nothing else
-        only = sliding & ~sticks & ~loose
-        self.mid[only, 1:, 0] = F[only, None] * at.e[only]
-        self.mid[only, 1:, 3:] = (pushed[only, None] * at.e[only])[:, :, None]
-        self.mid[only, 1:, 1:3] = (0.5 * (low + high) * at.across)[only]
-        half = 0.5 * (high - low) * SAFE + 4 * UNIT * size
-        self.rad[only, 1:, 1:3] = ((half * across + size * at.bent + rounded) * SAFE)[only]
 
 
 @dataclass(frozen=True)
@@ -253,13 +481,17 @@ class Directions:
     bent: Floats
 
     @classmethod
-    def of(cls, x: Ball) -> Directions:
-        """Of points in balls of shape (p, 2); where a component is 0 without radius, e has one component."""
-        length = np.linalg.norm(x.mid, axis=1)
-        e = x.mid / np.where(length > 0, length, 1.0)[:, None]
-        side = np.column_stack([-e[:, 1], e[:, 0]])
+    def of(cls, x: Ball, away: Floats | None = None) -> Directions:
+        """Of points in balls of shape (p, 2); where a component is 0 without radius, e has one component.
+
+        ``away``: bounds, (p, 2), of how far they are from the middle along its direction and beside it, if known.
+        """
+        length, e, side = _middle(x)
         # along the middle's direction, and beside it
         along, beside = (upper_sum(np.abs(one) * x.rad, axis=1) * (1.0 + 16 * UNIT) for one in (e, side))
+        if away is not None:
+            also = (away + 16 * UNIT * np.max(x.rad, axis=1)[:, None]) * SAFE
+            along, beside = np.minimum(along, also[:, 0]), np.minimum(beside, also[:, 1])
         rounded = 8 * UNIT * length
         least = (length - along) / SAFE - rounded - TINY
         ahead = length + along
@@ -274,6 +506,13 @@ class Directions:
         straight = a[:, :, None] * a[:, None, :] + b[:, :, None] * b[:, None, :]
         bent = (one * one * straight + one * (other + np.swapaxes(other, 1, 2))) * SAFE
         return cls(least, most, e, turn, side[:, :, None] * side[:, None, :], bent)
+
+
+def _middle(x: Ball) -> tuple[Floats, Floats, Floats]:
+    """Lengths, directions and directions beside them of the middles of balls of shape (p, 2)."""
+    length = np.linalg.norm(x.mid, axis=1)
+    e = x.mid / np.where(length > 0, length, 1.0)[:, None]
+    return length, e, np.column_stack([-e[:, 1], e[:, 0]])
 
 
 def middle_inverse(M: Ball) -> tuple[Floats, Floats] | None:

@@ -22,6 +22,7 @@ from enumsol.trusted.space.natural_map import (
     Corners,
     Directions,
     Discs,
+    Extent,
     Step,
     middle_inverse,
     split_off,
@@ -258,7 +259,7 @@ class AlphaProblem:
         """
         p, m = self.p, 3 * self.p
         near = Ball(z.mid, (z.rad + along.size * half + side) * SAFE)
-        plain = Discs(self.places, self.friction(near[m]), Ball.exact(self.F1))
+        plain = Discs(self.places, self.friction(near[m]), self.F1)
         F1 = Ball.exact(self.F1)
         with np.errstate(all="ignore"):
             at = Directions.of(plain.tangents(near[:m]))
@@ -561,17 +562,17 @@ class _Proven:
         """Bounds of the distances from c + t d of all solutions, of (z, alpha) there, and the operator for those."""
         with np.errstate(all="ignore"):
             near, half, step, shares, radius = self.near, self.near.half, self.step, self.shares, self.radius
-            wide = near.width(step, radius, shares)
             for _ in range(_IMAGES):
                 for _ in range(_IMAGES):
                     radius, shares = step.left(radius, shares, half), step.xi(radius, shares, half)
-                wide = np.minimum(wide, near.width(step, radius, shares))
+                extent = near.extent(radius, near.beside(step, shares))
+                wide = extent.near.rad
                 # the same solutions, whatever the shares are
                 radius = step.reach(radius, shares)
                 if not half:
                     # derivatives at a point are known but for rounding
                     return radius, wide, step
-                closer = near.step(wide)
+                closer = near.step(extent)
                 found = None if closer is None else closer.shares(radius, half)
                 if closer is None or found is None:
                     return radius, wide, step
@@ -582,8 +583,7 @@ class _Proven:
     def statuses(self) -> tuple[int | None, ...]:
         """Codes where a status holds strictly along all of the curve."""
         with np.errstate(all="ignore"):
-            z = self.near.along(self.spread[1])
-            return self.near.problem.statuses(z)
+            return self.near.problem.statuses(Ball(self.near.z.mid, self.spread[1]))
 
     @cached_property
     def slope(self) -> Array:
@@ -614,21 +614,22 @@ class _CurveMap:
         x = Ball.exact(self.c)
         self.alpha = x[-1]
         self.y = problem.forces_at(x)
-        self.z = problem.arguments(x, self.y, rho)
+        #: (z, alpha) there.
+        self.z = Ball.joined(problem.arguments(x, self.y, rho), x[-1:])
         self.zd = (self.Z @ Ball.exact(self.d)[:, None])[:, 0]
 
     # -- boxes -----------------------------------------------------------------------------------------------------
 
     def turned(self) -> float:
         """How far corners are from being too wide for the test: less than 1 where they are not."""
-        step = self.step(self.zd.size * self.half)
+        step = self.step(self.extent())
         if step is None or not np.all(np.isfinite(step.slopes)):
             return np.inf
         return float(np.max(np.abs(np.linalg.eigvals(step.slopes)), initial=0.0))
 
     def proposed(self, *, roomy: bool) -> SolutionCurve | None:
         """The curve in a box with radii of about what it needs, or as large as they may be."""
-        step = self.step(self.zd.size * self.half)
+        step = self.step(self.extent())
         for room in _ROOMS:
             radius = None if step is None else step.balanced(self.half, 1.0, room)
             if step is None or radius is None:
@@ -637,11 +638,11 @@ class _CurveMap:
             shares = step.shares(radius, self.half)
             if shares is None:
                 return None
-            wide = self.width(step, radius, shares)
-            found = self.mapped(radius, ERRORS, wide)
+            side = self.beside(step, shares)
+            found = self.mapped(radius, ERRORS, side)
             if found is not None:
                 break
-            step = self.step(wide)
+            step = self.step(self.extent(radius, side))
         else:
             return None
         if roomy:
@@ -656,56 +657,47 @@ class _CurveMap:
             CurveBox(self.c * unit, self.d * unit, self.e / unit, self.half, found.radius * unit, self.rho)
         )
 
-    def mapped(self, radius: Array, errors: float, wide: Array | None = None) -> _Proven | None:
+    def mapped(self, radius: Array, errors: float, side: Array | None = None) -> _Proven | None:
         """The operator around a box, if it maps sets that hold the box into their interiors.
 
-        ``wide``: bounds of what (z, alpha) are away there from those of c, if they are known.
+        ``side``: what (z, alpha) are farther away there from those of c than t d and b move them, if it is known.
         """
-        least = (self.zd.size * self.half + upper_product(self.Z.size, radius)) * SAFE
-        wide = least if wide is None else np.maximum(least, wide)
+        side = np.zeros(len(self.c)) if side is None else side
         for _ in range(_WIDENINGS):
-            step = self.step(wide)
+            step = self.step(self.extent(radius, side))
             shares = None if step is None else step.shares(radius, self.half)
             if step is None or shares is None:
                 return None
-            needed = self.width(step, radius, shares)
-            if np.all(needed <= wide):
+            needed = self.beside(step, shares)
+            if np.all(needed <= side):
                 proven = step.contracts(radius, shares, errors, self.half)
                 return _Proven(self, radius, step, shares) if proven else None
-            wide = np.maximum(wide, needed) * (1.0 + MARGIN)
+            side = np.maximum(side, needed) * (1.0 + MARGIN)
         return None
 
-    def width(self, step: Step, radius: Array, shares: Array) -> Array:
-        """Bounds of what (z, alpha) are away from those of c, for x = c + t d + G s + b."""
-        out = self.zd.size * self.half + upper_product(self.Z.size, radius)
-        if len(shares):
-            turned = (self.Z @ Ball.exact(step.G.mid)).size
-            out = out + upper_product(turned, shares)
-        return np.asarray(out * SAFE)
+    def extent(self, radius: Array | None = None, side: Array | None = None) -> Extent:
+        """All (z, alpha) at x = c + t d + b and no farther away from those than a side."""
+        nothing = np.zeros(len(self.c))
+        return Extent(
+            self.z, self.zd, self.half, self.Z, nothing if radius is None else radius, nothing if side is None else side
+        )
+
+    def beside(self, step: Step, shares: Array) -> Array:
+        """Bounds of what G s changes of (z, alpha)."""
+        if not len(shares):
+            return np.zeros(len(self.c))
+        return upper_product((self.Z @ Ball.exact(step.G.mid)).size, shares) * SAFE
 
     # -- the operator ----------------------------------------------------------------------------------------------
 
-    def along(self, wide: Array) -> Ball:
-        """(z, alpha) at all points that are no farther from that of c."""
-        z = Ball.joined(self.z, self.alpha[None])
-        return Ball(z.mid, (z.rad + wide) * SAFE)
-
-    def past(self, wide: Array) -> Ball:
-        """Bounds of |z_t| - F z_n at c + t d + b where ``wide`` bounds what both change of (z, alpha)."""
-        straight = self.zd.size * self.half
-        side = np.maximum(wide - straight, 0.0) + 4 * UNIT * (wide + straight)
-        return self.problem.past(Ball.joined(self.z, self.alpha[None]), self.zd, self.half, side)
-
-    def step(self, wide: Array) -> Step | None:
-        """Krawczyk's operator where (z, alpha) is no farther from that of c.
+    def step(self, extent: Extent) -> Step | None:
+        """Krawczyk's operator where (z, alpha) are in an extent.
 
         None where its middle matrix is singular or there is no bound of derivatives.
         """
         m = len(self.c) - 1
-        near = self.along(wide)
-        F1 = Ball.exact(self.problem.F1)
-        past = self.past(wide)
-        corners = Discs(self.problem.places, self.problem.friction(near[m]), F1).corners(near[:m], past)
+        near = extent.near
+        corners = Discs(self.problem.places, self.problem.friction(near[m]), self.problem.F1).corners(near[:m], extent)
         if corners is None:
             return None
         B = self._bordered(corners)
@@ -713,8 +705,9 @@ class _CurveMap:
         if found is None:
             return None
         Y, E = found
+        turned, turning = corners.turns.bounds(Y[:, :m], self.Z.mid, self.d)
         inverse = Ball.exact(Y)
-        at = Discs(self.problem.places, self.problem.friction(self.alpha), F1).projected(self.z)
+        at = Discs(self.problem.places, self.problem.friction(self.alpha), self.problem.F1).projected(self.z[:m])
         move = (inverse[:, :m] @ (at - self.y)[:, None])[:, 0]
         d = Ball.exact(self.d)[:, None]
         drift = (inverse @ (B @ d - Ball.exact(np.eye(m + 1)[:, m:])))[:, 0]
@@ -723,7 +716,10 @@ class _CurveMap:
         first, move = split_off(G, move)
         along, rest = split_off(G, drift)
         pushed = 0.5 * (V @ d)[:, 0].size if len(V.mid) else np.zeros(0)
-        return Step(move, E, G, V, Y, rest.size, first, (np.abs(along) + pushed) * SAFE)
+        drifts = (rest.size + turning) * SAFE
+        return Step(move, (E + turned) * SAFE, G, V, Y, drifts, first, (np.abs(along) + pushed) * SAFE)
 
     def _bordered(self, corners: Corners) -> Ball:
-        return Ball.joined(self.problem.part - corners.core @ self.Z, Ball.exact(self.e[None]))
+        B = self.problem.part - corners.still @ self.Z
+        # what turns is multiplied by the middle of Z
+        return Ball.joined(Ball(B.mid, (B.rad + corners.wide @ self.Z.rad) * SAFE), Ball.exact(self.e[None]))
