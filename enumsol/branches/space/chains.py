@@ -16,7 +16,7 @@ from enumsol.continuation.path_data import PathStatus
 from enumsol.errors import EnumsolError, Interrupted
 from enumsol.support.deadlines import TimeOverError, look, tell
 from enumsol.trusted.space.curve_chains import CurveChain, CurveLink, goes_on, link_between
-from enumsol.trusted.space.solution_curve import curve_around, curve_point
+from enumsol.trusted.space.solution_curve import corner_steps, curve_around, curve_point
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -31,8 +31,12 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 #: How much longer than the way between its joints a box is; the shortest way between two joints, relative to the
-#: length of a path's step; by how much the way grows.
-_LONGER, _SHORTEST, _GROWTH = 1.05, 1e-7, 2.0
+#: length of a path's step.
+_LONGER, _SHORTEST = 1.05, 1e-7
+#: By how much the way grows at most and shrinks at least, and how it shrinks where it was too long; which share of what
+#: seems possible is taken, and how that changes where a box fails and where it does not.
+_GROWTH, _SHRINK, _FAILED = 8.0, 0.5, 0.7
+_TRUST, _LESS, _MORE = 0.95, 0.85, 1.05
 #: The longest way from a corner to the ends of its box, likewise, and by how much it shrinks.
 _WIDEST, _NARROWER = 0.4, 0.3
 #: Joints this near to a point of the skeleton are put by this share of the way before it.
@@ -225,10 +229,12 @@ class ChainBuilder:
             if not 0 < corner < last:
                 continue
             share, start, proven = _WIDEST, None, None
+            steps: dict[tuple[int, ...], tuple[Array, float]] = {}
             while share > _SHORTEST:
                 look()
                 start = self.joint(*self._at(line, corner - share))
-                proven = None if start is None else self._link(line, corner - share, corner + share, start, None)
+                if start is not None:
+                    proven = self._link(line, corner - share, corner + share, start, None, steps=steps)
                 if proven is not None:
                     break
                 share *= _NARROWER
@@ -249,7 +255,7 @@ class ChainBuilder:
 
         ``known``: the joint there, if there is one; ``closed``: the skeleton is.
         """
-        way, failed = 1.0, False
+        way, trust, failed = 1.0, _TRUST, False
         while place < last:
             look()
             tell("steps along a curve", int(place), len(line) - 1)
@@ -263,14 +269,15 @@ class ChainBuilder:
             # that what a box at an end holds is beyond the interval is seen where alpha goes one way
             outer = not closed and (not links or further == len(line) - 1.0)
             if found is None or (outer and not found[0].curve.rises):
-                way, failed = 0.5 * (further - place), True
+                way = (_SHRINK if failed else _FAILED) * (further - place)
+                failed = True
                 if way < _SHORTEST:
                     return False
                 continue
             links.append(found[0])
             joints.append(found[1])
-            # what was too long a moment ago is not tried again at once
-            way = (further - place) * (1.0 if failed else _GROWTH)
+            trust = _LESS * trust if failed else min(_MORE * trust, _TRUST)
+            way = (further - place) * min(max(trust * found[0].curve.stretch, _SHRINK), _GROWTH)
             place, failed = further, False
         return True
 
@@ -313,8 +320,12 @@ class ChainBuilder:
         joint: SolutionCurve,
         former: CurveLink | None,
         end: SolutionCurve | None = None,
+        steps: dict[tuple[int, ...], tuple[Array, float]] | None = None,
     ) -> tuple[CurveLink, SolutionCurve] | None:
-        """A box from a joint to the one at another place of the skeleton, and that joint."""
+        """A box from a joint to the one at another place of the skeleton, and that joint.
+
+        ``steps``: those of the natural map at a corner, by the nodes that change, put in when they are known.
+        """
         x, ahead = self._at(line, further)
         border = self.across(ahead)
         near = curve_point(self.problem, x, border) if end is None else None
@@ -331,7 +342,10 @@ class ChainBuilder:
             return None
         changing = [i for i in range(self.problem.p) if joint.statuses[i] != after[i]]
         middle, half = start + 0.5 * chord, 0.5 * _LONGER * length
-        curve = curve_around(self.problem, middle, chord / length, across, half, changing)
+        nodes, steps = tuple(changing), {} if steps is None else steps
+        known = steps.get(nodes)
+        steps[nodes] = corner_steps(self.problem, middle, chord / length, across, half, changing, known)
+        curve = curve_around(self.problem, middle, chord / length, across, half, rho=steps[nodes][0])
         if curve is None:
             return None
         following = self._proven(near, border) if near is not None else end

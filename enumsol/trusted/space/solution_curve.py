@@ -48,13 +48,18 @@ ERRORS = 2.0
 #: What is proposed: how much more room the radii have than the curve seems to need, in the hope that this suffices for
 #: what the room itself adds; the least radius relative to the largest; and steps of Newton's method.
 _ROOMS, _LEAST, _STEPS = (1.2, 1.3, 1.5, 1.5, 1.5, 1.5, 1.5), 1e-3, 8
-#: Radii that are as large as they may be are sought between those that are needed and the box's length: shares of the
-#: logarithm.
-_SHARES = (1.0, 0.5, 0.25, 0.0)
+#: Of the radii with which the step seems to contract, what is tried first; and by how much larger than they need to be
+#: radii are at least that are as large as they may be.
+_OF_LIMIT, _TWICE = 0.8, 2.0
+#: Between both, shares of the logarithm that are tried.
+_SHARES = (1.0, 0.7, 0.4, 0.0)
+#: That a longer box has this room, too: (1 - e h)^2 / (k a) where the step contracts by e h + k r and moves by a.
+_ROOM = 5.0
 #: Loads whose exponents are larger have no unit of their own.
 _LARGEST = 200
-#: Factors of the steps of the natural map at a node that changes its status, and how wide corners may be without them.
-_TURNED = 0.5
+#: Factors of the steps of the natural map at a node that changes its status; how wide corners may be without them, and
+#: how much wider in a shorter box with those of a longer one.
+_TURNED, _AS_WIDE = 0.5, 1.05
 _FACTORS = (1.0, 4.0, 16.0, 64.0, 256.0, 0.25, 0.0625, 0.015625)
 
 
@@ -393,6 +398,21 @@ class SolutionCurve:
         return parameter_in(self.box, x)
 
     @property
+    def stretch(self) -> float:
+        """How much longer a box there may about be that is found as this one was; no claim."""
+        found = self.found
+        if not found.near.half:
+            return 1.0
+        radius, (spread, _, closer) = found.radius, found.spread
+        with np.errstate(all="ignore"):
+            whole, least = (float(np.max(step.E @ radius / radius)) for step in (found.step, closer))
+            share = float(np.max(spread / radius))
+            # the step contracts by e h + k r for boxes of length h and radius r
+            k = max((whole - least) / (1.0 - share), 0.0) if share < 1 else 0.0
+            most = 1.0 / (max(least - k * share, 0.0) + np.sqrt(_ROOM * k * share * max(1.0 - least, 0.0)))
+        return float(most) if most > 0 else 1.0
+
+    @property
     def rises(self) -> int:
         """The sign of d alpha / dt along all of the curve; 0 where it is not known, or changes."""
         low, high = self.slope.mid[-1] - self.slope.rad[-1] * SAFE, self.slope.mid[-1] + self.slope.rad[-1] * SAFE
@@ -454,6 +474,7 @@ def curve_around(
     half: float,
     changing: Sequence[int] = (),
     *,
+    rho: Array | None = None,
     roomy: bool = True,
 ) -> SolutionCurve | None:
     """The curve that runs near x, in a box that is proposed; as ``only_curve`` proves it with ``ERRORS``.
@@ -461,17 +482,41 @@ def curve_around(
     Parameters
     ----------
     changing : nodes whose status changes in the box
+    rho : steps of the natural map relative to those of the problem; ``corner_steps`` by default
     roomy : whether its radii are to be as large as they may be
     """
     with np.errstate(all="ignore"):
-        rho = np.ones(3 * problem.p)
+        steps = corner_steps(problem, x, direction, border, half, changing)[0] if rho is None else rho
+        return _CurveMap(problem, x, direction, border, half, steps).proposed(roomy=roomy)
+
+
+def corner_steps(
+    problem: AlphaProblem,
+    x: Array,
+    direction: Array,
+    border: Array,
+    half: float,
+    changing: Sequence[int],
+    known: tuple[Array, float] | None = None,
+) -> tuple[Array, float]:
+    """Steps for ``curve_around`` where nodes change their statuses, and how wide corners are with them.
+
+    ``known``: what is returned for a longer box around the same corner: mostly it serves for all of them.
+    """
+    rho, best = np.ones(3 * problem.p), 0.0
+    if not len(changing):
+        return rho, best
+    with np.errstate(all="ignore"):
 
         def turned(steps: Array) -> float:
             return _CurveMap(problem, x, direction, border, half, steps).turned()
 
+        if known is not None and known[1] < 1.0 and turned(known[0]) <= _AS_WIDE * known[1]:
+            return known
+        best = turned(rho)
         # all nodes alike, then each of them by itself
         for nodes in [changing, *([[i] for i in changing] if len(changing) > 1 else [])]:
-            if not len(nodes) or turned(rho) < _TURNED:
+            if best < _TURNED:
                 continue
             tau = [int(t) for i in nodes for t in problem.tau[i]]
             found: list[tuple[float, Array]] = []
@@ -480,8 +525,8 @@ def curve_around(
                     other = rho.copy()
                     other[places] *= factor
                     found.append((turned(other), other))
-            rho = min(found, key=lambda pair: pair[0])[1]
-        return _CurveMap(problem, x, direction, border, half, rho).proposed(roomy=roomy)
+            best, rho = min(found, key=lambda pair: pair[0])
+        return rho, best
 
 
 @dataclass(frozen=True, eq=False)
@@ -629,7 +674,8 @@ class _CurveMap:
 
     def proposed(self, *, roomy: bool) -> SolutionCurve | None:
         """The curve in a box with radii of about what it needs, or as large as they may be."""
-        step = self.step(self.extent())
+        step = straight = self.step(self.extent())
+        found = None
         for room in _ROOMS:
             radius = None if step is None else step.balanced(self.half, 1.0, room)
             if step is None or radius is None:
@@ -638,17 +684,14 @@ class _CurveMap:
             shares = step.shares(radius, self.half)
             if shares is None:
                 return None
-            side = self.beside(step, shares)
-            found = self.mapped(radius, ERRORS, side)
+            step, found = self.tried(radius, ERRORS, self.beside(step, shares))
             if found is not None:
                 break
-            step = self.step(self.extent(radius, side))
-        else:
+        if found is None or straight is None:
             return None
         if roomy:
             # parts of the curve are to have room beside it
-            most = float(np.max(np.abs(self.d))) * self.half / float(np.max(radius))
-            larger = (self.mapped(max(2.0, most**share) * radius, ERRORS) for share in _SHARES)
+            larger = (self.mapped(factor * found.radius, ERRORS) for factor in self._factors(straight, found))
             found = next((one for one in larger if one is not None), None)
         if found is None:
             return None
@@ -657,23 +700,39 @@ class _CurveMap:
             CurveBox(self.c * unit, self.d * unit, self.e / unit, self.half, found.radius * unit, self.rho)
         )
 
-    def mapped(self, radius: Array, errors: float, side: Array | None = None) -> _Proven | None:
-        """The operator around a box, if it maps sets that hold the box into their interiors.
+    def _factors(self, straight: Step, found: _Proven) -> list[float]:
+        """By what a radius is multiplied, the first one with which the step may still contract."""
+        radius = found.radius
+        most = float(np.max(np.abs(self.d))) * self.half / float(np.max(radius))
+        none, once = (float(np.max(step.E @ radius / radius)) for step in (straight, found.step))
+        moved = float(np.max((straight.move.size + straight.drift * self.half) / radius))
+        # it contracts by e + k r; the larger r at which what it leaves is r
+        k, free = max(once - none, 0.0), max(1.0 - none, 0.0)
+        limit = (free + np.sqrt(max(free * free - 4.0 * k * moved, 0.0))) / (2.0 * k) if k > 0 else np.inf
+        most = max(min(most, _OF_LIMIT * float(limit)), _TWICE)
+        return [_TWICE * (most / _TWICE) ** share for share in (_SHARES if most > _TWICE else _SHARES[-1:])]
 
-        ``side``: what (z, alpha) are farther away there from those of c than t d and b move them, if it is known.
+    def mapped(self, radius: Array, errors: float) -> _Proven | None:
+        """The operator around a box, if it maps sets that hold the box into their interiors."""
+        return self.tried(radius, errors, np.zeros(len(self.c)))[1]
+
+    def tried(self, radius: Array, errors: float, side: Array) -> tuple[Step | None, _Proven | None]:
+        """The operator around a box, and what it proves, if it does.
+
+        ``side``: what (z, alpha) are farther away there from those of c than t d and b move them, as far as is known.
         """
-        side = np.zeros(len(self.c)) if side is None else side
+        step = None
         for _ in range(_WIDENINGS):
             step = self.step(self.extent(radius, side))
             shares = None if step is None else step.shares(radius, self.half)
             if step is None or shares is None:
-                return None
+                return step, None
             needed = self.beside(step, shares)
             if np.all(needed <= side):
                 proven = step.contracts(radius, shares, errors, self.half)
-                return _Proven(self, radius, step, shares) if proven else None
+                return step, _Proven(self, radius, step, shares) if proven else None
             side = np.maximum(side, needed) * (1.0 + MARGIN)
-        return None
+        return step, None
 
     def extent(self, radius: Array | None = None, side: Array | None = None) -> Extent:
         """All (z, alpha) at x = c + t d + b and no farther away from those than a side."""
