@@ -39,9 +39,12 @@ def slides(parts: CurveParts, codes: Codes) -> Mask:
 
 def beside(parts: CurveParts, codes: Codes, centre: Floats, angle: Floats | float, radius: Floats) -> NDArray[np.intp]:
     """Which parts of a curve have the statuses of a leaf, and directions within angles from those at its middle."""
-    theta = parts.thetas[0][:, _turning(codes)]
+    there = np.flatnonzero(slides(parts, codes))
+    if not len(there):
+        return there
+    theta = parts.thetas[0][there][:, _turning(codes)]
     turned = np.arctan2(centre[:, 0] * theta[:, :, 1] - centre[:, 1] * theta[:, :, 0], np.sum(centre * theta, axis=2))
-    return np.flatnonzero(slides(parts, codes) & np.all(np.abs(turned - angle) < radius, axis=1))
+    return there[np.all(np.abs(turned - angle) < radius, axis=1)]
 
 
 def points_on(arc: LeafArc, known: KnownCurve, parts: CurveParts, codes: Codes) -> list[tuple[Fraction, Codes]]:

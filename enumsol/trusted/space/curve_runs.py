@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
     Flags = NDArray[np.bool_]
 
-#: Parts of a run at least, and for every link; how often parts are halved at most.
-_PARTS, _OF_LINK, _HALVINGS = 64, 4, 60
+#: Parts of a run at least, and for every link that comes to the piece; into how many a part is cut at most; how often.
+_PARTS, _OF_LINK, _CUT, _CUTS = 64, 4, 64, 24
 
 
 class Run(NamedTuple):
@@ -207,19 +207,23 @@ class KnownCurve:
         """The part of a run with alphas in a piece, in parts in its order; none where it does not come there."""
         links, places = self._links, self.places(run)
         assert places is not None
-        where, t, wanted = places, links.t[places], max(_PARTS, _OF_LINK * len(places))
+        where, t, wanted = places, links.t[places], _PARTS
         least, most = (float(np.nextafter(float(x), y)) for x, y in ((low, -np.inf), (high, np.inf)))
-        for _ in range(_HALVINGS):
+        for k in range(_CUTS):
             alpha = self._alphas(where, t)
             # what overflows is not known to be beyond the piece, and stays
             beyond = (alpha.mid + alpha.rad * SAFE < least) | (alpha.mid - alpha.rad * SAFE > most)
             where, t, alpha = where[~beyond], t[~beyond], alpha[~beyond]
+            wanted = wanted if k else max(_PARTS, _OF_LINK * len(where))
             if len(where) >= wanted or not len(where):
                 break
-            half = 0.5 * t.rad
-            rad = half * SAFE + 2 * UNIT * np.abs(t.mid)
-            t = Ball(np.concatenate([t.mid - half, t.mid + half]), np.concatenate([rad, rad]))
-            where = np.concatenate([where, where])
+            # a power of two
+            count = min(1 << (-(-wanted // len(where)) - 1).bit_length(), _CUT)
+            shares = (2.0 * np.arange(count) + 1.0) / count - 1.0
+            mid = (t.mid[:, None] + shares * t.rad[:, None]).ravel()
+            # of the sum and of the product
+            rad = np.repeat(t.rad / count * SAFE + 2 * UNIT * (np.abs(t.mid) + t.rad), count)
+            t, where = Ball(mid, rad), np.repeat(where, count)
         order = np.lexsort((t.mid, np.argsort(places)[np.searchsorted(np.sort(places), where)]))
         where, t = where[order], t[order]
         alpha = self._alphas(where, t)
