@@ -245,9 +245,8 @@ class _Slips:
         self.change = np.zeros(p) if discs.slope is None else discs.slope
         tangent = discs.tangents(self.z)
         self.length, self.e, self.side = _middle(tangent)
-        rows = np.zeros((p, 4, 4))
-        rows[:, 0, 1:3], rows[:, 1, 1:3], rows[:, 2, 0], rows[:, 3, 3] = self.e, self.side, 1.0, 1.0
-        self.rates, self.rest = extent.products(rows, self.places)
+        self.rows = self._rows()
+        self.rates, self.rest = extent.products(self.rows, self.places)
         away = self._most(self.rates, self.rest)
         self.at = Directions.of(tangent, away[:, :2])
         self.wide = np.append(self.z.rad, 0.0)[self.places]
@@ -258,13 +257,26 @@ class _Slips:
     def _most(self, rates: Floats, rest: Floats) -> Floats:
         return np.asarray((np.abs(rates) * self.extent.half + rest) * SAFE)
 
+    def _rows(self) -> Floats:
+        """By which z and the argument of F are multiplied, (p, 6, 4), for what changes with them.
+
+        z_t along its direction in the middle and beside it, z_n, the argument of F, |z_t| - F z_n and F z_n / |z_t|.
+        """
+        p, F, change = len(self.e), self.discs.F.mid, self.change
+        normal, length = self.z.mid[:p], np.where(self.length > 0, self.length, 1.0)
+        rows = np.zeros((p, 6, 4))
+        rows[:, 0, 1:3], rows[:, 1, 1:3], rows[:, 2, 0], rows[:, 3, 3] = self.e, self.side, 1.0, 1.0
+        rows[:, 4] = np.column_stack([-F, self.e, -change * normal])
+        beta = F * normal / length
+        rows[:, 5] = np.column_stack([F, -beta[:, None] * self.e, change * normal]) / length[:, None]
+        return rows
+
     def _gap(self) -> Ball:
         at, F, normal, change = self.at, self.discs.F, self.z.mid[: len(self.e)], self.change
-        row = np.column_stack([-F.mid, self.e, -change * normal])
-        off = np.column_stack([F.rad, at.turn, np.abs(change) * self.wide[:, 0]]) + 8 * UNIT * np.abs(row)
-        rates, rest = self.extent.products(row[:, None], self.places)
+        off = np.column_stack([F.rad, at.turn, np.abs(change) * self.wide[:, 0]]) + 8 * UNIT * np.abs(self.rows[:, 4])
         disc = F.mid * normal
-        rad = self._most(rates, rest)[:, 0] + upper_sum(off * self.wide, axis=1) + self.rounded * np.abs(normal)
+        rad = self._most(self.rates[:, 4], self.rest[:, 4])
+        rad = rad + upper_sum(off * self.wide, axis=1) + self.rounded * np.abs(normal)
         rad = (rad + 16 * UNIT * (self.length + np.abs(disc))) * SAFE
         known = (at.least > 0) & (F.mid > F.rad * SAFE) & np.isfinite(rad)
         return Ball(np.where(known, self.length - disc, 0.0), np.where(known, rad, np.inf))
@@ -284,7 +296,6 @@ class _Slips:
         beta = F * normal / length
         off = np.maximum(np.maximum(high - beta, beta - low), 0.0) + 16 * UNIT * np.abs(beta)
         size, F_size = np.maximum(np.abs(low), np.abs(high)), np.abs(F) + F_rad
-        row = np.column_stack([F, -beta[:, None] * e, change * normal]) / length[:, None]
         more = np.column_stack(
             [
                 (F_rad + F_size * bent),
@@ -292,16 +303,15 @@ class _Slips:
                 np.abs(change) * (wide[:, 0] + np.abs(normal) * bent),
             ]
         )
-        own, rest = self.extent.products(row[:, None], self.places[k])
-        lost = upper_sum((more / length[:, None] + 16 * UNIT * np.abs(row)) * wide, axis=1)
+        lost = upper_sum((more / length[:, None] + 16 * UNIT * np.abs(self.rows[k, 5])) * wide, axis=1)
         lost = lost + 32 * UNIT * np.abs(beta) + self.rounded[k] * np.abs(normal) / length
         turned = self.rates[k, 1] / length
         beside = self.rest[k, 1] / least + (bent + 8 * UNIT) * np.abs(turned) * half + 32 * UNIT
-        rates = np.column_stack([turned, own[:, 0], change * self.rates[k, 3], self.rates[k, 2]])
+        rates = np.column_stack([turned, self.rates[k, 5], change * self.rates[k, 3], self.rates[k, 2]])
         rests = np.column_stack(
             [
                 beside,
-                rest[:, 0] + lost,
+                self.rest[k, 5] + lost,
                 np.abs(change) * self.rest[k, 3] + self.rounded[k],
                 self.rest[k, 2],
             ]

@@ -766,17 +766,26 @@ class _CurveMap:
         Y, E = found
         turned, turning = corners.turns.bounds(Y[:, :m], self.Z.mid, self.d)
         inverse = Ball.exact(Y)
-        at = Discs(self.problem.places, self.problem.friction(self.alpha), self.problem.F1).projected(self.z[:m])
-        move = (inverse[:, :m] @ (at - self.y)[:, None])[:, 0]
+        move = (inverse[:, :m] @ self._moved[:, None])[:, 0]
         d = Ball.exact(self.d)[:, None]
         drift = (inverse @ (B @ d - Ball.exact(np.eye(m + 1)[:, m:])))[:, 0]
+        if not corners.u.shape[1]:
+            none = np.zeros(0)
+            G, V = Ball.exact(np.zeros((m + 1, 0))), Ball.exact(np.zeros((0, m + 1)))
+            return Step(move, (E + turned) * SAFE, G, V, Y, (drift.size + turning) * SAFE, none, none)
         G, V = inverse[:, :m] @ Ball.exact(corners.u), Ball.exact(corners.v.T) @ self.Z
         # what goes along the columns of G is a matter of the shares
         first, move = split_off(G, move)
         along, rest = split_off(G, drift)
-        pushed = 0.5 * (V @ d)[:, 0].size if len(V.mid) else np.zeros(0)
+        pushed = 0.5 * (V @ d)[:, 0].size
         drifts = (rest.size + turning) * SAFE
         return Step(move, (E + turned) * SAFE, G, V, Y, drifts, first, (np.abs(along) + pushed) * SAFE)
+
+    @cached_property
+    def _moved(self) -> Ball:
+        """-N(c)."""
+        discs = Discs(self.problem.places, self.problem.friction(self.alpha), self.problem.F1)
+        return discs.projected(self.z[:-1]) - self.y
 
     def _bordered(self, corners: Corners) -> Ball:
         B = self.problem.part - corners.still @ self.Z
