@@ -203,7 +203,7 @@ def check_part(part, whole):
 @pytest.mark.few(1)
 @pytest.mark.parametrize(
     ("where", "call"),
-    [(chains, 20), (pieces, 20), (chains, 5), (pieces, 4)],
+    [(chains, 20), (pieces, 8), (chains, 2), (pieces, 2)],
     ids=["second curve", "its arcs", "first curve", "arcs"],
 )
 @pytest.mark.parametrize("over", [TimeOverError, KeyboardInterrupt])
