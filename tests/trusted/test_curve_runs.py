@@ -16,6 +16,7 @@ from enumsol.branches.space.cover import SpaceCover
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.search.space.piece_certificates import runs_over
 from enumsol.search.space.piece_tree import _Examined
+from enumsol.trusted.space import curve_runs
 from enumsol.trusted.space.curve_runs import KnownCurve, Run
 from enumsol.trusted.space.piece_forms import PieceWeights, how_far_off
 from enumsol.trusted.space.pieces import AlphaPiece
@@ -95,6 +96,19 @@ def test_parts_of_a_run_hold_a_solution_at_every_alpha(p, seed):
                             tested += known_theta
                     assert any(held)
     assert tested or (p, seed) != (1, 1)
+
+
+def test_parts_are_as_many_as_the_links_that_come_to_a_piece_ask_for(monkeypatch):
+    monkeypatch.setattr(curve_runs, "_OF_LINK", 64)
+    _, (known, *_) = known_curves(1, 1)
+    low, high = PIECES[1]
+    (run,) = runs_over(known, low, high)
+    whole = Run(1, len(known.chain.links) - 1)
+    assert run.first == run.last < whole.last
+    several, one = known.over(whole, low, high), known.over(run, low, high)
+    assert 64 <= len(one.links) < 128
+    assert np.array_equal(several.links, one.links)
+    assert np.array_equal(several.t.mid, one.t.mid)
 
 
 @pytest.mark.parametrize(("p", "seed"), PROBLEMS)

@@ -125,3 +125,21 @@ def test_derivatives_of_nodes_that_slip_turn_as_their_rates_say(seed):
         lost = np.abs(Y) @ (found.still.rad + 1e-7) @ np.abs(Z)
         assert np.all(np.abs(Y @ D @ Z) <= most + lost)
         assert np.all(np.abs(Y @ D @ Z @ d) <= most_along + lost @ np.abs(d))
+
+
+def test_a_ratio_whose_changes_cancel_is_known_to_second_order():
+    # friction grows as much as the normal force falls: F z_n = (1 + t) (1 - t), and |z_t| does not change
+    half = 0.01
+    extent = Extent(
+        Ball.exact(np.array([1.0, 2.0, 0.0, 0.0])),
+        Ball.exact(np.array([-1.0, 0.0, 0.0, 1.0])),
+        half,
+        Ball.exact(np.zeros((4, 0))),
+        np.zeros(0),
+        np.zeros(4),
+    )
+    F = Ball.exact(np.ones(1)) + extent.near[3:]
+    turns = Discs(np.array([[1, 2]]), F, np.ones(1)).corners(extent.near[:3], extent).turns
+    assert abs(turns.rates[0, 1]) <= 1e-15
+    # by itself each of the two changes the ratio by 0.005
+    assert turns.rest[0, 1] <= 4 * half**2

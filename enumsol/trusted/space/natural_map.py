@@ -306,7 +306,7 @@ class _Slips:
         lost = upper_sum((more / length[:, None] + 16 * UNIT * np.abs(self.rows[k, 5])) * wide, axis=1)
         lost = lost + 32 * UNIT * np.abs(beta) + self.rounded[k] * np.abs(normal) / length
         turned = self.rates[k, 1] / length
-        beside = self.rest[k, 1] / least + (bent + 8 * UNIT) * np.abs(turned) * half + 32 * UNIT
+        beside = self.rest[k, 1] / least + (bent + 8 * UNIT) * np.abs(turned) * half + 32 * UNIT * (1.0 + bent)
         rates = np.column_stack([turned, self.rates[k, 5], change * self.rates[k, 3], self.rates[k, 2]])
         rests = np.column_stack(
             [
