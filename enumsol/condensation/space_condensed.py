@@ -20,6 +20,8 @@ from enumsol.condensation.floating import FloatingSystem, RigidRows
 from enumsol.errors import InvalidProblemError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.support.array_types import Floats, Indices, Mask
 

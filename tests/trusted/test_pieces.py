@@ -167,6 +167,35 @@ def test_second_derivatives_over_a_piece_hold_differences(p, seed):
                 assert np.all(np.abs(second.mid[:, j, k] - mean) <= second.rad[:, j, k] + lost)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_values_and_slopes_over_a_piece_hold_those_at_its_alphas(seed):
+    problem, rng, seen = changing_problem(2, seed), np.random.default_rng([7, seed]), 0
+    for length in (Fraction(1, 4), Fraction(1, 16), Fraction(1, 256)):
+        piece = piece_of(problem, LOW, LOW + length)
+        for _ in range(8):
+            leaf = Leaf(piece.whole, [SECTORS + int(rng.integers(64, 512)) for _ in range(2)])
+            angle, radius = rng.uniform(-0.5, 0.5, 2) * leaf.half, leaf.half * 10.0 ** -rng.uniform(0, 4)
+            state = leaf._state(angle, radius)
+            if state is None:
+                continue
+            seen += 1
+
+            def at(psi, s, leaf=leaf, piece=piece):
+                alpha = piece.middle + Fraction(float(s)) * (piece.high - piece.low) / 2
+                return Leaf(piece.space.at(alpha), leaf.codes)._state(psi, np.zeros(2))
+
+            for s in (-1.0, rng.uniform(-1, 1), 1.0):
+                psi = angle + 0.999 * radius * rng.choice([-1.0, 1.0, rng.uniform(-1, 1)], 2)
+                there = at(psi, s)
+                for over, point in zip(state[:4], there[:4], strict=True):
+                    assert np.all(np.abs(over.mid - point.mid) <= over.rad + 1e-12 * (1.0 + np.abs(point.mid)))
+                ends = max(s - 0.02, -1.0), min(s + 0.02, 1.0)
+                rate = (at(psi, ends[1]).G.mid - at(psi, ends[0]).G.mid) / (ends[1] - ends[0])
+                lost = 1e-12 * (1.0 + np.max(np.abs(there.G.mid)))
+                assert np.all(np.abs(state.G_turn.mid - rate) <= state.G_turn.rad + lost)
+    assert seen > 8
+
+
 def test_what_lies_in_several_boxes_lies_along_their_curve():
     """Between two points of a curve are the boxes between them, and no fewer."""
     given, interval = AlphaProblem.of(SLIDING.enclosure), (Fraction(2, 5), Fraction(3, 5))

@@ -98,9 +98,7 @@ def simplest(low: Fraction, high: Fraction) -> Fraction:
         step /= 2
 
 
-def served(
-    piece: AlphaPiece, alpha: Fraction, rows: Sequence[Row], values: Floats
-) -> tuple[Fraction, Fraction] | None:
+def served(piece: AlphaPiece, alpha: Fraction, rows: Sequence[Row], values: Floats) -> tuple[Fraction, Fraction] | None:
     """The part of a piece, around one alpha of it, at which multipliers seem to exclude; None if there is none.
 
     The bound (12.21) is a concave square in alpha.

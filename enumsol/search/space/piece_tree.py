@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from enumsol.relaxation.space_relaxation import SpaceRelaxation
     from enumsol.selections.solution import Codes
     from enumsol.trusted.space.curve_chains import CurveChain
-    from enumsol.trusted.space.sector_rows import Row
     from enumsol.trusted.space.solution_curve import SolutionCurve
 
     Array = NDArray[np.float64]
@@ -268,10 +267,12 @@ class PieceTree:
         return np.asarray((along <= self._h[boxes]) & np.all(beside <= self._b[boxes], axis=1))
 
     def _examined(self, low: Fraction, high: Fraction) -> _Examined:
-        return _kept(self._pieces, (low, high), lambda: _Examined(AlphaPiece(self._space, low, high)))
+        found: _Examined = _kept(self._pieces, (low, high), lambda: _Examined(AlphaPiece(self._space, low, high)))
+        return found
 
     def _point(self, alpha: Fraction) -> AlphaPoint:
-        return _kept(self._points, alpha, lambda: AlphaPoint(self._space, alpha))
+        found: AlphaPoint = _kept(self._points, alpha, lambda: AlphaPoint(self._space, alpha))
+        return found
 
     def run(self, spread: Callable[[PieceTree, list[Waiting]], object] | None = None) -> None:
         """Search the tree; ``spread`` takes the place of ``examined`` for what waits after some nodes.
@@ -387,7 +388,11 @@ class PieceTree:
             if both is not None and piece.margin(codes, rows, both, _COUNTED) > 0:
                 used = np.flatnonzero(both)
                 return ExcludedInSpace([rows[k] for k in used], both[used]), []
-        if part in (None, (piece.low, piece.high)) or cuts >= _CUTS or part[1] - part[0] < _USEFUL * (piece.high - piece.low):
+        if (
+            part in (None, (piece.low, piece.high))
+            or cuts >= _CUTS
+            or part[1] - part[0] < _USEFUL * (piece.high - piece.low)
+        ):
             return None
         # first what is below, then what is above
         alpha = part[0] if part[0] > piece.low else part[1]

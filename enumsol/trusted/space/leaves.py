@@ -679,9 +679,7 @@ class Leaf:
         second[:, :q, :q], second[:, :q, q], second[:, q, :q], second[:, q, q] = bends, mixed, mixed, w.twice()
         return second
 
-    def _curved(
-        self, Y: Floats, over: tuple[State, State], angle: Floats, radius: Floats
-    ) -> tuple[Combined, Ball]:
+    def _curved(self, Y: Floats, over: tuple[State, State], angle: Floats, radius: Floats) -> tuple[Combined, Ball]:
         """What Y G takes of w for directions that are held, and Y times the second derivatives of G, (q, q, q)."""
         (state, point), (d, turned), own = over, self._directions(angle, radius), np.arange(len(angle))
         # v_i1 d_i2 - v_i2 d_i1
@@ -689,7 +687,7 @@ class Leaf:
         scale = Ball.exact(Y), Ball.exact(self.slip_scale)
         for k, part in enumerate((d[:, 1], -d[:, 0])):
             rows[:, self.t[:, k]] = scale[0] * (scale[1][:, k] * part)
-        w = state.box.combined(rows, point.box, radius[: len(own)], 1.0)
+        w = state.box.combined(rows, point.box, radius[: len(own)])
         bends = w.bends()
         # psi_i turns d_i itself, in both orders, and d_i'' = -d_i
         (dv1, dv2), (v1, v2) = (self._slips(part) for part in (state.box.dw, state.box.w))

@@ -88,8 +88,8 @@ class Box:
         """Derivatives of w with respect to the free unknowns."""
         return self.lone[len(self.w.mid) :]
 
-    def combined(self, rows: Ball, point: Box, radius: Floats, swept: float) -> Combined:
-        """Rows times w: what is known over the box, given what is known in its middle.
+    def combined(self, rows: Ball, point: Box, radius: Floats) -> Combined:
+        """Rows times w over the box, with what is known in its middle.
 
         Combined first and bounded then, so that what cancels in the middle does so over the box, too.
 
@@ -99,15 +99,22 @@ class Box:
         point : the middle
         radius : (q,) array
             Of the box.
-        swept : how far s goes, over a piece of alpha
         """
-        q = len(self.x.mid)
-        over, middle = (
-            tuple(Ball.joined(part[:q], rows @ part[-len(self.w.mid) :]) for part in (box.pushed, box.led))
-            for box in (self, point)
-        )
-        by_alpha = None if self.share is None else grown_share(self.share).size * swept
-        across, along = (part[q:] for part in _nearer(over, middle, radius, by_alpha))
+        swept = np.zeros_like(radius) if self.share is None else grown_share(self.share).size
+        z, t = (part[: len(radius)].size for part in (self.pushed, self.led))
+        across, along = (rows @ part for part in (self.across, self.along))
+        middle = tuple(rows @ part for part in (point.across, point.along))
+        more = (1.0 + gamma(2 * len(radius) + 8)) * SAFE
+        for _ in range(_ROUNDS):
+            # by (12.4a), and with g = share / (1 + s share), whose bounds are ``swept``,
+            # dp_j / ds = p_j g_j - sum q_k g_k z_kj, and the same for q with t in place of z
+            p, q = across.size, along.size
+            turned, led = p * radius, q * swept
+            moves = turned @ z + q * radius + p * swept + led @ z, turned @ t + turned + led + led @ t
+            across, along = (
+                smaller(part, Ball(near.mid, (near.rad + by * more) * SAFE + TINY))
+                for part, near, by in zip((across, along), middle, moves, strict=True)
+            )
         return Combined(self, across, along)
 
 
@@ -342,9 +349,10 @@ class Turning:
                 lag = shift if self.share is None else shift + (straight @ (share * x)[:, None])
                 x = smaller(x, point.x - (moves + lag @ beside if len(free.mid) else moves)[:, 0])
         pushed, led = Ball.joined(z, push - moved @ z), Ball.joined(straight, ahead - moved @ straight)
-        (z, across), (straight, along) = ((part[:q], part[q:]) for part in (pushed, led))
         lag = shift if self.share is None else shift + straight @ (share * x)[:, None]
-        value, slope, lone = start + (moved @ x[:, None])[:, 0], across * x, lone - moved @ shift
+        value, slope, lone = start + (moved @ x[:, None])[:, 0], pushed[q:] * x, lone - moved @ shift
+        if self.share is not None:
+            lone = lone + led[q:] @ (share * x)[:, None]
         if point is not None:
             moves = slope @ span
             moves = moves + lone @ beside if len(free.mid) else moves
@@ -358,35 +366,6 @@ def grown_share(share: Ball) -> Ball:
     """share / (1 + s share) for all s from -1 to 1."""
     size = share.size
     return Ball(share.mid, (share.rad + size * size / np.where(size < 1, 1.0 - size, 0.0)) * SAFE)
-
-
-def _nearer(
-    over: tuple[Ball, Ball], point: tuple[Ball, Ball], radius: Floats, swept: Floats | None
-) -> tuple[Ball, Ball]:
-    """``pushed`` and ``led`` over a box by their derivatives, from those in its middle, where that is nearer.
-
-    With p and l for them, z for the first rows of p, t for those of l and g = share / (1 + s share):
-
-        dp_j / dpsi_k = -p_k z_kj (and -l_k where j = k),   dp_j / ds = p_j g_j - sum l_k g_k z_kj,
-        dl_j / dpsi_k = -p_k t_kj (and +p_k where j = k),   dl_j / ds = l_j g_j - sum l_k g_k t_kj.
-
-    ``swept``: bounds of g s.
-    """
-    q = len(radius)
-    more = (1.0 + gamma(q + 4)) * SAFE
-    for _ in range(_ROUNDS):
-        p, t = (part.size for part in over)
-        both = np.hstack([p[:q], t[:q]])
-        turned = p * radius
-        moves = turned @ both + np.hstack([t * radius, turned])
-        if swept is not None:
-            moves += np.hstack([p * swept, t * swept]) + (t * swept) @ both
-        moves = moves * more * SAFE + TINY
-        over = tuple(
-            smaller(part, Ball(middle.mid, (middle.rad + by) * SAFE))
-            for part, middle, by in zip(over, point, (moves[:, :q], moves[:, q:]), strict=True)
-        )
-    return over
 
 
 def _quotient_error(one: Ball, other: Ball) -> Floats:
