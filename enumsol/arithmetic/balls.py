@@ -19,7 +19,14 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from enumsol.arithmetic._balls import Pair
+
     Array = NDArray[np.float64]
+else:
+    try:
+        from enumsol.arithmetic._balls import Pair
+    except ImportError:
+        from enumsol.arithmetic.plain_pairs import Pair
 
 #: Unit roundoff of double arithmetic.
 UNIT = 2.0**-53
@@ -39,7 +46,7 @@ def gamma(k: int) -> float:
 def upper_sum(values: Array, axis: int | None = None) -> Any:
     """Upper bound of a sum of nonnegative floats."""
     count = values.size if axis is None else values.shape[axis]
-    return np.sum(values, axis=axis) * (1.0 + gamma(count + 2)) * SAFE + TINY
+    return np.add.reduce(values, axis=axis) * (1.0 + gamma(count + 2)) * SAFE + TINY
 
 
 def upper_norm(values: Array, axis: int | None = None) -> Any:
@@ -215,17 +222,19 @@ _LONG = float(np.finfo(np.longdouble).eps)
 _LARGEST_CONTRACTION, _POWER_STEPS = 0.95, 6
 
 
-@dataclass(frozen=True)
-class Ball:
-    """An array with radii; every operation gives a ball that holds all results."""
+class Ball(Pair):
+    """An array with radii; every operation gives a ball that holds all results. It is not to be given other arrays.
 
-    mid: Array
-    rad: Array
+    On small arrays of doubles the compiled `Pair` does it, and to the last bit as the numpy code here does.
+    """
 
-    @classmethod
-    def exact(cls, mid: Array) -> Ball:
-        """No radius."""
-        return cls(np.asarray(mid), np.zeros_like(np.asarray(mid)))
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return f"Ball(mid={self.mid!r}, rad={self.rad!r})"
+
+    def __reduce__(self) -> tuple[type[Ball], tuple[Array, Array]]:
+        return Ball, (self.mid, self.rad)
 
     @classmethod
     def joined(cls, *parts: Ball) -> Ball:
@@ -237,30 +246,27 @@ class Ball:
         """One to the right of the other, (n, m)."""
         return cls(np.hstack([part.mid for part in parts]), np.hstack([part.rad for part in parts]))
 
-    def __matmul__(self, other: Ball) -> Ball:
+    def _matrix_multiplied(self, other: Ball) -> Ball:
         k = gamma(self.mid.shape[-1] + 4)
         left, right = np.abs(self.mid), np.abs(other.mid)
         rad = self.rad @ (right + other.rad) + left @ other.rad + k * (left @ right)
         return Ball(self.mid @ other.mid, rad * (1.0 + k) * SAFE + TINY)
 
-    def __add__(self, other: Ball) -> Ball:
+    def _added(self, other: Ball) -> Ball:
         mid = self.mid + other.mid
         return Ball(mid, (self.rad + other.rad + 2 * UNIT * np.abs(mid)) * SAFE + TINY)
 
-    def __sub__(self, other: Ball) -> Ball:
+    def _subtracted(self, other: Ball) -> Ball:
         mid = self.mid - other.mid
         return Ball(mid, (self.rad + other.rad + 2 * UNIT * np.abs(mid)) * SAFE + TINY)
 
     def __neg__(self) -> Ball:
         return Ball(-self.mid, self.rad)
 
-    def __mul__(self, other: Ball) -> Ball:
+    def _multiplied(self, other: Ball) -> Ball:
         mid = self.mid * other.mid
         rad = np.abs(self.mid) * other.rad + self.rad * (np.abs(other.mid) + other.rad) + 2 * UNIT * np.abs(mid)
         return Ball(mid, rad * SAFE + TINY)
-
-    def __getitem__(self, item: Any) -> Ball:
-        return Ball(self.mid[item], self.rad[item])
 
     def __setitem__(self, item: Any, value: Any) -> None:
         """Put in a ball, or what is exact."""
@@ -277,14 +283,7 @@ class Ball:
         """Number of axes."""
         return self.mid.ndim
 
-    @property
-    def T(self) -> Ball:  # noqa: N802 (as of an array)
-        """The transpose."""
-        return Ball(self.mid.T, self.rad.T)
-
-    @property
-    def size(self) -> Array:
-        """Largest absolute values."""
+    def _sized(self) -> Array:
         return np.asarray((np.abs(self.mid) + self.rad) * SAFE)
 
     @property

@@ -22,7 +22,8 @@ What checker and search share
     - ``trusted.status_rows``: the codes, the rows and the branchings that cover, on which writer and reader have to
       agree;
     - ``condensation.products``, ``condensation.enclosure`` and ``arithmetic.balls``: balls for S, g and F, the
-      proofs that A and S are positive definite, and linear systems of balls;
+      proofs that A and S are positive definite, and linear systems of balls, on small arrays with the compiled
+      operations of ``arithmetic._balls`` (where these are missing, with ``arithmetic.plain_pairs``);
     - ``trusted.exclusion``: the exclusion inequality, of which the search has a compiled copy, at one alpha and over
       a piece of an interval (``trusted.over_interval``); ``trusted.energy_bounds``, what multipliers prove;
       ``trusted.quadratic_forms``, other forms than the energy;
