@@ -115,7 +115,7 @@ cdef bint _broadcast(View *a, View *b, View *out) noexcept nogil:
             return False
         out.shape[k] = max(a.shape[k], b.shape[k])
         size *= out.shape[k]
-        if size > LARGEST:
+        if out.shape[k] > LARGEST or size > LARGEST:
             return False
     return True
 
