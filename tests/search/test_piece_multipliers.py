@@ -1,0 +1,91 @@
+"""Relaxations at single alphas and the parts of a piece that their multipliers exclude, by the trusted bound."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from problems3d import forces, random_over_alpha
+
+from enumsol import enumerate_roots
+from enumsol.condensation.space_condensed import AlphaSpace
+from enumsol.model.sectors import SECTORS
+from enumsol.relaxation.engine import PRUNE_MARGIN
+from enumsol.search.space.piece_multipliers import AlphaPoint, served, simplest
+from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.trusted.space.pieces import AlphaPiece
+from enumsol.trusted.space.sector_rows import CONTACT, OPEN, STICK
+
+
+def space_of(problem):
+    system = SpaceSolvers(problem, Fraction(1, 2), "verified").system
+    return AlphaSpace(problem.enclosure, Fraction(1, 2), (system.force, system.length))
+
+
+def exclusions(problem, alpha, rng, count):
+    """Some assignments that the relaxation at an alpha excludes, with that point and its multipliers."""
+    point, statuses = AlphaPoint(space_of(problem), alpha), [OPEN, STICK, CONTACT]
+    for _ in range(count):
+        codes = tuple(int(rng.choice([*statuses, SECTORS + int(rng.integers(4, 64))])) for _ in range(problem.p))
+        relaxation = point.root(codes)
+        if relaxation.pruned and relaxation.bound > PRUNE_MARGIN:
+            yield codes, point, relaxation.bound, point.multipliers(relaxation)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_multipliers_of_one_alpha_prove_its_bound_in_the_variables_of_the_interval(seed):
+    problem, rng, seen = random_over_alpha(2, seed), np.random.default_rng(seed), 0
+    for alpha in (Fraction(1, 8), Fraction(7, 8)):
+        for codes, point, bound, (rows, values) in exclusions(problem, alpha, rng, 20):
+            seen += 1
+            piece = AlphaPiece(space_of(problem), alpha, alpha)
+            proven = piece.margin_at(point.alpha, codes, rows, values)
+            assert proven > 0
+            assert np.isclose(proven, bound, rtol=1e-6, atol=1e-12)
+    assert seen > 5
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_multipliers_serve_over_the_part_of_a_piece_that_is_told(seed):
+    """All over it, and hardly farther where it ends within the piece."""
+    problem, rng, cut = random_over_alpha(2, seed), np.random.default_rng(seed), 0
+    low, high, alpha = Fraction(0), Fraction(1), Fraction(3, 8)
+    for codes, point, _, (rows, values) in exclusions(problem, alpha, rng, 30):
+        piece = AlphaPiece(space_of(problem), low, high)
+        part = served(piece, point.alpha, rows, values)
+        assert part is not None
+        assert low <= part[0] <= alpha <= part[1] <= high
+
+        def bound(at, piece=piece, codes=codes, rows=rows, values=values):
+            return piece.margin_at(at, codes, rows, values)
+
+        assert all(bound(part[0] + (part[1] - part[0]) * Fraction(k, 8)) > 0 for k in range(9))
+        for end, border in zip(part, (low, high), strict=True):
+            if end != border:
+                cut += 1
+                beyond = alpha + (end - alpha) * Fraction(9, 8)
+                assert not low <= beyond <= high or bound(beyond) <= 0
+    assert cut > 0
+
+
+def test_the_simplest_number_between_two_others():
+    assert simplest(Fraction(1, 3), Fraction(2, 3)) == Fraction(1, 2)
+    assert simplest(Fraction(5, 8), Fraction(11, 16)) == Fraction(5, 8)
+    assert simplest(Fraction(-1, 3), Fraction(1, 5)) == 0
+    rng = np.random.default_rng(1)
+    for _ in range(200):
+        low, high = sorted(Fraction(int(n), 1000) for n in rng.choice(5000, 2, replace=False))
+        found = simplest(low, high)
+        assert low <= found <= high
+        # none with half its denominator is there
+        half = found.denominator // 2
+        assert found.denominator & (found.denominator - 1) == 0
+        assert not half or -(-low * half // 1) > high * half
+
+
+def test_newtons_method_at_an_alpha_gives_forces_in_the_units_of_the_problem():
+    for seed in range(3):
+        problem = random_over_alpha(2, seed)
+        found = AlphaPoint(space_of(problem), Fraction(1, 4)).solution()
+        roots = enumerate_roots(problem, 0.25)
+        assert found is not None
+        assert min(np.max(np.abs(found - forces(root))) for root in roots) < 1e-8 * (1 + np.max(np.abs(found)))
