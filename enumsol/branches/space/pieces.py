@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 #: How often a part is halved; how near to the place that bisection in floats finds the points beside it are put at
 #: best, relative to the part, how much of this that place may be off, by what factor farther others are, and how many.
 _HALVINGS = 12
-_BESIDE, _CLOSE, _FARTHER, _TRIALS = 2.0**-44, 0.25, 8.0, 12
+_BESIDE, _CLOSE, _FARTHER, _TRIALS = 2.0**-44, 0.25, 8.0, 15
 #: The same beside a smooth fold, where alpha is a square of the distance.
 _BESIDE_FOLD = 2.0**-24
 #: Parts are longer than the way between their ends by this, and wider than their ends are known.
