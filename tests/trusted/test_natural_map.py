@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from enumsol.arithmetic.balls import Ball
-from enumsol.trusted.space.natural_map import Discs, Extent
+from enumsol.trusted.space.natural_map import Directions, Discs, Extent
 
 #: Nodes with two tangents, and with one of either direction.
 TAU = np.array([[4, 8], [5, 9], [6, -1], [-1, 7]])
@@ -143,3 +143,27 @@ def test_a_ratio_whose_changes_cancel_is_known_to_second_order():
     assert abs(turns.rates[0, 1]) <= 1e-15
     # by itself each of the two changes the ratio by 0.005
     assert turns.rest[0, 1] <= 4 * half**2
+
+
+@np.errstate(all="ignore")
+@pytest.mark.parametrize("middle", [(0.0, 0.0), (1e-200, 0.0), (3e-163, -2e-162), (0.0, 1e-12)])
+def test_tangents_around_zero_may_slip(middle):
+    # P has the disc of radius 0.1 there, and z_t may be ten times as long, in all directions
+    z = np.array([1.0, *middle])
+    box = Ball(z, np.array([0.1, 1.0, 0.5]))
+    found = Discs(np.array([[1, 2]]), Ball.exact(np.full(1, 0.1)), np.zeros(1)).corners(box)
+    # (12.17) where z_t = (1, 0) and (0, 0.5), and the identity
+    for D in ([[1, 0, 0], [0.1, 0, 0], [0, 0, 0.1]], [[1, 0, 0], [0, 0.2, 0], [0.1, 0, 0]], np.eye(3)):
+        assert np.all(np.abs(D - found.core.mid[:, :3]) <= found.core.rad[:, :3])
+    at = Directions.of(Ball(z[None, 1:], box.rad[None, 1:]))
+    assert at.least[0] <= 0
+    assert at.most[0] >= np.hypot(1.0, 0.5)
+
+
+@np.errstate(all="ignore")
+def test_one_tangent_around_zero_may_slip():
+    box = Ball(np.array([1.0, 0.0]), np.array([0.0, 1.0]))
+    for places in ([1, -1], [-1, 1]):
+        core = Discs(np.array([places]), Ball.exact(np.full(1, 0.1))).corners(box).core
+        for slip in (-0.1, 0.1):
+            assert np.all(np.abs([slip, 0.0] - core.mid[1]) <= core.rad[1])

@@ -10,7 +10,7 @@ from space_proofs import random_problem
 from enumsol import enumerate_roots
 from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space.chains import chain_through
-from enumsol.condensation.space_condensed import AlphaSpace
+from enumsol.condensation.space_condensed import AlphaSpace, EnclosedSpace, PieceSpace, PieceTurn
 from enumsol.model.sectors import SECTORS, nearest, start_of
 from enumsol.search.space.piece_multipliers import balanced
 from enumsol.search.space.space_setup import SpaceSolvers
@@ -293,3 +293,91 @@ def test_what_is_not_proven_over_a_piece_is_left_open():
     """A wide piece of a problem whose solution changes its status holds no regular root in any leaf of it."""
     piece = piece_of(changing_problem(1, 22), Fraction(0), Fraction(64))
     assert isinstance(piece.held((SECTORS + 4,)), Open | None)
+
+
+class Along:
+    """y, w and G of a leaf of sectors over a piece, and their derivatives by (psi, s), in floats by formulas of (12.1).
+
+    M x = P g, y = E x, w = g - S y with E(psi, s) and g(s): no more is used than their derivatives.
+    """
+
+    def __init__(self, leaf, psi, s):
+        turn, rows, q = leaf.system.turn, leaf.rows, len(psi)
+        S, t, column, unit = leaf.system.S, leaf.t, leaf.column, leaf.system.unit
+        g, rate = turn.g.mid + s * turn.g_turn.mid, turn.g_turn.mid
+        disc, grows = (part.mid[leaf.turning] for part in (turn.disc, turn.disc_turn))
+        across = np.column_stack([-leaf.centre[:, 1], leaf.centre[:, 0]])
+        d = np.cos(psi)[:, None] * leaf.centre + np.sin(psi)[:, None] * across
+        turned = np.column_stack([-d[:, 1], d[:, 0]])
+        E = np.zeros((len(S), len(rows)))
+        E[rows, np.arange(len(rows))] = 1.0
+        first = np.zeros((q + 1, *E.shape))
+        for k in range(q):
+            E[t[k], column[k]] = (disc[k] + s * grows[k]) * d[k] / unit[t[k]]
+            first[k, t[k], column[k]] = (disc[k] + s * grows[k]) * turned[k] / unit[t[k]]
+            first[q, t[k], column[k]] = grows[k] * d[k] / unit[t[k]]
+        M = (S @ E)[rows]
+        x = np.linalg.solve(M, g[rows])
+        self.y = E @ x
+        self.w = g - S @ self.y
+        moved = []
+        for k in range(q + 1):
+            load = rate if k == q else np.zeros(len(g))
+            moved.append(first[k] @ x + E @ np.linalg.solve(M, load[rows] - (S @ first[k] @ x)[rows]))
+        self.dy = np.column_stack(moved)
+        self.dw = np.outer(rate, np.arange(q + 1) == q) - S @ self.dy
+        v, dv = (self._slips(leaf, part) for part in (self.w[:, None], self.dw))
+        self.G = v[0, :, 0] * d[:, 1] - v[1, :, 0] * d[:, 0]
+        self.dG = dv[0] * d[:, 1:] - dv[1] * d[:, :1]
+        self.dG[np.arange(q), np.arange(q)] += v[0, :, 0] * d[:, 0] + v[1, :, 0] * d[:, 1]
+        for part in (self.w, self.dw):
+            part[rows] = 0.0
+
+    @staticmethod
+    def _slips(leaf, w):
+        return np.array([w[leaf.t[:, k]] * leaf.slip_scale[:, k, None] for k in (0, 1)])
+
+
+def steep_piece(p, seed, share, level):
+    """A leaf over a piece of a random system whose coefficients change by up to a share, in sectors of a level."""
+    rng = np.random.default_rng([seed, p, 5])
+    m, none = 3 * p, Ball.exact(np.zeros(3 * p))
+    A = rng.normal(size=(m, m))
+    S, g, rate = A @ A.T / m + 0.1 * np.eye(m), rng.normal(size=m), share * rng.normal(size=m)
+    disc = rng.uniform(0.3, 2.0, p)
+    grows = share * disc * rng.uniform(-1, 1, p)
+    tau = np.array([[p + 2 * i, p + 2 * i + 1] for i in range(p)])
+    F, zero, unit = np.ones((p, 2)), np.zeros((m, m)), np.append(np.ones(p), 2.0 ** rng.choice([0, -2, 3], 2 * p))
+    held = EnclosedSpace(S, zero, g, none.mid, F, 0.0 * F, tau, unit)
+    along = PieceTurn(*map(Ball.exact, (g, rate, disc, grows)))
+    wide = (np.abs(part) * (1.0 + 1e-12) for part in (rate, grows))
+    whole = PieceSpace(S, zero, g, next(wide), F, 0.0 * F, tau, unit, disc, next(wide), along, held)
+    return Leaf(whole, [SECTORS + int(rng.integers(1 << level, 2 << level)) for _ in range(p)])
+
+
+@pytest.mark.parametrize("share", [1e-3, 0.1, 0.9])
+@pytest.mark.parametrize("p", [1, 2, 3])
+def test_what_changes_along_a_piece_lies_in_its_balls(p, share):
+    """Values and first derivatives at points of a box and a piece, and Y times those of G by second ones."""
+    rng, known = np.random.default_rng([p, 7]), 0
+    for seed in range(10):
+        leaf = steep_piece(p, seed, share, int(rng.integers(3, 9)))
+        radius = leaf.half * 10.0 ** -rng.uniform(0, 3, p)
+        with np.errstate(all="ignore"):
+            state, point = leaf._state(0.0 * radius, radius), leaf._state(0.0 * radius, 0.0 * radius, still=True)
+        if state is None or point is None:
+            continue
+        known += 1
+        Y = np.linalg.inv(point.J.mid) if seed % 2 else rng.normal(size=(p, p))
+        second = leaf._second(Y, (state, point), 0.0 * radius, radius)
+        slope = leaf._preconditioned(Ball.exact(Y), point.whole_J, state.whole_J, second, np.append(radius, 1.0))
+        held = Ball.beside(state.box.slope, state.box.lone)
+        for _ in range(20):
+            z = np.append(radius, 1.0) * rng.choice([-1, 1, rng.uniform(-1, 1)], p + 1)
+            there = Along(leaf, z[:-1], z[-1])
+            size = 1e-9 * (1.0 + np.max(np.abs(there.dy)) + np.max(np.abs(there.dw)))
+            pairs = [(state.y, there.y), (state.w, there.w), (state.G, there.G), (state.whole_J, there.dG)]
+            pairs += [(held, np.vstack([there.dy, there.dw])), (slope, Y @ there.dG)]
+            for ball, exact in pairs:
+                assert np.all(np.abs(exact - ball.mid) <= ball.rad + size * (1.0 + np.max(np.abs(Y))))
+    assert known >= 3

@@ -11,7 +11,7 @@ from typing import Self
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, upper_norm, upper_sum
+from enumsol.arithmetic.balls import ROOT_TINY, SAFE, TINY, UNIT, Ball, gamma, upper_norm, upper_sum
 from enumsol.support.array_types import Floats, Indices, Mask
 
 #: What a writer of proofs asks for beyond what a checker does.
@@ -300,7 +300,7 @@ class _Slips:
             [
                 (F_rad + F_size * bent),
                 off[:, None] * np.abs(e) + size[:, None] * (turn + bent[:, None] * (np.abs(e) + turn)),
-                np.abs(change) * (wide[:, 0] + np.abs(normal) * bent),
+                np.abs(change) * (wide[:, 0] + (np.abs(normal) + wide[:, 0]) * bent),
             ]
         )
         lost = upper_sum((more / length[:, None] + 16 * UNIT * np.abs(self.rows[k, 5])) * wide, axis=1)
@@ -503,9 +503,9 @@ class Directions:
             also = (away + 16 * UNIT * np.max(x.rad, axis=1)[:, None]) * SAFE
             along, beside = np.minimum(along, also[:, 0]), np.minimum(beside, also[:, 1])
         rounded = 8 * UNIT * length
-        least = (length - along) / SAFE - rounded - TINY
+        least = (length - along) / SAFE - rounded - ROOT_TINY
         ahead = length + along
-        most = np.sqrt(ahead * ahead + beside * beside) * SAFE * SAFE + rounded
+        most = np.sqrt(ahead * ahead + beside * beside) * SAFE * SAFE + rounded + ROOT_TINY
         # the sine of the angle, by its tangent or by a disc around the middle
         sine = np.minimum(beside / least, upper_norm(x.rad, axis=1) / length * (1.0 + 8 * UNIT)) * SAFE
         sine = np.where(np.any((x.mid == 0) & (x.rad == 0), axis=1), 0.0, sine)[:, None]
@@ -519,9 +519,11 @@ class Directions:
 
 
 def _middle(x: Ball) -> tuple[Floats, Floats, Floats]:
-    """Lengths, directions and directions beside them of the middles of balls of shape (p, 2)."""
+    """Lengths, directions and directions beside them of the middles of balls of shape (p, 2); any one for length 0."""
     length = np.linalg.norm(x.mid, axis=1)
-    e = x.mid / np.where(length > 0, length, 1.0)[:, None]
+    # where squares underflow any direction serves
+    known = (length > 0.5 * ROOT_TINY)[:, None]
+    e = np.where(known, x.mid / np.where(known[:, 0], length, 1.0)[:, None], np.array([1.0, 0.0]))
     return length, e, np.column_stack([-e[:, 1], e[:, 0]])
 
 
