@@ -286,14 +286,14 @@ class PieceSpace(EnclosedSpace):
         See ``discs``.
     along : PieceTurn or None
         See ``turn``.
-    at_once : EnclosedSpace
-        With the same S: what follows from that alone is computed once.
+    fixed : EnclosedSpace
+        With the same S: what follows from that alone is computed once (see AlphaSpace).
     """
 
     disc: Floats
     disc_rad: Floats
     along: PieceTurn | None
-    at_once: EnclosedSpace
+    fixed: EnclosedSpace
 
     @property
     def turn(self) -> PieceTurn | None:
@@ -324,27 +324,27 @@ class PieceSpace(EnclosedSpace):
     @property
     def inverse(self) -> Floats:
         """Approximate inverse of S; no claim rests on its accuracy."""
-        return self.at_once.inverse
+        return self.fixed.inverse
 
     @property
     def smallest_eigenvalue(self) -> float:
         """Proven lower bound on the smallest eigenvalue of every S in the enclosure (see EnclosedSystem)."""
-        return self.at_once.smallest_eigenvalue
+        return self.fixed.smallest_eigenvalue
 
     @property
     def form_error(self) -> float:
         """By how much a computed x'S x may be off, as a factor of |x|^2."""
-        return self.at_once.form_error
+        return self.fixed.form_error
 
     @property
     def largest_norm(self) -> float:
         """Upper bound on the norm of every S in the enclosure."""
-        return self.at_once.largest_norm
+        return self.fixed.largest_norm
 
     @property
     def product_error(self) -> Floats:
         """By how much a computed S y may be off, as a factor of |y|."""
-        return self.at_once.product_error
+        return self.fixed.product_error
 
 
 @dataclass(frozen=True, eq=False)
@@ -387,7 +387,7 @@ class AlphaSpace:
         return F, F_rad, friction_units(F), places(F > 0)
 
     @cached_property
-    def at_once(self) -> EnclosedSpace:
+    def fixed(self) -> EnclosedSpace:
         """S, F and the places of tau, which do not depend on alpha, with g at ``reference``."""
         F, F_rad, scale, (tau, _, node, axis) = self._friction
         weight, rows = self._rows
@@ -455,7 +455,7 @@ class AlphaSpace:
             if min(ends) < 0 or (not any(by) and max(ends) > 0):
                 raise NotEnclosedError("a coefficient of friction is negative, or begins to be positive, over a piece")
         middle, half = (low + high) / 2, (high - low) / 2
-        (weight, rows), length, held = self._rows, np.tile(self.units[1], 3), self.at_once
+        (weight, rows), length, held = self._rows, np.tile(self.units[1], 3), self.fixed
         g, g_rad = self.enclosure.load_in_units(middle, length)
         disc, disc_turn = self.discs(middle), self.discs(half, Fraction(0))
         with np.errstate(over="ignore", invalid="ignore"):

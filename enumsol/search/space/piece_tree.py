@@ -388,24 +388,27 @@ class PieceTree:
             if both is not None and piece.margin(codes, rows, both, _COUNTED) > 0:
                 used = np.flatnonzero(both)
                 return ExcludedInSpace([rows[k] for k in used], both[used]), []
-        if (
-            part in (None, (piece.low, piece.high))
-            or cuts >= _CUTS
-            or part[1] - part[0] < _USEFUL * (piece.high - piece.low)
-        ):
+        if part is None or part == (piece.low, piece.high) or cuts >= _CUTS:
             return None
-        # first what is below, then what is above
-        alpha = part[0] if part[0] > piece.low else part[1]
-        known = (piece.low, alpha) if alpha == part[1] else (alpha, piece.high)
-        return CutPiece(str(alpha)), [
-            (*ends, codes, (point, relaxation) if ends == known else None, -1, False, cuts + (ends != known))
-            for ends in ((piece.low, alpha), (alpha, piece.high))
-        ]
+        return self._cut(piece, part, codes, (point, relaxation), cuts)
+
+    @staticmethod
+    def _cut(
+        piece: AlphaPiece, part: tuple[Fraction, Fraction], codes: Codes, parent: Any, cuts: int
+    ) -> tuple[Any, list[Any]] | None:
+        """A piece that is cut where multipliers cease to serve, first below, then above; None for a short part."""
+        if part[1] - part[0] < _USEFUL * (piece.high - piece.low):
+            return None
+        below = part[0] > piece.low
+        alpha = part[0] if below else part[1]
+        left, right = (piece.low, alpha, codes), (alpha, piece.high, codes)
+        served, rest = (parent, -1, False, cuts), (None, -1, False, cuts + 1)
+        return CutPiece(str(alpha)), [(*left, *(rest if below else served)), (*right, *(served if below else rest))]
 
     def _ends(self, at: _Examined, codes: Codes) -> list[tuple[AlphaPoint, SpaceRelaxation]]:
         """The relaxations of an assignment at the ends of a piece; not at one where friction vanishes."""
         ends = [self._point(alpha) for alpha in (at.piece.low, at.piece.high)]
-        return [(end, end.root(codes)) for end in ends if np.array_equal(end.system.tau, self._space.at_once.tau)]
+        return [(end, end.root(codes)) for end in ends if np.array_equal(end.system.tau, self._space.fixed.tau)]
 
     def _undecided(self, at: _Examined, codes: Codes, cuts: int) -> tuple[Any, list[Any]]:
         """An assignment that one alpha excludes and the piece does not: cut, or branched where an end is possible."""
@@ -465,7 +468,7 @@ class PieceTree:
         if children is None and parent is not None:
             children = parent[0].splitting.children(codes, node, parent[1])
         elif children is None:
-            children = sector_children(codes[node], int(np.sum(self._space.at_once.tau[node] >= 0)))
+            children = sector_children(codes[node], int(np.sum(self._space.fixed.tau[node] >= 0)))
         below = []
         for k, child in enumerate(children):
             there = (*codes[:node], child, *codes[node + 1 :])

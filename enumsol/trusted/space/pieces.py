@@ -87,7 +87,7 @@ class AlphaPiece:
 
     def forces(self, y: Ball) -> Ball:
         """Forces in the units of the problem, (3p,), all normals first, of scaled ones."""
-        system, (force, _), p = self.space.at_once, self.space.units, len(self.space.units[0])
+        system, (force, _), p = self.space.fixed, self.space.units, len(self.space.units[0])
         found = Ball(np.zeros(3 * p), np.zeros(3 * p))
         # powers of two but for F: what is rounded besides is less than TINY
         found[:p] = Ball(y.mid[:p] * force, y.rad[:p] * force + TINY)
@@ -99,7 +99,7 @@ class AlphaPiece:
 
     def displacements(self, y: Ball, w: Ball, alpha: Ball) -> Ball:
         """The same of displacements w, (3p,), at all alpha of a ball."""
-        system, (_, length), p = self.space.at_once, self.space.units, len(self.space.units[0])
+        system, (_, length), p = self.space.fixed, self.space.units, len(self.space.units[0])
         found = Ball(np.zeros(3 * p), np.zeros(3 * p))
         found[:p] = Ball(w.mid[:p] * length, w.rad[:p] * length + TINY)
         for k in (0, 1):

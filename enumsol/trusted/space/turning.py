@@ -107,8 +107,8 @@ class Box:
         more = (1.0 + gamma(2 * len(radius) + 8)) * SAFE
         for _ in range(_ROUNDS):
             # by (12.4a), and with g = share / (1 + s share), whose bounds are ``swept``,
-            # dp_j / ds = p_j g_j - sum q_k g_k z_kj, and the same for q with t in place of z. Forces here are 1 + s share
-            # times d or its turn; what needs them for d alone has that too, as the radii hold all s
+            # dp_j / ds = p_j g_j - sum q_k g_k z_kj, and the same for q with t in place of z. Forces here are
+            # 1 + s share times d or its turn; what needs them for d alone has that too, as the radii hold all s
             p, q = across.size, along.size
             turned, led = p * radius, q * swept
             moves = turned @ z + q * radius + p * swept + led @ z, turned @ t + turned + led + led @ t
