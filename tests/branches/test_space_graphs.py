@@ -623,3 +623,12 @@ def test_two_folds_at_one_alpha_are_found_and_their_order_is_left_open():
     check_the_same(enumsol.branch_graph(problem, (0, 10)), space)
     assert len(space.reasons) == 1
     assert "at the smaller alpha stayed open" in space.reasons[0]
+
+
+@pytest.mark.parametrize("seed", [3071, 3078])
+def test_a_corner_at_which_a_curve_bends_far_out_of_its_box_is_told_to_rounding(seed):
+    graph = enumsol.branch_graph(random_over_alpha(2, seed), (0, 1), max_nodes=400)
+    (vertex,) = [vertex for vertex in graph.vertices if not vertex.border]
+    assert vertex.kind is VertexKind.TRANSITION
+    assert vertex.enclosure[1] - vertex.enclosure[0] < 1e-10
+    assert graph.complete

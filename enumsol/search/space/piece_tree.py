@@ -68,7 +68,7 @@ _BESIDE = 1.5
 #: How often a writer of proofs counts errors.
 _COUNTED = 2.0
 #: Leaves are tested from this level of their sectors on; where more than two nodes slip, from the second one on.
-_TRIED = 3, 6
+_TRIED = 3, 5
 #: Pieces are cut where multipliers cease to serve if they do so over more than this share.
 _USEFUL = Fraction(1, 8)
 #: Nodes that are examined before others than this process help.

@@ -381,7 +381,7 @@ class SolutionCurve:
         if not len(room) or np.any(room < 0):
             return False
         G = found.step.G.mid
-        s = np.clip(np.linalg.lstsq(G, beside.mid)[0], -room, room)
+        s = np.clip(np.linalg.lstsq(G / radius[:, None], beside.mid / radius)[0], -room, room)
         rest = beside - (Ball.exact(G) @ Ball.exact(s[:, None]))[:, 0]
         return bool(np.all((rest.size + upper_product(rest_of.size, off.rad)) * SAFE <= radius))
 
