@@ -120,6 +120,11 @@ class SpaceSystem(FrictionUnits):
     length: Floats
 
     @classmethod
+    def in_middle(cls, enclosed: EnclosedSpace, units: tuple[Floats, Floats]) -> SpaceSystem:
+        """That in the middle of balls, in units of force and length, (p,) each."""
+        return cls(enclosed.S, enclosed.g, enclosed.F, enclosed.tau, enclosed.unit, *units)
+
+    @classmethod
     def scaled(cls, S: Floats, g: Floats, F: Floats) -> SpaceSystem:
         """From S (3p, 3p) and g (3p,), all normals first, then both tangents, and coefficients F (p, 2).
 

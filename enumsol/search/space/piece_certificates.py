@@ -69,8 +69,7 @@ class PieceProposals:
 
     def __init__(self, piece: AlphaPiece) -> None:
         self._piece, self._middle = piece, piece.space.at(piece.middle)
-        held = self._middle
-        self._system = SpaceSystem(held.S, held.g, held.F, held.tau, held.unit, *piece.space.units)
+        self._system = SpaceSystem.in_middle(self._middle, piece.space.units)
 
     def numbers(self, codes: Codes, parts: CurveParts) -> Array | None:
         """Those of a form that seems to serve all over the piece, or None."""

@@ -52,7 +52,7 @@ class AlphaPoint:
     def __init__(self, space: AlphaSpace, alpha: Fraction) -> None:
         self.alpha = alpha
         enclosed = EnclosedSpace.of_problem(space.enclosure, alpha, *space.units)
-        self.system = SpaceSystem(enclosed.S, enclosed.g, enclosed.F, enclosed.tau, enclosed.unit, *space.units)
+        self.system = SpaceSystem.in_middle(enclosed, space.units)
         self.engine = SpaceEngine(self.system, _ROWS)
         self.splitting = SpaceSplitting(self.engine)
         self.rows = ImposedRows(self.splitting, self.system.p)
