@@ -1,7 +1,7 @@
 """Checker of trees over alpha in 3D: all solutions over an interval lie on curves in boxes (theory, section 12.9).
 
 A tree is given by its records in the order of a walk: ``["a", alpha]`` (the piece is cut there), ``["b", node, codes]``
-(a status is split), ``["x", rows, multipliers]`` (no solution over the piece), ``["n"]`` (the same, by the equations of
+(a status is split), ``["x", rows, low, high]`` (no solution over the piece), ``["n"]`` (the same, by the equations of
 a leaf), ``["k", first, last]`` (all solutions of a leaf lie in boxes of one curve), ``["r", box, low, high, alpha,
 codes]`` (the roots of a leaf lie on one arc over another piece, and one of its points is in the box), ``["m", numbers,
 first, last]`` (all solutions with the statuses of the assignment lie on the curve between two boxes, by one
@@ -22,7 +22,7 @@ from enumsol.proof.records import Branching, Limits, NoRoot, RecordError, Undeci
 from enumsol.proof.space_records import (
     PIECE_LEAVES,
     CutPiece,
-    ExcludedInSpace,
+    ExcludedOverPiece,
     InCurveBoxes,
     OnlyOnCurve,
     ThroughCurveBox,
@@ -128,8 +128,9 @@ class PieceTreeChecker:
 
     def _wrong(self, piece: AlphaPiece, codes: Codes, leaf: Any) -> str | None:
         """What a leaf does not prove; None if all is proven."""
-        if isinstance(leaf, ExcludedInSpace):
-            return None if piece.margin(codes, leaf.rows, leaf.values) > 0 else "its multipliers do not exclude it"
+        if isinstance(leaf, ExcludedOverPiece):
+            excluded = piece.margin(codes, leaf.rows, (leaf.low, leaf.high)) > 0
+            return None if excluded else "its multipliers do not exclude it"
         if isinstance(leaf, OnlyOnCurve):
             (known, first), (other, last) = self._boxes[leaf.first], self._boxes[leaf.last]
             alone = known is other and piece.lies_on(known, Run(first, last), codes, leaf.numbers)

@@ -52,17 +52,31 @@ class ExcludedInSpace(Exclusion):
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> ExcludedInSpace:
         """Rows and as many multipliers."""
-        rows, text = entries
-        if not all((isinstance(rows, list), isinstance(text, str))):
-            raise ValueError("its multipliers are not a list of rows and a text")
-        values = np.frombuffer(bytes_from(text), dtype="<f8").astype(np.float64)
-        if len(rows) != len(values):
-            raise ValueError(f"{len(rows)} rows and {len(values)} multipliers")
-        return cls([_row(row, limits.p) for row in rows], values)
+        return cls(*_multiplied(entries, limits))
 
     def entries(self) -> Iterable[Any]:
         """Rows, and the multipliers as a text."""
-        return self.rows, base64.b64encode(self.values.astype("<f8").tobytes()).decode()
+        return self.rows, _text(self.values)
+
+
+@dataclass(frozen=True, eq=False)
+class ExcludedOverPiece(Exclusion):
+    """The same over a piece of alpha: multipliers at its lower and at its upper end, between which they are affine."""
+
+    kind, sizes = ExcludedInSpace.kind, (4,)
+
+    rows: list[Row]
+    low: Floats
+    high: Floats
+
+    @classmethod
+    def of(cls, entries: list[Any], limits: Limits) -> ExcludedOverPiece:
+        """Rows and as many multipliers, twice."""
+        return cls(*_multiplied(entries, limits))
+
+    def entries(self) -> Iterable[Any]:
+        """Rows, and both lists of multipliers as texts."""
+        return self.rows, _text(self.low), _text(self.high)
 
 
 @dataclass(frozen=True, eq=False)
@@ -370,7 +384,23 @@ LEAVES = table_of(
 #: The same of a body that nothing holds; others rest on a stiffness that is positive definite.
 FLOATING_LEAVES = table_of(ExcludedInSpace, Unbalanced, NoRoot, RegularRoot, UndecidedRecord)
 #: Of a tree over alpha, too.
-PIECE_LEAVES = table_of(ExcludedInSpace, NoRoot, InCurveBoxes, ThroughCurveBox, OnlyOnCurve, UndecidedRecord)
+PIECE_LEAVES = table_of(ExcludedOverPiece, NoRoot, InCurveBoxes, ThroughCurveBox, OnlyOnCurve, UndecidedRecord)
+
+
+def _multiplied(entries: list[Any], limits: Limits) -> Iterable[Any]:
+    """Rows, and lists of as many multipliers."""
+    rows, *texts = entries
+    if not isinstance(rows, list) or not all(isinstance(text, str) for text in texts):
+        raise ValueError("its multipliers are not a list of rows and a text")
+    lists = [np.frombuffer(bytes_from(text), dtype="<f8").astype(np.float64) for text in texts]
+    for values in lists:
+        if len(rows) != len(values):
+            raise ValueError(f"{len(rows)} rows and {len(values)} multipliers")
+    return [_row(row, limits.p) for row in rows], *lists
+
+
+def _text(values: Floats) -> str:
+    return base64.b64encode(values.astype("<f8").tobytes()).decode()
 
 
 def _is_final(code: Any) -> bool:

@@ -32,12 +32,10 @@ if TYPE_CHECKING:
 
 #: The weight of the squares of multipliers, each by the length of its row, which keeps them bounded.
 _RIDGE = 1e-12
-#: How often the share of an end in the bound that is made as large as possible is halved.
-_HALVINGS = 4
+#: How often weights of the bounds are tried.
+_WEIGHTS = 6
 #: Rows of a program at one alpha.
 _ROWS = 4096
-#: What is used of the alphas, on either side of a relaxation's, at which its multipliers seem to serve.
-_USED = Fraction(15, 16), Fraction(63, 64)
 
 
 class AlphaPoint:
@@ -98,92 +96,74 @@ def simplest(low: Fraction, high: Fraction) -> Fraction:
         step /= 2
 
 
-def served(piece: AlphaPiece, alpha: Fraction, rows: Sequence[Row], values: Floats) -> tuple[Fraction, Fraction] | None:
-    """The part of a piece, around one alpha of it, at which multipliers seem to exclude; None if there is none.
+class PieceBounds:
+    """The numbers (12.21a) of a piece as functions of multipliers m of rows at its lower, then at its upper end, (2 n,).
 
-    The bound (12.21) is a concave square in alpha.
+    They are q'm - |v + B m|^2 / 4, one for each end and, last, one for what is between.
+
+    Parameters
+    ----------
+    piece : AlphaPiece
+    codes : (partial) status codes
+    rows : sequence of n rows
     """
-    low, high = piece.ends
-    columns = [_columns(end, rows) for end in (low, high)]
-    loads = np.array([end.g + A @ values for end, (A, _) in zip((low, high), columns, strict=True)])
-    squares = -0.25 * loads @ low.inverse @ loads.T
-    first, last = (float(-own @ values) for _, own in columns)
-    # of t from 0 to 1: value + slope t + bend t^2
-    value = float(squares[0, 0]) + first
-    slope = 2.0 * float(squares[0, 1] - squares[0, 0]) + last - first
-    bend = float(squares[0, 0] - 2.0 * squares[0, 1] + squares[1, 1])
-    length = piece.high - piece.low
-    t = float((alpha - piece.low) / length) if length else 0.0
-    here = value + (slope + bend * t) * t
-    if not here > 0:
+
+    def __init__(self, piece: AlphaPiece, codes: Sequence[int], rows: Sequence[Row]) -> None:
+        self._free = np.flatnonzero(2 * [row_sign(codes[row[1]], row) == FREE for row in rows])
+        (low, high), n = piece.ends, len(rows)
+        held, normals, slips = _columns(low, rows)
+        discs = [np.r_[end.discs.mid, np.zeros(len(low.g) - len(low.tau))] for end in (low, high)]
+        both = [held + disc[:, None] * normals for disc in discs]
+        lower = np.linalg.cholesky(low.S)
+        scaled = solve_triangular(lower, np.column_stack([low.g, high.g, *both]), lower=True, check_finite=False)
+        g, A = scaled.T[:2], (scaled[:, 2 : 2 + n], scaled[:, 2 + n :])
+        own = [-end.g @ slips for end in (low, high)]
+        none = np.zeros_like(A[0])
+        self._v = np.stack([g[0], g[1], 0.5 * (g[0] + g[1])])
+        self._B = np.stack([np.hstack([A[0], none]), np.hstack([none, A[1]]), 0.5 * np.hstack([A[1], A[0]])])
+        self._q = np.stack([np.r_[own[0], none[0]], np.r_[none[0], own[1]], 0.5 * np.r_[own[1], own[0]]])
+
+    def of(self, m: Floats) -> Floats:
+        """The three numbers."""
+        return np.asarray(self._q @ m - 0.25 * np.sum((self._v + self._B @ m) ** 2, axis=1))
+
+    def positive(self) -> Floats | None:
+        """Multipliers for which all three seem to be positive; None if none are found.
+
+        For fixed weights their mean is largest at the solution of a problem of nonnegative least squares, where
+        multipliers without a sign count twice; weights move to the number that is the least.
+        """
+        size = np.sqrt(np.sum(self._B * self._B, axis=(0, 1))) + 1e-300
+        B, q = self._B / size, self._q / size
+        B, q = np.concatenate([B, -B[:, :, self._free]], axis=2), np.concatenate([q, -q[:, self._free]], axis=1)
+        weight, ridge = np.full(3, 1 / 3), np.sqrt(_RIDGE)
+        for _ in range(_WEIGHTS):
+            root = np.sqrt(weight)[:, None]
+            matrix = np.vstack([*(root[:, :, None] * B), ridge * np.eye(B.shape[2])])
+            target = np.concatenate([*(root * self._v), -2.0 / ridge * (weight @ q)])
+            try:
+                found, _ = nnls(matrix, -target)
+            except RuntimeError:
+                return None
+            m = found[: len(size)].copy()
+            m[self._free] -= found[len(size) :]
+            m /= size
+            bounds = self.of(m)
+            if np.all(bounds > 0):
+                return np.asarray(m)
+            if not weight @ bounds > 0:
+                return None
+            weight = weight * np.exp(-bounds / np.max(np.abs(bounds)))
+            weight /= np.sum(weight)
         return None
-    ends = []
-    for end, bound, side in ((piece.low, value, -1.0), (piece.high, value + slope + bend, 1.0)):
-        far = _zero(here, slope + 2.0 * bend * t, bend, side) if not bound > 0 else 0.0
-        if not bound > 0 and not far:
-            return None
-        ends.append(simplest(*sorted(alpha + share * Fraction(far) * length for share in _USED)) if far else end)
-    return ends[0], ends[1]
 
 
-def _zero(value: float, slope: float, bend: float, side: float) -> float:
-    """The zero of value + slope u + bend u^2 next to 0 on a side, with value > 0; 0 if there is none."""
-    root = slope * slope - 4.0 * bend * value
-    below = slope * side - np.sqrt(root) if 0 <= root < np.inf else 0.0
-    found = -2.0 * value / below if below else 0.0
-    return float(side * found) if found > 0 else 0.0
-
-
-def balanced(piece: AlphaPiece, codes: Sequence[int], rows: Sequence[Row]) -> Floats | None:
-    """Multipliers of rows for which the bounds (12.21) at both ends of a piece seem to be positive.
-
-    With h = g + A m a bound is -h' S^-1 h / 4 - q'm, A and q by the rows at that end. A mean of both is largest at the
-    solution of a problem of nonnegative least squares, where multipliers without a sign count twice; the smaller one
-    is, for the weight at which both are the same.
-    """
-    both = [_columns(end, rows) for end in piece.ends]
-    try:
-        lower = np.linalg.cholesky(piece.ends[0].S)
-    except np.linalg.LinAlgError:
-        return None
-    free = np.array([row_sign(codes[row[1]], row) == FREE for row in rows])
-    M = np.stack([solve_triangular(lower, A, lower=True) for A, _ in both])
-    v = np.stack([solve_triangular(lower, end.g, lower=True) for end in piece.ends])
-    q = np.stack([own for _, own in both])
-    size = np.sqrt(np.sum(M * M, axis=(0, 1))) + 1e-300
-    M, q = M / size, q / size
-    M, q = np.concatenate([M, -M[:, :, free]], axis=2), np.concatenate([q, -q[:, free]], axis=1)
-    low, high, ridge = 0.0, 1.0, np.sqrt(_RIDGE)
-    for _ in range(_HALVINGS):
-        share = 0.5 * (low + high)
-        weight = np.array([1.0 - share, share])
-        root = np.sqrt(weight)
-        target = np.concatenate([root[0] * v[0], root[1] * v[1], 2.0 / ridge * (weight @ q)])
-        matrix = np.vstack([root[0] * M[0], root[1] * M[1], ridge * np.eye(M.shape[2])])
-        try:
-            m, _ = nnls(matrix, -target)
-        except RuntimeError:
-            return None
-        bounds = -0.25 * np.sum((v + M @ m) ** 2, axis=1) - q @ m
-        if np.all(bounds > 0):
-            values = m[: len(rows)].copy()
-            values[free] -= m[len(rows) :]
-            return np.asarray(values / size)
-        if weight @ bounds < 0:
-            return None
-        low, high = (share, high) if bounds[1] < bounds[0] else (low, share)
-    return None
-
-
-def _columns(system: EnclosedSpace, rows: Sequence[Row]) -> tuple[Floats, Floats]:
-    """What each row adds to the load, (m, rows), and its value where y = 0, (rows,)."""
-    size, units, discs = len(system.g), system.row_unit, system.discs.mid
-    forces, slips = np.zeros((size, len(rows))), np.zeros((size, len(rows)))
+def _columns(system: EnclosedSpace, rows: Sequence[Row]) -> tuple[Floats, Floats, Floats]:
+    """What each row adds to the load but for discs, by these, and it as a row on w, (m, n) each."""
+    size, units = len(system.g), system.row_unit
+    columns, normals = np.zeros((2 * size, len(rows))), np.zeros((size, len(rows)))
     for k, row in enumerate(rows):
         for i, coefficient in zip(*sector_row_terms(row, system.tau, size), strict=True):
-            factor = coefficient * units[i]
-            if i < size:
-                forces[i, k] += factor * (discs[i] if i == row[1] and row[0] in OF_DISCS else 1.0)
-            else:
-                slips[i - size, k] += factor
-    return forces - system.S @ slips, system.g @ slips
+            of_disc = i == row[1] and row[0] in OF_DISCS
+            (normals if of_disc else columns)[i, k] += coefficient * units[i]
+    return columns[:size] - system.S @ columns[size:], normals, columns[size:]

@@ -16,12 +16,12 @@ from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of, parts_around, places, span, width_level, width_of
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.proof.records import Branching, NoRoot
-from enumsol.proof.space_records import CutPiece, ExcludedInSpace, InCurveBoxes, OnlyOnCurve, ThroughCurveBox
+from enumsol.proof.space_records import CutPiece, ExcludedOverPiece, InCurveBoxes, OnlyOnCurve, ThroughCurveBox
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.outcome import StopReason
 from enumsol.search.space.piece_arcs import beside, points_on, slides
 from enumsol.search.space.piece_certificates import ERRORS, Passage, PieceProposals, runs_over
-from enumsol.search.space.piece_multipliers import AlphaPoint, balanced, served, simplest
+from enumsol.search.space.piece_multipliers import AlphaPoint, PieceBounds, simplest
 from enumsol.search.space.space_fathoming import without_sectors
 from enumsol.support.deadlines import TimeOverError, look
 from enumsol.trusted.space.curve_runs import CurveParts, KnownCurve, Run
@@ -69,8 +69,6 @@ _BESIDE = 1.5
 _COUNTED = 2.0
 #: Leaves are tested from this level of their sectors on; where more than two nodes slip, from the second one on.
 _TRIED = 3, 5
-#: Pieces are cut where multipliers cease to serve if they do so over more than this share.
-_USEFUL = Fraction(1, 8)
 #: Nodes that are examined before others than this process help.
 FIRST = 16
 #: Sectors above this level are halved, rather than alpha, where a leaf is settled in the middle only; by how many
@@ -341,7 +339,8 @@ class PieceTree:
                 relaxation = relaxation.child(*point.rows.of(changed, codes[changed]), last=last)
         final = not {CONTACT, UNDECIDED} & set(codes)
         if _is_excluded(relaxation):
-            done = self._excluded(at, codes, point, relaxation, cuts)
+            exclusion = self._excluded(at, codes, point, relaxation)
+            done = None if exclusion is None else (exclusion, [])
             if done is None and final and self._is_due(codes):
                 done = self._settled(at, codes, at.piece.narrowed(codes))
             return self._undecided(at, codes, cuts) if done is None else done
@@ -371,39 +370,27 @@ class PieceTree:
         return not levels or min(levels) >= _TRIED[len(levels) > 2]
 
     def _excluded(
-        self, at: _Examined, codes: Codes, point: AlphaPoint, relaxation: SpaceRelaxation, cuts: int
-    ) -> tuple[Any, list[Any]] | None:
-        """By multipliers of one alpha, where they serve, or else by some that serve both ends of the piece."""
+        self, at: _Examined, codes: Codes, point: AlphaPoint, relaxation: SpaceRelaxation
+    ) -> ExcludedOverPiece | None:
+        """By multipliers of one alpha, where they serve, or else by others for both ends of the piece."""
         piece = at.piece
         rows, values = point.multipliers(relaxation)
-        part = served(piece, point.alpha, rows, values)
-        if part == (piece.low, piece.high) and piece.margin(codes, rows, values, _COUNTED) > 0:
-            return ExcludedInSpace(rows, values), []
+        if piece.margin(codes, rows, (values, values), _COUNTED) > 0:
+            return ExcludedOverPiece(rows, values, values)
         ends = self._ends(at, codes)
-        if len(ends) == 2 and all(_is_excluded(other) for _, other in ends):
-            for end, other in ends:
-                rows += end.multipliers(other)[0]
-            rows = list(dict.fromkeys([*rows, *point.imposed(codes)]))
-            both = balanced(piece, codes, rows)
-            if both is not None and piece.margin(codes, rows, both, _COUNTED) > 0:
-                used = np.flatnonzero(both)
-                return ExcludedInSpace([rows[k] for k in used], both[used]), []
-        if part is None or part == (piece.low, piece.high) or cuts >= _CUTS:
+        if not all(_is_excluded(other) for _, other in ends):
             return None
-        return self._cut(piece, part, codes, (point, relaxation), cuts)
-
-    @staticmethod
-    def _cut(
-        piece: AlphaPiece, part: tuple[Fraction, Fraction], codes: Codes, parent: Any, cuts: int
-    ) -> tuple[Any, list[Any]] | None:
-        """A piece that is cut where multipliers cease to serve, first below, then above; None for a short part."""
-        if part[1] - part[0] < _USEFUL * (piece.high - piece.low):
+        for end, other in ends:
+            rows += end.multipliers(other)[0]
+        rows = list(dict.fromkeys([*rows, *point.imposed(codes)]))
+        found = PieceBounds(piece, codes, rows).positive()
+        if found is None:
             return None
-        below = part[0] > piece.low
-        alpha = part[0] if below else part[1]
-        left, right = (piece.low, alpha, codes), (alpha, piece.high, codes)
-        served, rest = (parent, -1, False, cuts), (None, -1, False, cuts + 1)
-        return CutPiece(str(alpha)), [(*left, *(rest if below else served)), (*right, *(served if below else rest))]
+        low, high = np.split(found, 2)
+        if not piece.margin(codes, rows, (low, high), _COUNTED) > 0:
+            return None
+        used = np.flatnonzero((low != 0) | (high != 0))
+        return ExcludedOverPiece([rows[k] for k in used], low[used], high[used])
 
     def _ends(self, at: _Examined, codes: Codes) -> list[tuple[AlphaPoint, SpaceRelaxation]]:
         """The relaxations of an assignment at the ends of a piece; not at one where friction vanishes."""

@@ -14,7 +14,7 @@ from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
 from enumsol.trusted.space.leaf_arcs import LeafArc, arc_of
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
 from enumsol.trusted.space.piece_forms import only_on_curve
-from enumsol.trusted.space.sector_rows import sector_margin
+from enumsol.trusted.space.sector_rows import swept_margin
 from enumsol.trusted.space.space_uniqueness import is_complete
 
 if TYPE_CHECKING:
@@ -67,23 +67,14 @@ class AlphaPiece:
         """The data at both ends."""
         return self.space.at(self.low), self.space.at(self.high)
 
-    def margin(self, codes: Sequence[int], rows: Sequence[Row], values: Array, errors: float = 1.0) -> float:
+    def margin(
+        self, codes: Sequence[int], rows: Sequence[Row], values: tuple[Array, Array], errors: float = 1.0
+    ) -> float:
         """Proven lower bound on the energy over a partial assignment and the piece; positive: there is no solution.
 
-        With fixed multipliers the bound is concave in alpha, so that it is least at an end.
+        ``values`` are the multipliers of rows at both ends, between which they are affine in alpha.
         """
-        least = np.inf
-        for end in (self.low, self.high):
-            least = min(least, self.margin_at(end, codes, rows, values, errors))
-            if not least > 0:
-                break
-        return least
-
-    def margin_at(
-        self, alpha: Fraction, codes: Sequence[int], rows: Sequence[Row], values: Array, errors: float = 1.0
-    ) -> float:
-        """The same at one alpha."""
-        return sector_margin(self.space.at(alpha), codes, rows, values, errors)
+        return swept_margin(self.ends, self.space.at(self.middle), codes, rows, values, errors)
 
     def forces(self, y: Ball) -> Ball:
         """Forces in the units of the problem, (3p,), all normals first, of scaled ones."""

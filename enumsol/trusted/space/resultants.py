@@ -32,8 +32,8 @@ def floating_margin(
     rows = Multiplied.of(system, codes, lines, multipliers)
     if rows is None:
         return -np.inf
-    c, c_rad = rows.c[None], rows.c_rad[None]
-    first = _finite(bounds_within(system, rows.y[None], rows.y_rad[None], c, c_rad, errors))
+    c, c_rad = rows.c.mid[None], rows.c.rad[None]
+    first = _finite(bounds_within(system, rows.y.mid[None], rows.y.rad[None], c, c_rad, errors))
     if first > 0 or not rows.pushes:
         return first
     # what changes is the multipliers of the rows on w: each y belongs to several of them

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, gamma, upper_norm, upper_sum
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, upper_norm, upper_sum
 from enumsol.model import sectors
 from enumsol.trusted.energy_bounds import energy_bounds, form_bounds
 
@@ -132,15 +132,13 @@ class Multiplied:
 
     Attributes
     ----------
-    y, y_rad, c, c_rad : (m,) arrays
+    y, c : Ball of shape (m,)
     pushes : list of pairs
         Of the rows on w, the multiplier and its terms in y by their places, each off by half a unit at most.
     """
 
-    y: Floats
-    y_rad: Floats
-    c: Floats
-    c_rad: Floats
+    y: Ball
+    c: Ball
     pushes: list[tuple[float, list[tuple[int, float]]]]
 
     @classmethod
@@ -178,7 +176,8 @@ class Multiplied:
         y, y_size, c, c_size = np.array(sums)
         k = gamma(len(rows) + 24)
         k *= 1.0 + 2.0 * k  # the sizes are sums as long
-        return cls(y, k * y_size * SAFE + TINY, c, (k * c_size + (1.0 + k) * np.array(unsure)) * SAFE + TINY, pushes)
+        c_rad = (k * c_size + (1.0 + k) * np.array(unsure)) * SAFE + TINY
+        return cls(Ball(y, k * y_size * SAFE + TINY), Ball(c, c_rad), pushes)
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -200,18 +199,55 @@ def sector_margin(
     added = Multiplied.of(system, codes, rows, values)
     if added is None:
         return -np.inf
-    y, y_rad, c, c_rad = added.y, added.y_rad, added.c, added.c_rad
-    if form is not None:
-        # y and what it is off by act on S y - g
-        c_rad = (c_rad + (np.abs(system.S) + system.S_rad) @ y_rad * (1 + gamma(len(y)))) * SAFE
-        bound = float(form_bounds(form, y[None], c[None], c_rad[None], errors)[0])
-        bound -= errors * float(upper_sum(y_rad * (np.abs(system.g) + system.g_rad))) * SAFE
-        return bound if np.isfinite(bound) else -np.inf
+    y, c = added.y, added.c
+    if form is None:
+        return _margin(system, y, c, errors)
+    # y and what it is off by act on S y - g
+    c_rad = (c.rad + (np.abs(system.S) + system.S_rad) @ y.rad * (1 + gamma(len(y.mid)))) * SAFE
+    bound = float(form_bounds(form, y.mid[None], c.mid[None], c_rad[None], errors)[0])
+    bound -= errors * float(upper_sum(y.rad * (np.abs(system.g) + system.g_rad))) * SAFE
+    return bound if np.isfinite(bound) else -np.inf
+
+
+@np.errstate(over="ignore", invalid="ignore")
+def swept_margin(
+    ends: tuple[EnclosedSpace, EnclosedSpace],
+    middle: EnclosedSpace,
+    codes: Sequence[int],
+    rows: Sequence[Row],
+    values: tuple[Floats, Floats],
+    errors: float = 1.0,
+) -> float:
+    """The same between two systems, with multipliers between those of both ends: the least number of (12.21a).
+
+    Parameters
+    ----------
+    ends, middle : with one S, and g and discs that are affine from one end to the other
+    values : at the ends
+    """
+    (first, one), (other, last) = ([Multiplied.of(end, codes, rows, part) for part in values] for end in ends)
+    if first is None or one is None or other is None or last is None:
+        return -np.inf
+    least = np.inf
+    for end, added in zip(ends, (first, last), strict=True):
+        least = min(least, _margin(end, added.y, added.c, errors))
+        if not least > 0:
+            return least
+    half, (low, high) = Ball.exact(np.array(0.5)), (Ball(end.g, end.g_rad) for end in ends)
+    lost = ((last.y - first.y)[None] @ (high - low)[:, None])[0, 0]
+    bound = _margin(middle, (one.y + other.y) * half, (one.c + other.c) * half, errors) - 0.25 * float(lost.mid)
+    bound -= errors * (0.25 * float(lost.rad) + 4 * UNIT * (abs(bound) + abs(float(lost.mid)))) * SAFE
+    return min(least, bound) if np.isfinite(bound) else -np.inf
+
+
+def _margin(system: EnclosedSpace, on_slips: Ball, on_forces: Ball, errors: float) -> float:
+    """By multipliers on S y - g and on the forces."""
+    y, c, c_rad = on_slips.mid, on_forces.mid, on_forces.rad
     bound = float(energy_bounds(system, y[None], c[None], c_rad[None], errors)[0])
     # rounded y are not quite multipliers: the bound is quadratic in y with the gradient g - v / 2, v = g + c + S y
     v = np.abs(system.g + c + system.S @ y) + system.product_error @ np.abs(y)
     v += system.g_rad + c_rad + gamma(len(system.g) + 4) * (np.abs(c) + np.abs(system.g))
     slope = np.abs(system.g) + system.g_rad + 0.5 * v * SAFE
-    lost = upper_sum(y_rad * slope) + system.largest_norm * upper_norm(y_rad) ** 2
+    lost = upper_sum(on_slips.rad * slope) + system.largest_norm * upper_norm(on_slips.rad) ** 2
     bound -= errors * float(lost) * SAFE * SAFE
     return bound if np.isfinite(bound) else -np.inf
