@@ -1,8 +1,6 @@
 """Mutants of graphs' proofs in 3D, and whether all that one says is true: of its curves, and of every leaf."""
 
-import base64
 import itertools
-import struct
 from dataclasses import dataclass, field
 from fractions import Fraction
 
@@ -171,7 +169,7 @@ def _same_leaf(rng, parts):
         boxes = _boxes_of(parts.tree[k])
         first, last = boxes[0], boxes[-1]
         parts.tree[k] = _pick(
-            rng, (["k", first, last], ["k", last, last], _arc(rng, parts, first), ["n"], ["x", [], ""])
+            rng, (["k", first, last], ["k", last, last], _arc(rng, parts, first), ["n"], ["x", [], "", ""])
         )
 
 
@@ -225,7 +223,13 @@ def _cut(rng, parts):
 def _multipliers(rng, parts):
     if parts.places("x"):
         for _ in range(int(rng.integers(1, 3))):
-            _pick(rng, (space_proofs._row, space_proofs._value))(rng, parts.tree)
+            _pick(rng, (space_proofs._row, space_proofs._value, _other_end))(rng, parts.tree)
+
+
+def _other_end(rng, tree):
+    """An exclusion by multipliers of one end at both, or by those of either end at the other one."""
+    record = tree[_pick(rng, [k for k, record in enumerate(tree) if record[0] == "x"])]
+    record[2:] = _pick(rng, (record[:1:-1], record[2:3] * 2, record[3:] * 2))
 
 
 def _fewer_rows(rng, parts):
@@ -233,13 +237,18 @@ def _fewer_rows(rng, parts):
     places = [k for k in parts.places("x") if parts.tree[k][1]]
     if places:
         k, other = _pick(rng, places), _pick(rng, places)
-        rows, values = parts.tree[k][1], space_proofs.values_of(parts.tree[k])
+        (rows, *lists), (more, *longer) = (
+            [parts.tree[place][1], *(space_proofs.values_of(parts.tree[place], at) for at in (2, 3))]
+            for place in (k, other)
+        )
         if rng.random() < 0.5:
-            rows, values = rows + parts.tree[other][1], values + space_proofs.values_of(parts.tree[other])
+            rows, *lists = (one + two for one, two in zip([rows, *lists], [more, *longer], strict=True))
         else:
             j = int(rng.integers(len(rows)))
-            rows, values = rows[:j] + rows[j + 1 :], values[:j] + values[j + 1 :]
-        parts.tree[k] = ["x", rows, base64.b64encode(struct.pack(f"<{len(values)}d", *values)).decode()]
+            rows, *lists = (part[:j] + part[j + 1 :] for part in (rows, *lists))
+        parts.tree[k] = ["x", rows, "", ""]
+        for at, values in enumerate(lists, 2):
+            parts.tree[k] = space_proofs.with_values(parts.tree[k], values, at)
 
 
 def _box_numbers(rng, parts):

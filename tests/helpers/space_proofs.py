@@ -64,15 +64,15 @@ def case(name):
     return problem, alpha, records_of(roots.proof), bytes_of(roots.proof)
 
 
-def values_of(record):
-    """Multipliers of an exclusion."""
-    data = base64.b64decode(record[2])
+def values_of(record, at=2):
+    """Multipliers of an exclusion, at one of its entries."""
+    data = base64.b64decode(record[at])
     return list(struct.unpack(f"<{len(data) // 8}d", data))
 
 
-def with_values(record, values):
+def with_values(record, values, at=2):
     """The exclusion with other multipliers."""
-    return [record[0], record[1], base64.b64encode(struct.pack(f"<{len(values)}d", *values)).decode()]
+    return [*record[:at], base64.b64encode(struct.pack(f"<{len(values)}d", *values)).decode(), *record[at + 1 :]]
 
 
 def arc_of_sector(number):
@@ -98,10 +98,11 @@ def _value(rng, records):
     places = [k for k in of_kind(records, "x") if records[k][1]]
     if places:
         k = _pick(rng, places)
-        values = values_of(records[k])
+        at = int(_pick(rng, range(2, len(records[k]))))
+        values = values_of(records[k], at)
         j = int(rng.integers(len(values)))
         values[j] = float(_pick(rng, (-values[j], 2 * values[j], values[j] * (1 + 1e-9), 0.0, 1e300, -1e-9)))
-        records[k] = with_values(records[k], values)
+        records[k] = with_values(records[k], values, at)
 
 
 def _sector(rng, records):

@@ -12,7 +12,7 @@ from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space.chains import chain_through
 from enumsol.condensation.space_condensed import AlphaSpace, EnclosedSpace, PieceSpace, PieceTurn
 from enumsol.model.sectors import SECTORS, nearest, start_of
-from enumsol.search.space.piece_multipliers import balanced
+from enumsol.search.space.piece_multipliers import PieceBounds
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space.leaves import Leaf, Open, SpaceRoot
 from enumsol.trusted.space.pieces import AlphaPiece, lie_along
@@ -91,7 +91,7 @@ def least_at(problem, piece, alpha, rows, values):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_multipliers_prove_the_least_minimum_over_a_piece(seed):
+def test_the_same_multipliers_at_both_ends_prove_the_least_minimum_over_a_piece(seed):
     """The bound is that of an end, and no minimum between is less."""
     rng = np.random.default_rng(seed)
     problem = changing_problem(2, seed)
@@ -104,7 +104,59 @@ def test_multipliers_prove_the_least_minimum_over_a_piece(seed):
         assert min(inside) >= min(ends) - 1e-9 * size
         for end, bound in zip(piece.ends, ends, strict=True):
             assert bound - 1e-6 * size <= sector_margin(end, codes, rows, values) <= bound + 1e-9 * size
-        assert (piece.margin(codes, rows, values) > 0) == (min(ends) > 0)
+        assert (piece.margin(codes, rows, (values, values)) > 0) == (min(ends) > 0)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_multipliers_between_those_of_the_ends_prove_no_more_than_the_least_minimum_over_a_piece(seed):
+    """Those of the ends may prove much there and nothing between; where all between is positive it mostly is proven."""
+    rng = np.random.default_rng([seed, 2])
+    problem = changing_problem(2, seed)
+    proven, between, possible = 0, 0, 0
+    assignments = [(OPEN, STICK), (STICK, STICK), (SECTORS + 9, SECTORS + 70), (STICK, SECTORS + 5), (OPEN, OPEN)]
+    for codes in 40 * assignments:
+        # friction changes up to thirtyfold
+        low, high = Fraction(int(rng.integers(-15, 4)), 16), Fraction(int(rng.integers(5, 16)), 16)
+        piece = piece_of(problem, low, high)
+        rows, values = rows_of(codes, rng)
+        # near multipliers that prove much at each end
+        best = [_best_at(end, codes, rows) for end in piece.ends]
+        pair = tuple(b * rng.uniform(0.8, 1.2, len(b)) + 0.02 * values for b in best)
+        shares = [Fraction(k, 16) for k in range(17)]
+        least = [
+            least_at(problem, piece, low + (high - low) * t, rows, float(1 - t) * pair[0] + float(t) * pair[1])
+            for t in shares
+        ]
+        bound = piece.margin(codes, rows, pair)
+        assert bound <= min(least) + 1e-9 * (1.0 + max(map(abs, least))) or min(least[0], least[-1]) <= 0
+        assert not bound > 0 or min(least) > 0
+        proven += bound > 0
+        possible += min(least) > 0
+        between += min(least[0], least[-1]) > 0 and min(least) <= 0
+    assert proven > 0.1 * possible > 0
+    assert between > 0
+    # a wrong sign at one end
+    rows, values = rows_of((OPEN, OPEN), rng)
+    wrong = np.where([row[0] == 6 for row in rows], -values, values)
+    assert piece.margin((OPEN, OPEN), rows, (values, wrong)) == -np.inf
+    assert piece.margin((OPEN, OPEN), rows, (wrong, values)) == -np.inf
+
+
+def _best_at(end, codes, rows):
+    """Multipliers of rows by which the bound at one alpha is about as large as it can be, by projected gradients."""
+    size, units = len(end.g), end.row_unit
+    A, B = np.zeros((size, len(rows))), np.zeros((size, len(rows)))
+    for k, row in enumerate(rows):
+        for i, factor in zip(*sector_row_terms(row, end.tau, size), strict=True):
+            value = factor * units[i] * (end.discs.mid[i] if i == row[1] and row[0] in (4, 6, 7) else 1.0)
+            (A[i] if i < size else B[i - size])[k] += value
+    H, q = A - end.S @ B, -end.g @ B
+    free = np.array([row_sign(codes[row[1]], row) == 2 for row in rows])
+    m, step = np.zeros(len(rows)), 2.0 / np.linalg.norm(H.T @ np.linalg.solve(end.S, H), 2)
+    for _ in range(400):
+        m = m + step * (q - 0.5 * H.T @ np.linalg.solve(end.S, end.g + H @ m))
+        m = np.where(free, m, np.maximum(m, 0))
+    return m
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -117,11 +169,13 @@ def test_multipliers_for_both_ends_serve_wherever_others_do(seed):
     for codes in [(OPEN, STICK), (STICK, STICK), (SECTORS + 9, SECTORS + 70), (STICK, SECTORS + 5), (OPEN, OPEN)]:
         for _ in range(20):
             rows, values = rows_of(codes, rng)
-            found = balanced(piece, codes, rows)
+            found = PieceBounds(piece, codes, rows).positive()
             if found is None:
-                assert max(piece.margin(codes, rows, scale * values) for scale in (0.3, 1.0, 3.0)) <= 1e-4
+                best = [_best_at(end, codes, rows) for end in piece.ends]
+                others = [best, *((scale * values, scale * values) for scale in (0.3, 1.0, 3.0))]
+                assert max(piece.margin(codes, rows, tuple(pair)) for pair in others) <= 1e-4
                 continue
-            assert min(least_at(problem, piece, alpha, rows, found) for alpha in (piece.low, piece.high)) > 0
+            assert piece.margin(codes, rows, tuple(np.split(found, 2))) > 0
             served += 1
     assert served
 

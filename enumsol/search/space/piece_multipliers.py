@@ -97,9 +97,9 @@ def simplest(low: Fraction, high: Fraction) -> Fraction:
 
 
 class PieceBounds:
-    """The numbers (12.21a) of a piece as functions of multipliers m of rows at its lower, then at its upper end, (2 n,).
+    """The numbers (12.21a) of a piece, as functions of multipliers m of rows at its lower, then its upper end, (2 n,).
 
-    They are q'm - |v + B m|^2 / 4, one for each end and, last, one for what is between.
+    They are q'm - |v + B m|^2 / 4; the last one is for what lies between the ends.
 
     Parameters
     ----------

@@ -50,7 +50,7 @@ _KEPT = 256
 #: Pieces are cut down to this share of the interval where only their length stands in the way of a certificate.
 _ALONE = 2.0**-5
 #: Pieces are cut so often at most between two branchings where multipliers fail at their ends only.
-_CUTS = 3
+_CUTS = 2
 #: Around the directions of known curves sectors get more room by this share of what these turn by, and are no narrower
 #: than those of a level; a sector is cut so if no more than this share of it is left.
 _ROOM, _NARROWEST, _LEFT = 0.5, 9, 0.5
@@ -339,10 +339,10 @@ class PieceTree:
                 relaxation = relaxation.child(*point.rows.of(changed, codes[changed]), last=last)
         final = not {CONTACT, UNDECIDED} & set(codes)
         if _is_excluded(relaxation):
-            exclusion = self._excluded(at, codes, point, relaxation)
-            done = None if exclusion is None else (exclusion, [])
-            if done is None and final and self._is_due(codes):
-                done = self._settled(at, codes, at.piece.narrowed(codes))
+            if (exclusion := self._excluded(at, codes, point, relaxation)) is not None:
+                return exclusion, []
+            due = final and self._is_due(codes)
+            done = self._settled(at, codes, at.piece.narrowed(codes)) if due else None
             return self._undecided(at, codes, cuts) if done is None else done
         done = self._certified(at, codes)
         if done is None and not self._sampled and self._sample():
