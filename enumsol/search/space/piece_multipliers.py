@@ -15,6 +15,7 @@ from scipy.linalg import solve_triangular
 from scipy.optimize import nnls
 
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
+from enumsol.proof.space_records import ExcludedOverPiece
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.space.space_newton import Isotropic
 from enumsol.search.space.space_search import SpaceSplitting
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
 
 #: The weight of the squares of multipliers, each by the length of its row, which keeps them bounded.
 _RIDGE = 1e-12
+#: How often a writer of proofs counts errors.
+COUNTED = 2.0
 #: How often weights of the bounds are tried.
 _WEIGHTS = 6
 #: Rows of a program at one alpha.
@@ -156,6 +159,18 @@ class PieceBounds:
             weight = weight * np.exp(-bounds / np.max(np.abs(bounds)))
             weight /= np.sum(weight)
         return None
+
+
+def exclusion(piece: AlphaPiece, codes: Sequence[int], rows: Sequence[Row]) -> ExcludedOverPiece | None:
+    """The proof by multipliers of rows that a piece holds no solution; None if none are found."""
+    found = PieceBounds(piece, codes, rows).positive()
+    if found is None:
+        return None
+    low, high = np.split(found, 2)
+    if not piece.margin(codes, rows, (low, high), COUNTED) > 0:
+        return None
+    used = np.flatnonzero((low != 0) | (high != 0))
+    return ExcludedOverPiece([rows[k] for k in used.tolist()], low[used], high[used])
 
 
 def _columns(system: EnclosedSpace, rows: Sequence[Row]) -> tuple[Floats, Floats, Floats]:

@@ -21,7 +21,7 @@ from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.outcome import StopReason
 from enumsol.search.space.piece_arcs import beside, points_on, slides
 from enumsol.search.space.piece_certificates import ERRORS, Passage, PieceProposals, runs_over
-from enumsol.search.space.piece_multipliers import AlphaPoint, PieceBounds, simplest
+from enumsol.search.space.piece_multipliers import COUNTED, AlphaPoint, exclusion, simplest
 from enumsol.search.space.space_fathoming import without_sectors
 from enumsol.support.deadlines import TimeOverError, look
 from enumsol.trusted.space.curve_runs import CurveParts, KnownCurve, Run
@@ -65,8 +65,6 @@ _SOUGHT, _SAMPLED = 8, (Fraction(15, 16), Fraction(1, 2), Fraction(1, 16))
 _FACTORS = 0, 1
 #: Arcs are sought where a known curve has directions in a leaf, or beside it by this factor.
 _BESIDE = 1.5
-#: How often a writer of proofs counts errors.
-_COUNTED = 2.0
 #: Leaves are tested from this level of their sectors on; where more than two nodes slip, from the second one on.
 _TRIED = 3, 5
 #: Nodes that are examined before others than this process help.
@@ -337,19 +335,14 @@ class PieceTree:
             point, relaxation = parent
             if changed >= 0:
                 relaxation = relaxation.child(*point.rows.of(changed, codes[changed]), last=last)
-        final = not {CONTACT, UNDECIDED} & set(codes)
         if _is_excluded(relaxation):
-            if (exclusion := self._excluded(at, codes, point, relaxation)) is not None:
-                return exclusion, []
-            due = final and self._is_due(codes)
-            done = self._settled(at, codes, at.piece.narrowed(codes)) if due else None
-            return self._undecided(at, codes, cuts) if done is None else done
+            return self._excluded(at, codes, (point, relaxation), cuts)
         done = self._certified(at, codes)
         if done is None and not self._sampled and self._sample():
             done = self._certified(at, codes)
         if done is not None:
             return done
-        if final and self._is_due(codes):
+        if self._is_due(codes):
             done = self._leaf(at, codes)
             if done is not None:
                 return done
@@ -357,8 +350,7 @@ class PieceTree:
                 return self._branched(at, codes, parts[0], (point, relaxation), children=parts[1])
             node = self._widest(codes)
         else:
-            node = relaxation.most_promising(codes, relaxation.violations(codes))
-            node = self._widest(codes) if node < 0 else node
+            node = self._promising(codes, relaxation)
         if node < 0:
             return self._leaf(at, codes) or self._halved(at, codes)
         return self._branched(at, codes, node, (point, relaxation))
@@ -367,50 +359,47 @@ class PieceTree:
     def _is_due(codes: Codes) -> bool:
         """Whether a leaf is to be tested: where sectors are wide that is of no use."""
         levels = [width_level(code - SECTORS) for code in codes if code > SECTORS]
-        return not levels or min(levels) >= _TRIED[len(levels) > 2]
+        final = not {CONTACT, UNDECIDED} & set(codes)
+        return final and (not levels or min(levels) >= _TRIED[len(levels) > 2])
 
     def _excluded(
-        self, at: _Examined, codes: Codes, point: AlphaPoint, relaxation: SpaceRelaxation
-    ) -> ExcludedOverPiece | None:
-        """By multipliers of one alpha, where they serve, or else by others for both ends of the piece."""
-        piece = at.piece
+        self, at: _Examined, codes: Codes, parent: tuple[AlphaPoint, SpaceRelaxation], cuts: int
+    ) -> tuple[Any, list[Any]]:
+        """An assignment that one alpha excludes: over all of the piece, if possible, or it is cut or branched."""
+        point, relaxation = parent
         rows, values = point.multipliers(relaxation)
-        if piece.margin(codes, rows, (values, values), _COUNTED) > 0:
-            return ExcludedOverPiece(rows, values, values)
+        if at.piece.margin(codes, rows, (values, values), COUNTED) > 0:
+            return ExcludedOverPiece(rows, values, values), []
         ends = self._ends(at, codes)
-        if not all(_is_excluded(other) for _, other in ends):
-            return None
-        for end, other in ends:
-            rows += end.multipliers(other)[0]
-        rows = list(dict.fromkeys([*rows, *point.imposed(codes)]))
-        found = PieceBounds(piece, codes, rows).positive()
-        if found is None:
-            return None
-        low, high = np.split(found, 2)
-        if not piece.margin(codes, rows, (low, high), _COUNTED) > 0:
-            return None
-        used = np.flatnonzero((low != 0) | (high != 0))
-        return ExcludedOverPiece([rows[k] for k in used], low[used], high[used])
+        possible = [(end, other) for end, other in ends if not _is_excluded(other)]
+        if not possible:
+            for end, other in ends:
+                rows += end.multipliers(other)[0]
+            found = exclusion(at.piece, codes, list(dict.fromkeys([*rows, *point.imposed(codes)])))
+            if found is not None:
+                return found, []
+        if self._is_due(codes):
+            done = self._settled(at, codes, at.piece.narrowed(codes))
+            if done is not None:
+                return done
+        if cuts < _CUTS:
+            return self._halved(at, codes, cuts=cuts + 1)
+        for other_parent in possible:
+            node = self._promising(codes, other_parent[1])
+            if node >= 0:
+                return self._branched(at, codes, node, other_parent)
+        node = next((i for i, code in enumerate(codes) if code in (CONTACT, UNDECIDED)), self._widest(codes))
+        return self._halved(at, codes, cuts=cuts + 1) if node < 0 else self._branched(at, codes, node, None)
 
     def _ends(self, at: _Examined, codes: Codes) -> list[tuple[AlphaPoint, SpaceRelaxation]]:
         """The relaxations of an assignment at the ends of a piece; not at one where friction vanishes."""
         ends = [self._point(alpha) for alpha in (at.piece.low, at.piece.high)]
         return [(end, end.root(codes)) for end in ends if np.array_equal(end.system.tau, self._space.fixed.tau)]
 
-    def _undecided(self, at: _Examined, codes: Codes, cuts: int) -> tuple[Any, list[Any]]:
-        """An assignment that one alpha excludes and the piece does not: cut, or branched where an end is possible."""
-        if cuts >= _CUTS:
-            for point, relaxation in self._ends(at, codes):
-                if _is_excluded(relaxation):
-                    continue
-                node = relaxation.most_promising(codes, relaxation.violations(codes))
-                node = self._widest(codes) if node < 0 else node
-                if node >= 0:
-                    return self._branched(at, codes, node, (point, relaxation))
-            node = next((i for i, code in enumerate(codes) if code in (CONTACT, UNDECIDED)), self._widest(codes))
-            if node >= 0:
-                return self._branched(at, codes, node, None)
-        return self._halved(at, codes, cuts=cuts + 1)
+    def _promising(self, codes: Codes, relaxation: SpaceRelaxation) -> int:
+        """The node that is to be split by a relaxation that is possible; -1 if there is none."""
+        node = relaxation.most_promising(codes, relaxation.violations(codes))
+        return self._widest(codes) if node < 0 else node
 
     @staticmethod
     def _widest(codes: Codes) -> int:
