@@ -58,6 +58,8 @@ _ROOM, _NARROWEST, _LEFT = 0.5, 9, 0.5
 _LONGEST, _RUNS = 9, 4
 #: Longer pieces are cut where statuses occur along one curve over a part of them.
 _SHORT = 2.0**-6
+#: At these shares of a piece it is asked how often a curve passes it.
+_PASSED = (2.0 * np.arange(4) + 1.0) / 8
 #: Pieces of undecided statuses at most at which a first curve is sought; where solutions are sampled, as shares of the
 #: interval, if more than one curve may be needed.
 _SOUGHT, _SAMPLED = 8, (Fraction(15, 16), Fraction(1, 2), Fraction(1, 16))
@@ -134,6 +136,14 @@ def _kept(known: OrderedDict[Any, Any], key: Any, make: Callable[[], Any]) -> An
 
 def _is_excluded(relaxation: SpaceRelaxation) -> bool:
     return relaxation.pruned and relaxation.bound > PRUNE_MARGIN
+
+
+def _only_turns(alpha: Array, piece: AlphaPiece) -> bool:
+    """Whether a run along a curve, given by alphas, passes some alphas of a piece twice, but none just once."""
+    low, high = float(piece.low), float(piece.high)
+    beyond = alpha > (low + (high - low) * _PASSED)[:, None]
+    passed = np.sum(beyond[:, 1:] != beyond[:, :-1], axis=1)
+    return bool(np.any(passed > 1) and not np.any(passed == 1))
 
 
 class _Examined:
@@ -341,9 +351,11 @@ class PieceTree:
                 relaxation = relaxation.child(*point.rows.of(changed, codes[changed]), last=last)
         final = not {CONTACT, UNDECIDED} & set(codes)
         if _is_excluded(relaxation):
-            done = self._excluded(at, codes, point, relaxation, cuts)
+            done, part = self._excluded(at, codes, point, relaxation)
             if done is None and final and self._is_due(codes):
                 done = self._settled(at, codes, at.piece.narrowed(codes))
+            if done is None and part is not None and cuts < _CUTS:
+                done = self._cut(at.piece, part, codes, (point, relaxation), cuts)
             return self._undecided(at, codes, cuts) if done is None else done
         done = self._certified(at, codes)
         if done is None and not self._sampled and self._sample():
@@ -371,14 +383,14 @@ class PieceTree:
         return not levels or min(levels) >= _TRIED[len(levels) > 2]
 
     def _excluded(
-        self, at: _Examined, codes: Codes, point: AlphaPoint, relaxation: SpaceRelaxation, cuts: int
-    ) -> tuple[Any, list[Any]] | None:
-        """By multipliers of one alpha, where they serve, or else by some that serve both ends of the piece."""
+        self, at: _Examined, codes: Codes, point: AlphaPoint, relaxation: SpaceRelaxation
+    ) -> tuple[tuple[Any, list[Any]] | None, tuple[Fraction, Fraction] | None]:
+        """By multipliers of one alpha, or else by some that serve both ends of the piece; and a part where those do."""
         piece = at.piece
         rows, values = point.multipliers(relaxation)
         part = served(piece, point.alpha, rows, values)
         if part == (piece.low, piece.high) and piece.margin(codes, rows, values, _COUNTED) > 0:
-            return ExcludedInSpace(rows, values), []
+            return (ExcludedInSpace(rows, values), []), None
         ends = self._ends(at, codes)
         if len(ends) == 2 and all(_is_excluded(other) for _, other in ends):
             for end, other in ends:
@@ -387,10 +399,8 @@ class PieceTree:
             both = balanced(piece, codes, rows)
             if both is not None and piece.margin(codes, rows, both, _COUNTED) > 0:
                 used = np.flatnonzero(both)
-                return ExcludedInSpace([rows[k] for k in used], both[used]), []
-        if part is None or part == (piece.low, piece.high) or cuts >= _CUTS:
-            return None
-        return self._cut(piece, part, codes, (point, relaxation), cuts)
+                return (ExcludedInSpace([rows[k] for k in used], both[used]), []), None
+        return None, None if part == (piece.low, piece.high) else part
 
     @staticmethod
     def _cut(
@@ -535,12 +545,16 @@ class PieceTree:
         return piece.high - piece.low > Fraction(share) * (self.interval[1] - self.interval[0])
 
     def _ends_within(self, at: _Examined, statuses: tuple[int, ...]) -> bool:
-        """Whether in one run along the known curves, and in no other, these statuses hold over a part of a piece."""
+        """Whether in one run along the known curves, and in no other, these statuses hold over a part of a piece.
+
+        Not where that run turns back and passes no alpha just once: with two solutions at one no form is definite.
+        """
         runs = 0
         for _, parts in at.along(self.curves):
             held = parts.held(statuses)
             if len(held):
                 runs += int(held[0]) + int(np.sum(held[1:] & ~held[:-1]))
+                runs += int(_only_turns(parts.alpha.mid[held], at.piece))
         return runs == 1
 
     def _passages(self, at: _Examined, statuses: tuple[int, ...]) -> list[Passage]:
