@@ -522,6 +522,38 @@ def test_folds_of_one_node_are_those_of_the_closed_form(way):
     assert before.rises == -after.rises
 
 
+@pytest.mark.parametrize(("seed", "most"), [(7, 80), (9, 80)])
+def test_a_graph_around_the_fold_of_one_node_is_complete(seed, most):
+    """Node 7 passes a point at which the equations of its status are singular; node 9 has no contact but two slips."""
+    node = OneNode(seed, load=True)
+    fold = node.alpha(node.folds()[0])
+    graph = enumsol.branch_graph(node.problem, around(fold, Fraction(37, 100)), max_nodes=most)
+    assert graph.complete
+    (found,) = [vertex for vertex in graph.vertices if vertex.kind is VertexKind.FOLD]
+    low, high = map(Fraction, found.enclosure)
+    near = Fraction(1e-12 * max(1.0, abs(fold)))
+    assert low - near <= Fraction(fold) <= high + near
+    assert high - low <= 2 * near
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("first", range(0, 500, 20))
+def test_graphs_of_many_nodes_are_complete_and_have_the_folds_of_the_closed_form(first):
+    for seed, load in product(range(first, first + 20), (True, False)):
+        node = OneNode(seed, load)
+        folds = sorted(node.alpha(phi) for phi in node.folds())
+        if not folds:
+            continue
+        interval = (folds[0] - 0.37 if load else 0.0, folds[-1] + 0.37)
+        graph = enumsol.branch_graph(node.problem, interval, max_nodes=1000)
+        assert graph.complete, (seed, load)
+        smooth = [v for v in graph.vertices if v.kind is VertexKind.FOLD and len(v.selections) == 1]
+        assert np.allclose(sorted(float(sum(v.enclosure)) / 2 for v in smooth), folds, rtol=1e-12, atol=1e-12), (
+            seed,
+            load,
+        )
+
+
 def test_a_curve_is_whole_over_an_interval_in_which_continuation_has_to_take_very_short_steps():
     node = OneNode(20, load=True)
     phi = node.folds()[-1]

@@ -191,28 +191,36 @@ def lies_between(low, high, x):
     return bool(np.all(b[a == 0] >= 0) and least <= most)
 
 
+@pytest.mark.parametrize("loose", [[], [0]])
 @pytest.mark.parametrize(("p", "seed"), [(1, 1), (2, 1), pytest.param(3, 1, marks=pytest.mark.slow)])
-def test_second_derivatives_over_a_piece_hold_differences(p, seed):
-    """Quotients of differences of G are means of its second derivatives with respect to (psi, s)."""
+def test_second_derivatives_over_a_piece_hold_differences(p, seed, loose):
+    """Quotients of differences of G are means of its second derivatives with respect to (psi, s).
+
+    And to normal forces between both that are left free.
+    """
     problem, rng = changing_problem(p, seed), np.random.default_rng(seed)
     piece = piece_of(problem, Fraction(3, 8), Fraction(3, 8) + Fraction(1, 64))
     for _ in range(6):
         codes = [SECTORS + int(rng.integers(256, 512)) for _ in range(p)]
-        leaf = Leaf(piece.whole, codes)
-        state = leaf._state(np.zeros(p), leaf.half)
+        leaf, n = Leaf(piece.whole, codes, loose), p + len(loose)
+        angle, radius = (
+            np.append(np.zeros(p), 0.5 * np.ones(len(loose))),
+            np.append(leaf.half, 0.3 * np.ones(len(loose))),
+        )
+        state = leaf._state(angle, radius)
         if state is None:
             continue
-        point = leaf._state(np.zeros(p), 0.0 * leaf.half, still=True)
-        Y = rng.standard_normal((p, p))
-        second = leaf._second(Y, (state, point), np.zeros(p), leaf.half)
+        point = leaf._state(angle, 0.0 * radius, still=True)
+        Y = rng.standard_normal((n, n))
+        second = leaf._second(Y, (state, point), angle, radius)
         half = (piece.high - piece.low) / 2
 
-        def at(z, codes=codes, half=half, Y=Y):
-            alpha = piece.middle + Fraction(float(z[-1])) * half
-            return Y @ Leaf(piece.space.at(alpha), codes)._state(z[:-1], np.zeros(p), still=True).G.mid
+        def at(z, codes=codes, half=half, Y=Y, angle=angle):
+            alpha, there = piece.middle + Fraction(float(z[-1])) * half, angle + z[:-1]
+            return Y @ Leaf(piece.space.at(alpha), codes, loose)._state(there, 0.0 * there, still=True).G.mid
 
-        steps = np.diag(np.append(0.4 * leaf.half, 0.4))
-        z = np.append(rng.uniform(-0.2, 0.2, p) * leaf.half, rng.uniform(-0.2, 0.2))
+        steps = np.diag(np.append(0.4 * radius, 0.4))
+        z = np.append(rng.uniform(-0.2, 0.2, n) * radius, rng.uniform(-0.2, 0.2))
         for j, one in enumerate(steps):
             for k, other in enumerate(steps):
                 difference = at(z + one + other) - at(z + one) - at(z + other) + at(z)
@@ -352,12 +360,14 @@ def test_what_is_not_proven_over_a_piece_is_left_open():
 class Along:
     """y, w and G of a leaf of sectors over a piece, and their derivatives by (psi, s), in floats by formulas of (12.1).
 
-    M x = P g, y = E x, w = g - S y with E(psi, s) and g(s): no more is used than their derivatives.
+    M x = P g, y = E x, w = g - S y with E(psi, s) and g(s): no more is used than their derivatives. Normal forces that
+    are left free are unknowns between psi and s, with y = E x + E_free free, and their w_n are zeros after G.
     """
 
-    def __init__(self, leaf, psi, s):
-        turn, rows, q = leaf.system.turn, leaf.rows, len(psi)
-        S, t, column, unit = leaf.system.S, leaf.t, leaf.column, leaf.system.unit
+    def __init__(self, leaf, psi, free, s):
+        turn, rows, q = leaf.system.turn, [*leaf.rows, *leaf.loose], len(psi)
+        S, t, unit = leaf.system.S, leaf.t, leaf.system.unit
+        column, solved = [rows.index(i) for i in leaf.turning], len(leaf.rows)
         g, rate = turn.g.mid + s * turn.g_turn.mid, turn.g_turn.mid
         disc, grows = (part.mid[leaf.turning] for part in (turn.disc, turn.disc_turn))
         across = np.column_stack([-leaf.centre[:, 1], leaf.centre[:, 0]])
@@ -370,30 +380,38 @@ class Along:
             E[t[k], column[k]] = (disc[k] + s * grows[k]) * d[k] / unit[t[k]]
             first[k, t[k], column[k]] = (disc[k] + s * grows[k]) * turned[k] / unit[t[k]]
             first[q, t[k], column[k]] = grows[k] * d[k] / unit[t[k]]
-        M = (S @ E)[rows]
-        x = np.linalg.solve(M, g[rows])
-        self.y = E @ x
+        rows = rows[:solved]
+        M = (S @ E[:, :solved])[rows]
+
+        def held(load, given):
+            """y of forces that are given, with those that the equations need."""
+            return given + E[:, :solved] @ np.linalg.solve(M, (load - S @ given)[rows])
+
+        self.y = held(g, E[:, solved:] @ free)
+        x, none = np.append(np.linalg.solve(M, (g - S @ E[:, solved:] @ free)[rows]), free), np.zeros(len(g))
         self.w = g - S @ self.y
-        moved = []
-        for k in range(q + 1):
-            load = rate if k == q else np.zeros(len(g))
-            moved.append(first[k] @ x + E @ np.linalg.solve(M, load[rows] - (S @ first[k] @ x)[rows]))
-        self.dy = np.column_stack(moved)
-        self.dw = np.outer(rate, np.arange(q + 1) == q) - S @ self.dy
+        moved = [held(none, first[k] @ x) for k in range(q)] + [held(none, column) for column in E[:, solved:].T]
+        self.dy = np.column_stack([*moved, held(rate, first[q] @ x)])
+        self.dw = np.column_stack([*np.zeros((q + len(free), len(g))), rate]) - S @ self.dy
         v, dv = (self._slips(leaf, part) for part in (self.w[:, None], self.dw))
         self.G = v[0, :, 0] * d[:, 1] - v[1, :, 0] * d[:, 0]
         self.dG = dv[0] * d[:, 1:] - dv[1] * d[:, :1]
         self.dG[np.arange(q), np.arange(q)] += v[0, :, 0] * d[:, 0] + v[1, :, 0] * d[:, 1]
+        self.G, self.dG = np.append(self.G, self.w[leaf.loose]), np.vstack([self.dG, self.dw[leaf.loose]])
         for part in (self.w, self.dw):
             part[rows] = 0.0
+        self.w[leaf.loose] = 0.0
 
     @staticmethod
     def _slips(leaf, w):
         return np.array([w[leaf.t[:, k]] * leaf.slip_scale[:, k, None] for k in (0, 1)])
 
 
-def steep_piece(p, seed, share, level):
-    """A leaf over a piece of a random system whose coefficients change by up to a share, in sectors of a level."""
+def steep_piece(p, seed, share, level, loose):
+    """A leaf over a piece of a random system whose coefficients change by up to a share, in sectors of a level.
+
+    ``loose`` normal forces are left free.
+    """
     rng = np.random.default_rng([seed, p, 5])
     m, none = 3 * p, Ball.exact(np.zeros(3 * p))
     A = rng.normal(size=(m, m))
@@ -406,29 +424,31 @@ def steep_piece(p, seed, share, level):
     along = PieceTurn(*map(Ball.exact, (g, rate, disc, grows)))
     wide = (np.abs(part) * (1.0 + 1e-12) for part in (rate, grows))
     whole = PieceSpace(S, zero, g, next(wide), F, 0.0 * F, tau, unit, disc, next(wide), along, held)
-    return Leaf(whole, [SECTORS + int(rng.integers(1 << level, 2 << level)) for _ in range(p)])
+    codes = [SECTORS + int(rng.integers(1 << level, 2 << level)) for _ in range(p)]
+    return Leaf(whole, codes, rng.permutation(p)[:loose])
 
 
 @pytest.mark.parametrize("share", [1e-3, 0.1, 0.9])
-@pytest.mark.parametrize("p", [1, 2, 3])
-def test_what_changes_along_a_piece_lies_in_its_balls(p, share):
+@pytest.mark.parametrize(("p", "loose"), [(1, 0), (2, 0), (3, 0), (1, 1), (2, 1), (3, 1), (3, 2)])
+def test_what_changes_along_a_piece_lies_in_its_balls(p, loose, share):
     """Values and first derivatives at points of a box and a piece, and Y times those of G by second ones."""
     rng, known = np.random.default_rng([p, 7]), 0
     for seed in range(10):
-        leaf = steep_piece(p, seed, share, int(rng.integers(3, 9)))
-        radius = leaf.half * 10.0 ** -rng.uniform(0, 3, p)
+        leaf = steep_piece(p, seed, share, int(rng.integers(3, 9)), loose)
+        radius = np.append(leaf.half * 10.0 ** -rng.uniform(0, 3, p), 10.0 ** -rng.uniform(0, 3, loose))
+        angle = np.append(np.zeros(p), rng.uniform(-1, 2, loose))
         with np.errstate(all="ignore"):
-            state, point = leaf._state(0.0 * radius, radius), leaf._state(0.0 * radius, 0.0 * radius, still=True)
+            state, point = leaf._state(angle, radius), leaf._state(angle, 0.0 * radius, still=True)
         if state is None or point is None:
             continue
         known += 1
-        Y = np.linalg.inv(point.J.mid) if seed % 2 else rng.normal(size=(p, p))
-        second = leaf._second(Y, (state, point), 0.0 * radius, radius)
+        Y = np.linalg.inv(point.J.mid) if seed % 2 else rng.normal(size=(p + loose, p + loose))
+        second = leaf._second(Y, (state, point), angle, radius)
         slope = leaf._preconditioned(Ball.exact(Y), point.whole_J, state.whole_J, second, np.append(radius, 1.0))
         held = Ball.beside(state.box.slope, state.box.lone)
         for _ in range(20):
-            z = np.append(radius, 1.0) * rng.choice([-1, 1, rng.uniform(-1, 1)], p + 1)
-            there = Along(leaf, z[:-1], z[-1])
+            z = np.append(radius, 1.0) * rng.choice([-1, 1, rng.uniform(-1, 1)], p + loose + 1)
+            there = Along(leaf, z[:p], angle[p:] + z[p:-1], z[-1])
             size = 1e-9 * (1.0 + np.max(np.abs(there.dy)) + np.max(np.abs(there.dw)))
             pairs = [(state.y, there.y), (state.w, there.w), (state.G, there.G), (state.whole_J, there.dG)]
             pairs += [(held, np.vstack([there.dy, there.dw])), (slope, Y @ there.dG)]

@@ -58,6 +58,8 @@ _ROOM, _NARROWEST, _LEFT = 0.5, 9, 0.5
 _LONGEST, _RUNS = 9, 4
 #: Longer pieces are cut where statuses occur along one curve over a part of them.
 _SHORT = 2.0**-6
+#: At these shares of a piece it is asked how often a curve passes it.
+_PASSED = (2.0 * np.arange(4) + 1.0) / 8
 #: Pieces of undecided statuses at most at which a first curve is sought; where solutions are sampled, as shares of the
 #: interval, if more than one curve may be needed.
 _SOUGHT, _SAMPLED = 8, (Fraction(15, 16), Fraction(1, 2), Fraction(1, 16))
@@ -130,6 +132,14 @@ def _kept(known: OrderedDict[Any, Any], key: Any, make: Callable[[], Any]) -> An
 
 def _is_excluded(relaxation: SpaceRelaxation) -> bool:
     return relaxation.pruned and relaxation.bound > PRUNE_MARGIN
+
+
+def _only_turns(alpha: Array, piece: AlphaPiece) -> bool:
+    """Whether a run along a curve, given by alphas, passes some alphas of a piece twice, but none just once."""
+    low, high = float(piece.low), float(piece.high)
+    beyond = alpha > (low + (high - low) * _PASSED)[:, None]
+    passed = np.sum(beyond[:, 1:] != beyond[:, :-1], axis=1)
+    return bool(np.any(passed > 1) and not np.any(passed == 1))
 
 
 class _Examined:
@@ -511,12 +521,16 @@ class PieceTree:
         return piece.high - piece.low > Fraction(share) * (self.interval[1] - self.interval[0])
 
     def _ends_within(self, at: _Examined, statuses: tuple[int, ...]) -> bool:
-        """Whether in one run along the known curves, and in no other, these statuses hold over a part of a piece."""
+        """Whether in one run along the known curves, and in no other, these statuses hold over a part of a piece.
+
+        Not where that run turns back and passes no alpha just once: with two solutions at one no form is definite.
+        """
         runs = 0
         for _, parts in at.along(self.curves):
             held = parts.held(statuses)
             if len(held):
                 runs += int(held[0]) + int(np.sum(held[1:] & ~held[:-1]))
+                runs += int(_only_turns(parts.alpha.mid[held], at.piece))
         return runs == 1
 
     def _passages(self, at: _Examined, statuses: tuple[int, ...]) -> list[Passage]:

@@ -34,7 +34,10 @@ def arc_of(system: EnclosedSpace, codes: Sequence[int], found: SpaceRoot | Open,
     errors : 1 proves; a writer of proofs takes more
     """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        return _ArcLeaf(system, codes).arc(found.angle, found.angle_rad, 1.0 + (errors - 1.0) * _MARGIN)
+        leaf, box = _ArcLeaf(system, codes), (found.angle, found.angle_rad, 1.0 + (errors - 1.0) * _MARGIN)
+        arc = leaf.arc(*box)
+        loosened = leaf.loosened() if arc is None else None
+        return arc if loosened is None else loosened.arc(*box)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +85,8 @@ class _Along(NamedTuple):
 class _ArcLeaf(Leaf):
     """Zeros z = (psi, s) of the equations of a leaf as a graph over one of these unknowns, z_k.
 
+    A normal force that is left free is between psi and s.
+
     With (12.22d), u being the other ones, the right-hand side maps a box of u into its interior, for every z_k: there
     is one zero for each of them, and these are an arc.
     """
@@ -91,13 +96,16 @@ class _ArcLeaf(Leaf):
 
         ``angle``, ``radius``: a box that holds the directions of all solutions.
         """
-        q = len(angle)
+        box = self._around_loose(angle, radius) if self.piece and len(self.free) == len(self.loose) else None
+        if box is None:
+            return None
+        (angle, radius), turning, q = box, len(angle), len(box[0])
         point = self._state(angle, 0.0 * radius, still=True)
-        if not self.piece or self.free or point is None or not point.whole_J.finite:
+        if point is None or not point.whole_J.finite:
             return None
         J, sizes = point.whole_J.mid, np.r_[radius, 1.0]
         k = int(np.argmax(np.abs(np.linalg.svd(J * sizes)[2][-1]))) if q else 0
-        others, reach = np.delete(np.arange(q + 1), k), Ball(np.zeros(1), sizes[k : k + 1])[0]
+        others = np.delete(np.arange(q + 1), k)
         try:
             Y = np.asarray(np.linalg.inv(np.delete(J, k, axis=1)), dtype=np.float64)
         except np.linalg.LinAlgError:
@@ -107,7 +115,7 @@ class _ArcLeaf(Leaf):
             state = self._state(angle, radius)
             if state is None or not state.whole_J.finite:
                 return None
-            room = np.r_[radius, 1.0][others]
+            room, reach = np.r_[radius, 1.0][others], Ball(np.zeros(1), np.r_[radius, 1.0][k : k + 1])[0]
             left, along, point_G = self._around(Y, k, angle, radius, state, point)
             beside = left @ Ball(np.zeros(q), room) + point_G
             needed = (beside + along * reach).size * errors
@@ -115,6 +123,11 @@ class _ArcLeaf(Leaf):
                 break
             radius = radius.copy()
             radius[psi] = np.maximum(radius[psi], _ROOM * needed[: len(psi)])
+            # solutions at wider angles may have other forces
+            cut = self._around_loose(angle[:turning], radius[:turning])
+            if cut is None:
+                return None
+            radius[turning:] = np.maximum(radius, (np.abs(cut[0] - angle) + cut[1]) * SAFE)[turning:]
         # u' = (I - Y J_u) u' - Y J_k, and I - Y J_u is a contraction in the norm of the box
         wide = left.size @ room * SAFE
         share = 1.0 - float(np.max(wide / room, initial=0.0)) * SAFE
@@ -122,12 +135,12 @@ class _ArcLeaf(Leaf):
             return None
         most = float(np.max(along.size / room, initial=0.0)) / share * SAFE
         rate = Ball(along.mid, (along.rad + wide * most) * SAFE + TINY)
-        slopes = Ball.beside(state.box.slope, state.box.lone[:, :1])
+        slopes = Ball.beside(state.box.slope, state.box.lone)
         values = Ball.joined(point.y, point.w) + (slopes[:, others] @ beside[:, None])[:, 0]
         values = values + ((slopes[:, others] @ along[:, None])[:, 0] + slopes[:, k]) * reach
         rates = (slopes[:, others] @ rate[:, None])[:, 0] + slopes[:, k]
         m = len(point.y.mid)
-        fixed = m + np.array(self.rows, dtype=np.intp)
+        fixed = m + np.array([*self.rows, *self.loose], dtype=np.intp)
         for part in (values, rates):
             part.mid[fixed], part.rad[fixed] = 0.0, 0.0
         s_rate = rate[-1] if k < q else Ball.exact(np.array(1.0))
@@ -136,7 +149,14 @@ class _ArcLeaf(Leaf):
         mid, rad = self._rates(found, angle, radius)
         if not np.all(holding | (np.abs(mid) > rad * errors * SAFE)):
             return None
-        return LeafArc(_pattern(self.codes), self.centre, angle, radius)
+        return LeafArc(_pattern(self.codes), self.centre, angle[:turning], radius[:turning])
+
+    def _around_loose(self, angle: Floats, radius: Floats) -> tuple[Floats, Floats] | None:
+        """A box of all unknowns but s that holds all zeros with angles in a box; None if there is none, or no such."""
+        if not self.loose:
+            return angle, radius
+        cut = self._cut_free(np.r_[angle, np.zeros(len(self.loose))], np.r_[radius, np.full(len(self.loose), np.inf)])
+        return cut if cut is not None and np.all(np.isfinite(cut[1])) else None
 
     def _rates(self, along: _Along, angle: Floats, radius: Floats) -> tuple[Floats, Floats]:
         """Bounds of how the conditions of ``_slacks`` change along the arc."""

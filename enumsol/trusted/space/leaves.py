@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 import numpy as np
 from scipy.linalg import qr
@@ -53,6 +53,8 @@ _POINT = 2.0**-24
 _DEPENDENT = 1e-9
 #: Directions that change no G by more (scaled) are not halved, nor for a linear system that they change by no more.
 _NEGLIGIBLE, _SINGULAR = 2.0**-44, 2.0**-36
+#: A normal force is left free where the linear equations change by this share over a sector.
+_COUPLED = 0.0625
 
 
 def _cut(angle: Floats, radius: Floats, reach: Floats, move: Ball) -> tuple[Floats, Floats]:
@@ -178,11 +180,20 @@ class Open:
     swept: bool = False
     span: tuple[float, float] = (-1.0, 1.0)
 
+    def tells_more(self, other: Open) -> bool:
+        """Whether this leaves less of a piece open than ``other``, or has bounds where that has none; no claim."""
+        shorter = self.span[1] - self.span[0] < other.span[1] - other.span[0]
+        return self.y is not None and (other.y is None or shorter)
+
 
 def settle(system: EnclosedSpace, codes: Sequence[int]) -> SpaceRoot | Open | None:
     """What a leaf holds: exactly one root in its box, no root (None), or it is not settled."""
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        return Leaf(system, codes).settle()
+        leaf = Leaf(system, codes)
+        found = leaf.settle()
+        loosened = leaf.loosened() if isinstance(found, Open) else None
+        again = found if loosened is None else loosened.settle()
+        return found if isinstance(again, Open) and isinstance(found, Open) and found.tells_more(again) else again
 
 
 def unsettled(system: EnclosedSpace, codes: Sequence[int]) -> Open:
@@ -219,10 +230,19 @@ class Leaf:
     Of a body that nothing holds S and g are bordered (theory, (14.3)): -q is part of x and y, and P picks the rows of
     its equilibrium, too; but for rigid modes that move neither w_n nor the slips that P picks. Theirs are unknowns s
     beside psi, and their rows of equilibrium are zeros beside G (theory, section 14.6).
+
+    Over a piece of alpha the normal force of a node in a sector may be left free, too, its w_n being a zero beside G:
+    where P S E is singular, both together determine it (theory, section 12.9).
+
+    Parameters
+    ----------
+    system : EnclosedSpace
+    codes : complete
+    loose : nodes in sectors whose normal forces are left free
     """
 
-    def __init__(self, system: EnclosedSpace, codes: Sequence[int]) -> None:
-        self.system, self.codes = system, codes
+    def __init__(self, system: EnclosedSpace, codes: Sequence[int], loose: Sequence[int] = ()) -> None:
+        self.system, self.codes, self.loose = system, codes, list(loose)
         tau = system.tau
         self.open = [i for i, code in enumerate(codes) if code == OPEN]
         self.closed = [i for i, code in enumerate(codes) if code != OPEN]
@@ -231,11 +251,12 @@ class Leaf:
         self.turning = [i for i, code in enumerate(codes) if code > SECTORS]
         self.numbers = [codes[i] - SECTORS for i in self.turning]
         size, modes = len(system.g), len(system.reach)
-        self.rows = [*self.closed, *(int(t) for i in self.stick for t in tau[i] if t >= 0)]
+        solved = [i for i in self.closed if i not in self.loose]
+        self.rows = [*solved, *(int(t) for i in self.stick for t in tau[i] if t >= 0)]
         free = self._free_modes() if modes else []
-        self.free = [size + mode for mode in free]
+        self.free = [*self.loose, *(size + mode for mode in free)]
         self.rows += [size + mode for mode in range(modes) if mode not in free]
-        self.column = [self.closed.index(i) for i in self.turning]
+        self.column = [-1 if i in self.loose else solved.index(i) for i in self.turning]
         self.t = tau[self.turning].reshape(-1, 2)
         turn = system.turn
         self.piece = turn is not None
@@ -248,11 +269,31 @@ class Leaf:
         E[self.rows, np.arange(len(self.rows))] = 1.0
         for i, sign in self.sliding:
             along = int(np.max(tau[i]))
-            E[along, self.closed.index(i)] = sign / system.unit[along]
+            E[along, solved.index(i)] = sign / system.unit[along]
         self.E = E
         self.centre, self.half = self._boxes()
         self._last: tuple[bytes, Turning | None] | None = None
         self._known: dict[tuple[bytes, bytes, bool], State | None] = {}
+
+    def loosened(self) -> Self | None:
+        """Over a piece of alpha, the leaf with the normal force left free that its equations determine least.
+
+        None where they hardly change over the sectors.
+        """
+        if not self.piece or not self.turning or self.free:
+            return None
+        turning, turns = self._turning(np.zeros(len(self.turning))), (1.0 + 2.0 * _WIDENED) * self.half
+        if turning is not None and np.max(np.sum(turning.coupling(turns), axis=1)) < _COUPLED:
+            return None
+        E = self.E.copy()
+        E[self.t, np.array(self.column, dtype=np.intp)[:, None]] = self.centre / self.system.unit[self.t]
+        try:
+            left, _, right = np.linalg.svd((self.system.balls[0].mid @ E)[self.rows])
+        except np.linalg.LinAlgError:
+            return None
+        # the minor without its row and column is largest
+        least = int(np.argmax(np.abs(left[self.column, -1] * right[-1, self.column])))
+        return type(self)(self.system, self.codes, [self.turning[least]])
 
     def _free_modes(self) -> list[int]:
         """Rigid modes that the equations leave free, one of those that are no other ones' combinations there."""
@@ -280,9 +321,10 @@ class Leaf:
 
     def settle(self) -> SpaceRoot | Open | None:
         """Angles in what follows are the values of the free unknowns, too, after those of the directions."""
-        q, modes = len(self.turning), np.array(self.free, dtype=np.intp) - len(self.system.g)
+        q, modes = len(self.turning), np.array(self.free[len(self.loose) :], dtype=np.intp) - len(self.system.g)
         turns = (1.0 + 2.0 * _WIDENED) * self.half
-        angle, radius = np.zeros(q + len(modes)), np.r_[turns, self.system.reach[modes]]
+        radius = np.r_[turns, np.full(len(self.loose), np.inf), self.system.reach[modes]]
+        angle = np.zeros(len(radius))
         state, rough = None, False
         for _ in range(_CONTRACTIONS):
             if self.free:
@@ -317,14 +359,15 @@ class Leaf:
                 rough = True
         return self._left_open(angle, radius, state)
 
-    def _cut_free(self, angle: Floats, radius: Floats) -> tuple[Floats, Floats] | None:
+    def _cut_free(self, angle: Floats, radius: Floats, *, still: bool = False) -> tuple[Floats, Floats] | None:
         """The box with the free unknowns that its angles leave; None if there are none.
 
-        G and the rows of equilibrium are affine in them: G = G_0 + R s, so that (Y R) s = -Y G_0 with any Y.
+        G and the rows beside it are affine in them: G = G_0 + R s, so that (Y R) s = -Y G_0 with any Y. Over all of a
+        piece of alpha, or ``still`` in its middle.
         """
         q = len(self.turning)
-        still = np.r_[angle[:q], 0.0 * angle[q:]]
-        state = self._state(still, np.r_[radius[:q], 0.0 * angle[q:]])
+        none = np.r_[angle[:q], 0.0 * angle[q:]]
+        state = self._state(none, np.r_[radius[:q], 0.0 * angle[q:]], still=still)
         if state is None or not (state.G.finite and state.J.finite):
             return angle, radius
         R = state.J[:, q:]
@@ -410,7 +453,7 @@ class Leaf:
         point = None if state is None else self._state(angle, 0.0 * radius, still=True)
         if state is None or point is None or not (state.whole_J.finite and point.J.finite):
             return None
-        slopes, k = Ball.beside(state.box.slope, state.box.lone[:, :1]), q
+        slopes, k = Ball.beside(state.box.slope, state.box.lone), q
         beside, along = Ball.exact(np.zeros(0)), Ball.exact(np.zeros(0))
         sizes = np.r_[radius, 1.0]
         if q:
@@ -424,7 +467,7 @@ class Leaf:
         others = np.delete(np.arange(q + 1), k)
         turn = (slopes[:, others] @ along[:, None])[:, 0] + slopes[:, k]
         middle = Ball.joined(point.y, point.w) + (slopes[:, others] @ beside[:, None])[:, 0]
-        fixed = len(point.y.mid) + np.array(self.rows, dtype=np.intp)
+        fixed = len(point.y.mid) + np.array([*self.rows, *self.loose], dtype=np.intp)
         for part in (middle, turn):
             part.mid[fixed], part.rad[fixed] = 0.0, 0.0
         return _Sweep(middle, turn, beside, along, float(sizes[k]), k == q)
@@ -475,8 +518,10 @@ class Leaf:
             ahead, rate = (
                 one * d[:, 0] + other * d[:, 1] for one, other in (self._slips(part[m:]) for part in sweep[:2])
             )
-            left = Ball.exact(self.half - angle) - sweep.beside, Ball.exact(self.half + angle) + sweep.beside
-            first, second = Ball.joined(ahead, *left), Ball.joined(rate, -sweep.along, sweep.along)
+            q = len(self.turning)
+            beside, turns_by = sweep.beside[:q], sweep.along[:q]
+            left = Ball.exact(self.half - angle[:q]) - beside, Ball.exact(self.half + angle[:q]) + beside
+            first, second = Ball.joined(ahead, *left), Ball.joined(rate, -turns_by, turns_by)
             high = np.concatenate([high, first.mid + first.rad])
             slopes = np.vstack([slopes, np.column_stack([second.mid - second.rad, second.mid + second.rad])])
         slack = 8 * UNIT * (np.abs(high) + np.max(np.abs(slopes), axis=1)) + TINY
@@ -490,6 +535,10 @@ class Leaf:
 
     def _is_swept(self, angle: Floats, radius: Floats, state: State | None) -> bool:
         """Whether dG/dpsi changes more along the piece than over the angles."""
+        if not np.all(np.isfinite(radius)):
+            # whether a free unknown would be bounded in the middle of the piece
+            cut = self._cut_free(angle, radius, still=True)
+            return cut is None or bool(np.all(np.isfinite(cut[1])))
         point = self._state(angle, 0.0 * radius, still=True)
         if point is None or not len(angle):
             return True
@@ -565,7 +614,7 @@ class Leaf:
         point = self._state(angle, np.zeros(len(angle)))
         if state is None or point is None:
             return Cause.RIGID if len(self.system.reach) else Cause.EQUATIONS
-        if self.free and nearly_singular(point.J.mid):
+        if len(self.system.reach) and self.free and nearly_singular(point.J.mid):
             return Cause.RIGID
         if not np.all(point.y.rad <= _POINT):
             return Cause.ROUNDING
@@ -581,6 +630,8 @@ class Leaf:
             # what free unknowns may be depends on all directions
             return np.where(moves[: len(self.half)] | np.any(moves[len(self.half) :]), self.half, 0.0)
         # the change of the linear system, where it keeps that from being regular
+        if not self.rows:
+            return self.half
         widths = self._directions(angle, radius)[0].rad / self.system.unit[self.t]
         changes = np.max(np.sum(np.abs(self.system.balls[0].mid[self.rows][:, self.t]) * widths, axis=2), axis=0)
         turning = self._turning(angle)
@@ -627,7 +678,8 @@ class Leaf:
         if self._last is None or self._last[0] != key:
             directions = turned_by(self.centre, angle)
             at = self.rows, self.column, self.t
-            self._last = key, Turning.of(self.system, self.E, at, directions, self.discs, self.free)
+            loose = [self.turning.index(i) for i in self.loose]
+            self._last = key, Turning.of(self.system, self.E, at, directions, self.discs, self.free, loose)
         return self._last[1]
 
     def _state(self, angle: Floats, radius: Floats, *, still: bool = False) -> State | None:
@@ -643,7 +695,9 @@ class Leaf:
     def _evaluated(self, angle: Floats, radius: Floats, *, still: bool) -> State | None:
         turning = self._turning(angle)
         q = len(self.turning)
-        free = Ball(np.zeros(1), np.full(1, 0.0 if still else 1.0)) if self.piece else Ball(angle[q:], radius[q:])
+        free = Ball(angle[q:], radius[q:])
+        if self.piece:
+            free = Ball.joined(free, Ball(np.zeros(1), np.full(1, 0.0 if still else 1.0)))
         box = None if turning is None else turning.over(radius[:q], free)
         if box is None:
             return None
@@ -655,36 +709,42 @@ class Leaf:
         corrected = J[diagonal, diagonal] + (v1 * turned[:, 1] - v2 * turned[:, 0])
         J.mid[diagonal, diagonal], J.rad[diagonal, diagonal] = corrected.mid, corrected.rad
         G = v1 * d2 - v2 * d1
-        if self.piece:
-            s1, s2 = self._slips(box.ds[:, 0])
-            return State(box.y, box.w, G, J, box, s1 * d2 - s2 * d1)
-        if self.free:
+        if self.free or self.piece:
             (s1, s2), w = self._slips(box.ds), box.w[self.free]
             G = Ball.joined(G, w)
             across = Ball.joined(s1 * d2[:, None] - s2 * d1[:, None], box.ds[self.free])
             along = Ball.joined(J, box.dw[self.free])
             J = Ball.beside(along, across)
-        return State(box.y, box.w, G, J, box)
+        w = Ball(box.w.mid.copy(), box.w.rad.copy())
+        w[self.loose] = 0.0
+        return State(box.y, w, G, J[:, :-1], box, J[:, -1]) if self.piece else State(box.y, w, G, J, box)
 
     def _bends(self, Y: Floats, over: tuple[State, State], angle: Floats, radius: Floats) -> Ball:
-        """Y times the second derivatives of G over a box, (q, q, q), by what is known there and in its middle."""
+        """Y times second derivatives of G over a box by the angles, by what is known there and in its middle."""
         return self._curved(Y, over, angle, radius)[1]
 
     def _second(self, Y: Floats, over: tuple[State, State], angle: Floats, radius: Floats) -> Ball:
-        """The same with respect to (psi, s) over a box and a piece of alpha, (q, q + 1, q + 1)."""
-        (w, bends), q = self._curved(Y, over, angle, radius), len(angle)
-        (s1, s2), (_, turned) = self._slips(over[0].box.ds[:, 0]), self._directions(angle, radius)
-        mixed = w.mixed() + Ball.exact(Y) * (s1 * turned[:, 1] - s2 * turned[:, 0])
-        second = Ball(np.zeros((q, q + 1, q + 1)), np.zeros((q, q + 1, q + 1)))
-        second[:, :q, :q], second[:, :q, q], second[:, q, :q], second[:, q, q] = bends, mixed, mixed, w.twice()
+        """The same over a box and a piece of alpha with respect to all n unknowns and s, (n, n + 1, n + 1)."""
+        (w, bends), n, q = self._curved(Y, over, angle, radius), len(angle), len(self.turning)
+        (s1, s2), (_, turned) = self._slips(over[0].box.ds), self._directions(angle, radius)
+        turn = Ball.exact(Y[:, :q])[:, :, None] * (s1 * turned[:, 1][:, None] - s2 * turned[:, 0][:, None])
+        second = Ball(np.zeros((n, n + 1, n + 1)), np.zeros((n, n + 1, n + 1)))
+        (by_angle, swept), mixed = w.loosened(), w.mixed() + turn[:, :, -1]
+        second[:, :q, :q], second[:, n, n] = bends, w.twice()
+        second[:, :q, q:n] = by_angle + turn[:, :, :-1]
+        second[:, :q, n], second[:, q:n, n] = mixed, swept
+        # the same on the other side of the diagonal
+        for part in (second.mid, second.rad):
+            part[:, q:, :q], part[:, n, q:n] = part[:, :q, q:].transpose(0, 2, 1), part[:, q:n, n]
         return second
 
     def _curved(self, Y: Floats, over: tuple[State, State], angle: Floats, radius: Floats) -> tuple[Combined, Ball]:
-        """What Y G takes of w for directions that are held, and Y times the second derivatives of G, (q, q, q)."""
-        (state, point), (d, turned), own = over, self._directions(angle, radius), np.arange(len(angle))
+        """What Y G takes of w for directions that are held, and Y times second derivatives of G by the angles."""
+        (state, point), (d, turned), own = over, self._directions(angle, radius), np.arange(len(self.turning))
         # v_i1 d_i2 - v_i2 d_i1
-        rows = Ball(np.zeros((len(own), len(state.box.w.mid))), np.zeros((len(own), len(state.box.w.mid))))
-        scale = Ball.exact(Y), Ball.exact(self.slip_scale)
+        rows = Ball(np.zeros((len(Y), len(state.box.w.mid))), np.zeros((len(Y), len(state.box.w.mid))))
+        scale = Ball.exact(Y[:, : len(own)]), Ball.exact(self.slip_scale)
+        rows[:, self.free] = Ball.exact(Y[:, len(own) :])
         for k, part in enumerate((d[:, 1], -d[:, 0])):
             rows[:, self.t[:, k]] = scale[0] * (scale[1][:, k] * part)
         w = state.box.combined(rows, point.box, radius[: len(own)])

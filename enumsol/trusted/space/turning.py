@@ -145,12 +145,22 @@ class Combined(NamedTuple):
         box = self.box
         assert box.share is not None
         turned = self.across * grown_share(box.share) - self.along @ (box.share[:, None] * box.z)
-        return turned * box.x - self.across * box.lag[:, 0]
+        return turned * box.x - self.across * box.lag[:, -1]
+
+    def loosened(self) -> tuple[Ball, Ball]:
+        """Over a piece of alpha, those by angles and other free unknowns, (k, q, f), and by s and the latter, (k, f).
+
+        w is affine in them, and what forces along d and across it change w by does not depend on them (12.22f).
+        """
+        box = self.box
+        assert box.share is not None
+        lag = box.lag[:, :-1]
+        return -(self.across[:, :, None] * lag), -(self.along @ (box.share[:, None] * lag))
 
     def twice(self) -> Ball:
         """Over a piece of alpha, second derivatives with respect to s, (k,): x_ss is 2 straight share lag."""
         assert self.box.share is not None
-        moved = self.box.share * self.box.lag[:, 0]
+        moved = self.box.share * self.box.lag[:, -1]
         return -(self.along @ (moved + moved)[:, None])[:, 0]
 
 
@@ -169,6 +179,8 @@ class Turning:
     are that P does not determine (theory, section 14.6): they are what forces in T are for which x is solved as well,
 
         x_c = (I + B_c D)^-1 (x_0c - B_s s),   y = y_0 + Pi_0 (T D x_c + T_s s),   w = w_0 - S Pi_0 (T D x_c + T_s s).
+
+    So may normal forces of turning nodes, which come first: x_c then has s itself, and B_c no other entries in its row.
 
     Attributes
     ----------
@@ -212,6 +224,7 @@ class Turning:
         directions: tuple[Floats, Floats],
         swept: tuple[Ball, Ball | None],
         free: Sequence[int] = (),
+        loose: Sequence[int] = (),
     ) -> Turning | None:
         """None where the equations are not proven regular for these directions.
 
@@ -226,6 +239,7 @@ class Turning:
         swept : of the turning nodes, (q,), tau over lambda_n where they slip; over a piece of alpha for s = 0, and what
             one s more adds
         free : rows of the free unknowns in y, k
+        loose : which turning nodes' normal forces are the first of these; their columns are not used
         """
         (rows, column, t), (discs, turn) = at, swept
         units = system.unit[t]
@@ -233,40 +247,29 @@ class Turning:
         share = None if turn is None else Ball(turn.mid / discs.mid, _quotient_error(turn, discs))
         piece = system.turn
         loads = [system.balls[1]] if piece is None else [piece.g, piece.g_turn]
-        if not len(rows):  # every node is open
-            none = Ball.exact(np.zeros((0, len(loads) - 1)))
-            start, *others = (Ball.joined(Ball.exact(np.zeros_like(load.mid)), load) for load in loads)
-            change = Ball.exact(np.zeros((len(start.mid), len(others))))
-            for k, other in enumerate(others):
-                change[:, k] = other
-            return cls(d, turned, Ball.exact(np.zeros(0)), start, none, change, none, rows, np.zeros(0), share)
-        E = E.copy()
-        E[t, np.asarray(column, dtype=np.intp)[:, None]] = d
+        E, held = E.copy(), np.delete(np.arange(len(t)), loose)
+        E[t[held], np.asarray(column, dtype=np.intp)[held, None]] = d[held]
         (S, _, _), sparse, both = system.balls, Ball.exact(E), np.r_[t.ravel(), np.asarray(free, dtype=np.intp)]
-        SE = S @ sparse
-        matrix = SE[rows]
-        inverse = Inverse.of(matrix)
-        if inverse is None:
-            return None
-        # columns: the load, and unit forces in the sectors
-        columns = [*loads, S[:, both]]
+        # forces in the sectors, and those that free unknowns are: a loose node's is along its direction, too
+        forces, others = np.zeros((len(S.mid), len(both))), t.size + np.arange(len(loose))
+        forces[both, np.arange(len(both))] = 1.0
+        forces[t[loose], others[:, None]] = d[loose]
+        pushed = S[:, both]
+        if len(loose):
+            pushed[:, others] = S @ Ball.exact(forces[:, others])
+        columns, SE = [*loads, pushed], S @ sparse
         load = Ball(*(np.column_stack([getattr(part, name) for part in columns]) for name in ("mid", "rad")))
-        near = Ball.exact(inverse.near(load.mid[rows]))
-        left = load - SE @ near
-        # what is left of the equations is rounding; (P S E0)^-1 is taken of that, and S E0 (P S E0)^-1, which is
-        # Q + (S E0 - Q P S E0) (P S E0)^-1 for whatever Q
-        rest = inverse.solve(left[rows])
-        Q = Ball.exact(SE.mid @ inverse.near(np.eye(len(rows))))
-        w = left - (Q @ left[rows] + (SE - Q @ matrix) @ rest)
-        w.mid[rows], w.rad[rows] = 0.0, 0.0
-        x = near + rest
-        y = sparse @ x
-        k = len(loads)
-        unit_forces = np.zeros_like(y.mid[:, k:])
-        unit_forces[both, np.arange(len(both))] = 1.0
-        start, change = Ball.joined(y[:, 0], w[:, 0]), Ball.joined(Ball.exact(unit_forces) - y[:, k:], w[:, k:])
+        matrix = SE[rows]
+        found = _held(matrix, SE, load, rows)
+        if found is None:
+            return None
+        all_x, w = found
+        y, k = sparse @ all_x, len(loads)
+        start, change = Ball.joined(y[:, 0], w[:, 0]), Ball.joined(Ball.exact(forces) - y[:, k:], w[:, k:])
         change = Ball(np.where(np.arange(len(change.mid))[:, None] < len(y.mid), 1.0, -1.0) * change.mid, change.rad)
-        x = x[list(column)]
+        x = Ball.exact(np.zeros((len(t), len(load.mid[0]))))
+        x[held] = all_x[np.asarray(column, dtype=np.intp)[held]]
+        x[list(loose), k + others] = -1.0
         B = x[:, k:]
         if piece is not None:
             # s is what is left free
@@ -320,6 +323,15 @@ class Turning:
             along * cos + across * sin + rounding,
         )
 
+    def _swept(self, part: Ball, led: Ball, x: Ball) -> Ball:
+        """Derivatives with respect to the free unknowns: by s, the last one, forces along d grow as well."""
+        if self.share is None:
+            return part
+        grown = (led @ (self.share * x)[:, None])[:, 0]
+        swept = Ball(part.mid.copy(), part.rad.copy())
+        swept[:, -1] = part[:, -1] + grown
+        return swept
+
     def _over(self, radius: Floats, free: Ball, point: Box | None) -> Box | None:
         q, m = len(radius), len(self.start.mid) // 2
         lone, start, base = self.change[:, 2 * q :], self.start, self.x
@@ -329,7 +341,7 @@ class Turning:
         B_moved, B_push, B_ahead = self._turned(self.B, radius)
         share = Ball.exact(np.zeros(q)) if self.share is None else self.share
         if self.share is not None:
-            grown = share * Ball(np.zeros(1), free.rad)
+            grown = share * Ball(np.zeros(1), free.rad[-1:])
             more = Ball.exact(np.ones(q)) + grown
             moved, push, ahead = moved + ahead * grown, push * more, ahead * more
             B_moved, B_push, B_ahead = B_moved + B_ahead * grown, B_push * more, B_ahead * more
@@ -347,13 +359,12 @@ class Turning:
             for _ in range(2):
                 # the mean value form: what the box adds to the values in its middle, dx = -z x dpsi
                 moves = (z * x) @ span
-                lag = shift if self.share is None else shift + (straight @ (share * x)[:, None])
+                lag = self._swept(shift, straight, x)
                 x = smaller(x, point.x - (moves + lag @ beside if len(free.mid) else moves)[:, 0])
         pushed, led = Ball.joined(z, push - moved @ z), Ball.joined(straight, ahead - moved @ straight)
-        lag = shift if self.share is None else shift + straight @ (share * x)[:, None]
-        value, slope, lone = start + (moved @ x[:, None])[:, 0], pushed[q:] * x, lone - moved @ shift
-        if self.share is not None:
-            lone = lone + led[q:] @ (share * x)[:, None]
+        lag = self._swept(shift, straight, x)
+        value, slope = start + (moved @ x[:, None])[:, 0], pushed[q:] * x
+        lone = self._swept(lone - moved @ shift, led[q:], x)
         if point is not None:
             moves = slope @ span
             moves = moves + lone @ beside if len(free.mid) else moves
@@ -361,6 +372,24 @@ class Turning:
         w = value[m:]
         w.mid[self.rows], w.rad[self.rows] = 0.0, 0.0
         return Box(value[:m], w, slope, lone, x, pushed, led, lag, self.share)
+
+
+def _held(matrix: Ball, SE: Ball, load: Ball, rows: Sequence[int]) -> tuple[Ball, Ball] | None:
+    """x and w of P (load - S E0 x) = 0, with ``matrix`` P S E0; None where that is not proven regular."""
+    if not len(rows):
+        return Ball.exact(np.zeros((0, len(load.mid[0])))), load
+    inverse = Inverse.of(matrix)
+    if inverse is None:
+        return None
+    near = Ball.exact(inverse.near(load.mid[rows]))
+    left = load - SE @ near
+    # what is left of the equations is rounding; (P S E0)^-1 is taken of that, and S E0 (P S E0)^-1, which is
+    # Q + (S E0 - Q P S E0) (P S E0)^-1 for whatever Q
+    rest = inverse.solve(left[rows])
+    Q = Ball.exact(SE.mid @ inverse.near(np.eye(len(rows))))
+    w = left - (Q @ left[rows] + (SE - Q @ matrix) @ rest)
+    w.mid[rows], w.rad[rows] = 0.0, 0.0
+    return near + rest, w
 
 
 def grown_share(share: Ball) -> Ball:
