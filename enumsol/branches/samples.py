@@ -15,15 +15,15 @@ import numpy as np
 
 from enumsol.errors import Interrupted, InvalidArgumentError
 from enumsol.model.problem import ContactProblem, check_is_problem
-from enumsol.model.statuses import STATUSES, ContactStatus, RowKind
+from enumsol.model.statuses import STATUSES, ContactStatus
 from enumsol.roots.enumerate import enumerate_roots
-from enumsol.support.arguments import alpha_list, instance_of, optional_callable, optional_executor
+from enumsol.roots.slips import affine_friction, ratios
+from enumsol.support.arguments import alpha_list, optional_callable, optional_executor
 from enumsol.support.messages import counted
 from enumsol.support.workers import spread
-from enumsol.trusted.selection import row_values
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
+    from collections.abc import Callable, Iterable, Mapping, Sequence
     from concurrent.futures import Executor
 
     import pandas as pd
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from enumsol.model.problem3d import AnyProblem
     from enumsol.roots.root import Root
     from enumsol.roots.root_set import RootSet
-    from enumsol.support.array_types import Alpha, AlphaLike
+    from enumsol.support.array_types import Alpha, AlphaLike, Floats
 
 
 #: Attributes of a root that are those of its node, too.
@@ -127,7 +127,7 @@ class SampledGraph:
 
 
 def link_samples(
-    problem: ContactProblem,
+    problem: AnyProblem,
     alphas: Iterable[AlphaLike],
     *,
     arithmetic: str | None = None,
@@ -135,15 +135,16 @@ def link_samples(
 ) -> SampledGraph:
     """Roots at the samples, linked into branches by their selections.
 
-    Two roots at neighbouring samples are linked when they have the same statuses. Of the roots left over, two are
-    linked when their statuses differ at one node only and the test function that separates them is predicted to
-    vanish between the samples (one step more allowed), by the derivatives at both roots. Where a root has several
-    such partners none is chosen and the pairs are marked as ambiguous. What happens between samples is not seen: use
+    Two roots at neighbouring samples are linked when they have the same statuses and, if both are regular, the same
+    index. Of the roots left over, two are linked when their statuses differ at one node only and the test function that
+    separates them is predicted to vanish between the samples (one step more allowed), by the derivatives at both roots.
+    Where a root has several such partners, as several in 3D may have the same statuses, none is chosen and the pairs
+    are marked as ambiguous. What happens between samples is not seen: use
     ``branch_graph``.
 
     Parameters
     ----------
-    problem : ContactProblem
+    problem : ContactProblem or ContactProblem3D
     alphas : iterable of float, Fraction or whatever enumerate_roots accepts as alpha
         Sorted by the function; at least one.
     arithmetic : str, optional
@@ -167,7 +168,7 @@ def link_samples(
     >>> enumsol.link_samples(enumsol.gallery.one_node_triangle(), [4, 5, 6])
     SampledGraph of 3 samples: 9 roots, 6 links (heuristic), 0 ambiguous pairs left open
     """
-    instance_of(problem, ContactProblem, "problem")
+    check_is_problem(problem)
     optional_callable(progress, "progress")
     samples = sorted(set(alpha_list(alphas)))
     if not samples:
@@ -189,62 +190,86 @@ def link_samples(
 
 
 def _link(
-    graph: Any, problem: ContactProblem, sample: int, left: RootSet, right: RootSet
+    graph: Any, problem: AnyProblem, sample: int, left: RootSet, right: RootSet
 ) -> list[tuple[tuple[int, int], tuple[int, int]]]:
     """Link neighbouring samples; returns the pairs left open."""
-    free_left, free_right = set(range(len(left))), set(range(len(right)))
-    for i, root in enumerate(left):
-        partners = [j for j in free_right if right[j].statuses == root.statuses]
-        if len(partners) == 1:
-            graph.add_edge((sample, i), (sample + 1, partners[0]), rule=LinkRule.SELECTION, heuristic=True)
-            free_left.discard(i)
-            free_right.discard(partners[0])
-    pairs = [(i, j) for i in sorted(free_left) for j in sorted(free_right) if _may_flip(problem, left[i], right[j])]
+    equal = [(i, j) for i, a in enumerate(left) for j, b in enumerate(right) if _may_continue(a, b)]
+    linked = [pair for pair in equal if _alone(pair, equal)]
+    for i, j in linked:
+        graph.add_edge((sample, i), (sample + 1, j), rule=LinkRule.SELECTION, heuristic=True)
+    open_pairs = [((sample, i), (sample + 1, j)) for i, j in equal if (i, j) not in linked]
+    # of those that no root with the same statuses may continue
+    free = [set(range(len(roots))) - {pair[k] for pair in equal} for k, roots in enumerate((left, right))]
+    pairs = [(i, j) for i in sorted(free[0]) for j in sorted(free[1]) if _may_flip(problem, left[i], right[j])]
     # two roots of one sample that differ by a flip may belong to a fold between the samples instead
-    open_pairs = []
     for i, j in pairs:
-        alone = sum(a == i for a, _ in pairs) == 1 and sum(b == j for _, b in pairs) == 1
-        if alone and left[i].index == right[j].index:
+        if _alone((i, j), pairs) and left[i].index == right[j].index:
             graph.add_edge((sample, i), (sample + 1, j), rule=LinkRule.FLIP, heuristic=True)
         else:
             open_pairs.append(((sample, i), (sample + 1, j)))
     return open_pairs
 
 
-def _may_flip(problem: ContactProblem, a: Root, b: Root) -> bool:
+def _alone(pair: tuple[int, int], pairs: Sequence[tuple[int, int]]) -> bool:
+    """Whether both roots of a pair are in no other one."""
+    return sum(a == pair[0] for a, _ in pairs) == 1 and sum(b == pair[1] for _, b in pairs) == 1
+
+
+def _may_continue(a: Root, b: Root) -> bool:
+    """Whether one selection holds at two roots, which a branch may have; along a regular one the index is the same."""
+    return a.statuses == b.statuses and (a.index == b.index or not (a.regular and b.regular))
+
+
+def _may_flip(problem: AnyProblem, a: Root, b: Root) -> bool:
     """Whether the statuses differ at one node by a flip that both roots predict to happen between the samples."""
     nodes = [i for i, (x, y) in enumerate(zip(a.statuses, b.statuses, strict=True)) if x is not y]
     if len(nodes) != 1:
         return False
     step = float(b.alpha) - float(a.alpha)
     for root, other in ((a, b), (b, a)):
-        at = _vanishing(problem, root, nodes[0], other.statuses[nodes[0]])
+        at = _vanishing(problem, root, nodes[0], other)
         if at is not None and not float(a.alpha) - step <= at <= float(b.alpha) + step:
             return False
     return True
 
 
-def _vanishing(problem: ContactProblem, root: Root, node: int, target: ContactStatus) -> float | None:
-    """Predicted alpha at which the condition that keeps the node from status ``target`` vanishes; None when unknown."""
+def _vanishing(problem: AnyProblem, root: Root, node: int, other: Root) -> float | None:
+    """Predicted alpha at which the condition that keeps a node from its status at another root vanishes, or None.
+
+    With the direction d of slip, at that root or the other one, a node in contact sticks while c lambda_n exceeds
+    d . lambda_t / q, and slips while d . q u_t is positive; q = F / c.
+    """
     if root.dlambda_dalpha is None or root.du_dalpha is None:
         return None
-    alpha, (F0, F1) = float(root.alpha), problem.friction
-    F = F0 + alpha * F1
-    forces, w = (np.concatenate(pair) for pair in ((root.lambda_n, root.lambda_t), (root.u_n, root.u_t)))
-    status = root.statuses[node]
+    (F0, F1), p = affine_friction(problem), problem.p
+    F, dF = ((one.reshape(p, -1)[node]) for one in (F0 + float(root.alpha) * F1, F1))
+    (force, force_rate), (move, move_rate) = (
+        (np.append(normal[node], along[node]), rate[node])
+        for normal, along, rate in (
+            (root.lambda_n, root.lambda_t, root.dlambda_dalpha),
+            (root.u_n, root.u_t, root.du_dalpha),
+        )
+    )
+    (c,), (q,) = ratios(F[None])
+    status, target = root.statuses[node], other.statuses[node]
     if status is ContactStatus.OPEN:
-        kind = RowKind.PENETRATION
-    elif target is ContactStatus.OPEN or (status is not ContactStatus.STICK and target is not ContactStatus.STICK):
-        kind = RowKind.NORMAL_FORCE
+        value, rate = -move[0], -move_rate[0]
+    elif target is ContactStatus.OPEN or ContactStatus.STICK not in (status, target):
+        value, rate = force[0], force_rate[0]
     elif status is ContactStatus.STICK:
-        kind = RowKind.CONE_PLUS if target is ContactStatus.SLIP_PLUS else RowKind.CONE_MINUS
+        d = _direction(F, np.atleast_1d(other.u_t[node])) / q
+        value, rate = c * force[0] - d @ force[1:], c * force_rate[0] - d @ force_rate[1:]
+        rate += (d * d @ (dF * q)) * force[0]
     else:
-        kind = RowKind.SLIP_FORWARD
-    value = row_values(forces, w, F)[kind, node]
-    rate = row_values(root.dlambda_dalpha.T.ravel(), root.du_dalpha.T.ravel(), F)[kind, node]
-    if kind in (RowKind.CONE_PLUS, RowKind.CONE_MINUS):
-        rate += F1[node] * root.lambda_n[node]
-    return None if rate == 0 else alpha - float(value) / float(rate)
+        d = _direction(F, move[1:]) * q
+        value, rate = d @ move[1:], d @ move_rate[1:]
+    return None if rate == 0 else float(root.alpha) - float(value) / float(rate)
+
+
+def _direction(F: Floats, slip: Floats) -> Floats:
+    """The direction of slip of a node against friction."""
+    size = np.linalg.norm(F * slip)
+    return np.asarray(F * slip / (size if size > 0 else 1.0))
 
 
 #: Columns with the number of roots at which at least one node has the status.

@@ -9,11 +9,12 @@ import numpy as np
 
 from enumsol.condensation.condensed import condensation_of
 from enumsol.continuation.condensed_equation import CondensedEquation
-from enumsol.continuation.space_equation import SLIP, SpaceEquation
+from enumsol.continuation.space_equation import SpaceEquation
 from enumsol.continuation.start import check_problem, equation_on
 from enumsol.errors import EnumsolError, InvalidArgumentError
 from enumsol.model.statuses import OPEN, STICK
-from enumsol.roots.local_branch import SINGULAR_TOLERANCE
+from enumsol.roots.linearisation import SelectionTangent
+from enumsol.roots.local_branch import SINGULAR_TOLERANCE, SLIP
 from enumsol.roots.root import Root
 from enumsol.support.arguments import alpha_value, positive_integer, positive_number
 from enumsol.support.array_arguments import real_array
@@ -259,6 +260,11 @@ def _root_of_floats(problem: Any, alpha: Alpha, equation: ScaledEquation, x: Flo
     rubs, rests = closed.reshape(tangential) & ~equation.without, at_rest.reshape(tangential) & ~equation.without
     lambda_n, lambda_t = np.where(closed, lambda_n, 0.0), np.where(rubs, lambda_t, 0.0)
     u_n, u_t = np.where(closed, 0.0, u_n), np.where(rests, 0.0, u_t)
+    tangent = None
+    if regular and lambda_t.ndim == 2:
+        parts = (lambda_n, lambda_t), (u_n, u_t)
+        forces, moved = (np.append(normal, along.ravel(order="F")) for normal, along in parts)
+        tangent = SelectionTangent.at(problem, alpha, codes, forces, moved)
     return Root(
         alpha=alpha,
         statuses=equation.statuses(codes, u_t.ravel(order="F")),
@@ -276,6 +282,7 @@ def _root_of_floats(problem: Any, alpha: Alpha, equation: ScaledEquation, x: Flo
         margin=float(np.min(equation.slacks(codes, x))) if regular else 0.0,
         enclosure=None,
         _condensed=condensation_of(problem),
+        _tangent=tangent,
         _rigid=equation.rigid(x) if equation.modes else None,
     )
 

@@ -11,11 +11,13 @@ import numpy as np
 
 from enumsol.condensation.condensed import RHS_BLOCK, FloatingCondensation, condensation_of
 from enumsol.errors import InvalidArgumentError
-from enumsol.model.problem import ContactProblem, check_is_problem
+from enumsol.model.problem import check_is_problem
+from enumsol.roots.slips import affine_friction
 from enumsol.support.arguments import alpha_value, optional_callable
 from enumsol.support.array_arguments import real_array
 
 if TYPE_CHECKING:
+    from enumsol.model.problem import ContactProblem
     from enumsol.model.problem3d import AnyProblem, ContactProblem3D
     from enumsol.support.array_types import AlphaLike, Floats, Mask
 
@@ -117,21 +119,6 @@ class AffinePath:
         """Nodes, in 3D nodes and axes, with F0 = F1 = 0."""
         F0, F1 = self.friction
         return np.asarray((F0 == 0) & (F1 == 0))
-
-
-def affine_friction(problem: AnyProblem) -> tuple[Floats, Floats]:
-    """Coefficients at alpha = 0 and their derivatives, (p,) both, in 3D (p, 2).
-
-    Raises
-    ------
-    InvalidArgumentError
-        They depend on the solution.
-    """
-    if isinstance(problem, ContactProblem):
-        return problem.friction
-    if problem.depends_on_solution:
-        problem.friction_at(0)  # refuses
-    return np.column_stack(problem.friction), np.column_stack(problem.friction_slope)
 
 
 class CallablePath:

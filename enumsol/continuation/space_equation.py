@@ -12,20 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
-from math import prod
 
 import numpy as np
 
 from enumsol.continuation.scaled_equation import STATUS_TOLERANCE, ScaledEquation
-from enumsol.errors import TooLargeError
-from enumsol.model.sectors import SECTORS
 from enumsol.model.statuses import FRICTIONLESS, OPEN, STICK, ContactStatus
-from enumsol.roots.local_branch import LOCATED_SINGULAR_TOLERANCE, MAX_SELECTIONS, LocalBranchTest
+from enumsol.roots.local_branch import SLIP, LocalBranchTest, coherent_orientation
+from enumsol.roots.slips import NodeSlips
 from enumsol.support.array_types import Codes, Floats, Mask
 
-#: Slip in any direction: the sector that is the whole circle.
-SLIP = SECTORS + 1
 #: The statuses on the other side of the conditions of a status, in their order.
 _ACROSS = {
     OPEN: ((SLIP, FRICTIONLESS),),
@@ -255,18 +250,9 @@ class SpaceEquation(ScaledEquation):
 
     def local_test(self, x: Floats) -> LocalBranchTest:
         """The local branch test at a point of a path; see ScaledEquation."""
-        active, slip = self.active(x), self.w(x)[self.p :]
-        count = prod(len(held) for held in active)
-        if count > MAX_SELECTIONS:
-            raise TooLargeError(
-                f"{count} selections hold at alpha = {self.alpha(x):g}; the local branch test examines at most "
-                f"{MAX_SELECTIONS}"
-            )
-        signs = tuple(
-            (self.statuses(codes, slip), self.index(codes, x, LOCATED_SINGULAR_TOLERANCE))
-            for codes in product(*(sorted(held) for held in active))
-        )
-        return LocalBranchTest.from_signs(signs, premise=bool(np.all(self.at(x).F > 0)))
+        F, (slip, force) = self.at(x).F, (self.split(part)[1] for part in (self.w(x), x[:-1]))
+        slips = NodeSlips.of(F, force, slip)
+        return coherent_orientation(self.bordered, F, self.active(x), slip, self.alpha(x), slips=slips)
 
 
 def _flat(normal: Floats, tangential: Floats) -> Floats:

@@ -9,11 +9,12 @@ import numpy as np
 
 from enumsol.continuation.condensed_equation import CondensedEquation
 from enumsol.continuation.continuation_options import ContinuationOptions
-from enumsol.continuation.parameter_path import AffinePath, CallablePath, SmoothPath, affine_friction
+from enumsol.continuation.parameter_path import AffinePath, CallablePath, SmoothPath
 from enumsol.continuation.path_data import PathData
 from enumsol.continuation.space_equation import SpaceEquation
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import ContactProblem, check_is_problem
+from enumsol.roots.slips import affine_friction
 from enumsol.support.arguments import alpha_value, instance_of, unbounded_interval
 from enumsol.support.array_arguments import real_array
 

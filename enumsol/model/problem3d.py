@@ -181,8 +181,8 @@ class ContactProblem3D(ContactBody):
     """
 
     taken_by: ClassVar[str] = (
-        " (problems in 3D are taken by enumerate_roots, multiplicity_table, branch_graph, newton, follow, follow_all, "
-        "audit, successive_approximations and solve_tresca so far)"
+        " (problems in 3D are taken by enumerate_roots, multiplicity_table, link_samples, branch_graph, newton, "
+        "follow, follow_all, audit, local_branch_test, successive_approximations and solve_tresca so far)"
     )
 
     def __init__(

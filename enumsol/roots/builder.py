@@ -87,7 +87,7 @@ class RootBuilder:
         )
 
     def _tangent(self, codes: Codes, force: Floats, w: Floats) -> SelectionTangent:
-        return SelectionTangent(self.floats, condensation_of(self.problem), self.problem.friction[1], codes, force, w)
+        return SelectionTangent.at(self.problem, self.alpha, codes, force, w, self.floats)
 
     def _rigid(self, solution: SelectionSolution) -> Floats | None:
         """Coordinates of the rigid displacement of a body that nothing holds."""

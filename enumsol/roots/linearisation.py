@@ -12,103 +12,134 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.condensation.condensed import Condensation, FloatingCondensation
+from enumsol.condensation.condensed import Condensation, FloatingCondensation, condensation_of
 from enumsol.condensation.data import EXACT_DOF_LIMIT
-from enumsol.model.statuses import FRICTIONLESS, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK, ContactStatus
+from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK, ContactStatus
+from enumsol.roots.slips import affine_friction
 from enumsol.support.immutable import Sealed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
     from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import AnyProblem
     from enumsol.selections.float_selections import FloatSelections
     from enumsol.selections.solution import ActiveSets
     from enumsol.support.array_types import Alpha, Codes, Floats, Indices
 
+#: A node of which nothing is known but that it moves less than this, by the largest displacement, may stick.
+_STILL = 1e-9
+
 
 @dataclass(frozen=True)
 class SelectionTangent(Sealed):
-    """The linear system of a regular root's selection.
+    """The equations of a regular root's statuses, linearised there.
 
-    Of a body that nothing holds it has the coordinates of the rigid displacement among its unknowns, and the
-    equilibrium of the body as a whole among its equations (theory, (14.3)).
+    Of a body that nothing holds they have the coordinates of the rigid displacement among their unknowns, and the
+    equilibrium of the body as a whole among them (theory, (14.3)).
 
     Attributes
     ----------
-    floats : FloatSelections
-        Solver of the system at the root's alpha, of the body on springs where nothing holds it.
     condensed : Condensation
-        Of the 2D problem.
-    friction_slope : (p,) array
+    friction : F and its derivative at the root's alpha, (p,), in 3D (p, 2)
     codes : tuple of p status codes
-    force, w : (2p,) arrays
+        In 3D a sector, or slip along one axis, stands for slip in the direction that the root has.
+    force, w : (m,) arrays
         lambda and w at the root, in the problem's units.
+    floats : FloatSelections or None
+        In 2D, solver of the system at the root's alpha, of the body on springs where nothing holds it.
     """
 
-    floats: FloatSelections
     condensed: Condensation
-    friction_slope: Floats
+    friction: tuple[Floats, Floats]
     codes: Codes
     force: Floats
     w: Floats
+    floats: FloatSelections | None = None
+
+    @classmethod
+    def at(
+        cls,
+        problem: AnyProblem,
+        alpha: Alpha,
+        codes: Codes,
+        force: Floats,
+        w: Floats,
+        floats: FloatSelections | None = None,
+    ) -> SelectionTangent:
+        """That of a problem at an alpha."""
+        F0, F1 = affine_friction(problem)
+        return cls(condensation_of(problem), (F0 + float(alpha) * F1, F1), codes, force, w, floats)
 
     def condition(self) -> float:
-        """Condition number of the scaled matrix."""
+        """In 2D, the condition number of the scaled matrix."""
+        if self.floats is None:
+            raise ValueError("the condition number is that of a selection in 2D")
         M, _, E = self.floats.matrix(self.codes)
-        M = self._bordered(M, self.floats.reduced(self.codes)[0], E, 1.0 / np.sqrt(np.diagonal(self.floats.system.S)))
+        M = self._bordered(self.floats, M, E)
         return float(np.linalg.cond(M)) if len(M) else 1.0
 
-    @cached_property
-    def rates(self) -> tuple[Floats, Floats] | None:
-        """d(lambda_n, lambda_t)/d alpha and d(u_n, u_t)/d alpha in the selection: M lambda = b differentiated.
-
-        Both have shape (p, 2). Where a coefficient is zero but its slope is not, the branch is followed to the side on
-        which F >= 0; None where a node with such a coefficient does not slip, since the branch may then stick.
-        """
-        floats, condensed, p = self.floats, self.condensed, self.floats.p
-        system = floats.system
-        change: Floats = np.zeros(2 * p)
-        for i, code in enumerate(self.codes):
-            if code in (SLIP_PLUS, SLIP_MINUS):
-                change[p + i] = (1.0 if code == SLIP_PLUS else -1.0) * self.friction_slope[i] * self.force[i]
-            elif code == FRICTIONLESS and self.friction_slope[i] != 0:
-                slip = self.w[p + i] / system.length[p + i]
-                if abs(slip) <= floats.tolerance:
-                    return None
-                change[p + i] = float(np.sign(slip)) * self.friction_slope[i] * self.force[i]
-        change /= system.force
-        rows, E = floats.reduced(self.codes)
-        load, G = condensed.g1 / system.length, self._moves
-        rhs = np.append((load - system.S @ change)[rows], self._load - G @ change)
-        rigid: Floats = np.zeros(len(G))
-        if len(rhs):
-            matrix = self._bordered(system.S[rows] @ E, rows, E)
-            found = np.asarray(np.linalg.solve(matrix, rhs), dtype=np.float64)
-            change, rigid = change + E @ found[: len(rows)], found[len(rows) :]
-        move = (load - system.S @ change + G.T @ rigid) * system.length
-        change = change * system.force
-        return change.reshape(2, p).T, move.reshape(2, p).T
-
-    def _bordered(self, matrix: Floats, rows: Indices, E: Floats, size: Floats | float = 1.0) -> Floats:
-        """The matrix of the selection, whose rows are those of S times ``size``, with q and equilibrium as a whole."""
-        G = self._moves
+    def _bordered(self, floats: FloatSelections, matrix: Floats, E: Floats) -> Floats:
+        """The matrix of the selection with q and equilibrium as a whole."""
+        if not isinstance(self.condensed, FloatingCondensation):
+            return matrix
+        system, rows = floats.system, floats.reduced(self.codes)[0]
+        G = np.asarray(self.condensed.moves * self.condensed.node_scale * np.sqrt(system.force / system.length))
+        size = 1.0 / np.sqrt(np.diagonal(system.S))
         return np.block([[matrix, -(G * size)[:, rows].T], [G @ E, np.zeros((len(G), len(G)))]])
 
     @cached_property
-    def _moves(self) -> Floats:
-        """G in the units of ``floats`` and of rigid displacements, shape (r, 2p)."""
-        if not isinstance(self.condensed, FloatingCondensation):
-            return np.zeros((0, 2 * self.floats.p))
-        system = self.floats.system
-        return np.asarray(self.condensed.moves * self.condensed.node_scale * np.sqrt(system.force / system.length))
+    def rates(self) -> tuple[Floats, Floats] | None:
+        """d(lambda_n, lambda_t)/d alpha and d(u_n, u_t)/d alpha with these statuses (theory, (7.8)).
 
-    @property
-    def _load(self) -> Floats:
-        """The derivative of h in the same units, shape (r,)."""
-        if not isinstance(self.condensed, FloatingCondensation):
-            return np.zeros(0)
-        unit = np.sqrt(self.floats.system.force[0] * self.floats.system.length[0])
-        return np.asarray(np.linalg.solve(self.condensed.mixing, self.condensed.h[1]) / unit)
+        Both have shape (p, 2), in 3D (p, 3). Where the coefficients of a node are zero but their slope is not, the
+        branch is followed to the side on which F >= 0; None where such a node does not slip, since the branch may then
+        stick.
+        """
+        condensed, p, m = self.condensed, len(self.codes), len(self.force)
+        scale, matrix = condensed.node_scale, condensed.bordered
+        g1, J = condensed.g1 / scale, np.eye(len(matrix))
+        right: Floats = np.zeros(len(matrix))
+        if isinstance(condensed, FloatingCondensation):
+            J[m:], right[m:] = matrix[m:], np.linalg.solve(condensed.mixing, condensed.h[1])
+        for i, code in enumerate(self.codes):
+            if code == OPEN:
+                continue
+            J[i], right[i] = matrix[i], g1[i]
+            found = self._tangential(i, code, matrix, g1)
+            if found is None:
+                return None
+            rows, J[rows], right[rows] = found[0], *found[1:]
+        change = np.linalg.solve(J, right)
+        move = (g1 - matrix[:m] @ change) * scale
+        return (change[:m] / scale).reshape(-1, p).T, move.reshape(-1, p).T
+
+    def _tangential(self, i: int, code: int, matrix: Floats, g1: Floats) -> tuple[Indices, Floats, Floats] | None:
+        """The tangential equations of a node in contact: their rows and right-hand sides; None where it may stick."""
+        p, scale = len(self.codes), self.condensed.node_scale
+        F, dF = (one.reshape(p, -1)[i] for one in self.friction)
+        t, held, n = p * (1 + np.arange(len(F))) + i, F > 0, self.force[i] * scale[i]
+        w, J = (self.w / scale)[t], np.eye(len(matrix))[t]
+        if code == STICK:
+            without = bool(np.any(~held & (dF != 0)))
+            return None if without else (t[held], matrix[t[held]], g1[t[held]])
+        if not np.any(held):
+            still = np.linalg.norm(w[dF != 0]) <= _STILL * np.max(np.abs(self.w / scale))
+            return None if still and np.any(dF != 0) else (t, J, n * dF * _unit(np.abs(dF) * w))
+        if len(F) == 1:
+            d, across = np.array([-1.0 if code == SLIP_MINUS else 1.0]), np.zeros((1, 1))
+        else:
+            d = _unit(F * w)
+            across = n * F[:, None] * (np.eye(2) - np.outer(d, d)) / np.linalg.norm(F * w)
+        # lambda_t = lambda_n F d with the direction d of F w
+        J += across @ (F[:, None] * matrix[t])
+        J[:, i] -= F * d
+        return t, J, n * dF * d + across @ (F * g1[t] + dF * w)
+
+
+def _unit(vector: Floats) -> Floats:
+    size = float(np.linalg.norm(vector))
+    return vector / size if size > 0 else vector
 
 
 @dataclass(frozen=True)

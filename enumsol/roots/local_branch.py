@@ -6,17 +6,30 @@ from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from itertools import product
 from math import prod
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from enumsol.condensation.condensed import condensation_of
 from enumsol.errors import InvalidArgumentError, TooLargeError
-from enumsol.model.problem import ContactProblem
-from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, STATUSES, STICK, ContactStatus, contact_status
-from enumsol.support.arguments import instance_of
+from enumsol.model.problem import ContactProblem, check_is_problem
+from enumsol.model.sectors import SECTORS
+from enumsol.model.statuses import (
+    FRICTIONLESS,
+    OPEN,
+    SLIP_MINUS,
+    STATUSES,
+    STICK,
+    ContactStatus,
+    contact_status,
+    space_status,
+)
+from enumsol.roots.slips import NodeSlips, affine_friction, ratios
 from enumsol.support.array_types import Alpha, Codes, Floats
 from enumsol.support.messages import counted
+
+if TYPE_CHECKING:
+    from enumsol.model.problem3d import AnyProblem
 
 #: Selections examined at one point (paper, Remark 5.1); six nodes in a corner of three statuses have 729.
 MAX_SELECTIONS = 4096
@@ -24,10 +37,13 @@ MAX_SELECTIONS = 4096
 SINGULAR_TOLERANCE = 1e-12
 #: The same at transition points of a path, whose alpha is located to about 1e-10.
 LOCATED_SINGULAR_TOLERANCE = 1e-8
+#: Slip in any direction, in 3D: the sector that is the whole circle.
+SLIP = SECTORS + 1
+_CODES = {**{status: code for code, status in enumerate(STATUSES)}, ContactStatus.SLIP: SLIP}
 
 
 class SolutionPoint(Protocol):
-    """What the test needs of a root: its alpha, the statuses that hold at every node, and u_t."""
+    """What the test needs of a root: its alpha, the statuses that hold at every node, lambda_t and u_t."""
 
     @property
     def alpha(self) -> Alpha:
@@ -38,8 +54,12 @@ class SolutionPoint(Protocol):
         """All statuses that hold, node by node."""
 
     @property
+    def lambda_t(self) -> Floats:
+        """Tangential forces, shape (p,), in 3D (p, 2)."""
+
+    @property
     def u_t(self) -> Floats:
-        """Tangential displacements, shape (p,)."""
+        """Tangential displacements, of the same shape."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +104,7 @@ class LocalBranchTest:
         return f"{answer} in the load ({detail}){premise}"
 
 
-def local_branch_test(problem: ContactProblem, root: SolutionPoint) -> LocalBranchTest:
+def local_branch_test(problem: AnyProblem, root: SolutionPoint) -> LocalBranchTest:
     """Whether a local Lipschitz branch of solutions passes through a root (theory, section 3.2).
 
     The test looks at the normal map G(z) = w + S lambda, which does not depend on the parameter r of H, over the
@@ -92,7 +112,7 @@ def local_branch_test(problem: ContactProblem, root: SolutionPoint) -> LocalBran
 
     Parameters
     ----------
-    problem : ContactProblem
+    problem : ContactProblem or ContactProblem3D
     root : Root
         Or a vertex of a branch graph.
 
@@ -103,9 +123,10 @@ def local_branch_test(problem: ContactProblem, root: SolutionPoint) -> LocalBran
     Raises
     ------
     InvalidArgumentError
-        The root does not belong to the problem.
+        The root does not belong to the problem, or friction depends on the solution.
     TooLargeError
-        More than MAX_SELECTIONS selections hold at the root.
+        More than MAX_SELECTIONS selections hold at the root; in 3D, too, where a node touches without load and rests,
+        so that every direction of slip does.
     NotHeldError
         Some rigid displacement of a body that nothing holds moves no contact node.
 
@@ -117,23 +138,30 @@ def local_branch_test(problem: ContactProblem, root: SolutionPoint) -> LocalBran
     >>> print(enumsol.local_branch_test(problem, root))
     a local Lipschitz branch exists in the load (1 selection holds)
     """
-    instance_of(problem, ContactProblem, "problem")
+    check_is_problem(problem)
     active = getattr(root, "active", None)
     if not isinstance(active, tuple) or len(active) != problem.p:
         raise InvalidArgumentError(f"root is {type(root).__name__}; expected a Root with {problem.p} contact nodes")
+    dimension = 2 if isinstance(problem, ContactProblem) else 3
+    if np.ndim(root.u_t) != dimension - 1:
+        raise InvalidArgumentError(f"root is one in {5 - dimension}D; expected one in {dimension}D, as is the problem")
     return branch_test(condensation_of(problem), root)
 
 
 def branch_test(condensed: Any, root: SolutionPoint) -> LocalBranchTest:
-    """The test at a root of a condensation of a 2D problem; see local_branch_test."""
-    alpha, (F0, F1) = float(root.alpha), condensed.problem.friction
+    """The test at a root of a condensation; see local_branch_test."""
+    alpha, (F0, F1) = float(root.alpha), affine_friction(condensed.problem)
     frictionless = (F0 == 0) & (F1 == 0)
+    frictionless = frictionless if frictionless.ndim == 1 else np.all(frictionless, axis=1)
     active = []
     for without, holds in zip(frictionless, root.active, strict=True):
-        codes = {STATUSES.index(status) for status in holds}
+        codes = {_CODES[status] for status in holds}
         active.append(frozenset(OPEN if code == OPEN else FRICTIONLESS for code in codes) if without else codes)
-    F = F0 + alpha * F1
-    return coherent_orientation(condensed.bordered, F, active, root.u_t, alpha, SINGULAR_TOLERANCE)
+    F, slips = F0 + alpha * F1, None
+    if F.ndim == 2:
+        scale = condensed.node_scale[: len(F), None]
+        slips = NodeSlips.of(F, root.lambda_t * scale, root.u_t / scale)
+    return coherent_orientation(condensed.bordered, F, active, root.u_t, alpha, SINGULAR_TOLERANCE, slips)
 
 
 def coherent_orientation(
@@ -143,48 +171,76 @@ def coherent_orientation(
     slip: Floats,
     alpha: float,
     singular: float = LOCATED_SINGULAR_TOLERANCE,
+    slips: NodeSlips | None = None,
 ) -> LocalBranchTest:
     """The test for the statuses that hold at a solution.
 
     Parameters
     ----------
-    S : (2p, 2p) balanced compliance, or (2p + r, 2p + r) the matrix of theory, (14.9), of a body that nothing holds
-    F : (p,) friction coefficients at alpha
+    S : (m, m) balanced compliance, or (m + r, m + r) the matrix of theory, (14.9), of a body that nothing holds
+    F : (p,) friction coefficients at alpha, in 3D (p, 2)
     active : per node the codes that hold
-    slip : (p,) u_t, whose sign names the slip of nodes without friction
+    slip : (p,) u_t, in 3D (p, 2), which names the slip of nodes without friction
     alpha : for messages
     singular : singular values below this count as zero
+    slips : in 3D, directions of slip
     """
+    if F.ndim == 2:
+        active = [_without_friction(codes) if not np.any(f > 0) else codes for codes, f in zip(active, F, strict=True)]
+    if F.ndim == 2 and any({OPEN, STICK} <= codes for codes in active):
+        raise TooLargeError(
+            f"a node touches without load and rests at alpha = {alpha:g}, so that all directions of slip hold there; "
+            "the local branch test examines finitely many selections"
+        )
     count = prod(len(codes) for codes in active)
     if count > MAX_SELECTIONS:
         raise TooLargeError(
             f"{count} selections hold at alpha = {alpha:g}; the local branch test examines at most {MAX_SELECTIONS}"
         )
     signs = tuple(
-        (
-            tuple(contact_status(code, float(u)) for code, u in zip(codes, slip, strict=True)),
-            normal_map_sign(S, F, codes, singular),
-        )
+        (tuple(map(_status, codes, slip)), normal_map_sign(S, F, codes, singular, slips))
         for codes in product(*(sorted(codes) for codes in active))
     )
     return LocalBranchTest.from_signs(signs, premise=bool(np.all(F > 0)))
 
 
-def normal_map_sign(S: Floats, F: Floats, codes: Codes, singular: float = SINGULAR_TOLERANCE) -> int:
-    """Sign of det DG in the cell of these statuses, 0 when it is singular; columns scaled to length one."""
+def _without_friction(codes: Set[int]) -> Set[int]:
+    """What holds at a node where F = 0."""
+    return frozenset(OPEN if code == OPEN else FRICTIONLESS for code in codes)
+
+
+def _status(code: int, slip: Floats) -> ContactStatus:
+    return contact_status(code, float(slip)) if np.ndim(slip) == 0 else space_status(code, slip)
+
+
+def normal_map_sign(
+    S: Floats, F: Floats, codes: Codes, singular: float = SINGULAR_TOLERANCE, slips: NodeSlips | None = None
+) -> int:
+    """Sign of det DG in the cell of these statuses, 0 when it is singular; columns scaled to length one.
+
+    The columns are those of z_n and, in units of q, of the tangential z (theory, section 3.2).
+    """
     p = len(codes)
+    F = F.reshape(p, -1)
+    (c, q), count = ratios(F), F.shape[1]
     DG = np.eye(len(S))
-    DG[:, 2 * p :] = S[:, 2 * p :]
+    DG[:, p * (1 + count) :] = S[:, p * (1 + count) :]
     for i, code in enumerate(codes):
         if code == OPEN:
             continue
         DG[:, i] = S[:, i]
-        if code == STICK:
-            DG[:, p + i] = S[:, p + i]
-        elif code != FRICTIONLESS:
-            slope = -F[i] if code == SLIP_MINUS else F[i]
-            DG[:, i] += slope * S[:, p + i]
-            DG[p + i, i] -= slope
+        if code == FRICTIONLESS:
+            continue
+        rubs = np.flatnonzero(F[i] > 0)
+        t, ratio, held = p * (1 + rubs) + i, q[i, rubs], np.eye(len(rubs))
+        if code != STICK:
+            d, share = (np.ones(1), 0.0) if slips is None else (slips.direction[i, rubs], slips.share[i])
+            d = -d if code == SLIP_MINUS else d
+            DG[:, i] += c[i] * S[:, t] @ (ratio * d)
+            DG[t, i] -= c[i] * d / ratio
+            held = share * (held - np.outer(d, d))
+        DG[:, t] = (S[:, t] * ratio) @ held
+        DG[t[:, None], t] += (np.eye(len(rubs)) - held) / ratio[:, None]
     DG /= np.linalg.norm(DG, axis=0)
     if np.linalg.svd(DG, compute_uv=False)[-1] <= singular:
         return 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -148,25 +148,16 @@ class Root(ContactState):
 
     @cached_property
     def dlambda_dalpha(self) -> Floats | None:
-        """In 2D, derivatives of (lambda_n, lambda_t) along the branch, shape (p, 2); None unless the root is regular.
+        """Derivatives of (lambda_n, lambda_t) along the branch, shape (p, 2), in 3D (p, 3).
 
-        Raises
-        ------
-        InvalidArgumentError
-            The problem is one in 3D.
+        None unless the root is regular, and where a node that rests has F = 0 but not beside this alpha.
         """
-        return self._rates("dlambda_dalpha")[0]
+        return self._rates[0]
 
     @cached_property
     def du_dalpha(self) -> Floats | None:
-        """In 2D, derivatives of (u_n, u_t) along the branch, shape (p, 2) [length]; None unless the root is regular.
-
-        Raises
-        ------
-        InvalidArgumentError
-            The problem is one in 3D.
-        """
-        return self._rates("du_dalpha")[1]
+        """Derivatives of (u_n, u_t) along the branch, shape (p, 2), in 3D (p, 3) [length]; None as above."""
+        return self._rates[1]
 
     @property
     def u(self) -> Floats:
@@ -199,14 +190,14 @@ class Root(ContactState):
         Raises
         ------
         TooLargeError
-            Too many selections hold at the root to examine each of them.
+            Too many selections hold at the root to examine each of them; in 3D, a node touches without load and rests,
+            so that all directions of slip hold there.
         NotHeldError
             Some rigid displacement of a body that nothing holds moves no contact node.
         InvalidArgumentError
-            The problem is one in 3D.
+            Friction depends on the solution.
         """
-        condensed = self._in_2d("local_branch_test")
-        return branch_test(condensed, self)
+        return branch_test(self._condensed, self)
 
     @property
     def exact_slips(self) -> tuple[Fraction, ...] | None:
@@ -270,15 +261,14 @@ class Root(ContactState):
 
         return draw_body(self, self.problem, ax, scale)
 
-    def _in_2d(self, name: str) -> CondensedProblem:
-        """The condensed problem, if it is one in 2D."""
+    def _in_2d(self, name: str) -> None:
+        """Refuse what roots in 3D do not have."""
         if self.lambda_t.ndim == 2:
             raise InvalidArgumentError(f"{name} is asked of a root in 3D; expected one in 2D")
-        return cast("CondensedProblem", self._condensed)
 
-    def _rates(self, name: str) -> tuple[Floats, ...] | tuple[None, None]:
+    @property
+    def _rates(self) -> tuple[Floats, ...] | tuple[None, None]:
         """Derivatives of forces and of displacements with respect to alpha."""
-        self._in_2d(name)
         rates = None if self._tangent is None else self._tangent.rates
         return (None, None) if rates is None else tuple(map(sealed, rates))
 

@@ -17,6 +17,7 @@ from enumsol.condensation.space_condensed import FloatingSpace
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, STICK, UNDECIDED, ContactStatus, space_status
 from enumsol.roots.enumeration import Enumeration
+from enumsol.roots.linearisation import SelectionTangent
 from enumsol.roots.root import Enclosure, Root
 from enumsol.roots.root_set import RootSet, Undecided
 from enumsol.roots.space_regions import loose_angles, regions_of, slip_angles, with_zeros
@@ -80,7 +81,14 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         statuses = tuple(space_status(code, u_t[i]) for i, code in enumerate(codes))
         active, bounds = [frozenset((status,)) for status in statuses], self._root_enclosure(codes, found)
         root = self._root(statuses, active, forces, (u_n, u_t), self._angles(codes, found), found.index, bounds)
-        return replace(root, regular=True, margin=found.slack, _rigid=None if rigid is None else rigid.mid + 0.0)
+        flat, moved = (np.append(normal, along.ravel(order="F")) for normal, along in (forces, (u_n, u_t)))
+        return replace(
+            root,
+            regular=True,
+            margin=found.slack,
+            _tangent=SelectionTangent.at(self.problem, self.alpha, codes, flat, moved),
+            _rigid=None if rigid is None else rigid.mid + 0.0,
+        )
 
     def _loose(self, found: LooseSolution) -> Root:
         """A solution whose statuses need not be known."""

@@ -28,6 +28,14 @@ five. Both find the same number of roots.
 nodes, without. ``closed`` of the ``pieces`` are such, ``proof s`` is what the checker takes. Both graphs have the same
 arcs, or the study fails.
 
+In 3D mu and kappa were the same at open nodes before. The largest smallest eigenvalue of Q relative to S (mu and kappa
+one in the mean, one alpha) was then -0.18 for ``block3d(5, 5, 1)`` at alpha = 1.94. By a semidefinite program theta as
+it is with mu at least kappa gives 0.29, theta = 0 at open nodes with all mu that it needs 0.006, any theta that serves
+with mu = kappa -0.03, and any theta with any mu 0.41. The first of these has no theta to be sought. Over alpha from 0
+to 2 (282 nodes of the tree then, one now) branching first at the node of the curve whose status makes the form nearly
+definite took 399 nodes and two thirds of the time; to stop where a matrix shows that no numbers will do spared less
+than half of the evaluations in a fifth of all cases.
+
 Read ``certificate`` beside ``roots``, and ``any`` beside ``before`` and ``several from``.
 """
 

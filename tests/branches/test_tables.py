@@ -2,15 +2,17 @@
 
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 
+import networkx as nx
 import numpy as np
 import pandas as pd
 import pytest
 from interruptions import CtrlC, interrupted
 from path_problems import generic_problem
+from problems3d import SLIDING, in_space, random_plane_over_alpha
 from refusals import bad_argument
 
-from enumsol import gallery
-from enumsol.branches import branch_graph, link_samples, multiplicity_table
+from enumsol import enumerate_roots, gallery
+from enumsol.branches import branch_graph, link_samples, multiplicity_table, samples
 
 ALPHAS = [0.5, 2.0, 3.5, 5.0, 7.5]
 
@@ -122,3 +124,54 @@ def test_what_samples_miss_is_named(square):
     assert missed.branches == missed.components == (1,)
     family = branch_graph(gallery.get("one-node-6.3").build(), (0.0, 5.0))
     assert link_samples(family.problem, [1.0, 3.0]).missed(family).families == 1
+
+
+def rules(linked):
+    return [data["rule"] for *_, data in linked.graph.edges(data=True)]
+
+
+@pytest.mark.few(4, 20)
+@pytest.mark.parametrize("seed", range(100, 124))
+def test_a_problem_in_2d_written_in_3d_has_the_same_links(seed):
+    problem, alphas = random_plane_over_alpha(2, seed), np.linspace(0.05, 3.95, 14)
+    plane, space = link_samples(problem, alphas), link_samples(in_space(problem), alphas)
+    places = []
+    for flat, solid in zip(plane.root_sets, space.root_sets, strict=True):
+        near = [[np.allclose(a.lambda_n, b.lambda_n, atol=1e-7) for b in solid] for a in flat]
+        assert len(flat) == len(solid)
+        assert [row.count(True) for row in near] == [1] * len(flat)
+        places.append([row.index(True) for row in near])
+    edges = {frozenset((s, places[s][r]) for s, r in edge) for edge in plane.graph.edges}
+    assert edges == set(map(frozenset, space.graph.edges))
+    assert (sorted(rules(plane)), len(plane.ambiguous)) == (sorted(rules(space)), len(space.ambiguous))
+
+
+def test_in_3d_links_follow_a_transition_and_none_is_missed():
+    """SLIDING sticks as soon as alpha is the length of (3/2, 1), 1.803."""
+    linked = link_samples(SLIDING, [1.78, 1.79, 1.81, 1.82])
+    assert rules(linked) == ["selection", "flip", "selection"]
+    assert linked.missed(branch_graph(SLIDING, (1.78, 1.82))).arcs == ()
+    # predicted from either side within a tenth of the step
+    slips, sticks = (linked.root_sets[k][0] for k in (1, 2))
+    for root, other in ((slips, sticks), (sticks, slips)):
+        assert samples._vanishing(SLIDING, root, 0, other) == pytest.approx(np.sqrt(3.25), abs=2e-3)
+
+
+def test_of_several_roots_with_the_same_statuses_none_is_chosen():
+    left, right = (enumerate_roots(SLIDING, alpha, "fast")[0] for alpha in (1.78, 1.79))
+    graph = nx.Graph()
+    assert samples._link(graph, SLIDING, 0, [left, left], [right]) == [((0, 0), (1, 0)), ((0, 1), (1, 0))]
+    assert graph.number_of_edges() == 0
+
+
+@pytest.mark.slow
+def test_in_3d_no_link_joins_roots_of_different_branches():
+    problem = gallery.wedge3d(2, 1, 2)
+    graph, linked = branch_graph(problem, (0, 4)), link_samples(problem, np.linspace(0.05, 3.95, 40))
+    assert linked.missed(graph).branches == linked.ambiguous == ()
+    place = {}
+    for node, data in linked.graph.nodes(data=True):
+        (arc,) = (arc for arc in graph.arcs_at(data["alpha"]) if arc.statuses == data["statuses"])
+        place[node] = graph.branch_of[arc.number]
+    assert all(place[a] == place[b] for a, b in linked.graph.edges)
+    assert [len(branch) for branch in linked.branches] == [40, 32, 32]

@@ -107,3 +107,13 @@ def test_a_block_has_one_curve_by_a_few_certificates(cells):
     assert {record.kind for record in cover.records} <= {"a", "m"}
     complete_report(problem, cover.proof())
     assert all(len(enumerate_roots(problem, alpha)) == 1 for alpha in (0.1, 0.3, 0.7, 1.5))
+
+
+@pytest.mark.slow
+def test_a_flat_block_takes_one_node():
+    """3, and with 5 x 5 cells 282, where mu and kappa of open nodes are the same."""
+    problem = gallery.block3d(4, 2, 1)
+    cover = SpaceCover(problem, (Fraction(0), Fraction(2)))
+    cover.search(max_nodes=1)
+    assert (len(cover.chains), cover.gaps, cover.stopped) == (1, [], None)
+    complete_report(problem, cover.proof())

@@ -308,9 +308,8 @@ def test_without_coordinates_there_is_no_picture():
 def test_what_is_known_in_2d_only_is_refused():
     root = enumsol.enumerate_roots(enumsol.gallery.one_node_3d(), 0)[0]
     assert isinstance(root, enumsol.Root)
-    for name in ("condition", "dlambda_dalpha", "signs"):
+    for name in ("condition", "signs"):
         bad_argument(f"{name} is asked of a root in 3D; expected one in 2D", getattr, root, name)
-    bad_argument("local_branch_test is asked of a root in 3D", root.local_branch_test)
 
 
 def test_a_root_in_2d_is_plotted_as_its_body():

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from compare import forces
 from generators import dense_compliance, from_condensed, named, planted_load
+from problems3d import from_compliance, in_space, random_over_alpha, random_plane_over_alpha
 
 import enumsol
 from enumsol import ContactProblem, ContactStatus, PiecewiseSmoothEquation, branch_graph, enumerate_roots, gallery
@@ -98,6 +99,46 @@ def test_derivative_in_closed_form():
     expected = {"open": [0, 0], "stick": [0, 0], "slip-": [slip, -1 / (alpha - 2) - alpha * slip]}
     for root in roots:
         np.testing.assert_allclose(root.dlambda_dalpha[0], expected[root.statuses[0].value], rtol=1e-12, atol=1e-15)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_derivatives_in_3d_against_finite_differences(seed):
+    """Of forces and displacements, where friction, load or both depend on alpha."""
+    problem, alpha, h = random_over_alpha(2, seed), 0.4, 1e-5
+    before, at, after = (enumsol.enumerate_roots(problem, alpha + k * h, "fast") for k in (-1, 0, 1))
+    assert len(before) == len(at) == len(after)
+    for low, root, high in zip(before, at, after, strict=True):
+        assert root.regular
+        assert low.statuses == root.statuses == high.statuses
+        parts = (("lambda_n", "lambda_t"), root.dlambda_dalpha), (("u_n", "u_t"), root.du_dalpha)
+        for names, given in parts:
+            difference = np.column_stack([(getattr(high, name) - getattr(low, name)) / (2 * h) for name in names])
+            size = max(np.max(np.abs(getattr(root, name))) for name in names)
+            np.testing.assert_allclose(given, difference, rtol=1e-6, atol=1e-7 * (1 + size))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_problem_in_2d_written_in_3d_has_the_same_derivatives(seed):
+    problem = random_plane_over_alpha(2, seed)
+    flat, solid = (enumsol.enumerate_roots(one, 0.3, "fast") for one in (problem, in_space(problem)))
+    assert len(flat) == len(solid)
+    for one in flat:
+        other = min(solid, key=lambda root: np.max(np.abs(root.lambda_n - one.lambda_n)))
+        for name in ("dlambda_dalpha", "du_dalpha"):
+            np.testing.assert_allclose(getattr(other, name)[:, :2], getattr(one, name), rtol=1e-9, atol=1e-9)
+            assert np.max(np.abs(getattr(other, name)[:, 2])) < 1e-9
+
+
+def test_derivative_in_3d_where_friction_begins():
+    """F = alpha: at alpha = 0 the force of friction grows along the slip; where the node rests it may stick."""
+    S, g = np.diag([1.0, 2.0, 3.0]), np.array([1.0, 0.3, -0.4])
+    root = enumsol.enumerate_roots(from_compliance(S, g, 0.0).replace(friction_slope=(1.0, 2.0)), 0)[0]
+    d = np.array([0.3, -0.8]) / np.hypot(0.3, 0.8)
+    np.testing.assert_allclose(root.dlambda_dalpha[0], [0.0, d[0], 2 * d[1]], atol=1e-12)
+    np.testing.assert_allclose(root.du_dalpha[0], [0.0, -2 * d[0], -6 * d[1]], atol=1e-12)
+    rest = from_compliance(S, np.array([1.0, 0.0, 0.0]), 0.0).replace(friction_slope=(1.0, 2.0))
+    (found,) = enumsol.enumerate_roots(rest, 0)
+    assert found.dlambda_dalpha is found.du_dalpha is None
 
 
 def test_margin_shrinks_towards_the_change_of_status():

@@ -22,7 +22,7 @@ from problems3d import (
 from space_proofs import RANDOM, random_problem
 from trees import by_the_tree
 
-from enumsol import enumerate_roots, gallery, verify
+from enumsol import ContactStatus, enumerate_roots, gallery, verify
 from enumsol.model.statuses import UNDECIDED
 from enumsol.search.space.space_fathoming import SpaceCloser
 from enumsol.search.space.space_setup import SpaceSolvers
@@ -69,6 +69,17 @@ def test_better_numbers_where_plain_ones_will_not_do():
     problem = gallery.block3d(5, 5, 2, friction=2)
     assert closed(problem).regular
     assert enumerate_roots(problem, 0, max_nodes=1, arithmetic="fast").stats.closed == 0
+
+
+@pytest.mark.parametrize(("cells", "F"), [((3, 2, 2), 8), ((5, 5, 2), 3)])
+def test_open_nodes_may_have_more_weight_along_the_normal(cells, F):
+    """With mu = kappa there no form is found that is definite."""
+    problem = gallery.block3d(*cells, friction=F)
+    root = closed(problem)
+    assert any(status is ContactStatus.OPEN for status in root.statuses)
+    with by_the_tree():
+        (other,) = all_roots(problem, 0)
+    assert np.max(np.abs(forces(other) - forces(root))) < 1e-9 * np.max(root.lambda_n)
 
 
 def test_fast_arithmetic_takes_the_same_where_it_is_clear():

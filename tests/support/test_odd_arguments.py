@@ -103,6 +103,7 @@ CALLS = [
         "problem alphas arithmetic executor progress max_nodes time_limit",
     ),
     (enumsol.link_samples, {"problem": PROBLEM, "alphas": [5.0, 6.0]}, "problem alphas arithmetic progress"),
+    (enumsol.link_samples, {"problem": SOLID, "alphas": [0.0, 1.0]}, "alphas arithmetic progress"),
     (
         enumsol.branch_graph,
         {"problem": PROBLEM, "interval": (0, 1)},
@@ -153,6 +154,7 @@ CALLS = [
     (enumsol.SmoothPath, {"F": abs, "dF": abs}, "F dF f df"),
     (SMOOTH.problem_at, {"problem": PROBLEM, "alpha": 5.0}, "problem alpha"),
     (enumsol.local_branch_test, {"problem": PROBLEM, "root": ROOTS[0]}, "problem root"),
+    (enumsol.local_branch_test, {"problem": SOLID, "root": enumsol.enumerate_roots(SOLID, 0)[0]}, "problem root"),
     (enumsol.PiecewiseSmoothEquation, {"problem": PROBLEM}, "problem r"),
     (EQUATION.residual, {"x": np.zeros(4), "alpha": 5.0}, "x alpha"),
     (EQUATION.selection_jacobian, {"signs": [[1, 1, 1]], "x": np.zeros(4), "alpha": 5.0}, "signs x alpha"),

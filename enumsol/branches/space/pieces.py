@@ -370,7 +370,8 @@ class LinkCutter:
         curve = curve_around(self.problem, middle, chord / length, self.border, half, changing, roomy=False)
         if curve is None:
             return None
-        least = _ROUNDED * np.maximum(start.point.spread, end.point.spread)
+        # a curve that only alpha changes along needs a box of the size of rounding errors
+        least = _ROUNDED * np.maximum(*(place.point.at(0.0).rad for place in (start, end)))
         if np.any(curve.box.radius < least):
             curve = only_curve(self.problem, replace(curve.box, radius=np.maximum(curve.box.radius, least)))
         if curve is None or not all(lies_in(curve.box, place.point.at(0.0)) for place in (start, end)):

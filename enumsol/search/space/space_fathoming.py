@@ -39,7 +39,7 @@ _HARD, _PROGRAMS = 256, 8
 _LONGEST = 4096
 #: Smallest eigenvalue of Q relative to S below which it counts as not definite, at which numbers are good enough, and
 #: below which plain numbers leave no hope of better ones.
-_DEFINITE, _GOOD, _HOPELESS = 1e-9, 1e-2, -0.5
+_DEFINITE, _GOOD, _HOPELESS = 1e-9, 1e-2, -4.0
 #: Slack and smallest eigenvalue that fast arithmetic asks for.
 _CLEAR = 1e-6
 #: Contact nodes from which better numbers than the plain ones are sought; evaluations for that, in rounds of so many.
@@ -305,8 +305,9 @@ def _sector(direction: Floats, level: int) -> int:
 class DefiniteForm:
     """Q = (D'S + S D) / 2 less what is lost, as a function of logarithms of mu and kappa, and of nu; no claim.
 
-    Where a node is open mu = kappa and nu = 0, so that the same theta serves whatever they are. Elsewhere nu = mu z /
-    (1 + |z|^2)^(1/2) for a z in the plane, over the largest radius of the disc.
+    Where a node is open nu = 0 and mu is at least kappa, so that a theta which serves for mu = kappa does so whatever
+    they are; in place of log mu there is log (mu / kappa) >= 0. Elsewhere nu = mu z / (1 + |z|^2)^(1/2) for a z in the
+    plane, over the largest radius of the disc.
 
     Parameters
     ----------
@@ -375,9 +376,12 @@ class DefiniteForm:
 
     def improved(self, logs: Floats, shares: Floats, least: float) -> tuple[Floats, Floats, float]:
         """Better numbers: those with the largest soft minimum of the eigenvalues of Q relative to S."""
-        from scipy.optimize import minimize  # seldom needed
+        from scipy.optimize import Bounds, minimize  # seldom needed
 
         x, left = np.concatenate([logs.ravel(), shares.ravel()]), _EVALUATIONS
+        least_x = np.full_like(x, -np.inf)
+        least_x[: self._system.p][self._open] = 0.0
+        bounds = Bounds(least_x, np.inf)
         # columns in which S is the unit matrix
         columns = np.linalg.inv(np.linalg.cholesky(self._S)).T
         for hardness in _HARDNESS:
@@ -386,7 +390,7 @@ class DefiniteForm:
             look()
             options = {"maxfun": min(_ROUND, left), "maxiter": _ROUND}
             given = columns, hardness
-            found = minimize(self._value, x, given, method="L-BFGS-B", jac=True, options=options)
+            found = minimize(self._value, x, given, method="L-BFGS-B", jac=True, bounds=bounds, options=options)
             left -= max(int(found.nfev), 1)
             x, least = found.x, self.least(*self._split(found.x))
         return *self._split(x), least
@@ -396,7 +400,7 @@ class DefiniteForm:
         return x[: 2 * p].reshape(2, p), x[2 * p :].reshape(p, 2)
 
     def _numbers(self, logs: Floats, shares: Floats) -> tuple[Floats, Floats, Floats]:
-        logs = np.where(self._open, np.mean(logs, axis=0), logs)
+        logs = np.stack([np.where(self._open, logs[0] + logs[1], logs[0]), logs[1]])
         mu, kappa = np.exp(logs - np.mean(logs))
         most = mu / self._discs
         return mu, kappa, np.where(self._pushes, most[:, None] * self._disc(shares)[0] * (1.0 - NEAR), 0.0)
@@ -452,8 +456,9 @@ class DefiniteForm:
             by_kappa[i] -= 0.5 * self._off[i] * (reach * P[i, i] + float(np.sum((rows @ P) * rows)) / reach)
         by_nu = np.where(self._pushes, by_nu, 0.0)
         logs = np.stack([by_mu * mu + np.sum(by_nu * nu, axis=1), by_kappa * kappa])
-        logs = np.where(self._open, np.mean(logs, axis=0), logs)
+        logs -= np.mean(logs)
+        logs[1] += np.where(self._open, logs[0], 0.0)
         z, root = self._disc(shares)
         pulled = by_nu * (mu / self._discs)[:, None] * (1.0 - NEAR)
         pulled = (pulled - z * np.sum(z * pulled, axis=1, keepdims=True)) / root
-        return -np.concatenate([(logs - np.mean(logs)).ravel(), pulled.ravel()])
+        return -np.concatenate([logs.ravel(), pulled.ravel()])
