@@ -58,12 +58,12 @@ def _energy_bounds(system: EnclosedSystem, y: Floats, c: Floats, c_rad: Floats, 
     y_form, x_form = dots(y, Sy), dots(x, Sx)
     first_error = dots(y_abs, k * (np.abs(g) + np.abs(c)) + system.g_rad + c_rad)
     cross_error = dots(np.abs(x), k * q_abs + q_rad)
-    y_square, x_square, rest = dots(y, y), dots(x, x), q - Sx
+    y_lost, x_lost, rest = _lost(system.form_error, y), _lost(system.form_error, x), q - Sx
     rest_norm = np.sqrt(dots(rest, rest)) + np.sqrt(dots(q_rad, q_rad)) + k * np.sqrt(dots(q, q))
-    rest_norm = (rest_norm + system.form_error * np.sqrt(x_square) + ROOT_TINY) * (1 + k) * SAFE
+    rest_norm = (rest_norm + np.sqrt(system.form_error * x_lost) + ROOT_TINY) * (1 + k) * SAFE
     tail = rest_norm * rest_norm / system.smallest_eigenvalue
     total = 0.5 * first - 0.25 * y_form - 0.5 * cross + 0.25 * x_form
-    error = 0.5 * (first_error + cross_error) + 0.25 * (system.form_error * (y_square + x_square) + tail)
+    error = 0.5 * (first_error + cross_error) + 0.25 * (y_lost + x_lost + tail)
     error += 8 * UNIT * (np.abs(first) + np.abs(y_form) + np.abs(cross) + np.abs(x_form))
     return np.asarray(total - errors * error * (1 + k) * SAFE * SAFE - TINY)
 
@@ -107,15 +107,21 @@ def form_bounds(form: Any, y: Floats, c: Floats, c_rad: Floats, errors: float) -
         x += (v - x @ form.H) @ form.inverse.T
     Hx = x @ form.H
     x_abs, rest = np.abs(x), v - Hx
-    x_square, cross, x_form, first = dots(x, x), dots(x, v), dots(x, Hx), y @ g
+    x_lost, cross, x_form, first = _lost(form.form_error, x), dots(x, v), dots(x, Hx), y @ g
     rest_norm = np.sqrt(dots(rest, rest)) + np.sqrt(dots(v_rad, v_rad)) + k * np.sqrt(dots(v, v))
-    rest_norm = (rest_norm + form.form_error * np.sqrt(x_square) + ROOT_TINY) * (1 + k) * SAFE
+    rest_norm = (rest_norm + np.sqrt(form.form_error * x_lost) + ROOT_TINY) * (1 + k) * SAFE
     tail = rest_norm * rest_norm / form.smallest_eigenvalue
     total = form.k + first - 0.5 * cross + 0.25 * x_form
     error = form.k_rad + y_abs @ (g_rad + k * np.abs(g)) + 0.5 * dots(x_abs, v_rad + k * np.abs(v))
-    error += 0.25 * (form.form_error * x_square + tail)
+    error += 0.25 * (x_lost + tail)
     error += 8 * UNIT * (abs(form.k) + np.abs(first) + np.abs(cross) + np.abs(x_form))
     return np.asarray(total - errors * error * (1 + k) * SAFE * SAFE - TINY)
+
+
+def _lost(form_error: float, x: Floats) -> Floats:
+    """By how much computed x'S x may be off; |x|^2 may underflow where S is large."""
+    scaled = np.sqrt(form_error) * x
+    return np.asarray(dots(scaled, scaled) * SAFE + TINY)
 
 
 def dots(a: Floats, b: Floats) -> Floats:

@@ -12,10 +12,12 @@ from oracles import _affine, _conditions, exact_condense
 from proof_tools import Judge, det_sign, leaves_of, multipliers, records_of
 
 from enumsol import enumerate_roots, gallery
+from enumsol.condensation.enclosure import EnclosedSystem
 from enumsol.search.certifiers._margin import Margins
 from enumsol.search.solvers import Solvers
 from enumsol.trusted import at_alpha as point
 from enumsol.trusted.at_alpha import solve_selection
+from enumsol.trusted.energy_bounds import energy_bounds
 from enumsol.trusted.exclusion import Leaves, exclusion_margin, exclusion_margins
 from enumsol.trusted.status_rows import row_signs
 
@@ -238,6 +240,23 @@ def test_singular_integer_selections_are_never_called_regular():
                 singular += 1
                 assert solve_selection(system, codes) is None
     assert singular >= some(3, of=10)
+
+
+@pytest.mark.parametrize("powers", [(0, 0), (500, 0), (500, -60)])
+def test_an_uncertain_matrix_counts_where_the_squares_of_multipliers_underflow(powers):
+    """At 1.2 S the minimum is negative, in whatever units; that of S is not."""
+    (stiff, force), S = powers, np.array([[2.0, 1.0], [1.0, 2.0]])
+    y, c, g = np.array([-4.5, -6.75]), np.array([6.5, 3.5]), np.array([-5.0, -5.5])
+    least = [y @ g - v @ np.linalg.solve(t * S, v) / 4 for t in (1.0, 1.2) for v in [g + c + t * S @ y]]
+    assert least[1] < 0 < least[0]
+    bounds = []
+    for unsure in (0.0, 0.2):
+        S_rad, none = unsure * np.ldexp(S, stiff), np.zeros(2)
+        system = EnclosedSystem(np.ldexp(S, stiff), S_rad, np.ldexp(g, force), none, np.zeros(1), np.zeros(1))
+        scaled = np.ldexp(y, force - stiff)[None], np.ldexp(c, force)[None], none[None]
+        bounds.append(float(np.ldexp(energy_bounds(system, *scaled)[0], stiff - 2 * force)))
+    assert np.isclose(bounds[0], least[0])
+    assert bounds[1] <= least[1]
 
 
 def test_scaled_units_change_nothing():
