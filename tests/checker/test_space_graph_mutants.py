@@ -29,6 +29,7 @@ CASES = {
     "plane": (lambda: in_space(random_plane_over_alpha(1, 5)), "0", "1"),
     "orthotropic": (lambda: orthotropic(1, 514), "0", "1"),
     "load": (lambda: OneNode(5, load=True).problem, "-1", "1"),
+    "singular": (lambda: OneNode(7, load=True).problem, "0.7", "1"),
     "fold": (lambda: random_over_alpha(2, 119), "0", "1/8"),
     "curves": (lambda: random_over_alpha(1, 513), "0", "1"),
     "closed": (closed_branch, "1.3", "1.6"),
