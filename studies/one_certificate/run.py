@@ -56,6 +56,7 @@ from enumsol.branches.claims import uniqueness_bound
 from enumsol.model.statuses import UNDECIDED
 from enumsol.search.fathoming import propose
 from enumsol.search.reduction import WeightSource
+from enumsol.search.space.space_fathoming import SpaceCloser
 from one_certificate.graphs import graphs
 from shared.clock import least_time, timed
 from shared.figures import BLUE, GREEN, GREY, ORANGE, RED, panels
@@ -139,7 +140,9 @@ def whole_by(numbers: WeightSource | None) -> Iterator[None]:
     with ExitStack() as stack:
         stack.enter_context(patch("enumsol.search.fathoming.propose", proposed))
         if numbers is None:
-            stack.enter_context(patch("enumsol.search.space.space_fathoming.SpaceCloser.whole", lambda self: None))
+            stack.enter_context(patch.object(SpaceCloser, "whole", lambda self: None))
+            # nor below its root, where it would be nearly the same
+            stack.enter_context(patch.object(SpaceCloser, "closed", lambda *_: None))
         if numbers is WeightSource.PLAIN:
             # what is sought in 3D are better numbers than those given
             stack.enter_context(patch("scipy.optimize.minimize", unchanged))
