@@ -146,7 +146,8 @@ class PieceBounds:
             target = np.concatenate([*(root * self._v), -2.0 / ridge * (weight @ q)])
             try:
                 found, _ = nnls(matrix, -target)
-            except RuntimeError:
+            except (RuntimeError, ValueError):
+                # it does not end, or something overflows
                 return None
             m = found[: len(size)].copy()
             m[self._free] -= found[len(size) :]
@@ -163,7 +164,11 @@ class PieceBounds:
 
 def exclusion(piece: AlphaPiece, codes: Sequence[int], rows: Sequence[Row]) -> ExcludedOverPiece | None:
     """The proof by multipliers of rows that a piece holds no solution; None if none are found."""
-    found = PieceBounds(piece, codes, rows).positive()
+    with np.errstate(over="ignore", invalid="ignore"):
+        try:
+            found = PieceBounds(piece, codes, rows).positive()
+        except np.linalg.LinAlgError:
+            found = None
     if found is None:
         return None
     low, high = np.split(found, 2)

@@ -220,6 +220,8 @@ def swept_margin(
 ) -> float:
     """The same between two systems, with multipliers between those of both ends: the least number of (12.21a).
 
+    That of an end, if it is not positive.
+
     Parameters
     ----------
     ends, middle : with one S, and g and discs that are affine from one end to the other
