@@ -12,9 +12,9 @@ from enumsol.continuation.condensed_equation import CondensedEquation
 from enumsol.continuation.space_equation import SpaceEquation
 from enumsol.continuation.start import check_problem, equation_on
 from enumsol.errors import EnumsolError, InvalidArgumentError
-from enumsol.model.statuses import OPEN, STICK
+from enumsol.model.statuses import OPEN, SLIP, STICK
 from enumsol.roots.linearisation import SelectionTangent
-from enumsol.roots.local_branch import SINGULAR_TOLERANCE, SLIP
+from enumsol.roots.local_branch import SINGULAR_TOLERANCE
 from enumsol.roots.root import Root
 from enumsol.support.arguments import alpha_value, positive_integer, positive_number
 from enumsol.support.array_arguments import real_array

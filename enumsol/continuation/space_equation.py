@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from enumsol.continuation.scaled_equation import STATUS_TOLERANCE, ScaledEquation
-from enumsol.model.statuses import FRICTIONLESS, OPEN, STICK, ContactStatus
-from enumsol.roots.local_branch import SLIP, LocalBranchTest, coherent_orientation
+from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP, STICK, ContactStatus
+from enumsol.roots.local_branch import LocalBranchTest, coherent_orientation
 from enumsol.roots.slips import NodeSlips
 from enumsol.support.array_types import Codes, Floats, Mask
 

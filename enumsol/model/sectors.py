@@ -21,7 +21,7 @@ import numpy as np
 if TYPE_CHECKING:
     from enumsol.support.array_types import Floats
 
-#: The status code of sector i is SECTORS + i.
+#: The status code of sector i is SECTORS + i; that of the whole circle, sector 1, is SLIP of ``model.statuses``.
 SECTORS = 8
 #: Deepest level of a sector; s has that many binary digits, and all integers below are exact in float64.
 DEEPEST = 28

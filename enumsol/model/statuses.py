@@ -43,6 +43,8 @@ OPEN, STICK, SLIP_PLUS, SLIP_MINUS = range(4)
 FRICTIONLESS = 4
 #: Inside the searches a node whose status is not final: in contact and not known how, and nothing known.
 CONTACT, UNDECIDED = 5, 6
+#: Slip in any direction in 3D: the sector that is the whole circle (enumsol/model/sectors.py).
+SLIP = 9
 #: A node that is open or slips in one direction (theory, section 6.11).
 FORWARD, BACKWARD = 7, 8
 SLIDING = {FORWARD: (OPEN, SLIP_PLUS), BACKWARD: (OPEN, SLIP_MINUS)}

@@ -13,10 +13,10 @@ import numpy as np
 from enumsol.condensation.condensed import condensation_of
 from enumsol.errors import InvalidArgumentError, TooLargeError
 from enumsol.model.problem import ContactProblem, check_is_problem
-from enumsol.model.sectors import SECTORS
 from enumsol.model.statuses import (
     FRICTIONLESS,
     OPEN,
+    SLIP,
     SLIP_MINUS,
     STATUSES,
     STICK,
@@ -37,8 +37,6 @@ MAX_SELECTIONS = 4096
 SINGULAR_TOLERANCE = 1e-12
 #: The same at transition points of a path, whose alpha is located to about 1e-10.
 LOCATED_SINGULAR_TOLERANCE = 1e-8
-#: Slip in any direction, in 3D: the sector that is the whole circle.
-SLIP = SECTORS + 1
 _CODES = {**{status: code for code, status in enumerate(STATUSES)}, ContactStatus.SLIP: SLIP}
 
 

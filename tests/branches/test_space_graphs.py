@@ -330,9 +330,7 @@ def test_figures_and_pages_show_ranges_that_are_left_open(through_zero, graph, t
 
 
 @pytest.mark.few(0, 3)
-@pytest.mark.parametrize(
-    ("p", "seed"), [(2, 1), (2, 2), (1, 9), (2, 3), (1, 28), (2, 6), (2, 9), (2, 14), (1, 26), (2, 27), (2, 31)]
-)
+@pytest.mark.parametrize(("p", "seed"), [(2, 2), (1, 9), (2, 3), (2, 6), (2, 9), (2, 14), (2, 27), (2, 31)])
 def test_counts_of_random_graphs_with_gaps_are_those_of_searches_elsewhere(p, seed, monkeypatch):
     """Pieces that are left open although shorter ones would decide them."""
     monkeypatch.setattr(cover, "PieceTree", partial(cover.PieceTree, smallest=2.0**-5))

@@ -4,6 +4,7 @@ import numpy as np
 from hypothesis import given, strategies as st
 
 from enumsol.model.sectors import DEEPEST, SECTORS, direction, is_sector, nearest, parts_around, places, span
+from enumsol.model.statuses import SLIP
 from enumsol.trusted.space.sector_rows import is_sector_covering
 
 
@@ -14,6 +15,10 @@ def test_directions_of_sectors_are_where_they_begin(level, number):
     away = (float(places(np.array(direction(sector)))) - begin) % (1 << (DEEPEST + 2))
     assert min(away, (1 << (DEEPEST + 2)) - away) < 16
     assert nearest(*direction(sector), level) == sector
+
+
+def test_slip_in_any_direction_is_the_code_of_the_whole_circle():
+    assert SECTORS + 1 == SLIP
 
 
 @given(st.floats(0, 2 * np.pi), st.floats(1e-300, 1e300))

@@ -565,7 +565,7 @@ class PieceTree:
                 return self._open(at, codes, piece.forces(there.y).mid), []
             passed = number is not None and narrowed.low <= piece.middle <= narrowed.high and found is not None
             arc = narrowed.arc(codes, 2.0, found) if passed else None
-            if number is not None and arc is not None and arc.has(there, codes):
+            if number is not None and arc is not None and self._has(narrowed, codes, there, codes):
                 return ThroughCurveBox(number, str(narrowed.low), str(narrowed.high), str(piece.middle), codes), []
         elif self._is_wide(piece, codes) and (there is None or self._box(piece.point, there) is None):
             return None
@@ -598,10 +598,18 @@ class PieceTree:
                 for point in points_on(arc, known, parts, codes):
                     there, root = whole.root_at(*point)
                     number = None if root is None else self._box(there, root)
-                    if number is not None and whole.meets(arc, point, self._given, self._boxes[number], 2.0):
+                    if root is None or number is None or not self._has(whole, codes, root, point[1]):
+                        continue
+                    if whole.meets(arc, point, self._given, self._boxes[number], 2.0):
                         ends = str(whole.low), str(whole.high)
                         return ThroughCurveBox(number, *ends, str(point[0]), point[1]), []
         return None
+
+    @staticmethod
+    def _has(piece: AlphaPiece, codes: Codes, root: SpaceRoot, there: Codes) -> bool:
+        """Whether the arc of a leaf has the root of another one, as a checker has it: no wider than is needed."""
+        arc = piece.arc(codes)
+        return arc is not None and arc.has(root, there)
 
     def _run(self, piece: AlphaPiece, found: SpaceRoot | Open) -> tuple[int, int] | None:
         """The first and the last of the boxes in which forces lie."""

@@ -241,7 +241,7 @@ class Turning:
         free : rows of the free unknowns in y, k
         loose : which turning nodes' normal forces are the first of these; their columns are not used
         """
-        (rows, column, t), (discs, turn) = at, swept
+        (rows, column, t), (discs, turn), loose = at, swept, list(loose)
         units = system.unit[t]
         d, turned = (part * discs.mid[:, None] / units for part in directions)
         share = None if turn is None else Ball(turn.mid / discs.mid, _quotient_error(turn, discs))
@@ -255,7 +255,7 @@ class Turning:
         forces[both, np.arange(len(both))] = 1.0
         forces[t[loose], others[:, None]] = d[loose]
         pushed = S[:, both]
-        if len(loose):
+        if loose:
             pushed[:, others] = S @ Ball.exact(forces[:, others])
         columns, SE = [*loads, pushed], S @ sparse
         load = Ball(*(np.column_stack([getattr(part, name) for part in columns]) for name in ("mid", "rad")))
@@ -269,7 +269,7 @@ class Turning:
         change = Ball(np.where(np.arange(len(change.mid))[:, None] < len(y.mid), 1.0, -1.0) * change.mid, change.rad)
         x = Ball.exact(np.zeros((len(t), len(load.mid[0]))))
         x[held] = all_x[np.asarray(column, dtype=np.intp)[held]]
-        x[list(loose), k + others] = -1.0
+        x[loose, k + others] = -1.0
         B = x[:, k:]
         if piece is not None:
             # s is what is left free
