@@ -54,7 +54,7 @@ _DEPENDENT = 1e-9
 #: Directions that change no G by more (scaled) are not halved, nor for a linear system that they change by no more.
 _NEGLIGIBLE, _SINGULAR = 2.0**-44, 2.0**-36
 #: A normal force is left free where the linear equations change by this share over a sector.
-_COUPLED = 0.25
+_COUPLED = 0.0625
 
 
 def _cut(angle: Floats, radius: Floats, reach: Floats, move: Ball) -> tuple[Floats, Floats]:
