@@ -565,7 +565,7 @@ class PieceTree:
                 return self._open(at, codes, piece.forces(there.y).mid), []
             passed = number is not None and narrowed.low <= piece.middle <= narrowed.high and found is not None
             arc = narrowed.arc(codes, 2.0, found) if passed else None
-            if number is not None and arc is not None and self._has(narrowed, codes, there, codes):
+            if number is not None and arc is not None and self._has(narrowed, codes, found, there, codes):
                 return ThroughCurveBox(number, str(narrowed.low), str(narrowed.high), str(piece.middle), codes), []
         elif self._is_wide(piece, codes) and (there is None or self._box(piece.point, there) is None):
             return None
@@ -591,24 +591,28 @@ class PieceTree:
             runs = at.along(self.curves, whole)
             if not any(len(beside(parts, codes, centre, 0.0, _BESIDE * half)) for _, parts in runs):
                 continue
-            arc = whole.arc(codes, 2.0, None if factor else settled[1])
+            found = whole.held(codes) if factor else settled[1]
+            arc = None if found is None else whole.arc(codes, 2.0, found)
             if arc is None:
                 continue
             for known, parts in runs:
                 for point in points_on(arc, known, parts, codes):
                     there, root = whole.root_at(*point)
                     number = None if root is None else self._box(there, root)
-                    if root is None or number is None or not self._has(whole, codes, root, point[1]):
+                    if root is None or number is None or not arc.has(root, point[1]):
                         continue
-                    if whole.meets(arc, point, self._given, self._boxes[number], 2.0):
+                    if self._has(whole, codes, found, root, point[1]):
                         ends = str(whole.low), str(whole.high)
                         return ThroughCurveBox(number, *ends, str(point[0]), point[1]), []
         return None
 
     @staticmethod
-    def _has(piece: AlphaPiece, codes: Codes, root: SpaceRoot, there: Codes) -> bool:
-        """Whether the arc of a leaf has the root of another one, as a checker has it: no wider than is needed."""
-        arc = piece.arc(codes)
+    def _has(piece: AlphaPiece, codes: Codes, found: SpaceRoot | Open | None, root: SpaceRoot, there: Codes) -> bool:
+        """Whether the arc of a leaf has the root of another one, as a checker has it: no wider than is needed.
+
+        ``found`` is what the leaf holds.
+        """
+        arc = piece.arc(codes, found=found)
         return arc is not None and arc.has(root, there)
 
     def _run(self, piece: AlphaPiece, found: SpaceRoot | Open) -> tuple[int, int] | None:

@@ -183,11 +183,10 @@ class AlphaPiece:
         point: tuple[Fraction, Codes],
         given: AlphaProblem,
         curve: SolutionCurve,
-        errors: float = 1.0,
     ) -> bool:
         """Whether the only root of a leaf at some alpha of the piece is on an arc, and in the box of a curve."""
         at, root = self.root_at(*point)
-        return root is not None and arc.has(root, point[1]) and lies_in(at.place(root, given), curve, errors)
+        return root is not None and arc.has(root, point[1]) and lies_in(at.place(root, given), curve)
 
     def root_at(self, alpha: Fraction, codes: Codes) -> tuple[AlphaPiece, SpaceRoot | None]:
         """The only root of a leaf at some alpha of the piece, and that alpha as a piece; None where there is none."""

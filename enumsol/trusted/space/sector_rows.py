@@ -227,14 +227,17 @@ def swept_margin(
     ends, middle : with one S, and g and discs that are affine from one end to the other
     values : at the ends
     """
-    (first, one), (other, last) = ([Multiplied.of(end, codes, rows, part) for part in values] for end in ends)
-    if first is None or one is None or other is None or last is None:
+    first, last = (Multiplied.of(end, codes, rows, part) for end, part in zip(ends, values, strict=True))
+    if first is None or last is None:
         return -np.inf
     least = np.inf
     for end, added in zip(ends, (first, last), strict=True):
         least = min(least, _margin(end, added.y, added.c, errors))
         if not least > 0:
             return least
+    one, other = (Multiplied.of(end, codes, rows, part) for end, part in zip(ends, values[::-1], strict=True))
+    if one is None or other is None:
+        return -np.inf
     half, (low, high) = Ball.exact(np.array(0.5)), (Ball(end.g, end.g_rad) for end in ends)
     lost = ((last.y - first.y)[None] @ (high - low)[:, None])[0, 0]
     bound = _margin(middle, (one.y + other.y) * half, (one.c + other.c) * half, errors) - 0.25 * float(lost.mid)
