@@ -50,7 +50,7 @@ What checker and search share
       ``trusted.space.boxed_solution``, the test that a box holds exactly one, and which of these are
       the same, with the derivatives of ``trusted.space.natural_map``; over an interval of alpha
       ``trusted.space.solution_curve``, the test that a box holds one curve of solutions,
-      ``trusted.space.curve_chains``, that boxes hold one whole curve, ``trusted.space.pieces``, what holds over a
+      ``trusted.space.curve_chains``, that boxes hold one curve, ``trusted.space.pieces``, what holds over a
       piece of alpha, ``trusted.space.leaf_arcs``, that the solutions of an assignment there are one arc,
       ``trusted.space.curve_runs``, bounds of a curve there, and ``trusted.space.piece_forms``, the test that it has
       all solutions with some statuses (where such a curve changes its statuses or turns back is a matter of

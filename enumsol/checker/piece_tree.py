@@ -40,7 +40,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.trusted.space.curve_runs import KnownCurve
-    from enumsol.trusted.space.solution_curve import AlphaProblem, SolutionCurve
+    from enumsol.trusted.space.solution_curve import AlphaProblem
 
     Array = NDArray[np.float64]
     Codes = tuple[int, ...]
@@ -57,7 +57,7 @@ class PieceTreeChecker:
     given : AlphaProblem
         By which boxes are given.
     curves : sequence of KnownCurve
-        Each is proven to be whole. Their boxes are numbered in this order.
+        Each is proven to be one. Their boxes are numbered in this order.
     fail : called with what a leaf does not prove
     leaves : int
     gaps : list of (low, high)
@@ -154,10 +154,7 @@ class PieceTreeChecker:
         (a, b), (low, high) = self._interval, leaf.piece
         if not a <= low <= narrowed.low <= narrowed.high <= high <= b:
             return False
-        whole = AlphaPiece(narrowed.space, low, high)
-        arc = whole.arc(codes)
-        return arc is not None and whole.meets(arc, leaf.point, self.given, self._curve(leaf.box))
-
-    def _curve(self, box: int) -> SolutionCurve:
-        known, number = self._boxes[box]
-        return known.chain.links[number].curve
+        whole, (known, number) = AlphaPiece(narrowed.space, low, high), self._boxes[leaf.box]
+        arc, chain = whole.arc(codes), known.chain
+        through = arc is not None and whole.meets(arc, leaf.point, self.given, chain.links[number].curve)
+        return through and chain.runs_through(low, high)

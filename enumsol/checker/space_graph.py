@@ -7,8 +7,8 @@ between n + 1 boxes without length around the points that they share (see ``trus
 ``{"tree": true}`` and the records of a tree (see ``checker.piece_tree``), whose boxes are numbered in the order of the
 curves, points left out; at the end ``{"curves", "leaves", "gaps"}``.
 
-What is checked: every curve is one, and leaves the interval at both ends or is closed; no two are the same; the leaves
-of the tree cover all solutions, and those of a leaf lie on one of the curves.
+What is checked: every curve is one, from end to end; no two have a point in common; the leaves of the tree cover all
+solutions, and those of a leaf lie on one of the curves. An end inside the interval is a gap, as an open leaf is.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.proof.reading import RefusedError, data_of, exponents_from, numbers_from, quoted, rational_from, same
 from enumsol.proof.records import Limits
 from enumsol.proof.space_records import CurveBoxRecord
-from enumsol.trusted.space.curve_chains import apart, whole_chain
+from enumsol.trusted.space.curve_chains import apart, chain_of
 from enumsol.trusted.space.curve_runs import KnownCurve
 from enumsol.trusted.space.sector_rows import UNDECIDED
 from enumsol.trusted.space.solution_curve import AlphaProblem, CurveBox
@@ -106,7 +106,7 @@ class SpaceGraphChecker:
         curves = [KnownCurve(given, chain) for chain in self.curves]
         tree = PieceTreeChecker(enclosure, units, given, curves, self._fail)
         tree.run(*self.interval, records)
-        self.leaves, self.gaps = tree.leaves, tree.gaps
+        self.leaves, self.gaps = tree.leaves, [gap for chain in self.curves for gap in chain.gaps] + tree.gaps
         if self.progress is not None:
             self.progress(self.leaves)
         claim = {"curves": len(self.curves), "leaves": self.leaves, "gaps": len(self.gaps)}
@@ -138,7 +138,7 @@ class SpaceGraphChecker:
                 raise RefusedError(f"curve {number} cannot be read: {error}") from None
             found.append(CurveBox(said.centre, said.direction, said.border, said.half, said.radius, said.rho))
         assert self.interval is not None
-        chain = whole_chain(given, found[1::2], found[::2], self.interval)
+        chain = chain_of(given, found[1::2], found[::2], self.interval)
         if chain is None:
             raise RefusedError(f"curve {number} is not proven to be one from end to end")
         self.curves.append(chain)

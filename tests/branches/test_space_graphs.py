@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from alike import assert_same
-from complete import complete_report, only_root, read_back, whole_graph
+from complete import all_roots, complete_report, only_root, read_back, whole_graph
 from effort import some
 from interruptions import CtrlC, interrupted
 from problems3d import (
@@ -37,7 +37,7 @@ from enumsol.branches.space.make_curved import unordered
 from enumsol.branches.space.pieces import Run, Turn, orders, runs_and_turns
 from enumsol.continuation.path_data import PathStatus
 from enumsol.support.deadlines import TimeOverError, within
-from enumsol.trusted.space.curve_chains import leaves_interval
+from enumsol.trusted.space.curve_chains import CurveChain
 from enumsol.trusted.space.curve_events import CurveMotion
 from enumsol.trusted.space.sector_rows import OPEN, STICK
 from enumsol.trusted.space.solution_curve import SLIP, AlphaProblem, curve_point
@@ -258,12 +258,65 @@ def test_the_time_may_be_over_during_continuation(monkeypatch):
 @pytest.mark.slow
 def test_a_curve_that_is_not_proven_to_be_whole_is_kept_as_far_as_it_is(two_curves, monkeypatch):
     problem, whole = two_curves
-    monkeypatch.setattr(cover.SpaceCover, "_is_new", lambda self, chain: False)
-    part = enumsol.branch_graph(problem, (0, 1), max_nodes=60)
+    follow = cover.chain_through
+
+    def cut_short(*arguments):
+        chain = follow(*arguments)
+        if chain is None or chain.closed:
+            return chain
+        return CurveChain.of(chain.links[:-1], chain.joints[:-1], (Fraction(0), Fraction(1)))
+
+    monkeypatch.setattr(cover, "chain_through", cut_short)
+    part = enumsol.branch_graph(problem, (0, 1), max_nodes=100)
     assert not part.complete
     assert len(part.components) == 2
     assert part.at_least(0.6) == 3
     check_part(part, whole)
+    report = enumsol.verify(problem, part.proof) if part.proof else None
+    assert report is None or (report.ok and not report.complete)
+
+
+def broken(chain, x, interval):
+    """Links of a curve below alpha = 1, or above 1.1, on the side of a point x; none for one between these."""
+    alphas = [float(joint.alphas[0]) for joint in chain.joints]
+    kept = [k for k, alpha in enumerate(alphas) if (alpha > 1.1 if x[-1] > 1.1 else alpha < 1.0)]
+    if len(kept) < 2 or 1.0 <= x[-1] <= 1.1:
+        return None
+    first, last = kept[0], kept[-1]
+    return CurveChain.of(chain.links[first:last], chain.joints[first : last + 1], interval)
+
+
+def test_beside_ends_of_curves_all_solutions_are_known(monkeypatch):
+    """As if the curve could not be followed through its middle; the tree finds both parts."""
+    follow, interval = cover.chain_through, (Fraction(1, 2), Fraction(3, 2))
+    monkeypatch.setattr(chains, "_TRUST", 0.2)
+    monkeypatch.setattr(cover, "chain_through", lambda *given: broken(follow(*given), given[2], interval))
+    graph = enumsol.branch_graph(SLIDING, interval, max_nodes=200)
+    ((low, high),) = graph.open_ranges
+    assert 0.5 < low < high < 1.5
+    (reason,) = graph.reasons
+    assert "nothing is proven beyond 2 ends of curves there" in reason
+    assert [v.kind for v in graph.vertices].count(VertexKind.UNSETTLED) == 2
+    report = enumsol.verify(SLIDING, graph.proof)
+    assert (report.ok, report.complete, report.curves) == (True, False, 2)
+    assert report.open >= 3
+    for alpha in (0.5, float(low) - 1e-6, float(high) + 1e-6, 1.5):
+        assert graph.multiplicity_at(alpha) == len(all_roots(SLIDING, alpha)) == 1
+    middle = float(low + high) / 2
+    refusal(enumsol.IncompleteGraphError, "not complete", graph.multiplicity_at, middle)
+    assert graph.at_least(middle) == 1
+
+
+@pytest.mark.long
+def test_beside_a_point_in_which_branches_of_a_symmetric_body_meet():
+    """Seven solutions below, of which three become one there."""
+    problem = enumsol.gallery.wedge3d(2, 2, 2)
+    graph = enumsol.branch_graph(problem, ("0.8955", "0.8985"))
+    ((low, high),) = graph.open_ranges
+    assert high - low < 1e-6
+    assert enumsol.verify(problem, graph.proof).ok
+    for alpha, number in ((0.8955, 7), (float(low) - 1e-5, 7), (float(high) + 1e-5, 5), (0.8985, 5)):
+        assert graph.multiplicity_at(alpha) == len(all_roots(problem, alpha)) == number
 
 
 # -- what is left open -------------------------------------------------------------------------------------------------
@@ -559,7 +612,7 @@ def test_a_curve_is_whole_over_an_interval_in_which_continuation_has_to_take_ver
     interval = around(fold, 5 * abs(alpha - fold))
     chain = chain_through(AlphaProblem.of(node.problem.enclosure), node.problem, np.array([n, *t, alpha]), interval)
     assert chain.whole
-    assert leaves_interval(chain.links, chain.joints, interval)
+    assert chain.joints[0].alphas[1] < interval[0] or chain.joints[0].alphas[0] > interval[1]
 
 
 def test_no_curve_is_followed_from_where_continuation_goes_neither_way(monkeypatch):

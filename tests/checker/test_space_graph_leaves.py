@@ -59,6 +59,30 @@ def test_open_leaves_are_gaps():
     assert repr(report).endswith("complete: no")
 
 
+def cut_short(records):
+    """Without the last box of its curve, and the point behind that."""
+    place = records.index({"tree": True})
+    (header, curve), boxes = records[:2], records[2 : place - 2]
+    return [header, {"curve": curve["curve"] - 1}, *boxes, *records[place:]]
+
+
+def test_where_a_curve_ends_inside_the_interval_an_arc_says_nothing():
+    problem, records = leaf_by_leaf(*ARCS)
+    short = put(cut_short(records), (-1, "gaps"), 1)
+    assert why_refused(problem, short).count("not proven to be an arc through its box") == len(of_kind(records, "r"))
+
+
+def test_an_end_inside_the_interval_is_a_gap():
+    problem, records = leaf_by_leaf(*ROWS)
+    curve, place = cut_short(records), records.index({"tree": True}) - 2
+    tree = [{"tree": True}, ["u", "no time"], {"curves": 1, "leaves": 1, "gaps": 2}]
+    report = accepted_report(problem, proof_of([*curve[:place], *tree]))
+    assert (report.complete, report.curves, report.open) == (False, 1, 2)
+    for gaps in (0, 1):
+        forged = [*curve[:place], *tree[:-1], {"curves": 1, "leaves": 1, "gaps": gaps}]
+        assert "the counts at the end" in why_refused(problem, forged)
+
+
 def test_a_curve_alone_says_nothing():
     problem, records = leaf_by_leaf(*ROWS)
     place = records.index({"tree": True}) + 1
@@ -130,7 +154,7 @@ def test_the_check_ends_after_many_failures():
         ((0, "steps"), lambda steps: steps[1:], "expected 6 numbers"),
         ((1, "curve"), 0, "curve 1 has 0 boxes"),
         ((1, "curve"), True, "curve 1 has True boxes"),
-        ((1, "curve"), 1, "curve 1 is not proven to be one from end to end"),
+        ((1, "curve"), 1, "the tree over alpha is missing"),
         ((1, "curve"), lambda count: count + 1, "is no box"),
         ((2, 1), [0.0], "a box around a curve cannot be read"),
         ((3, 2), lambda direction: [-x for x in direction], "curve 1 is not proven to be one"),

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from complete import only_root
 from problems3d import SLIDING, OneNode, random_over_alpha, sliding_node
+from space_graph_proofs import closed_branch
 
+from enumsol import enumerate_roots
 from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space import chains
 from enumsol.branches.space.chains import chain_through
@@ -51,13 +53,13 @@ def test_a_point_where_a_curve_bends_beyond_its_box_is_on_it():
             continue
         joint = curve_around(given, point.x, point.direction, box.border, 0.0)
         beside += 1
-        assert not apart(CurveChain([], [joint], True), chain)
+        assert not apart(CurveChain([], [joint], True, (None, None)), chain)
     assert beside > 2
 
 
 def part_of(chain, first, last):
     """Some links of a chain."""
-    return CurveChain(chain.links[first:last], chain.joints[first : last + 1], False)
+    return CurveChain.of(chain.links[first:last], chain.joints[first : last + 1], (Fraction(2, 5), Fraction(3, 5)))
 
 
 def test_parts_of_one_curve_share_what_they_share():
@@ -86,3 +88,50 @@ def test_curves_of_different_solutions_apart():
         found.append(chain_through(given, node.problem, np.array([n, *t, alpha]), interval))
     assert apart(*found)
     assert not apart(found[0], found[0])
+
+
+def sliding_chain(low, high):
+    """The curve of a sliding node over an interval, and that interval."""
+    given, interval, alpha = AlphaProblem.of(SLIDING.enclosure), (Fraction(low), Fraction(high)), float(low + high) / 2
+    return chain_through(given, SLIDING, np.append(sliding_node(alpha), alpha), interval), interval
+
+
+def test_an_end_inside_the_interval_is_a_gap_with_all_that_its_box_holds():
+    chain, interval = sliding_chain(Fraction(2, 5), Fraction(3, 5))
+    assert (chain.whole, chain.ends, chain.gaps) == (True, (None, None), [])
+    count = len(chain.links)
+    for first, last in ((0, count - 1), (2, count)):
+        part = CurveChain.of(chain.links[first:last], chain.joints[first : last + 1], interval)
+        assert [end is None for end in part.ends] == [first == 0, last == count]
+        assert not part.whole
+        for end, link, joint, side in zip(
+            part.ends, (part.links[0], part.links[-1]), (part.joints[0], part.joints[-1]), (-1, 1), strict=True
+        ):
+            if end is None:
+                continue
+            low, high = end
+            # the node slides on one smooth curve, on which alpha is known at every t
+            for t in (side * link.curve.box.half, float((link.end if side > 0 else link.start).mid)):
+                alpha = link.curve.at(t).mid[-1]
+                assert low <= alpha <= high
+            assert low <= joint.alphas[0] <= joint.alphas[1] <= high
+            assert not part.runs_through(low, high)
+            assert not part.runs_through(interval[0], interval[1])
+            assert not part.runs_through(high, high)
+            assert part.runs_through(high + Fraction(1, 10**9), high + 1) or len(part.gaps) == 2
+    assert chain.runs_through(*interval)
+
+
+def test_a_curve_that_runs_twice_round_is_none():
+    problem, interval = closed_branch(), (Fraction(4, 5), Fraction(8, 5))
+    (root,) = (root for root in enumerate_roots(problem, 1.0625) if root.index == -1)
+    x = np.concatenate([root.lambda_n, *root.lambda_t.T, [1.0625]])
+    closed = chain_through(AlphaProblem.of(problem.enclosure), problem, x, interval)
+    assert closed.closed
+    links, joints = list(closed.links), list(closed.joints)
+    assert CurveChain.of(links, joints, interval).closed
+    assert CurveChain.of([*links, *links], [*joints, *joints[1:]], interval) is None
+    for further in range(1, len(links)):
+        assert CurveChain.of([*links, *links[:further]], [*joints, *joints[1 : further + 1]], interval) is None
+    part = CurveChain.of(links[:-1], joints[:-1], interval)
+    assert [end is None for end in part.ends] == [False, False]

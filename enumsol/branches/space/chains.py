@@ -5,6 +5,7 @@ Where to put the boxes is told by paths of continuation, in floats; what a chain
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -16,7 +17,7 @@ from enumsol.continuation.path_data import PathStatus
 from enumsol.errors import EnumsolError, Interrupted
 from enumsol.support.deadlines import TimeOverError, look, tell
 from enumsol.trusted.space.curve_chains import CurveChain, CurveLink, goes_on, link_between
-from enumsol.trusted.space.solution_curve import corner_steps, curve_around, curve_point
+from enumsol.trusted.space.solution_curve import corner_steps, curve_around, curve_point, only_curve
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
     from enumsol.continuation.path import Path
     from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.trusted.space.solution_curve import AlphaProblem, CurveBox, CurvePoint, SolutionCurve
+    from enumsol.trusted.space.solution_curve import AlphaProblem, CurvePoint, SolutionCurve
 
     Array = NDArray[np.float64]
 
@@ -47,26 +48,10 @@ _EVEN = 0.125
 _INSIDE = 2.0**-10
 #: The shortest step of continuation where it stalls with that of its own.
 _LEAST_STEP = 1e-8
+#: So many links less one, at most, are left out at an end of a curve that run into others of it.
+_TRIMMED = 4
 #: How far a skeleton is prolonged beyond the interval, relative to its last step.
 _BEYOND = 0.05
-
-
-@dataclass(frozen=True, eq=False)
-class Chain(CurveChain):
-    """One curve of solutions, through boxes that overlap, as far as it is proven.
-
-    Attributes
-    ----------
-    whole : bool
-        Whether it has the length that was asked for.
-    """
-
-    whole: bool
-
-    @property
-    def boxes(self) -> list[CurveBox]:
-        """Those of the links."""
-        return [link.curve.box for link in self.links]
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,11 +65,20 @@ class Skeleton:
     corners : sequence of int
         Points at which a status changes.
     closed : bool
+    start : int
+        The point from which it was followed.
     """
 
     points: Array
     corners: Sequence[int]
     closed: bool
+    start: int = 0
+
+    def half(self, way: int) -> Skeleton:
+        """From the start to the last point, or back to the first one."""
+        kept = range(len(self.points))[None if self.closed else self.start :: way]
+        corners = sorted(kept.index(corner) for corner in self.corners if corner in kept)
+        return Skeleton(self.points[list(kept)], corners, closed=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,17 +97,17 @@ def chain_through(
     problem: ContactProblem3D,
     x: Array,
     interval: tuple[Fraction, Fraction],
-    begun: Callable[[Chain], object] | None = None,
-) -> Chain | None:
+    begun: Callable[[CurveChain], object] | None = None,
+) -> CurveChain | None:
     """The curve through a regular root x, (3p + 1,), until it leaves the interval on both sides or is closed.
 
-    None where not even its beginning is proven; ``whole`` says whether all of it is. ``begun`` is called with what
-    there is of it when the time is over or somebody interrupts.
+    As much of it as is proven, with x if possible; None where that is nothing. ``begun`` is called with what there is
+    of it when the time is over or somebody interrupts.
     """
     skeleton = skeleton_through(problem, x, (float(interval[0]), float(interval[1])))
     if skeleton is None:
         return None
-    builder = ChainBuilder(given)
+    builder = ChainBuilder(given, interval)
     try:
         return builder.chain(skeleton)
     except (TimeOverError, KeyboardInterrupt):
@@ -147,7 +141,7 @@ def skeleton_through(problem: ContactProblem3D, x: Array, span: tuple[float, flo
     places = {last - k for k in corners[0]} | {last + k for k in corners[1]}
     points = np.vstack([back, lines[1][1:]])
     # from a fold continuation may start in neither direction
-    return Skeleton(points, sorted(places), closed=False) if len(points) > 1 else None
+    return Skeleton(points, sorted(places), closed=False, start=last) if len(points) > 1 else None
 
 
 def _path(problem: ContactProblem3D, start: tuple[float, Array, Array], way: int, span: tuple[float, float]) -> Path:
@@ -164,47 +158,85 @@ class ChainBuilder:
     Parameters
     ----------
     problem : AlphaProblem
+    interval : first and last alpha
     """
 
-    def __init__(self, problem: AlphaProblem) -> None:
-        self.problem = problem
+    def __init__(self, problem: AlphaProblem, interval: tuple[Fraction, Fraction]) -> None:
+        self.problem, self._interval = problem, interval
         self.unit = np.append(problem.force, 1.0)
         self._ends: dict[int, tuple[Array, ...]] = {}
         self._links: list[CurveLink] = []
         self._joints: list[SolutionCurve] = []
 
     @property
-    def begun(self) -> Chain | None:
-        """What is proven so far of the chain that is being made."""
+    def begun(self) -> CurveChain | None:
+        """What is proven so far of the chain that is being made, without links at its ends that run into others."""
         count = min(len(self._links), len(self._joints) - 1)
-        return Chain(self._links[:count], self._joints[: count + 1], False, False) if count > 0 else None
+        for off in range(min(_TRIMMED, count)):
+            for first, last in dict.fromkeys(((0, count - off), (off, count), (off, count - off))):
+                links, joints = self._links[first:last], self._joints[first : last + 1]
+                chain = CurveChain.of(links, joints, self._interval)
+                if chain is not None:
+                    return chain
+        return None
 
-    def chain(self, skeleton: Skeleton) -> Chain | None:
-        """A chain along a skeleton, as far as it is proven."""
-        skeleton = self._thinned(replace(skeleton, points=self.problem.placed(skeleton.points)))
-        line = skeleton.points
-        self._ends, self._links, self._joints = {}, [], []
-        first = self.joint(*self._at(line, 0.0))
+    def chain(self, skeleton: Skeleton) -> CurveChain | None:
+        """A chain along a skeleton, as far as it is proven; if that is not to its start, from there both ways."""
+        skeleton = replace(skeleton, points=self.problem.placed(skeleton.points))
+        self._links, self._joints = [], []
+        if not self._put(skeleton):
+            self._links, self._joints = [], []
+            self._put(skeleton.half(-1))
+            self._turn_back()
+            self._put(skeleton.half(1))
+        return self.begun
+
+    def _put(self, skeleton: Skeleton) -> bool:
+        """Put further links along a skeleton as far as they are proven; whether that is beyond its start."""
+        skeleton = self._thinned(skeleton)
+        line, links, joints = skeleton.points, self._links, self._joints
+        self._ends = {}
+        first = joints[-1] if joints else self.joint(*self._at(line, 0.0))
         if first is None:
-            return None
-        links, joints = self._links, self._joints = list[CurveLink](), [first]
+            return False
+        joints[len(links) :] = [first]
         place, last = 0.0, len(line) - 1.0
         for corner in self._around(skeleton):
-            if not self._filled(line, place, corner.low, links, joints, corner.start, closed=skeleton.closed):
+            place = self._filled(line, place, corner.low, links, joints, corner.start, closed=skeleton.closed)
+            if place < corner.low or corner.link is None or corner.end is None:
                 break
-            place = corner.low
-            if corner.link is None or corner.end is None or (links and not goes_on(links[-1], corner.link, joints[-1])):
+            # two corners may be so near to each other that the places around them overlap
+            link = (
+                corner.link if joints[-1] is corner.start else link_between(corner.link.curve, joints[-1], corner.end)
+            )
+            if link is None or (links and not goes_on(links[-1], link, joints[-1])):
                 break
-            links.append(corner.link)
+            links.append(link)
             joints.append(corner.end)
             place = corner.high
         else:
             known = first if skeleton.closed else None
-            if self._filled(line, place, last, links, joints, known, closed=skeleton.closed):
-                place = last
-        whole = place == last
-        closed = skeleton.closed and whole and bool(links) and goes_on(links[-1], links[0], first)
-        return Chain(links, joints, closed, whole) if links else None
+            place = self._filled(line, place, last, links, joints, known, closed=skeleton.closed)
+        return place == last or (not skeleton.closed and place > skeleton.start)
+
+    def _turn_back(self) -> None:
+        """Have the links that there are run the other way, as far as that is proven of those next to the last joint."""
+        links: list[CurveLink] = []
+        joints: list[SolutionCurve] = []
+        curves = [self._turned(link.curve) for link in self._links[::-1]]
+        for k, joint in enumerate(map(self._turned, self._joints[::-1])):
+            curve = curves[k - 1] if k else None
+            link = link_between(curve, joints[-1], joint) if curve and joint and joints else None
+            if link is None:
+                links, joints = [], []
+            links += [] if link is None else [link]
+            joints += [] if joint is None else [joint]
+        self._links, self._joints = links, joints
+
+    def _turned(self, curve: SolutionCurve) -> SolutionCurve | None:
+        """The same curve the other way."""
+        box = curve.box
+        return only_curve(self.problem, replace(box, direction=-box.direction, border=-box.border))
 
     def _thinned(self, skeleton: Skeleton) -> Skeleton:
         """Without points close to a corner, so that the edges on both sides of it have about the same length."""
@@ -220,7 +252,7 @@ class ChainBuilder:
                 del kept[k]
                 at = kept.index(corner)
         corners = [kept.index(corner) for corner in skeleton.corners]
-        return Skeleton(skeleton.points[kept], corners, skeleton.closed)
+        return Skeleton(skeleton.points[kept], corners, skeleton.closed, bisect_left(kept, skeleton.start))
 
     def _around(self, skeleton: Skeleton) -> Iterator[_Corner]:
         """Places before and after every corner and what is proven between them, one box where that is possible."""
@@ -250,8 +282,8 @@ class ChainBuilder:
         known: SolutionCurve | None,
         *,
         closed: bool,
-    ) -> bool:
-        """Add links from one place of a skeleton to another one; whether that place is reached.
+    ) -> float:
+        """Add links from one place of a skeleton to another one; how far they come.
 
         ``known``: the joint there, if there is one; ``closed``: the skeleton is.
         """
@@ -272,14 +304,14 @@ class ChainBuilder:
                 way = (_SHRINK if failed else _FAILED) * (further - place)
                 failed = True
                 if way < _SHORTEST:
-                    return False
+                    return place
                 continue
             links.append(found[0])
             joints.append(found[1])
             trust = _LESS * trust if failed else min(_MORE * trust, _TRUST)
             way = (further - place) * min(max(trust * found[0].curve.stretch, _SHRINK), _GROWTH)
             place, failed = further, False
-        return True
+        return place
 
     def joint(self, x: Array, direction: Array) -> SolutionCurve | None:
         """The solution near a point, in a box without length across a direction."""

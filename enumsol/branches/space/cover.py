@@ -1,4 +1,4 @@
-"""All solutions of a problem in 3D over an interval of alpha: whole curves in boxes, and the tree that shows it.
+"""All solutions of a problem in 3D over an interval of alpha: curves in boxes, and the tree that shows it.
 
 The tree finds the curves (theory, section 12.9): at a solution that lies in no box yet a curve is followed through it.
 """
@@ -19,21 +19,21 @@ from enumsol.proof.space_records import CurveBoxRecord
 from enumsol.proof.writer import ProofWriter, unit_exponents
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.search.space.piece_parallel import spread_over
-from enumsol.search.space.piece_tree import OpenLeaf, PieceTree
+from enumsol.search.space.piece_tree import OpenLeaf, PieceTree, joined
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.support.deadlines import look, remaining
-from enumsol.trusted.space.curve_chains import apart, leaves_interval
+from enumsol.trusted.space.curve_chains import apart
 from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable
     from concurrent.futures import Executor
 
     from numpy.typing import NDArray
 
-    from enumsol.branches.space.chains import Chain
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.search.outcome import StopReason
+    from enumsol.trusted.space.curve_chains import CurveChain
     from enumsol.trusted.space.solution_curve import CurveBox
 
     Array = NDArray[np.float64]
@@ -42,8 +42,9 @@ if TYPE_CHECKING:
 _SAMPLED = 500
 #: Seconds that it has at least.
 _LEAST_TIME = 1e-3
-#: After so many curves that are not proven to be whole no further one is followed.
-_FAILURES = 3
+#: After so many curves that are not new, or neither whole nor as long as this share of the interval, no further one is
+#: followed.
+_FAILURES, _LONG = 3, 2.0**-6
 #: What the record of an open leaf says.
 _OPEN = "solutions there lie on no curve that is known"
 
@@ -56,14 +57,12 @@ class SpaceCover:
     ----------
     problem : ContactProblem3D
     interval : first and last alpha
-    chains : list of Chain
-        Whole curves.
-    parts : list of Chain
-        Of other curves, which are not whole; no two have a solution in common.
+    chains : list of CurveChain
+        No two have a solution in common.
     records : list
         Of the tree, in the order of a walk; open leaves among them.
     failed : int
-        Curves that were met and are not whole.
+        Curves that were met and of no use.
     nodes : int
     stopped : StopReason or None
         Why the tree was not searched to its end.
@@ -71,8 +70,7 @@ class SpaceCover:
 
     problem: ContactProblem3D
     interval: tuple[Fraction, Fraction]
-    chains: list[Chain] = field(default_factory=list)
-    parts: list[Chain] = field(default_factory=list)
+    chains: list[CurveChain] = field(default_factory=list)
     records: list[Any] = field(default_factory=list)
     failed: int = 0
     nodes: int = 0
@@ -80,11 +78,17 @@ class SpaceCover:
 
     @property
     def gaps(self) -> list[tuple[Fraction, Fraction]]:
-        """Pieces of alpha over which something is not decided, in order, those that touch as one."""
-        return in_order((leaf.low, leaf.high) for leaf in self.records if isinstance(leaf, OpenLeaf))
+        """Ranges of alpha over which something is not decided, in order, those that touch as one."""
+        return joined([*((leaf.low, leaf.high) for leaf in self.records if isinstance(leaf, OpenLeaf)), *self.ends])
+
+    @property
+    def ends(self) -> list[tuple[Fraction, Fraction]]:
+        """Alphas of the interval at which curves go on where nothing is known of them."""
+        low, high = self.interval
+        return [(max(begin, low), min(end, high)) for chain in self.chains for begin, end in chain.gaps]
 
     def unexplained(self, low: Fraction, high: Fraction) -> bool:
-        """Whether a solution was met over a gap through which no whole curve is known."""
+        """Whether a solution was met over a gap through which no curve is known."""
         leaves = (leaf for leaf in self.records if isinstance(leaf, OpenLeaf) and leaf.forces is not None)
         return any(low <= leaf.low and leaf.high <= high for leaf in leaves)
 
@@ -108,18 +112,14 @@ class SpaceCover:
         given = AlphaProblem.of(self.problem.enclosure)
         tick = None if progress is None else lambda share: progress("search", share)
 
-        def more(x: Array) -> Chain | None:
-            chain = chain_through(given, self.problem, x, self.interval, self._keep)
-            if chain is not None and self._is_new(chain):
-                self.parts = [part for part in self.parts if apart(part, chain)]
-                self.chains.append(chain)
-                return chain
-            if chain is not None:
-                self._keep(chain)
+        def more(x: Array) -> CurveChain | None:
+            chain = chain_through(given, self.problem, x, self.interval, self._take)
+            if chain is not None and not self._take(chain):
+                chain = None
             # what is left open costs as much at every further point of the same curve
-            self.failed += 1
+            self.failed += chain is None or not self._is_of_use(chain)
             tree.more = more if self.failed < _FAILURES else None
-            return None
+            return chain
 
         tree = PieceTree(
             self.problem.enclosure, self.interval, self._units(), more, max_nodes, tick, solutions=self._solutions
@@ -130,10 +130,16 @@ class SpaceCover:
         finally:
             self.records, self.nodes, self.stopped = tree.records, tree.nodes, tree.stopped
 
-    def _keep(self, chain: Chain) -> None:
-        """Keep a part of a curve, if it has nothing in common with what is known."""
-        if all(apart(chain, other) for other in (*self.chains, *self.parts)):
-            self.parts.append(chain)
+    def _is_of_use(self, chain: CurveChain) -> bool:
+        alphas, (low, high) = [end for joint in chain.joints for end in joint.alphas], self.interval
+        return chain.whole or max(alphas) - min(alphas) > Fraction(_LONG) * (high - low)
+
+    def _take(self, chain: CurveChain) -> bool:
+        """Take in a curve, if it is proven to have nothing in common with those that are known."""
+        new = all(apart(chain, other) for other in self.chains)
+        if new:
+            self.chains.append(chain)
+        return new
 
     def _solutions(self, alpha: Fraction) -> list[Array]:
         """Forces of solutions at an alpha, as many as a short search finds."""
@@ -142,11 +148,6 @@ class SpaceCover:
         left = None if seconds is None else max(seconds, _LEAST_TIME)
         roots = enumerate_roots(self.problem, alpha, max_nodes=_SAMPLED, time_limit=left)
         return [np.concatenate([root.lambda_n, *root.lambda_t.T]) for root in roots]
-
-    def _is_new(self, chain: Chain) -> bool:
-        """Whether a chain is proven to be whole, and none that is known."""
-        whole = chain.whole and (chain.closed or leaves_interval(chain.links, chain.joints, self.interval))
-        return whole and all(apart(chain, other) for other in self.chains)
 
     def proof(self) -> Proof:
         """Curves and tree for ``enumsol.verify``."""
@@ -171,7 +172,7 @@ class SpaceCover:
                 if k < len(chain.links):
                     writer.write(_box(chain.links[k].curve.box))
         writer.write({"tree": True})
-        leaves = gaps = 0
+        leaves, gaps = 0, len(self.ends)
         for record in self.records:
             is_open = isinstance(record, OpenLeaf)
             gaps += is_open
@@ -179,17 +180,6 @@ class SpaceCover:
             writer.write((UndecidedRecord(_OPEN) if is_open else record).write())
         writer.write({"curves": len(self.chains), "leaves": leaves, "gaps": gaps})
         return writer.close()
-
-
-def in_order(ranges: Iterable[tuple[Fraction, Fraction]]) -> list[tuple[Fraction, Fraction]]:
-    """Ranges in their order, those that touch as one."""
-    found: list[tuple[Fraction, Fraction]] = []
-    for low, high in sorted(ranges):
-        if found and low <= found[-1][1]:
-            found[-1] = found[-1][0], max(high, found[-1][1])
-        else:
-            found.append((low, high))
-    return found
 
 
 def _box(box: CurveBox) -> list[Any]:

@@ -136,19 +136,30 @@ class CurvedGraph:
 
     # -- curves ----------------------------------------------------------------------------------------------------
 
-    def add(self, parts: Sequence[Run | Turn], remedy: str | None = None) -> None:
+    def add(
+        self,
+        parts: Sequence[Run | Turn],
+        ends: tuple[Bounds | None, Bounds | None],
+        remedy: str | None,
+        *,
+        closed: bool = False,
+    ) -> None:
         """Take in a curve; only what lies over the interval.
 
-        ``remedy``: that it is not whole, and what may prove more of it. Its ends are then not settled.
+        Parameters
+        ----------
+        parts : of a closed curve all of them
+        ends : bounds of alpha at a first and a last point beyond which it is not known
+            Such an end is not settled.
+        remedy : what may prove more of it, None where it is told elsewhere that something is missing there
+        closed : whether the last part goes on with the first one
         """
         known: dict[int, int] = {}
-        ends: Sequence[Run | Turn] = ()
-        if remedy is not None and parts:
-            parts = _with_open_ends(parts)
-            ends = parts[0], parts[-1]
-            self._tell_ends([end.alphas for end in ends if isinstance(end, Turn)], remedy)
+        parts, open_ends = _with_open_ends(parts, ends) if parts else (parts, [])
+        if remedy is not None:
+            self._tell_ends([end.alphas for end in open_ends], remedy)
         for part in parts:
-            if part in ends:
+            if part in open_ends:
                 continue
             if isinstance(part, Turn) and not part.settled and self._side(part.alphas) in (0, None):
                 low, high = (float(end) for end in part.alphas)
@@ -159,7 +170,7 @@ class CurvedGraph:
                 )
         for k, part in enumerate(parts):
             if isinstance(part, Run):
-                self._take(parts, k, known)
+                self._take(parts, k, known, closed=closed)
 
     def _leave_open(self, reason: str, *alphas: Bounds) -> None:
         """Note what is open, and between which alphas."""
@@ -168,16 +179,18 @@ class CurvedGraph:
 
     def _tell_ends(self, ends: Sequence[Bounds], remedy: str) -> None:
         """Say where a curve that is not whole ends inside the interval."""
-        inside = [f"{float(low):.8g}" for low, high in ends if self._side((low, high)) in (0, None)]
+        a, b = self.interval
+        places = [(max(low, a) + min(high, b)) / 2 for low, high in ends if self._side((low, high)) in (0, None)]
+        inside = [f"{float(alpha):.8g}" for alpha in places]
         if inside:
             self.reasons.append(f"a curve was not followed beyond its ends at alpha = {' and '.join(inside)}; {remedy}")
 
-    def _take(self, parts: Sequence[Run | Turn], k: int, known: dict[int, int]) -> None:
+    def _take(self, parts: Sequence[Run | Turn], k: int, known: dict[int, int], *, closed: bool) -> None:
         run = parts[k]
         if not isinstance(run, Run):
             return
         # in the order of alpha; a closed curve goes on from its end to its first turn
-        before, after = k - 1, (k + 1) % len(parts) if isinstance(parts[0], Turn) else k + 1
+        before, after = k - 1, (k + 1) % len(parts) if closed else k + 1
         ends = [(before, run.start), (after, run.end)][:: run.rises]
         sides = [self._side(self._alphas(parts, number, beyond)) for number, beyond in ends]
         if sides[0] == 1 or sides[1] == -1:
@@ -318,16 +331,24 @@ class CurvedGraph:
         )
 
 
-def _with_open_ends(parts: Sequence[Run | Turn]) -> list[Run | Turn]:
-    """With a turn that is not settled at both ends."""
-    first, last = parts[0], parts[-1]
-    begin = replace(first, settled=False) if isinstance(first, Turn) else _open_end(first, first.start, first.knots[0])
-    end = replace(last, settled=False) if isinstance(last, Turn) else _open_end(last, last.end, last.knots[-1])
-    return [begin, *parts[isinstance(first, Turn) : len(parts) - isinstance(last, Turn)], end]
-
-
-def _open_end(run: Run, alphas: Bounds, x: Floats) -> Turn:
-    return Turn(alphas, x, (run.codes,), settled=False)
+def _with_open_ends(
+    parts: Sequence[Run | Turn], ends: tuple[Bounds | None, Bounds | None]
+) -> tuple[list[Run | Turn], list[Turn]]:
+    """With a turn that is not settled at every end with bounds of alpha, and these turns."""
+    found, turns = list(parts), []
+    for alphas, place in zip(ends, (0, -1), strict=True):
+        if alphas is None:
+            continue
+        last = found[place]
+        if isinstance(last, Turn):
+            bounds = *alphas, *last.alphas
+            turn = replace(last, alphas=(min(bounds), max(bounds)), settled=False)
+            found[place] = turn
+        else:
+            turn = Turn(alphas, last.knots[place], (last.codes,), settled=False)
+            found.insert(0 if place == 0 else len(found), turn)
+        turns.append(turn)
+    return found, turns
 
 
 def unordered(vertices: Sequence[Vertex]) -> list[tuple[str, Bounds, Bounds]]:

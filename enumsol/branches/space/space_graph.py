@@ -1,22 +1,24 @@
-"""branch_graph in 3D: whole curves, and the tree that shows that there are no others (theory, section 12.9)."""
+"""branch_graph in 3D: curves, and the tree that shows that there are no others (theory, section 12.9)."""
 
 from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from enumsol.branches.graph import BranchGraph
 from enumsol.branches.graph_data import GraphStats
 from enumsol.branches.remedies import ANOTHER_INTERVAL, MORE_TIME, SHORT_INTERVAL
-from enumsol.branches.space.cover import SpaceCover, in_order
+from enumsol.branches.space.cover import SpaceCover
 from enumsol.branches.space.make_curved import CurvedGraph
-from enumsol.branches.space.pieces import runs_and_turns
+from enumsol.branches.space.pieces import Run, runs_and_turns
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.errors import Interrupted
 from enumsol.proof.space_records import CutPiece
 from enumsol.search.outcome import Stop, StopReason
+from enumsol.search.space.piece_tree import joined
 from enumsol.support.deadlines import Deadline, TimeOverError, within
+from enumsol.support.messages import counted
 from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
@@ -25,7 +27,7 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
     from enumsol.branches.elements import Arc, Vertex
-    from enumsol.branches.space.pieces import Run, Turn
+    from enumsol.branches.space.pieces import Turn
     from enumsol.model.problem3d import ContactProblem3D
 
 #: Gaps that are named one by one.
@@ -115,25 +117,25 @@ def _elements(
     stop: Stop | None,
 ) -> _Elements:
     """Those of all curves that were found."""
-    remedy = ANOTHER_INTERVAL if stop is None else MORE_TIME
-    curves = [*((chain, None) for chain in cover.chains), *((part, remedy) for part in cover.parts)]
+    # what the tree left open is told by its gaps
+    remedy, curves = None if stop is None else MORE_TIME, cover.chains
     if not curves:
         return _Elements()
     given = AlphaProblem.of(cover.problem.enclosure)
     made, whole, interrupted = CurvedGraph(cover.problem, given, interval), True, False
-    for k, (chain, more) in enumerate(curves):
+    for k, chain in enumerate(curves):
         found: list[Run | Turn] = []
         try:
             if progress is not None:
                 progress("arcs", k / len(curves))
-            made.add(runs_and_turns(given, chain, found), more)
+            made.add(runs_and_turns(given, chain, found), chain.ends, remedy, closed=chain.closed)
         except TimeOverError:
             cut = f"the time was over before curve {k + 1} of {len(curves)} was cut into arcs"
             made.reasons.append(f"{cut}; {MORE_TIME}")
-            made.add(found, MORE_TIME)
+            made.add(found, _ends_of(found), MORE_TIME)
             whole = False
         except KeyboardInterrupt:
-            made.add(found, MORE_TIME)
+            made.add(found, _ends_of(found), MORE_TIME)
             whole, interrupted = False, True
             break
     else:
@@ -143,22 +145,34 @@ def _elements(
     return _Elements(vertices, arcs, made.reasons, made.left_open if whole else None, interrupted)
 
 
+def _ends_of(parts: Sequence[Run | Turn]) -> tuple[Any, Any]:
+    """Bounds of alpha at both ends of a part of a curve."""
+    if not parts:
+        return None, None
+    first, last = parts[0], parts[-1]
+    return first.start if isinstance(first, Run) else first.alphas, last.end if isinstance(last, Run) else last.alphas
+
+
 def _left_open(cover: SpaceCover, made: _Elements) -> tuple[tuple[Fraction, Fraction], ...] | None:
     """Ranges of alpha outside of which nothing is missing; None where that is not known."""
     if not cover.records or made.left_open is None:
         return None
     low, high = cover.interval
     ranges = ((max(begin, low), min(end, high)) for begin, end in (*cover.gaps, *made.left_open))
-    return tuple(in_order(ends for ends in ranges if ends[0] <= ends[1]))
+    return tuple(joined(ends for ends in ranges if ends[0] <= ends[1]))
 
 
 def _gaps(cover: SpaceCover) -> list[str]:
     """Where solutions may be missing, why, and what may decide it, in words."""
     found = []
     for low, high in cover.gaps[:_NAMED]:
+        ends = sum(low <= begin and end <= high for begin, end in cover.ends)
         why, remedy = "pieces of alpha as short as are tried left statuses undecided", SHORT_INTERVAL
-        if cover.unexplained(low, high):
-            why, remedy = "no curve through a solution there was proven to be whole", ANOTHER_INTERVAL
+        if ends:
+            curves = counted(ends, "end of a curve", "ends of curves")
+            why, remedy = f"nothing is proven beyond {curves} there, as where branches meet", ANOTHER_INTERVAL
+        elif cover.unexplained(low, high):
+            why, remedy = "no curve through a solution there was proven", ANOTHER_INTERVAL
         found.append(f"solutions may be missing for alpha in [{float(low):.8g}, {float(high):.8g}]: {why}; {remedy}")
     more = len(cover.gaps) - _NAMED
     return [*found, f"and {more} gaps more"] if more > 0 else found

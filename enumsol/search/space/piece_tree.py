@@ -7,7 +7,7 @@ from collections import OrderedDict
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from itertools import product
+from itertools import pairwise, product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,7 +31,7 @@ from enumsol.trusted.space.sector_rows import sector_children
 from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from numpy.typing import NDArray
 
@@ -56,6 +56,8 @@ _CUTS = 2
 _ROOM, _NARROWEST, _LEFT = 0.5, 9, 0.5
 #: Boxes of a curve in a row in which a leaf may lie, and how many such rows are tried.
 _LONGEST, _RUNS = 9, 4
+#: From the ends of curves inside the interval so far, as a share of it, nothing is searched.
+_AROUND_ENDS = 2.0**-14
 #: Longer pieces are cut where statuses occur along one curve over a part of them.
 _SHORT = 2.0**-6
 #: At these shares of a piece it is asked how often a curve passes it.
@@ -130,6 +132,17 @@ def _kept(known: OrderedDict[Any, Any], key: Any, make: Callable[[], Any]) -> An
     return known[key]
 
 
+def joined(ranges: Iterable[tuple[Fraction, Fraction]]) -> list[tuple[Fraction, Fraction]]:
+    """Ranges in their order, those that touch as one."""
+    found: list[tuple[Fraction, Fraction]] = []
+    for low, high in sorted(ranges):
+        if found and low <= found[-1][1]:
+            found[-1] = found[-1][0], max(high, found[-1][1])
+        else:
+            found.append((low, high))
+    return found
+
+
 def _is_excluded(relaxation: SpaceRelaxation) -> bool:
     return relaxation.pruned and relaxation.bound > PRUNE_MARGIN
 
@@ -181,7 +194,7 @@ class PieceTree:
     units : force and length, (p,) arrays of powers of two
     more : callable, optional
         Called with a solution (forces and alpha, in the units of the problem) that lies in no known box; gives the
-        whole curve through it, if there is one and it is new.
+        curve through it, as far as it is proven, if it is new.
     max_nodes : int, optional
     tick : callable, optional
         Called with the share of the tree that is done, every child of a node being as large as the others.
@@ -232,6 +245,8 @@ class PieceTree:
         #: The curve of every box, numbered as in a proof.
         self._boxes: list[SolutionCurve] = []
         self._owner: list[int] = []
+        #: Ranges of alpha around the ends of curves, in their order.
+        self._ends_of_curves: list[tuple[Fraction, Fraction]] = []
 
     def known(self) -> Known:
         """What the search of a subtree depends on."""
@@ -247,16 +262,20 @@ class PieceTree:
 
     def _take(self, known: KnownCurve) -> None:
         """Add a curve to those that are known."""
-        self.curves.append(known)
         chain = known.chain
         self._boxes += [link.curve for link in chain.links]
         self._owner += [len(self.curves)] * len(chain.links)
+        self.curves.append(known)
         boxes = [curve.box for curve in self._boxes]
         self._c, self._d, self._e = (
             np.array([getattr(box, name) for box in boxes]) for name in ("centre", "direction", "border")
         )
         self._b = np.array([curve.reach for curve in self._boxes])
         self._h = np.array([box.half for box in boxes])
+        room = Fraction(_AROUND_ENDS) * (self.interval[1] - self.interval[0])
+        ends = [end for known in self.curves for end in known.chain.gaps]
+        whole = joined((low - room, high + room) for low, high in ends)
+        self._ends_of_curves = [(simplest(low, low + room / 2), simplest(high - room / 2, high)) for low, high in whole]
 
     def _is_known(self, x: Array) -> bool:
         """Whether a solution seems to lie on a known curve; no claim."""
@@ -337,6 +356,8 @@ class PieceTree:
         self, low: Fraction, high: Fraction, codes: Codes, parent: Any, changed: int, last: bool, cuts: int
     ) -> tuple[Any, list[Any]]:
         at = self._examined(low, high)
+        if (done := self._beside_ends(at, codes)) is not None:
+            return done
         if parent is None:
             third = (high - low) / 3
             point = self._point(simplest(low + third, high - third))
@@ -349,7 +370,7 @@ class PieceTree:
             return self._excluded(at, codes, (point, relaxation), cuts)
         done = self._certified(at, codes)
         if done is None and not self._sampled and self._sample():
-            done = self._certified(at, codes)
+            done = self._beside_ends(at, codes) or self._certified(at, codes)
         if done is not None:
             return done
         if self._is_due(codes):
@@ -466,8 +487,23 @@ class PieceTree:
         low, high = at.piece.low, at.piece.high
         if high - low <= self._least:
             return self._open(at, codes, forces), []
-        middle = at.piece.middle
-        return CutPiece(str(middle)), [(x, y, codes, None, -1, False, cuts) for x, y in ((low, middle), (middle, high))]
+        return self._cut(at, codes, at.piece.middle, cuts)
+
+    @staticmethod
+    def _cut(at: _Examined, codes: Codes, alpha: Fraction, cuts: int = 0) -> tuple[Any, list[Any]]:
+        ends = at.piece.low, alpha, at.piece.high
+        return CutPiece(str(alpha)), [(*both, codes, None, -1, False, cuts) for both in pairwise(ends)]
+
+    def _beside_ends(self, at: _Examined, codes: Codes) -> tuple[Any, list[Any]] | None:
+        """Where curves end, what stays open is cut off from what has to be searched."""
+        low, high = at.piece.low, at.piece.high
+        for begin, end in self._ends_of_curves:
+            if begin <= low and high <= end:
+                return self._open(at, codes, None), []
+            alpha = next((alpha for alpha in (begin, end) if low < alpha < high), None)
+            if alpha is not None:
+                return self._cut(at, codes, alpha)
+        return None
 
     def _open(self, at: _Examined, codes: Codes, forces: Array | None) -> OpenLeaf:
         return OpenLeaf(at.piece.low, at.piece.high, codes, forces)
@@ -563,7 +599,8 @@ class PieceTree:
             number = self._met(piece.point, there)
             if number is None and not self._is_known(self._middle(piece, there)):
                 return self._open(at, codes, piece.forces(there.y).mid), []
-            passed = number is not None and narrowed.low <= piece.middle <= narrowed.high and found is not None
+            passed = narrowed.low <= piece.middle <= narrowed.high and found is not None
+            passed = passed and number is not None and self._runs_through(number, narrowed)
             arc = narrowed.arc(codes, 2.0, found) if passed else None
             if number is not None and arc is not None and self._has(narrowed, codes, found, there, codes):
                 return ThroughCurveBox(number, str(narrowed.low), str(narrowed.high), str(piece.middle), codes), []
@@ -601,10 +638,16 @@ class PieceTree:
                     number = None if root is None else self._box(there, root)
                     if root is None or number is None or not arc.has(root, point[1]):
                         continue
+                    if not self._runs_through(number, whole):
+                        continue
                     if self._has(whole, codes, found, root, point[1]):
                         ends = str(whole.low), str(whole.high)
                         return ThroughCurveBox(number, *ends, str(point[0]), point[1]), []
         return None
+
+    def _runs_through(self, number: int, piece: AlphaPiece) -> bool:
+        """Whether the curve of a box has no end over a piece."""
+        return self.curves[self._owner[number]].chain.runs_through(piece.low, piece.high)
 
     @staticmethod
     def _has(piece: AlphaPiece, codes: Codes, found: SpaceRoot | Open | None, root: SpaceRoot, there: Codes) -> bool:

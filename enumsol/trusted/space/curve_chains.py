@@ -8,7 +8,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, Ball
+from enumsol.arithmetic.balls import SAFE, UNIT, Ball
 from enumsol.trusted.space.solution_curve import (
     AlphaProblem,
     CurveBox,
@@ -17,6 +17,9 @@ from enumsol.trusted.space.solution_curve import (
     only_curve,
     parameter_in,
 )
+
+#: Bounds of alpha.
+Range = tuple[Fraction, Fraction]
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +64,7 @@ def goes_on(before: CurveLink, after: CurveLink, joint: SolutionCurve) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class CurveChain:
-    """One whole curve over an interval.
+    """One curve over an interval.
 
     Attributes
     ----------
@@ -70,17 +73,49 @@ class CurveChain:
         One more than links: its points between them, and both ends.
     closed : bool
         Whether the last point is the first one.
+    ends : pair of (Fraction, Fraction) or None
+        Of a first and a last point that are not beyond the interval: bounds of alpha there, and of all that the first
+        or the last box holds beyond them.
     """
 
     links: Sequence[CurveLink]
     joints: Sequence[SolutionCurve]
     closed: bool
+    ends: tuple[Range | None, Range | None]
+
+    @classmethod
+    def of(cls, links: Sequence[CurveLink], joints: Sequence[SolutionCurve], interval: Range) -> CurveChain | None:
+        """That of links and joints; None where they do not run on from each other, or do so more than once round."""
+        if not links or not all(map(goes_on, links[:-1], links[1:], joints[1:-1])):
+            return None
+        closed = _same(joints[0].box, joints[-1].box)
+        if closed and not goes_on(links[-1], links[0], joints[0]):
+            return None
+        # a curve that came back to where it was would have an end on a link that is not the one at that end
+        others = [(joints[0], links[1:-1])] if closed else [(joints[0], links[1:]), (joints[-1], links[:-1])]
+        if not all(_not_on(link, end.at(0.0)) for end, rest in others for link in rest):
+            return None
+        return cls(links, joints, closed, (None, None) if closed else _open_ends(links, joints, interval))
+
+    @property
+    def whole(self) -> bool:
+        """Whether it is closed, or leaves the interval at both ends."""
+        return not self.gaps
+
+    @property
+    def gaps(self) -> list[Range]:
+        """Alphas at which it may go on where nothing is known of it."""
+        return [end for end in self.ends if end is not None]
+
+    def runs_through(self, low: Fraction, high: Fraction) -> bool:
+        """Whether solutions over [low, high] that are connected with a point in one of its boxes are all on it."""
+        return all(end < low or begin > high for begin, end in self.gaps)
 
 
-def whole_chain(
-    problem: AlphaProblem, boxes: Sequence[CurveBox], points: Sequence[CurveBox], interval: tuple[Fraction, Fraction]
+def chain_of(
+    problem: AlphaProblem, boxes: Sequence[CurveBox], points: Sequence[CurveBox], interval: Range
 ) -> CurveChain | None:
-    """The curve through boxes, if it leaves the interval at both ends or is closed; None where that is not proven.
+    """The curve through boxes; None where it is not proven to be one.
 
     Parameters
     ----------
@@ -103,22 +138,32 @@ def whole_chain(
         if link is None:
             return None
         links.append(link)
-    if not all(map(goes_on, links[:-1], links[1:], known[1:-1])):
-        return None
-    if _same(points[0], points[-1]):
-        return CurveChain(links, known, True) if goes_on(links[-1], links[0], known[0]) else None
-    return CurveChain(links, known, False) if leaves_interval(links, known, interval) else None
+    return CurveChain.of(links, known, interval)
 
 
-def leaves_interval(
-    links: Sequence[CurveLink], joints: Sequence[SolutionCurve], interval: tuple[Fraction, Fraction]
-) -> bool:
-    """Whether both ends of a curve are beyond an interval, and all that its first and last box hold beyond them."""
-    return _leaves(links[0], joints[0], -1, interval) and _leaves(links[-1], joints[-1], 1, interval)
+def _open_ends(
+    links: Sequence[CurveLink], joints: Sequence[SolutionCurve], interval: Range
+) -> tuple[Range | None, Range | None]:
+    """See ``CurveChain.ends``."""
+    low, high = interval
+    first, last = _beyond(links[0], joints[0], -1), _beyond(links[-1], joints[-1], 1)
+    inside = [None if end < low or begin > high else (begin, end) for begin, end in (first, last)]
+    return inside[0], inside[1]
+
+
+def _beyond(link: CurveLink, end: SolutionCurve, side: int) -> Range:
+    """Bounds of alpha at an end, and of all that its box holds beyond it."""
+    half, t = link.curve.box.half, link.end if side > 0 else link.start
+    near = float(side * t.mid - t.rad * SAFE)
+    reach = (0.5 * max(half - near, 0.0) + 2 * UNIT * (abs(near) + half)) * SAFE
+    alpha = link.curve.at(Ball(np.array(0.5 * side * (near + half)), np.array(reach)))[-1]
+    low, high = (Fraction(float(alpha.mid)) + sign * Fraction(float(alpha.rad)) for sign in (-1, 1))
+    rises, (least, most) = link.curve.rises * side, end.alphas
+    return (max(low, least) if rises > 0 else low), (min(high, most) if rises < 0 else high)
 
 
 def apart(one: CurveChain, other: CurveChain) -> bool:
-    """Whether two whole curves have no point in common.
+    """Whether two curves have no point in common.
 
     From a point in common they run on together until one of them ends, or, if both are closed, all the way round. So
     the ends of neither lie in a box of the other one, of a closed curve any of its points.
@@ -129,6 +174,13 @@ def apart(one: CurveChain, other: CurveChain) -> bool:
 def _ends_outside(one: CurveChain, other: CurveChain) -> bool:
     ends = one.joints[:1] if one.closed else (one.joints[0], one.joints[-1])
     return all(_outside(link.curve, end.at(0.0)) for end in ends for link in other.links)
+
+
+def _not_on(link: CurveLink, x: Ball) -> bool:
+    """Whether a link has no point in a ball between its two joints."""
+    t = parameter_in(link.curve.box, x)
+    before, after = t - link.start, t - link.end
+    return bool(before.mid < -before.rad * SAFE or after.mid > after.rad * SAFE) or _outside(link.curve, x)
 
 
 def _outside(curve: SolutionCurve, x: Ball) -> bool:
@@ -144,12 +196,3 @@ def _same(one: CurveBox, other: CurveBox) -> bool:
     """Whether two boxes are given by the same numbers, so that they hold the same solution."""
     parts = ("centre", "direction", "border", "radius", "rho")
     return all(np.array_equal(getattr(one, part), getattr(other, part)) for part in parts)
-
-
-def _leaves(link: CurveLink, end: SolutionCurve, side: int, interval: tuple[Fraction, Fraction]) -> bool:
-    """Whether an end is beyond the interval, and the rest of its box is, too: alpha increases or decreases in it."""
-    alpha, rises = end.at(0.0)[-1], link.curve.rises * side
-    low, high = (float(np.nextafter(x, y)) for x, y in ((float(interval[0]), -np.inf), (float(interval[1]), np.inf)))
-    if rises > 0:
-        return bool(alpha.mid - alpha.rad * SAFE >= high)
-    return bool(rises < 0 and alpha.mid + alpha.rad * SAFE <= low)

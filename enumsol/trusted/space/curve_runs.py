@@ -1,4 +1,4 @@
-"""The trusted bounds in 3D of the solutions along a whole curve, at every alpha of a piece (theory, section 12.9)."""
+"""The trusted bounds in 3D of the solutions along a curve, at every alpha of a piece (theory, section 12.9)."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ class _Links(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class KnownCurve:
-    """A whole curve, whose links pass alphas.
+    """A curve, whose links pass alphas.
 
     Attributes
     ----------
