@@ -1,4 +1,4 @@
-"""Vertices and arcs in the user's terms, made from whole curves in 3D (theory, section 12.10)."""
+"""Vertices and arcs in the user's terms, made from curves in 3D (theory, section 12.10)."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ class _Piece:
 
 @dataclass
 class CurvedGraph:
-    """Vertices and arcs of whole curves over an interval.
+    """Vertices and arcs of curves over an interval.
 
     Attributes
     ----------
@@ -202,7 +202,7 @@ class CurvedGraph:
                 numbers.append(self._border(run, self.interval[way > 0]))
                 inner.append(None)
                 continue
-            # a whole curve ends beyond the interval
+            # an end that is not open is beyond the interval
             turn = cast("Turn", parts[number])
             if number not in known:
                 known[number] = self._turn(turn, settled=turn.settled and side == 0)

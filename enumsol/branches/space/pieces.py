@@ -1,4 +1,4 @@
-"""What a whole curve in 3D says over alpha: runs on which statuses hold and alpha goes one way, and turns between them.
+"""What a curve in 3D says over alpha: runs on which statuses hold and alpha goes one way, and turns between them.
 
 A turn is where one condition changes its sign, or a few do too near to each other to be told apart, or where alpha
 turns back, once; a part of the curve of which nothing of this could be shown is left open (theory, section 12.10).
