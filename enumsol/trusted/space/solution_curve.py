@@ -531,11 +531,15 @@ def corner_steps(
 
 @dataclass(frozen=True, eq=False)
 class CurvePoint:
-    """A solution x as floats have it, the direction of its curve, and statuses by the signs of their conditions."""
+    """A solution x as floats have it, the direction of its curve, and statuses by the signs of their conditions.
+
+    z are the arguments of P there, and alpha.
+    """
 
     x: Array
     direction: Array
     statuses: tuple[int | None, ...]
+    z: Array
 
 
 def curve_point(problem: AlphaProblem, x: Array, border: Array) -> CurvePoint | None:
@@ -561,7 +565,17 @@ def curve_point(problem: AlphaProblem, x: Array, border: Array) -> CurvePoint | 
             if np.all(np.abs(found[:, 0]) <= 4 * UNIT * np.max(np.abs(x))):
                 break
         statuses = problem.statuses(Ball.exact(z))
-    return CurvePoint(x * unit, found[:, 1] * unit, statuses) if np.all(np.isfinite(found)) else None
+    return CurvePoint(x * unit, found[:, 1] * unit, statuses, z) if np.all(np.isfinite(found)) else None
+
+
+def status_margin(problem: AlphaProblem, z: Array, nodes: Sequence[int], codes: Sequence[int]) -> float:
+    """The least of the conditions of nodes' statuses at (z, alpha), negative where one does not hold; no claim."""
+    i = np.asarray(nodes)
+    normal, F = z[i], np.maximum(problem.F0 + z[-1] * problem.F1, 0.0)[i]
+    tangent = np.where(problem.places[i] >= 0, z[problem.places[i]], 0.0)
+    gap = np.linalg.norm(tangent, axis=1) - F * normal
+    status, sticks, slips = np.asarray(codes), np.minimum(normal, -gap), np.minimum(normal, gap)
+    return float(np.min(np.select([status == OPEN, status == STICK, status == SLIP], [-normal, sticks, slips], normal)))
 
 
 def _projected(problem: AlphaProblem, z: Array) -> tuple[Array, Array]:
