@@ -249,10 +249,8 @@ class Ball(Pair):
     def _matrix_multiplied(self, other: Ball) -> Ball:
         k = gamma(self.mid.shape[-1] + 4)
         left, right = np.abs(self.mid), np.abs(other.mid)
-        # no product is taken with radii that are all 0
-        rad = self.rad @ (right + other.rad) if np.any(self.rad) else 0.0
-        rad = rad + left @ other.rad if np.any(other.rad) else rad
-        return Ball(self.mid @ other.mid, (rad + k * (left @ right)) * (1.0 + k) * SAFE + TINY)
+        rad = self.rad @ (right + other.rad) + left @ other.rad + k * (left @ right)
+        return Ball(self.mid @ other.mid, rad * (1.0 + k) * SAFE + TINY)
 
     def _added(self, other: Ball) -> Ball:
         mid = self.mid + other.mid
