@@ -1,9 +1,11 @@
 """Derivatives of the projection onto discs in boxes (theory, (12.12) and (12.17)), against differences of P itself."""
 
+from fractions import Fraction
+
 import numpy as np
 import pytest
 
-from enumsol.arithmetic.balls import Ball
+from enumsol.arithmetic.balls import Ball, gamma
 from enumsol.trusted.space.natural_map import Directions, Discs, Extent
 
 #: Nodes with two tangents, and with one of either direction.
@@ -125,6 +127,35 @@ def test_derivatives_of_nodes_that_slip_turn_as_their_rates_say(seed):
         lost = np.abs(Y) @ (found.still.rad + 1e-7) @ np.abs(Z)
         assert np.all(np.abs(Y @ D @ Z) <= most + lost)
         assert np.all(np.abs(Y @ D @ Z @ d) <= most_along + lost @ np.abs(d))
+
+
+@pytest.mark.few(2, 4)
+@pytest.mark.parametrize("seed", range(30))
+def test_bounds_of_what_turns_hold_in_exact_arithmetic(seed):
+    rng, exact = np.random.default_rng([seed, 124]), np.vectorize(Fraction, otypes=[object])
+    scale, width, half = 10.0 ** rng.uniform(-6, 6, 4), 10.0 ** rng.uniform(-9, -1), rng.choice([0.0, 1e-3])
+    z = Ball(rng.normal(size=M + 1), width * rng.uniform(0, 1, M + 1))
+    z.mid[:4], z.mid[4:M] = rng.uniform(0.2, 1.0, 4), 3 * z.mid[4:M]
+    along, moves = Ball.exact(rng.normal(size=M + 1)), Ball.exact(rng.normal(size=(M + 1, 5)))
+    extent = Extent(z, along, half, moves, width * rng.uniform(0, 1, 5), np.zeros(M + 1))
+    F0, F1, near = rng.uniform(0.1, 0.5, 4), rng.normal(size=4) * 0.1, extent.near
+    turns = Discs(TAU, Ball.exact(F0) + near[M] * Ball.exact(F1), F1).corners(near[:M], extent).turns
+    Y, Z, d = scale[0] * rng.normal(size=(3, M)), scale[1] * rng.normal(size=(M + 1, 2)), scale[2] * rng.normal(size=2)
+    before, after = np.hstack([Y, np.zeros((3, 1))])[:, turns.rows], np.vstack([Z, np.zeros((1, 2))])[turns.columns]
+    products = [
+        [exact(before[:, q]) @ exact(matrix) @ exact(after[q]) for matrix in turns.matrices[q]]
+        for q in range(len(turns.rows))
+    ]
+    rates, rest, lost = exact(turns.rates), exact(turns.rest), gamma(8 * 4 + 64)
+    for found, last in zip(turns.bounds(Y, Z, d), (np.eye(2), d[:, None]), strict=True):
+        terms = [(one @ exact(last), k, q) for q, of_node in enumerate(products) for k, one in enumerate(of_node)]
+        true = sum(rest[q, k] * np.abs(one) for one, k, q in terms)
+        true = true + Fraction(half) * np.abs(sum(rates[q, k] * one for one, k, q in terms))
+        rounded = sum(np.abs(before[:, q]) @ turns.size[q] @ np.abs(after[q]) for q in range(len(turns.rows)))
+        room = (lost * rounded @ np.abs(last)).reshape(found.shape)
+        true = true.reshape(found.shape)
+        assert np.all(true <= exact(found) + exact(room))
+        assert np.all(exact(found) <= true * Fraction(1.0 + 1e-9) + exact(room))
 
 
 def test_a_ratio_whose_changes_cancel_is_known_to_second_order():

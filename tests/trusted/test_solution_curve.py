@@ -9,13 +9,16 @@ from problems3d import SLIDING, forces, from_compliance, random_compliance, slid
 
 import enumsol
 from enumsol.arithmetic.balls import Ball
+from enumsol.trusted.space.sector_rows import OPEN, STICK
 from enumsol.trusted.space.solution_curve import (
+    SLIP,
     AlphaProblem,
     curve_around,
     curve_point,
     lies_in,
     only_curve,
     parameter_in,
+    status_margin,
 )
 
 GIVEN = AlphaProblem.of(SLIDING.enclosure)
@@ -76,6 +79,21 @@ def test_what_is_past_the_limit_of_stick_is_bounded_along_a_direction():
     # |z_t| alone changes by 0.1
     assert high - low < 0.02
     assert np.isinf(GIVEN.past(Ball.exact(np.array([1.0, 0.0, 0.0, 0.5])), Ball.exact(along), half, side).rad[0])
+
+
+def test_the_margin_of_statuses_is_positive_where_they_hold():
+    given = AlphaProblem.of(enumsol.gallery.block3d(1, 1, 1).enclosure)
+    rng, seen = np.random.default_rng(5), set()
+    for _ in range(50):
+        z = np.append(rng.normal(size=3 * given.p), rng.uniform(0, 2))
+        codes = given.statuses(Ball.exact(z))
+        seen.update(codes)
+        for i, code in enumerate(codes):
+            for other in (OPEN, STICK, SLIP):
+                assert (status_margin(given, z, [i], [other]) > 0) == (code == other)
+        least = min(status_margin(given, z, [i], [code]) for i, code in enumerate(codes))
+        assert status_margin(given, z, range(given.p), codes) == least
+    assert seen == {OPEN, STICK, SLIP}
 
 
 def test_the_curve_is_that_of_the_closed_form(box):

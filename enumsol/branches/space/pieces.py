@@ -13,10 +13,18 @@ from itertools import pairwise, permutations, product
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy.optimize import brentq
 
 from enumsol.support.deadlines import look, tell
 from enumsol.trusted.space.curve_events import CurveMotion
-from enumsol.trusted.space.solution_curve import curve_around, curve_point, lies_in, only_curve, parameter_in
+from enumsol.trusted.space.solution_curve import (
+    curve_around,
+    curve_point,
+    lies_in,
+    only_curve,
+    parameter_in,
+    status_margin,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -29,7 +37,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: How often a part is halved; how near to the place that bisection in floats finds the points beside it are put at
+#: How often a part is halved; how near to the place that floats find the points beside it are put at
 #: best, relative to the part, how much of this that place may be off, by what factor farther others are, and how many.
 _HALVINGS = 12
 _BESIDE, _CLOSE, _FARTHER, _TRIALS = 2.0**-44, 0.25, 8.0, 15
@@ -139,12 +147,14 @@ def runs_and_turns(problem: AlphaProblem, chain: CurveChain, found: list[Run | T
     Begins and ends with a run, but for a curve that is closed and has a turn: it begins with that and ends with a run.
     ``found`` is filled on the way, so that it has what there is when the time is over.
     """
-    found = [] if found is None else found
+    found, nearness = [] if found is None else found, _TRIALS // 2
     for k, (link, start, end) in enumerate(zip(chain.links, chain.joints[:-1], chain.joints[1:], strict=True)):
         look()
         tell("boxes of a curve cut into arcs", k, len(chain.links))
-        for part in LinkCutter(problem, link).parts(start, end):
+        cutter = LinkCutter(problem, link, nearness)
+        for part in cutter.parts(start, end):
             _append(found, part)
+        nearness = cutter.nearness
     if chain.closed:
         first = next((k for k, part in enumerate(found) if isinstance(part, Turn)), 0)
         ahead, found = found[:first], found[first:]
@@ -189,10 +199,17 @@ class LinkCutter:
 
     Parts have the border of the link and end in solutions that lie in its box. Two curves with the same border that
     share a point go on together as long as both are in their boxes, of which they do not reach the sides.
+
+    Parameters
+    ----------
+    problem : AlphaProblem
+    link : CurveLink
+    nearness : int
+        Which of the distances from a change to the points beside it is tried first: then that of the last change.
     """
 
-    def __init__(self, problem: AlphaProblem, link: CurveLink) -> None:
-        self.problem, self.curve = problem, link.curve
+    def __init__(self, problem: AlphaProblem, link: CurveLink, nearness: int = _TRIALS // 2) -> None:
+        self.problem, self.curve, self.nearness = problem, link.curve, nearness
         self.border = link.curve.box.border
 
     def parts(self, start: SolutionCurve, end: SolutionCurve) -> list[Run | Turn]:
@@ -264,7 +281,7 @@ class LinkCutter:
         # the derivative of alpha is monotone
         if start.rises == end.rises:
             return [self._run(start, end, codes, start.rises)]
-        sides = self._beside(start, end, lambda point: bool(start.rises * point.direction[-1] > 0), _BESIDE_FOLD)
+        sides = self._beside(start, end, lambda point: start.rises * float(point.direction[-1]), _BESIDE_FOLD)
         if sides is None or [side.rises for side in sides] != [start.rises, end.rises]:
             return None
         alphas = self._fold(*sides)
@@ -277,7 +294,8 @@ class LinkCutter:
     ) -> list[Run | Turn] | None:
         """Where nodes change their statuses, each of them once: the first change, and what follows."""
         one = start.codes
-        sides = self._beside(start, end, lambda point: all(point.statuses[i] == one[i] for i in nodes), _BESIDE)
+        own = [one[i] for i in nodes]
+        sides = self._beside(start, end, lambda point: status_margin(self.problem, point.z, nodes, own), _BESIDE)
         if sides is None or sides[0].codes != one:
             return None
         other = sides[1].codes
@@ -329,30 +347,45 @@ class LinkCutter:
         found = (self._at(start, end, share) for share in _CUTS)
         return next((place for place in found if place is not None), None)
 
+    def _passage(self, start: Place, end: Place, value: Callable[[CurvePoint], float], close: float) -> float | None:
+        """The share of the way at which a number that is positive before and negative behind is 0, in floats."""
+
+        def at(share: float) -> float:
+            point = self._near(start, end, share)
+            return np.nan if point is None else value(point)
+
+        try:
+            return float(brentq(at, 0.0, 1.0, xtol=close))
+        except ValueError:  # no point is found, or there is no change of signs
+            return None
+
     def _beside(
-        self, start: Place, end: Place, is_before: Callable[[CurvePoint], bool], least: float
+        self, start: Place, end: Place, value: Callable[[CurvePoint], float], least: float
     ) -> tuple[Place, Place] | None:
-        """Places close to where something changes, on both sides of it."""
-        low, high = 0.0, 1.0
-        while high - low > _CLOSE * least:
-            middle = 0.5 * (low + high)
-            point = self._near(start, end, middle)
-            if point is None or middle in (low, high):
-                break
-            low, high = (middle, high) if is_before(point) else (low, middle)
-        found, share = None, 0.5 * (low + high)
-        nearest, farthest = 0, _TRIALS
+        """Places close to where a number changes its sign, on both sides of it."""
+        share = self._passage(start, end, value, _CLOSE * least)
+        if share is None:
+            return None
+        found, nearest, farthest = None, 0, _TRIALS
         while nearest < farthest:
-            k = (nearest + farthest) // 2
+            k = min(max(self.nearness, nearest), farthest - 1)
             away = least * _FARTHER**k
             # both ends may be as near to it as the points beside it are put
-            before, after = max(share - away, 0.5 * share), min(share + away, 0.5 * (1.0 + share))
-            sides = self._at(start, end, before), self._at(start, end, after)
-            if sides[0] is not None and sides[1] is not None and self._tells(sides[0], sides[1]):
-                found, farthest = (sides[0], sides[1]), k
-            else:
+            shares = max(share - away, 0.5 * share), min(share + away, 0.5 * (1.0 + share))
+            sides = self._apart(start, end, shares)
+            if sides is None:
                 nearest = k + 1
+            else:
+                found, farthest = sides, k
+        if found is not None:
+            self.nearness = farthest
         return found
+
+    def _apart(self, start: Place, end: Place, shares: tuple[float, float]) -> tuple[Place, Place] | None:
+        """Places at two shares of the way, if they are proven to be on different sides."""
+        before = self._at(start, end, shares[0])
+        after = None if before is None else self._at(start, end, shares[1])
+        return (before, after) if before is not None and after is not None and self._tells(before, after) else None
 
     @staticmethod
     def _tells(one: Place, other: Place) -> bool:

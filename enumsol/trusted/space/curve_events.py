@@ -135,8 +135,16 @@ class CurveMotion:
         inverse = Ball(np.array(middle), np.array((half + 4 * UNIT * middle) * SAFE))
         if len(t) == 1:
             return Ball.exact(np.sign(self.z.mid[t])), Ball.exact(np.zeros((1, 1))), inverse
-        at = Directions.of(self.z[t][None])
-        return Ball(at.e[0], at.turn[0]), Ball(at.across[0], at.bent[0] + 16 * UNIT), inverse
+        at = self._directions
+        return Ball(at.e[i], at.turn[i]), Ball(at.across[i], at.bent[i] + 16 * UNIT), inverse
+
+    @cached_property
+    def _directions(self) -> Directions:
+        """Of z_t of all nodes; they serve where it has two components and does not vanish."""
+        places = self.problem.places
+        x = Ball(np.where(places >= 0, self.z.mid[places], 0.0), np.where(places >= 0, self.z.rad[places], 0.0))
+        with np.errstate(all="ignore"):
+            return Directions.of(x)
 
     # -- conditions ------------------------------------------------------------------------------------------------
 

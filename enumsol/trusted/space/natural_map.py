@@ -86,6 +86,8 @@ class Turns:
     rows, columns : (q, 3) and (q, 4) arrays of int
         Places of the matrices of every node, -1 where there is none.
     matrices : (q, K, 3, 4) array
+    left, right : (q, K - 1, 3) and (q, K - 1, 4) arrays
+        All matrices but the first are products of one column and one row, up to rounding these.
     rates, rest : (q, K) arrays
     half : float
     """
@@ -93,6 +95,8 @@ class Turns:
     rows: Indices
     columns: Indices
     matrices: Floats
+    left: Floats
+    right: Floats
     rates: Floats
     rest: Floats
     half: float
@@ -105,14 +109,24 @@ class Turns:
 
     def bounds(self, Y: Floats, Z: Floats, d: Floats | None = None) -> tuple[Floats, Floats]:
         """Of |Y D Z| and |Y D Z d| for all these D, up to rounding, for which ``size`` times gamma serves."""
-        left = np.hstack([Y, np.zeros((len(Y), 1))])[:, self.rows].transpose(1, 0, 2)[:, None]
-        right = np.vstack([Z, np.zeros((1, Z.shape[1]))])[self.columns][:, None]
-        products = left @ (self.matrices @ right)
-        out = []
-        for one in (products, (products @ (np.zeros(Z.shape[1]) if d is None else d))[..., None]):
-            rates, rest = self.rates[:, :, None, None], self.rest[:, :, None, None]
-            out.append(np.abs(np.sum(rates * one, axis=(0, 1))) * self.half + np.sum(rest * np.abs(one), axis=(0, 1)))
-        return out[0] * SAFE, out[1][:, 0] * SAFE
+        m, n = len(Y), Z.shape[1]
+        before = np.hstack([Y, np.zeros((m, 1))])[:, self.rows]
+        after = np.vstack([Z, np.zeros((1, n))])[self.columns]
+        of_nodes = before.transpose(1, 0, 2)
+        # |Y u v' Z| is |Y u| |v' Z|
+        beside = np.abs(of_nodes @ self.left.transpose(0, 2, 1)).transpose(1, 0, 2).reshape(m, -1)
+        beyond = (np.abs(self.right @ after) * self.rest[:, 1:, None]).reshape(-1, n)
+        first = of_nodes @ ((self.rest[:, 0, None, None] * self.matrices[:, 0]) @ after)
+        most = np.sum(np.abs(first, out=first), axis=0) + beside @ beyond
+        moved = after @ (np.zeros(n) if d is None else d)
+        ends = (self.matrices @ moved[:, None, :, None])[..., 0] * self.rest[:, :, None]
+        along = np.sum(np.abs(of_nodes @ ends.transpose(0, 2, 1)), axis=(0, 2))
+        if self.half:
+            # t is the same for all nodes and matrices
+            turned = np.sum(self.rates[:, :, None, None] * self.matrices, axis=1)
+            most = most + np.abs(before.reshape(m, -1) @ (turned @ after).reshape(-1, n)) * self.half
+            along = along + np.abs(before.reshape(m, -1) @ (turned @ moved[:, :, None]).ravel()) * self.half
+        return most * SAFE, along * SAFE
 
 
 @dataclass(frozen=True)
@@ -322,6 +336,9 @@ class _Slips:
         M[:, 0, 1:, 0], M[:, 0, 1:, 1:3] = F[:, None] * side, -beta[:, None, None] * both
         M[:, 0, 1:, 3], M[:, 1, 1:, 1:3] = (change * normal)[:, None] * side, at.across[k]
         M[:, 2, 1:, 0], M[:, 3, 1:, 3] = e, change[:, None] * e
+        columns, lines = np.zeros((len(k), 3, 3)), np.zeros((len(k), 3, 4))
+        columns[:, 0, 1:], columns[:, 1:, 1:] = side, e[:, None, :]
+        lines[:, 0, 1:3], lines[:, 1, 0], lines[:, 2, 3] = side, 1.0, change
         middle, left = np.zeros((len(k), 3, 4)), np.zeros((len(k), 3, 4))
         middle[:, 0, 0], middle[:, 1:, 0], middle[:, 1:, 3] = 1.0, F[:, None] * e, (change * normal)[:, None] * e
         middle[:, 1:, 1:3] = beta[:, None, None] * at.across[k]
@@ -334,7 +351,7 @@ class _Slips:
         straight = a[:, :, None] * a[:, None, :] + b[:, :, None] * b[:, None, :]
         left[:, 1:, 1:3] = (size * sine**2)[:, None, None] * (straight + sine[:, None, None] * c)
         left[:, 1:, 1:3] += (off * sine)[:, None, None] * c
-        found = Turns(self.places[k, :3], self.places[k], M, rates, rests, half)
+        found = Turns(self.places[k, :3], self.places[k], M, columns, lines, rates, rests, half)
         left = left + gamma(8 * len(self.e) + 64) * (found.size + np.abs(middle))
         return found, middle, left * SAFE
 

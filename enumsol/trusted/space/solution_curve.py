@@ -52,7 +52,7 @@ _ROOMS, _LEAST, _STEPS = (1.2, 1.3, 1.5, 1.5, 1.5, 1.5, 1.5), 1e-3, 8
 #: radii are at least that are as large as they may be.
 _OF_LIMIT, _TWICE = 0.8, 2.0
 #: Between both, shares of the logarithm that are tried.
-_SHARES = (1.0, 0.7, 0.4, 0.0)
+_SHARES = (0.6, 0.3, 0.0)
 #: That a longer box has this room, too: (1 - e h)^2 / (k a) where the step contracts by e h + k r and moves by a.
 _ROOM = 5.0
 #: Loads whose exponents are larger have no unit of their own.
@@ -531,11 +531,15 @@ def corner_steps(
 
 @dataclass(frozen=True, eq=False)
 class CurvePoint:
-    """A solution x as floats have it, the direction of its curve, and statuses by the signs of their conditions."""
+    """A solution x as floats have it, the direction of its curve, and statuses by the signs of their conditions.
+
+    z are the arguments of P there, and alpha.
+    """
 
     x: Array
     direction: Array
     statuses: tuple[int | None, ...]
+    z: Array
 
 
 def curve_point(problem: AlphaProblem, x: Array, border: Array) -> CurvePoint | None:
@@ -561,7 +565,17 @@ def curve_point(problem: AlphaProblem, x: Array, border: Array) -> CurvePoint | 
             if np.all(np.abs(found[:, 0]) <= 4 * UNIT * np.max(np.abs(x))):
                 break
         statuses = problem.statuses(Ball.exact(z))
-    return CurvePoint(x * unit, found[:, 1] * unit, statuses) if np.all(np.isfinite(found)) else None
+    return CurvePoint(x * unit, found[:, 1] * unit, statuses, z) if np.all(np.isfinite(found)) else None
+
+
+def status_margin(problem: AlphaProblem, z: Array, nodes: Sequence[int], codes: Sequence[int]) -> float:
+    """The least of the conditions of nodes' statuses at (z, alpha), negative where one does not hold; no claim."""
+    i = np.asarray(nodes)
+    normal, F = z[i], np.maximum(problem.F0 + z[-1] * problem.F1, 0.0)[i]
+    tangent = np.where(problem.places[i] >= 0, z[problem.places[i]], 0.0)
+    gap = np.linalg.norm(tangent, axis=1) - F * normal
+    status, sticks, slips = np.asarray(codes), np.minimum(normal, -gap), np.minimum(normal, gap)
+    return float(np.min(np.select([status == OPEN, status == STICK, status == SLIP], [-normal, sticks, slips], normal)))
 
 
 def _projected(problem: AlphaProblem, z: Array) -> tuple[Array, Array]:
@@ -666,11 +680,17 @@ class _CurveMap:
     # -- boxes -----------------------------------------------------------------------------------------------------
 
     def turned(self) -> float:
-        """How far corners are from being too wide for the test: less than 1 where they are not."""
-        step = self.step(self.extent())
-        if step is None or not np.all(np.isfinite(step.slopes)):
+        """How wide corners are in floats, too wide for the test from 1 on; no claim."""
+        corners = self._corners(self.extent())
+        if corners is None:
             return np.inf
-        return float(np.max(np.abs(np.linalg.eigvals(step.slopes)), initial=0.0))
+        B = np.vstack([self.problem.part.mid - corners.still.mid @ self.Z.mid, self.e])
+        u = np.vstack([corners.u, np.zeros((1, corners.u.shape[1]))])
+        try:
+            slopes = 0.5 * np.abs(corners.v.T @ self.Z.mid @ np.linalg.solve(B, u))
+        except np.linalg.LinAlgError:
+            return np.inf
+        return float(np.max(np.abs(np.linalg.eigvals(slopes)), initial=0.0)) if np.all(np.isfinite(slopes)) else np.inf
 
     def proposed(self, *, roomy: bool) -> SolutionCurve | None:
         """The curve in a box with radii of about what it needs, or as large as they may be."""
@@ -754,9 +774,7 @@ class _CurveMap:
 
         None where its middle matrix is singular or there is no bound of derivatives.
         """
-        m = len(self.c) - 1
-        near = extent.near
-        corners = Discs(self.problem.places, self.problem.friction(near[m]), self.problem.F1).corners(near[:m], extent)
+        m, corners = len(self.c) - 1, self._corners(extent)
         if corners is None:
             return None
         B = self._bordered(corners)
@@ -780,6 +798,10 @@ class _CurveMap:
         pushed = 0.5 * (V @ d)[:, 0].size
         drifts = (rest.size + turning) * SAFE
         return Step(move, (E + turned) * SAFE, G, V, Y, drifts, first, (np.abs(along) + pushed) * SAFE)
+
+    def _corners(self, extent: Extent) -> Corners | None:
+        near, m = extent.near, len(self.c) - 1
+        return Discs(self.problem.places, self.problem.friction(near[m]), self.problem.F1).corners(near[:m], extent)
 
     @cached_property
     def _moved(self) -> Ball:
