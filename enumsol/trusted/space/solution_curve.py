@@ -680,17 +680,11 @@ class _CurveMap:
     # -- boxes -----------------------------------------------------------------------------------------------------
 
     def turned(self) -> float:
-        """How wide corners are in floats, too wide for the test from 1 on; no claim."""
-        corners = self._corners(self.extent())
-        if corners is None:
+        """How far corners are from being too wide for the test: less than 1 where they are not."""
+        step = self.step(self.extent())
+        if step is None or not np.all(np.isfinite(step.slopes)):
             return np.inf
-        B = np.vstack([self.problem.part.mid - corners.still.mid @ self.Z.mid, self.e])
-        u = np.vstack([corners.u, np.zeros((1, corners.u.shape[1]))])
-        try:
-            slopes = 0.5 * np.abs(corners.v.T @ self.Z.mid @ np.linalg.solve(B, u))
-        except np.linalg.LinAlgError:
-            return np.inf
-        return float(np.max(np.abs(np.linalg.eigvals(slopes)), initial=0.0)) if np.all(np.isfinite(slopes)) else np.inf
+        return float(np.max(np.abs(np.linalg.eigvals(step.slopes)), initial=0.0))
 
     def proposed(self, *, roomy: bool) -> SolutionCurve | None:
         """The curve in a box with radii of about what it needs, or as large as they may be."""
