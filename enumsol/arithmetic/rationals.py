@@ -24,6 +24,16 @@ def to_fraction(value: Any) -> Fraction:
     return Fraction(int(value.p), int(value.q))
 
 
+def simplest(low: Fraction, high: Fraction) -> Fraction:
+    """The number with the smallest power of two as its denominator from one number to another, larger one."""
+    length = high - low
+    # no smaller than the length
+    step = Fraction(2) ** (length.numerator.bit_length() - length.denominator.bit_length() + 1)
+    while (number := -((-low) // step) * step) > high:
+        step /= 2
+    return number
+
+
 def rational_matrix(array: NDArray[np.float64]) -> Any:
     """The exact values of a matrix of floats as fmpq_mat."""
     rows, columns = array.shape

@@ -139,7 +139,8 @@ def _in_plane(root: Root) -> dict[str, Any]:
 
 
 def _in_space(root: Any) -> dict[str, Any]:
-    return {"slip_angle": _angles(root.slip_angle)}
+    angles = {"slip_angle": _angles(root.slip_angle)}
+    return angles if root.rigid_coordinates is not None else {**angles, "dlambda_dalpha": root.dlambda_dalpha}
 
 
 def _undecided(item: Undecided) -> dict[str, Any]:

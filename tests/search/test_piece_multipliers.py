@@ -10,7 +10,7 @@ from enumsol import enumerate_roots
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import SECTORS
 from enumsol.relaxation.engine import PRUNE_MARGIN
-from enumsol.search.space.piece_multipliers import AlphaPoint, PieceBounds, simplest
+from enumsol.search.space.piece_multipliers import AlphaPoint, PieceBounds
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space.pieces import AlphaPiece
 from enumsol.trusted.space.sector_rows import CONTACT, OPEN, STICK
@@ -61,21 +61,6 @@ def test_bounds_of_a_piece_are_the_proven_ones(seed):
             # where rows contradict each other multipliers are large, and rounding takes some of the bound
             assert bound >= (1 - 1e-6) * least - 1e-9 or np.max(np.abs(m)) > 1e3
     assert proven > served
-
-
-def test_the_simplest_number_between_two_others():
-    assert simplest(Fraction(1, 3), Fraction(2, 3)) == Fraction(1, 2)
-    assert simplest(Fraction(5, 8), Fraction(11, 16)) == Fraction(5, 8)
-    assert simplest(Fraction(-1, 3), Fraction(1, 5)) == 0
-    rng = np.random.default_rng(1)
-    for _ in range(200):
-        low, high = sorted(Fraction(int(n), 1000) for n in rng.choice(5000, 2, replace=False))
-        found = simplest(low, high)
-        assert low <= found <= high
-        # none with half its denominator is there
-        half = found.denominator // 2
-        assert found.denominator & (found.denominator - 1) == 0
-        assert not half or -(-low * half // 1) > high * half
 
 
 def test_newtons_method_at_an_alpha_gives_forces_in_the_units_of_the_problem():

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.arithmetic.rationals import simplest
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator
 
@@ -347,7 +349,8 @@ class Cutting:
             before, after = (first - borders[2 * k]) / 4, (borders[2 * k + 3] - last) / 4
             if first < last:
                 before, after = min(before, 4 * reach), min(after, 4 * reach)
-            ends += [_simple(first - before, first - before / 2), _simple(last + after / 2, last + after)]
+            for low, high in ((first - before, first - before / 2), (last + after / 2, last + after)):
+                ends.append(simplest(low, high) if isinstance(low, Fraction) and low < high else low)
         ends.append(self.high)
         return [x for k, x in enumerate(ends) if not k or x > ends[k - 1]]
 
@@ -403,15 +406,4 @@ def between(low: Number, high: Number) -> Number:
     if isinstance(middle, float) and low < middle < high:
         return middle
     first, last = Fraction(low), Fraction(high)
-    roughly: Fraction = _simple((5 * first + 3 * last) / 8, (3 * first + 5 * last) / 8)
-    return roughly
-
-
-def _simple(low: Any, high: Any) -> Any:
-    """A fraction of few bits in [low, high]; of floats the first."""
-    if isinstance(low, float) or not low < high:
-        return low
-    # of the form k / 2^e or k 2^e, with 2^e nearly as large as the interval is long
-    length = high - low
-    unit = Fraction(2) ** (length.numerator.bit_length() - length.denominator.bit_length() - 1)
-    return -((-low) // unit) * unit
+    return simplest((5 * first + 3 * last) / 8, (3 * first + 5 * last) / 8)

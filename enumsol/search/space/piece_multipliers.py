@@ -6,8 +6,6 @@ together with that of others. What is proposed here proves nothing.
 
 from __future__ import annotations
 
-import math
-from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -24,6 +22,7 @@ from enumsol.trusted.space.sector_rows import FORCE, FREE, GAP, OF_DISCS, TAU, R
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from fractions import Fraction
 
     from enumsol.condensation.space_condensed import AlphaSpace
     from enumsol.relaxation.space_relaxation import SpaceRelaxation
@@ -87,16 +86,6 @@ class AlphaPoint:
             return None
         F = system.F / np.where(system.tau >= 0, system.unit[system.tau], 1.0)
         return np.concatenate([y[:, 0], *(F * y[:, 1:]).T]) * np.tile(system.force, 3)
-
-
-def simplest(low: Fraction, high: Fraction) -> Fraction:
-    """The number with the smallest power of two as its denominator from one number to another, larger one."""
-    step = Fraction(2) ** math.ceil(math.log2(high - low))
-    while True:
-        number = math.ceil(low / step) * step
-        if number <= high:
-            return number
-        step /= 2
 
 
 class PieceBounds:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.arithmetic.rationals import simplest
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of, parts_around, places, span, width_level, width_of
 from enumsol.model.statuses import CONTACT, UNDECIDED
@@ -21,7 +22,7 @@ from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.outcome import StopReason
 from enumsol.search.space.piece_arcs import beside, points_on, slides
 from enumsol.search.space.piece_certificates import ERRORS, Passage, PieceProposals, runs_over
-from enumsol.search.space.piece_multipliers import COUNTED, AlphaPoint, exclusion, simplest
+from enumsol.search.space.piece_multipliers import COUNTED, AlphaPoint, exclusion
 from enumsol.search.space.space_fathoming import without_sectors
 from enumsol.support.deadlines import TimeOverError, look
 from enumsol.trusted.space.curve_runs import CurveParts, KnownCurve, Run
