@@ -165,6 +165,7 @@ def test_all_solutions_in_3d(capsys, tmp_path):
     assert slides["statuses"] == ["slip"]
     low, high = slides["slip_angle"][0]
     assert low < np.arctan2(slides["u_t"][0][1], slides["u_t"][0][0]) < high < low + 1e-6
+    assert np.shape(slides["dlambda_dalpha"]) == (1, 3)
     assert "open, stick, slip: how many" in printed(capsys, *TABLE_3D)
 
 

@@ -45,6 +45,8 @@ _BESIDE, _CLOSE, _FARTHER, _TRIALS = 2.0**-44, 0.25, 8.0, 15
 _BESIDE_FOLD = 2.0**-24
 #: Parts are longer than the way between their ends by this, and wider than their ends are known.
 _LONGER, _ROUNDED = 1.05, 16.0
+#: After so many parts of a link that stay open none is halved: along a continuum of solutions all would.
+_MOST_OPEN = 16
 #: So many nodes at most may change their statuses too near to each other to be told apart.
 _AT_ONCE = 3
 #: Where a part is cut: at the first of these shares where the solution is regular.
@@ -210,7 +212,7 @@ class LinkCutter:
 
     def __init__(self, problem: AlphaProblem, link: CurveLink, nearness: int = _TRIALS // 2) -> None:
         self.problem, self.curve, self.nearness = problem, link.curve, nearness
-        self.border = link.curve.box.border
+        self.border, self._open = link.curve.box.border, 0
 
     def parts(self, start: SolutionCurve, end: SolutionCurve) -> list[Run | Turn]:
         """From one joint to another one."""
@@ -243,8 +245,9 @@ class LinkCutter:
                 found = self._smooth(motion, start, end, codes)
             if found is not None:
                 return found
-        middle = self._middle(start, end) if times > 0 else None
+        middle = self._middle(start, end) if times > 0 and self._open < _MOST_OPEN else None
         if middle is None:
+            self._open += 1
             return [self._left_open(curve, start, end)]
         halves = (start, middle), (middle, end)
         found = []
