@@ -2,9 +2,11 @@
 
 from fractions import Fraction
 from itertools import combinations, pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from matplotlib.text import Text
 from path_problems import sheet_of_one_node
 from refusals import bad_argument
 
@@ -206,6 +208,23 @@ def test_the_legend_names_every_mark(graphs):
 def test_both_slips_have_styles_of_their_own():
     assert STATUS_STYLES[ContactStatus.SLIP_PLUS] != STATUS_STYLES[ContactStatus.SLIP_MINUS]
     assert len({str(style) for style in STATUS_STYLES.values()}) == 4
+
+
+def test_a_long_title_stays_over_its_panel(graphs):
+    figure = graphs["square"].plot(title="a body with a name that says a lot about it, " * 4, zoom=(2.9, 4))
+    figure.canvas.draw()
+    main, part = figure.axes[0], figure.axes[2]
+    assert part.get_title("left").startswith("A: ")
+    title = main.get_title("left")
+    assert title.count("\n") >= 2
+    (drawn,) = (text for text in main.findobj(Text) if text.get_text() == title)
+    assert drawn.get_window_extent().x1 < part.get_window_extent().x0
+
+
+def test_no_part_is_shown_larger_that_is_as_narrow_as_rounding():
+    steps = SimpleNamespace(alphas=[0.0, 1.0, 1.0 + 1e-14, 2.0, 2.0 + 1e-7, 4.0], between=[1, 3, 5, 7, 9])
+    ((low, high),) = narrow_changes(steps, (0.0, 4.0))
+    assert low < 2.0 < 2.0 + 1e-7 < high < 2.0 + 1e-6
 
 
 def test_title_units_and_other_axes(graphs):

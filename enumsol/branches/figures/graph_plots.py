@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -302,13 +303,22 @@ def _mark_windows(axes: list[list[Any]], windows: list[tuple[float, float]]) -> 
             axis.xaxis.get_major_locator().set_params(nbins=4)
 
 
+#: Letters of a title an inch, and at least in a line.
+_LETTERS, _FEWEST = 13, 20
+
+
 def _words(
     figure: Any, first: Any, graph: GraphData, quantity: Quantity, title: str | None, others: set[str], *, alone: bool
 ) -> None:
     """The title and the legend."""
     problem, (a, b) = graph.problem, graph.interval
     name = counted(problem.p, "contact node") if title is None else title
-    first.set_title(f"{name}, alpha in [{a:g}, {b:g}]; {graph.completeness()}", fontsize=9, loc="left", wrap=True)
+    words = f"{name}, alpha in [{a:g}, {b:g}]; {graph.completeness()}"
+    if not alone:
+        # no wider than the panel below, beside which others have titles of their own
+        widths = first.get_gridspec().get_width_ratios()
+        words = fill(words, max(int(_LETTERS * figure.get_figwidth() * widths[0] / sum(widths)), _FEWEST))
+    first.set_title(words, fontsize=9, loc="left", wrap=True)
     arcs = [arc for arc in graph.arcs if not arc.dimension]
     others |= {"continuum"} if any(v.family is not None for v in graph.vertices) else set()
     others |= {"sheet"} if len(arcs) < len(graph.arcs) and quantity.dimension == "force" else set()

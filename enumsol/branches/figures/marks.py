@@ -176,8 +176,9 @@ def dense(line: Floats, step: float) -> Floats:
     return np.stack([np.interp(at, along, line[:, 0]), np.interp(at, along, line[:, 1])], axis=1)
 
 
-#: Narrower than this part of the interval, a change cannot be seen; at most so many are shown.
-_NARROW, _MOST = 0.02, 2
+#: Narrower than this part of the interval, a change cannot be seen; at most so many are shown, and none that is
+#: narrower than this relative to alpha: the numbers beside it would hardly differ.
+_NARROW, _MOST, _NARROWEST = 0.02, 2, 1e-10
 #: What is shown on both sides, by the width of the narrow part.
 _MARGIN = 0.75
 
@@ -199,7 +200,7 @@ def narrow_changes(steps: MultiplicitySteps, interval: tuple[float, float]) -> l
     # change, first and last alpha, width of the narrowest step
     found: list[tuple[int, float, float, float]] = []
     for k, (count, lo, hi) in enumerate(plateaus):
-        if len(plateaus) == 1 or not 0 < hi - lo < least:
+        if len(plateaus) == 1 or not _NARROWEST * max(abs(lo), abs(hi)) < hi - lo < least:
             continue
         change = max(abs(count - plateaus[j][0]) for j in (k - 1, k + 1) if 0 <= j < len(plateaus))
         largest, first, last, width = found[-1] if found else (0, lo, float("-inf"), 0.0)
