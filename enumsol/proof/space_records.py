@@ -28,6 +28,7 @@ from enumsol.proof.records import (
     table_of,
 )
 from enumsol.trusted.space.sector_rows import FORCE, GAP, RIGHT, UNDECIDED
+from enumsol.trusted.space.solution_curve import CurveBox
 
 if TYPE_CHECKING:
     from fractions import Fraction
@@ -250,6 +251,60 @@ class CurveBoxRecord(Record):
         except ValueError as error:
             raise RecordError(f"a box around a curve cannot be read: {error}") from None
         return cls(c, d, e, radius, rho, float(half))
+
+    @classmethod
+    def around(cls, box: CurveBox) -> CurveBoxRecord:
+        """That of a box."""
+        return cls(box.centre, box.direction, box.border, box.radius, box.rho, box.half)
+
+    @property
+    def box(self) -> CurveBox:
+        """What it stands for."""
+        return CurveBox(self.centre, self.direction, self.border, self.half, self.radius, self.rho)
+
+
+#: Boxes of the kinds of parts: of the part itself, then of places and of what lies between them.
+PARTS = {"s": 1, "f": 3, "c": 4, "h": 2, "u": 1}
+
+
+@dataclass(frozen=True, eq=False)
+class CurvePart:
+    """What the curve of a link does between two places, or how that part is cut (theory, section 12.10).
+
+    Attributes
+    ----------
+    kind : of PARTS
+        A run, a fold between two places, a change of statuses between two places, a middle place, or nothing is known.
+    boxes : of CurveBoxRecord, or None
+        The part's own box first, None where one is known that holds it, or none is needed.
+    """
+
+    kind: str
+    boxes: tuple[CurveBoxRecord | None, ...]
+
+    @classmethod
+    def read(cls, record: Any, limits: Limits) -> CurvePart:
+        """A part; RecordError where it is none."""
+        kind = record[0] if isinstance(record, list) and record and isinstance(record[0], str) else None
+        if kind not in PARTS or len(record) != 1 + PARTS[kind]:
+            raise RecordError(f"{quoted(record)} is no part of a curve")
+        boxes = [None if box is None else box_from(box, limits) for box in record[1:]]
+        places = boxes[1:3] if kind in ("f", "c") else boxes[1:]
+        if None in places:
+            raise RecordError("a place on a curve is missing")
+        return cls(kind, tuple(boxes))
+
+    def write(self) -> list[Any]:
+        """As ``read`` takes it."""
+        return [self.kind, *(None if box is None else box.write() for box in self.boxes)]
+
+
+def box_from(record: Any, limits: Limits) -> CurveBoxRecord:
+    """A box; RecordError where it is none."""
+    if not isinstance(record, list) or record[:1] != [CurveBoxRecord.kind]:
+        raise RecordError(f"{quoted(record)} is no box")
+    found: CurveBoxRecord = CurveBoxRecord.read(record, limits)
+    return found
 
 
 @dataclass(frozen=True)

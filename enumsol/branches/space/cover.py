@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.search.outcome import StopReason
     from enumsol.trusted.space.curve_chains import CurveChain
-    from enumsol.trusted.space.solution_curve import CurveBox
 
     Array = NDArray[np.float64]
 
@@ -168,9 +167,9 @@ class SpaceCover:
         for chain in self.chains:
             writer.write({"curve": len(chain.links)})
             for k, joint in enumerate(chain.joints):
-                writer.write(_box(joint.box))
+                writer.write(CurveBoxRecord.around(joint.box).write())
                 if k < len(chain.links):
-                    writer.write(_box(chain.links[k].curve.box))
+                    writer.write(CurveBoxRecord.around(chain.links[k].curve.box).write())
         writer.write({"tree": True})
         leaves, gaps = 0, len(self.ends)
         for record in self.records:
@@ -180,7 +179,3 @@ class SpaceCover:
             writer.write((UndecidedRecord(_OPEN) if is_open else record).write())
         writer.write({"curves": len(self.chains), "leaves": leaves, "gaps": gaps})
         return writer.close()
-
-
-def _box(box: CurveBox) -> list[Any]:
-    return CurveBoxRecord(box.centre, box.direction, box.border, box.radius, box.rho, box.half).write()

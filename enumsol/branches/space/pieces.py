@@ -1,30 +1,21 @@
-"""What a curve in 3D says over alpha: runs on which statuses hold and alpha goes one way, and turns between them.
+"""Cuts curves in 3D into runs, on which statuses hold and alpha goes one way, and turns between them.
 
-A turn is where one condition changes its sign, or a few do too near to each other to be told apart, or where alpha
-turns back, once; a part of the curve of which nothing of this could be shown is left open (theory, section 12.10).
+Where to cut is found in floats; what holds of the parts is shown in ``trusted.space.curve_parts`` (theory, 12.10).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from fractions import Fraction
-from functools import cached_property
-from itertools import pairwise, permutations, product
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import brentq
 
+from enumsol.proof.space_records import CurveBoxRecord, CurvePart
 from enumsol.support.deadlines import look, tell
 from enumsol.trusted.space.curve_events import CurveMotion
-from enumsol.trusted.space.solution_curve import (
-    curve_around,
-    curve_point,
-    lies_in,
-    only_curve,
-    parameter_in,
-    status_margin,
-)
+from enumsol.trusted.space.curve_parts import LinkParts, Place, Run, Turn, in_order, put_behind
+from enumsol.trusted.space.solution_curve import curve_around, curve_point, status_margin
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -47,160 +38,37 @@ _BESIDE_FOLD = 2.0**-24
 _LONGER, _ROUNDED = 1.05, 16.0
 #: After so many parts of a link that stay open none is halved: along a continuum of solutions all would.
 _MOST_OPEN = 16
-#: So many nodes at most may change their statuses too near to each other to be told apart.
-_AT_ONCE = 3
 #: Where a part is cut: at the first of these shares where the solution is regular.
 _CUTS = (0.5, 0.4375, 0.59375)
 
 
-@dataclass(frozen=True, eq=False)
-class Place:
-    """A proven point of a curve, at which all statuses hold strictly.
+def runs_and_turns(
+    problem: AlphaProblem, chain: CurveChain, found: list[Run | Turn] | None = None, records: list[CurvePart] | None = None
+) -> list[Run | Turn]:
+    """Those of a curve, in its order; see ``in_order``.
 
-    Attributes
-    ----------
-    point : SolutionCurve
-        Without length.
-    motion : CurveMotion
-        With the border of the link that it lies in.
-    """
-
-    point: SolutionCurve
-    motion: CurveMotion
-
-    @property
-    def codes(self) -> Codes:
-        """The statuses."""
-        return tuple(code for code in self.point.statuses if code is not None)
-
-    @cached_property
-    def x(self) -> Array:
-        """Forces and alpha, in the middle of their bounds."""
-        return self.point.at(0.0).mid
-
-    @property
-    def alphas(self) -> tuple[Fraction, Fraction]:
-        """Bounds of alpha."""
-        return self.point.alphas
-
-    @cached_property
-    def rises(self) -> int:
-        """The sign of d alpha / dt; 0 where it is not known."""
-        return self.motion.rises(self.codes)
-
-
-@dataclass(frozen=True, eq=False)
-class Run:
-    """A part of a curve on which alpha goes one way and the statuses stay.
-
-    Attributes
-    ----------
-    codes : statuses
-    rises : int
-    index : int
-        Of the roots on it.
-    knots : sequence of (3p + 1,) arrays
-        Points on it, in floats, in the order of the curve.
-    borders : sequence of (3p + 1,) arrays
-        Rows of the parameter between two of them.
-    start, end : pairs of Fraction
-        Bounds of alpha at its first and last point that is known.
-    """
-
-    codes: Codes
-    rises: int
-    index: int
-    knots: tuple[Array, ...]
-    borders: tuple[Array, ...]
-    start: tuple[Fraction, Fraction]
-    end: tuple[Fraction, Fraction]
-
-    def joined(self, other: Run) -> Run:
-        """With the run that goes on from it."""
-        knots, borders = (*self.knots, *other.knots[1:]), (*self.borders, *other.borders)
-        return replace(self, knots=knots, borders=borders, end=other.end)
-
-
-@dataclass(frozen=True, eq=False)
-class Turn:
-    """Between two runs.
-
-    Attributes
-    ----------
-    alphas : pair of Fraction
-        Between them is all alpha of it.
-    x : (3p + 1,) array
-        A point of it, in floats.
-    selections : statuses on both sides, one or two
-    settled : bool
-        Conditions change their sign once each, or alpha turns back once, and nothing else happens. Where several do,
-        alpha goes one way or turns back once in whichever order they do.
-    """
-
-    alphas: tuple[Fraction, Fraction]
-    x: Array
-    selections: tuple[Codes, ...]
-    settled: bool
-
-
-def runs_and_turns(problem: AlphaProblem, chain: CurveChain, found: list[Run | Turn] | None = None) -> list[Run | Turn]:
-    """Those of a curve, in its order; runs and turns alternate.
-
-    Begins and ends with a run, but for a curve that is closed and has a turn: it begins with that and ends with a run.
-    ``found`` is filled on the way, so that it has what there is when the time is over.
+    ``found`` is filled on the way, so that it has what there is when the time is over; ``records`` with those of a proof.
     """
     found, nearness = [] if found is None else found, _TRIALS // 2
     for k, (link, start, end) in enumerate(zip(chain.links, chain.joints[:-1], chain.joints[1:], strict=True)):
         look()
         tell("boxes of a curve cut into arcs", k, len(chain.links))
-        cutter = LinkCutter(problem, link, nearness)
-        for part in cutter.parts(start, end):
-            _append(found, part)
+        cutter = LinkCutter(problem, link, nearness, records)
+        _put(found, cutter.parts(start, end))
         nearness = cutter.nearness
-    if chain.closed:
-        first = next((k for k, part in enumerate(found) if isinstance(part, Turn)), 0)
-        ahead, found = found[:first], found[first:]
-        for part in ahead:
-            _append(found, part)
-    return found
+    whole = in_order([found], closed=chain.closed)
+    assert whole is not None
+    return whole
 
 
-def _append(found: list[Run | Turn], part: Run | Turn) -> None:
-    """Put a part behind others: a run goes on where the statuses and the direction are those of the last one."""
-    if not found or isinstance(part, Run) != isinstance(found[-1], Run):
-        found.append(part)
-        return
-    last = found.pop()
-    if isinstance(last, Run) and isinstance(part, Run):
-        if (last.codes, last.rises) != (part.codes, part.rises):
-            raise AssertionError("a curve changes at a regular point")
-        found.append(last.joined(part))
-    elif isinstance(last, Turn) and isinstance(part, Turn):
-        ends = (*last.alphas, *part.alphas)
-        selections = tuple(dict.fromkeys((*last.selections, *part.selections)))
-        found.append(Turn((min(ends), max(ends)), part.x, selections, settled=False))
+def _put(found: list[Run | Turn], parts: Sequence[Run | Turn]) -> None:
+    """Put parts behind others."""
+    if not put_behind(found, parts):
+        raise AssertionError("a curve changes at a regular point")
 
 
-def changed(codes: Codes, nodes: Sequence[int], to: Sequence[int]) -> Codes:
-    """Codes with those of some nodes replaced."""
-    new = dict(zip(nodes, to, strict=True))
-    return tuple(new.get(i, code) for i, code in enumerate(codes))
-
-
-def orders(one: Codes, other: Codes) -> list[list[Codes]]:
-    """The ways from some statuses to others along which the nodes change one by one."""
-    nodes = [i for i, pair in enumerate(zip(one, other, strict=True)) if pair[0] != pair[1]]
-    return [
-        [changed(one, order[:k], [other[i] for i in order[:k]]) for k in range(len(order) + 1)]
-        for order in permutations(nodes)
-    ]
-
-
-class LinkCutter:
+class LinkCutter(LinkParts):
     """Cuts the curve of a link into runs and turns.
-
-    Parts have the border of the link and end in solutions that lie in its box. Two curves with the same border that
-    share a point go on together as long as both are in their boxes, of which they do not reach the sides.
 
     Parameters
     ----------
@@ -208,18 +76,29 @@ class LinkCutter:
     link : CurveLink
     nearness : int
         Which of the distances from a change to the points beside it is tried first: then that of the last change.
+    records : list, optional
+        Filled with the records of a proof, in the order of a walk.
     """
 
-    def __init__(self, problem: AlphaProblem, link: CurveLink, nearness: int = _TRIALS // 2) -> None:
-        self.problem, self.curve, self.nearness = problem, link.curve, nearness
-        self.border, self._open = link.curve.box.border, 0
+    def __init__(
+        self,
+        problem: AlphaProblem,
+        link: CurveLink,
+        nearness: int = _TRIALS // 2,
+        records: list[CurvePart] | None = None,
+    ) -> None:
+        super().__init__(problem, link)
+        self.nearness, self._open, self._records = nearness, 0, [] if records is None else records
 
     def parts(self, start: SolutionCurve, end: SolutionCurve) -> list[Run | Turn]:
         """From one joint to another one."""
-        return self._cut(self.curve, self._place(start), self._place(end), None, _HALVINGS)
+        return self._cut(self.curve, self.place(start), self.place(end), None, _HALVINGS)
 
-    def _place(self, point: SolutionCurve) -> Place:
-        return Place(point, CurveMotion(self.problem, point, self.border))
+    def _told(self, kind: str, own: SolutionCurve | None, *places: Place, near: SolutionCurve | None = None) -> None:
+        """Add a record of a part with a box of its own, if it has one, and these places."""
+        curves = [own, *(place.point for place in places), *([near] if kind == "c" else [])]
+        boxes = (None if curve is None else CurveBoxRecord.around(curve.box) for curve in curves)
+        self._records.append(CurvePart(kind, tuple(boxes)))
 
     def _cut(
         self, curve: SolutionCurve | None, start: Place, end: Place, codes: Codes | None, times: int
@@ -232,102 +111,71 @@ class LinkCutter:
         codes : the statuses that hold all along, if that is known
         times : how often it may be halved
         """
-        curve = self._between(start, end) if curve is None else curve
+        own = self._between(start, end) if curve is None else None
+        curve = own if curve is None else curve
         if curve is not None:
             motion = CurveMotion(self.problem, curve)
             changing: Sequence[int] = ()
             if codes is None:
-                codes, changing = self._statuses(motion, start, end)
+                codes, changing = self.statuses(motion, start, end)
             found = None
             if changing:
-                found = self._corner(motion, start, end, changing, times)
+                found = self._corner(own, motion, start, end, changing, times)
             elif codes is not None:
-                found = self._smooth(motion, start, end, codes)
+                found = self._smooth(own, motion, start, end, codes)
             if found is not None:
                 return found
         middle = self._middle(start, end) if times > 0 and self._open < _MOST_OPEN else None
         if middle is None:
             self._open += 1
-            return [self._left_open(curve, start, end)]
-        halves = (start, middle), (middle, end)
+            self._told("u", own)
+            return [self.left_open(curve, start, end)]
+        self._told("h", own, middle)
         found = []
-        for one, other in halves:
-            for part in self._cut(None, one, other, codes, times - 1):
-                _append(found, part)
+        for one, other in ((start, middle), (middle, end)):
+            _put(found, self._cut(None, one, other, codes, times - 1))
         return found
 
-    def _statuses(self, motion: CurveMotion, start: Place, end: Place) -> tuple[Codes | None, list[int]]:
-        """The statuses that hold all along, or the nodes that change their status exactly once, or neither."""
-        loose = [i for i, codes in enumerate(motion.possible) if len(codes) > 1]
-        here = start.codes
-        if not loose:
-            return here, []
-        if len(loose) > _AT_ONCE or any(len(motion.possible[i]) > 2 for i in loose):
-            return None, []
-        pairs = [(here[i], next((code for code in motion.possible[i] if code != here[i]), here[i])) for i in loose]
-        # every condition passes zero once at most, whatever the statuses of the other nodes are
-        for i, pair in zip(loose, pairs, strict=True):
-            beside = product(*(pair[:1] if j == i else ends for j, ends in zip(loose, pairs, strict=True)))
-            signs = {motion.decides(changed(here, loose, codes), i, pair[1]) for codes in beside}
-            if len(signs) > 1 or 0 in signs:
-                return None, []
-        nodes = [i for i in loose if here[i] != end.codes[i]]
-        return (None, nodes) if nodes else (here, [])
-
-    def _smooth(self, motion: CurveMotion, start: Place, end: Place, codes: Codes) -> list[Run | Turn] | None:
+    def _smooth(
+        self, own: SolutionCurve | None, motion: CurveMotion, start: Place, end: Place, codes: Codes
+    ) -> list[Run | Turn] | None:
         """Where the statuses do not change: one run, or two with a fold between them."""
-        rises = motion.rises(codes)
-        if rises:
-            return [self._run(start, end, codes, rises)]
-        if not (start.rises and end.rises and motion.bends(codes)):
+        run = self.run(motion, start, end, codes)
+        if run is not None:
+            self._told("s", own)
+            return [run]
+        if not (start.rises and start.rises == -end.rises and motion.bends(codes)):
             return None
-        # the derivative of alpha is monotone
-        if start.rises == end.rises:
-            return [self._run(start, end, codes, start.rises)]
         sides = self._beside(start, end, lambda point: start.rises * float(point.direction[-1]), _BESIDE_FOLD)
-        if sides is None or [side.rises for side in sides] != [start.rises, end.rises]:
-            return None
-        alphas = self._fold(*sides)
-        turn = Turn(alphas, 0.5 * (sides[0].x + sides[1].x), (codes,), settled=True)
-        before, after = self._run(start, sides[0], codes, start.rises), self._run(sides[1], end, codes, end.rises)
-        return [before, turn, after]
+        found = None if sides is None else self.fold(motion, start, end, codes, sides)
+        if sides is not None and found is not None:
+            self._told("f", own, *sides)
+        return found
 
     def _corner(
-        self, motion: CurveMotion, start: Place, end: Place, nodes: Sequence[int], times: int
+        self,
+        own: SolutionCurve | None,
+        motion: CurveMotion,
+        start: Place,
+        end: Place,
+        nodes: Sequence[int],
+        times: int,
     ) -> list[Run | Turn] | None:
         """Where nodes change their statuses, each of them once: the first change, and what follows."""
         one = start.codes
-        own = [one[i] for i in nodes]
-        sides = self._beside(start, end, lambda point: status_margin(self.problem, point.z, nodes, own), _BESIDE)
+        mine = [one[i] for i in nodes]
+        sides = self._beside(start, end, lambda point: status_margin(self.problem, point.z, nodes, mine), _BESIDE)
         if sides is None or sides[0].codes != one:
             return None
-        other = sides[1].codes
         near = self._between(*sides)
-        motion = motion if near is None else CurveMotion(self.problem, near)
-        between = list(orders(one, other))
-        passed = dict.fromkeys(codes for order in between for codes in order)
-        rises = {codes: motion.rises(codes) for codes in passed}
-        # in any order of the changes alpha turns back once, or never
-        turned = {sum(rises[x] != rises[y] for x, y in pairwise(order)) for order in between}
-        if not all(rises.values()) or turned not in ({0}, {1}):
+        turn = self.corner(motion if near is None else CurveMotion(self.problem, near), start, end, sides)
+        if turn is None:
             return None
-        step = self._step(*sides)
-        reach = Fraction(0)
-        for codes in passed:
-            speed = motion.speed(codes)
-            if speed is None:
-                return None
-            reach = max(reach, Fraction(float(speed.size[-1])) * step)
-        alphas = sides[0].alphas[0] - reach, sides[0].alphas[1] + reach
-        turn = Turn(alphas, 0.5 * (sides[0].x + sides[1].x), (one, other), settled=True)
+        self._told("c", own, *sides, near=near)
         found: list[Run | Turn] = []
-        rest = (self.curve, other) if other == end.codes else (None, None)
-        for part in (
-            *self._cut(self.curve, start, sides[0], one, times - 1),
-            turn,
-            *self._cut(rest[0], sides[1], end, rest[1], times - 1),
-        ):
-            _append(found, part)
+        _put(found, self._cut(self.curve, start, sides[0], one, times - 1))
+        _put(found, [turn])
+        _put(found, self._cut(*self.behind(sides[1], end), times - 1))
         return found
 
     # -- places ----------------------------------------------------------------------------------------------------
@@ -341,10 +189,7 @@ class LinkCutter:
         near = self._near(start, end, share)
         if near is None:
             return None
-        point = curve_around(self.problem, near.x, near.direction, self.border, 0.0, roomy=False)
-        if point is None or None in point.statuses or not self.curve.holds(point.at(0.0)):
-            return None
-        return self._place(point)
+        return self.place_at(curve_around(self.problem, near.x, near.direction, self.border, 0.0, roomy=False))
 
     def _middle(self, start: Place, end: Place) -> Place | None:
         found = (self._at(start, end, share) for share in _CUTS)
@@ -409,42 +254,5 @@ class LinkCutter:
         # a curve that only alpha changes along needs a box of the size of rounding errors
         least = _ROUNDED * np.maximum(*(place.point.at(0.0).rad for place in (start, end)))
         if np.any(curve.box.radius < least):
-            curve = only_curve(self.problem, replace(curve.box, radius=np.maximum(curve.box.radius, least)))
-        if curve is None or not all(lies_in(curve.box, place.point.at(0.0)) for place in (start, end)):
-            return None
-        return curve
-
-    # -- what is known ---------------------------------------------------------------------------------------------
-
-    def _run(self, start: Place, end: Place, codes: Codes, rises: int) -> Run:
-        knots, index = (start.x, end.x), self.curve.sign * rises
-        return Run(codes, rises, index, knots, (self.border,), start.alphas, end.alphas)
-
-    def _left_open(self, curve: SolutionCurve | None, start: Place, end: Place) -> Turn:
-        """A part of which is not known what it does."""
-        alphas = (self.curve if curve is None else curve).alphas
-        selections = tuple(dict.fromkeys((start.codes, end.codes)))
-        return Turn(alphas, 0.5 * (start.x + end.x), selections, settled=False)
-
-    def _step(self, start: Place, end: Place) -> Fraction:
-        """An upper bound of how much the parameter increases between two places."""
-        ends = [parameter_in(self.curve.box, place.point.at(0.0)) for place in (start, end)]
-        return sum(
-            (Fraction(float(t.mid)) * s + Fraction(float(t.rad)) for s, t in zip((-1, 1), ends, strict=True)),
-            Fraction(0),
-        )
-
-    def _fold(self, before: Place, after: Place) -> tuple[Fraction, Fraction]:
-        """Bounds of alpha where it turns back once between two places, beyond both of them.
-
-        Its derivative is monotone, so that alpha lies on one side of its tangents.
-        """
-        step, sign = self._step(before, after), before.rises
-        inner = [sign * place.alphas[0 if sign > 0 else 1] for place in (before, after)]
-        outer = []
-        for place in (before, after):
-            speed = place.motion.speed(place.codes)
-            if speed is not None:
-                outer.append(sign * place.alphas[1 if sign > 0 else 0] + Fraction(float(speed.size[-1])) * step)
-        ends = sign * max(inner), sign * min(outer)
-        return min(ends), max(ends)
+            return self.curve_in(replace(curve.box, radius=np.maximum(curve.box.radius, least)), start, end)
+        return curve if self.has(curve, start, end) else None

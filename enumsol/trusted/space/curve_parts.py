@@ -1,0 +1,366 @@
+"""The trusted tests of what a curve in 3D does over alpha between two of its points (theory, section 12.10).
+
+On a run statuses hold and alpha goes one way. A turn is where one condition changes its sign, or a few do too near to
+each other to be told apart, or where alpha turns back, once; or a part of which nothing of this is shown, left open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import cached_property
+from itertools import pairwise, permutations, product
+
+import numpy as np
+
+from enumsol.arithmetic.balls import SAFE
+from enumsol.support.array_types import Codes, Floats
+from enumsol.trusted.space.curve_chains import CurveLink, Range
+from enumsol.trusted.space.curve_events import CurveMotion
+from enumsol.trusted.space.solution_curve import (
+    AlphaProblem,
+    CurveBox,
+    SolutionCurve,
+    lies_in,
+    only_curve,
+    parameter_in,
+)
+
+#: So many nodes at most may change their statuses too near to each other to be told apart.
+_AT_ONCE = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A proven point of a curve, at which all statuses hold strictly.
+
+    Attributes
+    ----------
+    point : SolutionCurve
+        Without length.
+    motion : CurveMotion
+        With the border of the link that it lies in.
+    """
+
+    point: SolutionCurve
+    motion: CurveMotion
+
+    @property
+    def codes(self) -> Codes:
+        """The statuses."""
+        return tuple(code for code in self.point.statuses if code is not None)
+
+    @cached_property
+    def x(self) -> Floats:
+        """Forces and alpha, in the middle of their bounds."""
+        return self.point.at(0.0).mid
+
+    @property
+    def alphas(self) -> Range:
+        """Bounds of alpha."""
+        return self.point.alphas
+
+    @cached_property
+    def rises(self) -> int:
+        """The sign of d alpha / dt; 0 where it is not known."""
+        return self.motion.rises(self.codes)
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A part of a curve on which alpha goes one way and the statuses stay.
+
+    Attributes
+    ----------
+    codes : statuses
+    rises : int
+    index : int
+        Of the roots on it.
+    knots : sequence of (3p + 1,) arrays
+        Points on it, in floats, in the order of the curve.
+    borders : sequence of (3p + 1,) arrays
+        Rows of the parameter between two of them.
+    start, end : pairs of Fraction
+        Bounds of alpha at its first and last point that is known.
+    """
+
+    codes: Codes
+    rises: int
+    index: int
+    knots: tuple[Floats, ...]
+    borders: tuple[Floats, ...]
+    start: Range
+    end: Range
+
+    def joined(self, other: Run) -> Run:
+        """With the run that goes on from it."""
+        knots, borders = (*self.knots, *other.knots[1:]), (*self.borders, *other.borders)
+        return replace(self, knots=knots, borders=borders, end=other.end)
+
+
+@dataclass(frozen=True, eq=False)
+class Turn:
+    """Between two runs.
+
+    Attributes
+    ----------
+    alphas : pair of Fraction
+        Between them is all alpha of it.
+    x : (3p + 1,) array
+        A point of it, in floats.
+    selections : statuses on both sides, one or two
+    settled : bool
+        Conditions change their sign once each, or alpha turns back once, and nothing else happens. Where several do,
+        alpha goes one way or turns back once in whichever order they do.
+    """
+
+    alphas: Range
+    x: Floats
+    selections: tuple[Codes, ...]
+    settled: bool
+
+    def joined(self, other: Turn) -> Turn:
+        """With one that follows at once: what happens there is not settled."""
+        ends = (*self.alphas, *other.alphas)
+        selections = tuple(dict.fromkeys((*self.selections, *other.selections)))
+        return Turn((min(ends), max(ends)), other.x, selections, settled=False)
+
+
+def in_order(links: Iterable[Sequence[Run | Turn]], *, closed: bool) -> list[Run | Turn] | None:
+    """Runs and turns of the links of a curve, which alternate; None where a run does not go on at a joint.
+
+    Begins and ends with a run, but where a part at an end is left open, and for a curve that is closed and has a turn:
+    it begins with that and ends with a run.
+    """
+    found: list[Run | Turn] = []
+    for parts in links:
+        if not put_behind(found, parts):
+            return None
+    if closed:
+        first = next((k for k, part in enumerate(found) if isinstance(part, Turn)), 0)
+        ahead, found = found[:first], found[first:]
+        if not put_behind(found, ahead):
+            return None
+    return found
+
+
+def arcs_over(parts: Sequence[Run | Turn], interval: Range, *, closed: bool) -> tuple[int, list[Range]]:
+    """The number of runs of a curve over an interval, and where it is not known how they are joined, or whether."""
+    gaps = []
+    for turn in parts:
+        if isinstance(turn, Turn):
+            side = side_of(turn.alphas, interval)
+            if side is None or (side == 0 and not turn.settled):
+                gaps.append((max(turn.alphas[0], interval[0]), min(turn.alphas[1], interval[1])))
+    ends = [ends_of(parts, k, closed=closed) for k, part in enumerate(parts) if isinstance(part, Run)]
+    sides = [[side_of(alphas, interval) for _, alphas in both] for both in ends]
+    return sum(low != 1 and high != -1 for low, high in sides), gaps
+
+
+def ends_of(parts: Sequence[Run | Turn], k: int, *, closed: bool) -> list[tuple[int | None, Range]]:
+    """The lower and the upper end of a run: the number of the turn there, if there is one, and bounds of alpha."""
+    run = parts[k]
+    assert isinstance(run, Run)
+    # a closed curve goes on from its end to its first turn
+    numbers = k - 1, (k + 1) % len(parts) if closed else k + 1
+    found: list[tuple[int | None, Range]] = []
+    for number, beyond in zip(numbers, (run.start, run.end), strict=True):
+        turn = parts[number] if 0 <= number < len(parts) else None
+        found.append((number, turn.alphas) if isinstance(turn, Turn) else (None, beyond))
+    return found[:: run.rises]
+
+
+def side_of(alphas: Range, interval: Range) -> int | None:
+    """-1 below an interval, 0 inside, 1 above it; None where it may be either."""
+    (a, b), (low, high) = interval, alphas
+    if high < a:
+        return -1
+    if low > b:
+        return 1
+    return 0 if a < low and high < b else None
+
+
+def put_behind(found: list[Run | Turn], parts: Iterable[Run | Turn]) -> bool:
+    """Put parts behind others; False where statuses or the direction of alpha change between two runs."""
+    for part in parts:
+        last = found[-1] if found else None
+        if isinstance(last, Run) and isinstance(part, Run):
+            if (last.codes, last.rises) != (part.codes, part.rises):
+                return False
+            found[-1] = last.joined(part)
+        elif isinstance(last, Turn) and isinstance(part, Turn):
+            found[-1] = last.joined(part)
+        else:
+            found.append(part)
+    return True
+
+
+def changed(codes: Codes, nodes: Sequence[int], to: Sequence[int]) -> Codes:
+    """Codes with those of some nodes replaced."""
+    new = dict(zip(nodes, to, strict=True))
+    return tuple(new.get(i, code) for i, code in enumerate(codes))
+
+
+def orders(one: Codes, other: Codes) -> list[list[Codes]]:
+    """The ways from some statuses to others along which the nodes change one by one."""
+    nodes = [i for i, pair in enumerate(zip(one, other, strict=True)) if pair[0] != pair[1]]
+    return [
+        [changed(one, order[:k], [other[i] for i in order[:k]]) for k in range(len(order) + 1)]
+        for order in permutations(nodes)
+    ]
+
+
+class LinkParts:
+    """Tests of what the curve of a link does between two of its places.
+
+    Places have the border of the link and are solutions that lie in its box. Two curves with the same border that
+    share a point go on together as long as both are in their boxes, of which they do not reach the sides.
+
+    Parameters
+    ----------
+    problem : AlphaProblem
+    link : CurveLink
+    """
+
+    def __init__(self, problem: AlphaProblem, link: CurveLink) -> None:
+        self.problem, self.curve = problem, link.curve
+        self.border = link.curve.box.border
+
+    # -- places and boxes ------------------------------------------------------------------------------------------
+
+    def place(self, point: SolutionCurve) -> Place:
+        """At a joint."""
+        return Place(point, CurveMotion(self.problem, point, self.border))
+
+    def place_at(self, point: SolutionCurve | None) -> Place | None:
+        """At a point of the curve; None where it is not proven to be one at which all statuses hold strictly."""
+        if point is None or point.box.half or None in point.statuses or not self.curve.holds(point.at(0.0)):
+            return None
+        return self.place(point)
+
+    def is_between(self, start: Place, place: Place, end: Place) -> bool:
+        """Whether a place is behind another one and before a third one."""
+        t = [parameter_in(self.curve.box, one.point.at(0.0)) for one in (start, place, end)]
+        steps = [two - one for one, two in pairwise(t)]
+        return all(step.mid > step.rad * SAFE for step in steps)
+
+    def curve_in(self, box: CurveBox, start: Place, end: Place) -> SolutionCurve | None:
+        """The curve in a box of its own that has two places; None where it is not proven to be the link's."""
+        if not np.array_equal(box.border, self.border):
+            return None
+        curve = only_curve(self.problem, box)
+        return curve if curve is not None and self.has(curve, start, end) else None
+
+    @staticmethod
+    def has(curve: SolutionCurve, start: Place, end: Place) -> bool:
+        """Whether two places lie in the box of a curve."""
+        return all(lies_in(curve.box, place.point.at(0.0)) for place in (start, end))
+
+    # -- parts -----------------------------------------------------------------------------------------------------
+
+    def statuses(self, motion: CurveMotion, start: Place, end: Place) -> tuple[Codes | None, list[int]]:
+        """The statuses that hold all along, or the nodes that change their status exactly once, or neither."""
+        loose = [i for i, codes in enumerate(motion.possible) if len(codes) > 1]
+        here = start.codes
+        if not loose:
+            return here, []
+        if len(loose) > _AT_ONCE or any(len(motion.possible[i]) > 2 for i in loose):
+            return None, []
+        pairs = [(here[i], next((code for code in motion.possible[i] if code != here[i]), here[i])) for i in loose]
+        # every condition passes zero once at most, whatever the statuses of the other nodes are
+        for i, pair in zip(loose, pairs, strict=True):
+            beside = product(*(pair[:1] if j == i else ends for j, ends in zip(loose, pairs, strict=True)))
+            signs = {motion.decides(changed(here, loose, codes), i, pair[1]) for codes in beside}
+            if len(signs) > 1 or 0 in signs:
+                return None, []
+        nodes = [i for i in loose if here[i] != end.codes[i]]
+        return (None, nodes) if nodes else (here, [])
+
+    def run(self, motion: CurveMotion, start: Place, end: Place, codes: Codes) -> Run | None:
+        """Where statuses hold all along: the run, if alpha goes one way."""
+        rises = motion.rises(codes)
+        if not rises and start.rises == end.rises and motion.bends(codes):
+            # the derivative of alpha is monotone
+            rises = start.rises
+        return self._run(start, end, codes, rises) if rises else None
+
+    def fold(
+        self, motion: CurveMotion, start: Place, end: Place, codes: Codes, sides: tuple[Place, Place]
+    ) -> list[Run | Turn] | None:
+        """Where statuses hold all along: two runs and the fold between them, if alpha turns back once."""
+        before, after = sides
+        if not start.rises or start.rises != -end.rises or not motion.bends(codes):
+            return None
+        if [side.rises for side in sides] != [start.rises, end.rises]:
+            return None
+        if not (self.is_between(start, before, end) and self.is_between(start, after, end)):
+            return None
+        turn = Turn(self._fold(before, after), 0.5 * (before.x + after.x), (codes,), settled=True)
+        return [self._run(start, before, codes, start.rises), turn, self._run(after, end, codes, end.rises)]
+
+    def corner(self, motion: CurveMotion, start: Place, end: Place, sides: tuple[Place, Place]) -> Turn | None:
+        """Where nodes change their statuses, each of them once: the first change, between places.
+
+        ``motion`` is that of a curve that has both.
+        """
+        (before, after), one = sides, start.codes
+        if before.codes != one or after.codes == one:
+            return None
+        if not (self.is_between(start, before, end) and self.is_between(start, after, end)):
+            return None
+        other = after.codes
+        between = list(orders(one, other))
+        passed = dict.fromkeys(codes for order in between for codes in order)
+        rises = {codes: motion.rises(codes) for codes in passed}
+        # in any order of the changes alpha turns back once, or never
+        turned = {sum(rises[x] != rises[y] for x, y in pairwise(order)) for order in between}
+        if not all(rises.values()) or turned not in ({0}, {1}):
+            return None
+        step = self._step(before, after)
+        reach = Fraction(0)
+        for codes in passed:
+            speed = motion.speed(codes)
+            if speed is None:
+                return None
+            reach = max(reach, Fraction(float(speed.size[-1])) * step)
+        alphas = before.alphas[0] - reach, before.alphas[1] + reach
+        return Turn(alphas, 0.5 * (before.x + after.x), (one, other), settled=True)
+
+    def behind(self, after: Place, end: Place) -> tuple[SolutionCurve | None, Place, Place, Codes | None]:
+        """What follows a corner: a curve that has both places and the statuses there, where these do not change again."""
+        known = after.codes == end.codes
+        return (self.curve if known else None), after, end, (end.codes if known else None)
+
+    def left_open(self, curve: SolutionCurve | None, start: Place, end: Place) -> Turn:
+        """A part of which is not known what it does."""
+        alphas = (self.curve if curve is None else curve).alphas
+        selections = tuple(dict.fromkeys((start.codes, end.codes)))
+        return Turn(alphas, 0.5 * (start.x + end.x), selections, settled=False)
+
+    def _run(self, start: Place, end: Place, codes: Codes, rises: int) -> Run:
+        knots, index = (start.x, end.x), self.curve.sign * rises
+        return Run(codes, rises, index, knots, (self.border,), start.alphas, end.alphas)
+
+    def _step(self, start: Place, end: Place) -> Fraction:
+        """An upper bound of how much the parameter increases between two places."""
+        ends = [parameter_in(self.curve.box, place.point.at(0.0)) for place in (start, end)]
+        return sum(
+            (Fraction(float(t.mid)) * s + Fraction(float(t.rad)) for s, t in zip((-1, 1), ends, strict=True)),
+            Fraction(0),
+        )
+
+    def _fold(self, before: Place, after: Place) -> Range:
+        """Bounds of alpha where it turns back once between two places, beyond both of them.
+
+        Its derivative is monotone, so that alpha lies on one side of its tangents.
+        """
+        step, sign = self._step(before, after), before.rises
+        inner = [sign * place.alphas[0 if sign > 0 else 1] for place in (before, after)]
+        outer = []
+        for place in (before, after):
+            speed = place.motion.speed(place.codes)
+            if speed is not None:
+                outer.append(sign * place.alphas[1 if sign > 0 else 0] + Fraction(float(speed.size[-1])) * step)
+        ends = sign * max(inner), sign * min(outer)
+        return min(ends), max(ends)
