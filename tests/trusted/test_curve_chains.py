@@ -12,7 +12,7 @@ from enumsol import enumerate_roots
 from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space import chains
 from enumsol.branches.space.chains import chain_through
-from enumsol.trusted.space.curve_chains import CurveChain, apart
+from enumsol.trusted.space.curve_chains import CurveChain, apart, link_between
 from enumsol.trusted.space.solution_curve import AlphaProblem, curve_around, curve_point, lies_in
 
 
@@ -135,3 +135,27 @@ def test_a_curve_that_runs_twice_round_is_none():
         assert CurveChain.of([*links, *links[:further]], [*joints, *joints[1 : further + 1]], interval) is None
     part = CurveChain.of(links[:-1], joints[:-1], interval)
     assert [end is None for end in part.ends] == [False, False]
+
+
+def test_a_box_that_reaches_beyond_a_shorter_last_one_is_part_of_the_gap():
+    """Else what the longer box holds behind the short one would be neither on the curve nor in its gap."""
+    chain, interval = sliding_chain(Fraction(2, 5), Fraction(3, 5))
+    given, k = AlphaProblem.of(SLIDING.enclosure), 2
+    link, joint = chain.links[k], chain.joints[k]
+    box, (low, high) = link.curve.box, (float(end.mid) for end in (link.start, link.end))
+    # the curve ends a tenth of the way along that box
+    places = [low + share * (high - low) for share in (0.05, 0.1)]
+    points = [curve_point(given, link.curve.at(t).mid, box.border) for t in places]
+    joints = [curve_around(given, point.x, point.direction, box.border, 0.0, roomy=False) for point in points]
+    between = 0.5 * (points[0].x + points[1].x)
+    short = curve_around(given, between, points[0].direction, box.border, 0.03 * (high - low))
+    links = [
+        *chain.links[:k],
+        link_between(link.curve, joint, joints[0]),
+        link_between(short, joints[0], joints[1]),
+    ]
+    part = CurveChain.of(links, [*chain.joints[: k + 1], *joints], interval)
+    (end,) = part.gaps
+    farthest = link.curve.at(box.half).mid[-1]
+    assert short.at(short.box.half).mid[-1] < farthest
+    assert end[0] <= joints[1].alphas[0] < farthest <= end[1]

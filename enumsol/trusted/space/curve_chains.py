@@ -74,8 +74,8 @@ class CurveChain:
     closed : bool
         Whether the last point is the first one.
     ends : pair of (Fraction, Fraction) or None
-        Of a first and a last point that are not beyond the interval: bounds of alpha there, and of all that the first
-        or the last box holds beyond them.
+        Of a first and a last point that are not beyond the interval: bounds of alpha there, and of all that boxes hold
+        beyond them.
     """
 
     links: Sequence[CurveLink]
@@ -146,19 +146,29 @@ def _open_ends(
 ) -> tuple[Range | None, Range | None]:
     """See ``CurveChain.ends``."""
     low, high = interval
-    first, last = _beyond(links[0], joints[0], -1), _beyond(links[-1], joints[-1], 1)
-    inside = [None if end < low or begin > high else (begin, end) for begin, end in (first, last)]
+    ranges = [_beyond(links, joints[0], -1), _beyond(links, joints[-1], 1)]
+    inside = [None if end < low or begin > high else (begin, end) for begin, end in ranges]
     return inside[0], inside[1]
 
 
-def _beyond(link: CurveLink, end: SolutionCurve, side: int) -> Range:
-    """Bounds of alpha at an end, and of all that its box holds beyond it."""
-    half, t = link.curve.box.half, link.end if side > 0 else link.start
-    near = float(side * t.mid - t.rad * SAFE)
+def _beyond(links: Sequence[CurveLink], end: SolutionCurve, side: int) -> Range:
+    """Bounds of alpha at an end, and of all that any box which holds this end has beyond it.
+
+    The boxes before the last one may be longer than that.
+    """
+    x = end.at(0.0)
+    ranges = [_beyond_in(link.curve, end, side) for link in links if not _outside(link.curve, x)]
+    return min(low for low, _ in ranges), max(high for _, high in ranges)
+
+
+def _beyond_in(curve: SolutionCurve, end: SolutionCurve, side: int) -> Range:
+    """Bounds of alpha at an end, and of all that one box holds beyond it."""
+    half, t = curve.box.half, parameter_in(curve.box, end.at(0.0))
+    near = max(float(side * t.mid - t.rad * SAFE), -half)
     reach = (0.5 * max(half - near, 0.0) + 2 * UNIT * (abs(near) + half)) * SAFE
-    alpha = link.curve.at(Ball(np.array(0.5 * side * (near + half)), np.array(reach)))[-1]
+    alpha = curve.at(Ball(np.array(0.5 * side * (near + half)), np.array(reach)))[-1]
     low, high = (Fraction(float(alpha.mid)) + sign * Fraction(float(alpha.rad)) for sign in (-1, 1))
-    rises, (least, most) = link.curve.rises * side, end.alphas
+    rises, (least, most) = curve.rises * side, end.alphas
     return (max(low, least) if rises > 0 else low), (min(high, most) if rises < 0 else high)
 
 
