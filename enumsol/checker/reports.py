@@ -105,8 +105,7 @@ class GraphVerificationReport:
     within : float or None
         Of a body that nothing holds: all this is about solutions whose rigid displacement is within this bound.
     curves : int or None
-        In 3D, where the proof holds no selections and arcs: curves of solutions from end to end of the interval, or
-        closed.
+        In 3D, where the proof holds no selections: curves of solutions, of which the arcs are.
     """
 
     ok: bool
@@ -157,6 +156,8 @@ class GraphVerificationReport:
     def _arcs(self, ends: tuple[float, ...]) -> list[str]:
         if self.curves is not None:
             curves = counted(self.curves, "curve")
+            if self.arcs is not None:
+                curves = f"{counted(self.arcs, 'arc')} of {curves}"
             if self.complete:
                 return [f"  every solution for every alpha in [{ends[0]:g}, {ends[1]:g}] lies on {curves}"]
             return [f"  {curves}; left open in {counted(self.open, 'piece')} of alpha"]

@@ -3,9 +3,10 @@
 Records: a header ``{"format": "enumsol-proof", "version": 1, "kind": "graph", "problem": <fingerprint>, "interval":
 [a, b], "p": p, "data": "problem", "force", "length", "steps"}`` with the steps of the coordinates (see AlphaProblem);
 for every curve ``{"curve": n}`` with n boxes, and these as ``["w", centre, direction, border, radius, rho, half]``
-between n + 1 boxes without length around the points that they share (see ``trusted.space.curve_chains``);
+between n + 1 boxes without length around the points that they share (see ``trusted.space.curve_chains``), and perhaps
+how it is cut into arcs (see ``checker.curve_cuts``);
 ``{"tree": true}`` and the records of a tree (see ``checker.piece_tree``), whose boxes are numbered in the order of the
-curves, points left out; at the end ``{"curves", "leaves", "gaps"}``.
+curves, points left out; at the end ``{"curves", "arcs", "leaves", "gaps"}``, arcs null where not all curves are cut.
 
 What is checked: every curve is one, from end to end; no two have a point in common; the leaves of the tree cover all
 solutions, and those of a leaf lie on one of the curves. An end inside the interval is a gap, as an open leaf is.
@@ -17,6 +18,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
+from enumsol.checker.curve_cuts import parts_of
 from enumsol.checker.piece_tree import PieceTreeChecker
 from enumsol.checker.reports import MAX_FAILURES, GraphVerificationReport
 from enumsol.condensation.data import exactly_at
@@ -24,11 +26,12 @@ from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.proof.reading import RefusedError, data_of, exponents_from, numbers_from, quoted, rational_from, same
 from enumsol.proof.records import Limits
-from enumsol.proof.space_records import CurveBoxRecord
+from enumsol.proof.space_records import box_from
 from enumsol.trusted.space.curve_chains import apart, chain_of
+from enumsol.trusted.space.curve_parts import arcs_over
 from enumsol.trusted.space.curve_runs import KnownCurve
 from enumsol.trusted.space.sector_rows import UNDECIDED
-from enumsol.trusted.space.solution_curve import AlphaProblem, CurveBox
+from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -63,6 +66,7 @@ class SpaceGraphChecker:
         self.failures: list[str] = []
         self.interval: tuple[Fraction, Fraction] | None = None
         self.curves: list[CurveChain] = []
+        self.arcs: int | None = 0
         self.leaves = 0
         self.gaps: list[tuple[Fraction, Fraction]] = []
 
@@ -82,6 +86,7 @@ class SpaceGraphChecker:
             self.leaves,
             frozenset(),
             "problem",
+            arcs=self.arcs,
             open=len(self.gaps),
             curves=len(self.curves),
         )
@@ -98,7 +103,7 @@ class SpaceGraphChecker:
         record = next(records, None)
         while isinstance(record, dict) and record.keys() == {"curve"}:
             self._curve(given, record["curve"], records)
-            record = next(records, None)
+            record = self._cuts(given, next(records, None), records)
         self._compare()
         if record != {"tree": True}:
             raise RefusedError("the tree over alpha is missing")
@@ -106,10 +111,11 @@ class SpaceGraphChecker:
         curves = [KnownCurve(given, chain) for chain in self.curves]
         tree = PieceTreeChecker(enclosure, units, given, curves, self._fail)
         tree.run(*self.interval, records)
-        self.leaves, self.gaps = tree.leaves, [gap for chain in self.curves for gap in chain.gaps] + tree.gaps
+        self.leaves = tree.leaves
+        self.gaps += [gap for chain in self.curves for gap in chain.gaps] + tree.gaps
         if self.progress is not None:
             self.progress(self.leaves)
-        claim = {"curves": len(self.curves), "leaves": self.leaves, "gaps": len(self.gaps)}
+        claim = {"curves": len(self.curves), "arcs": self.arcs, "leaves": self.leaves, "gaps": len(self.gaps)}
         footer = next(records, None)
         if not same(footer, claim):
             self._fail(f"the counts at the end are {quoted(footer)}; the records give {claim!r}")
@@ -133,15 +139,28 @@ class SpaceGraphChecker:
         found = []
         for _ in range(2 * count + 1):
             try:
-                said = _box_from(next(records, None), limits)
+                said = box_from(next(records, None), limits)
             except ValueError as error:
                 raise RefusedError(f"curve {number} cannot be read: {error}") from None
-            found.append(CurveBox(said.centre, said.direction, said.border, said.half, said.radius, said.rho))
+            found.append(said.box)
         assert self.interval is not None
         chain = chain_of(given, found[1::2], found[::2], self.interval)
         if chain is None:
             raise RefusedError(f"curve {number} is not proven to be one from end to end")
         self.curves.append(chain)
+
+    def _cuts(self, given: AlphaProblem, record: Any, records: Iterator[Any]) -> Any:
+        """How the last curve is cut into arcs, if its record says so; the record that follows."""
+        if not same(record, {"parts": True}):
+            self.arcs = None
+            return record
+        assert self.interval is not None
+        chain, limits = self.curves[-1], Limits((UNDECIDED,) * self.problem.p)
+        parts = parts_of(given, chain, records, limits)
+        arcs, gaps = arcs_over(parts, self.interval, closed=chain.closed)
+        self.arcs = None if self.arcs is None else self.arcs + arcs
+        self.gaps += gaps
+        return next(records, None)
 
     def _compare(self) -> None:
         """Refuse curves that may have a point in common, and so all that they have between the ends of one of them."""
@@ -171,10 +190,3 @@ def _read(
     if not np.all(steps > 0):
         raise ValueError("a step is not positive")
     return (low, high), (np.ldexp(1.0, np.array(force)), np.ldexp(1.0, np.array(length))), steps
-
-
-def _box_from(record: Any, limits: Limits) -> CurveBoxRecord:
-    if not isinstance(record, list) or record[:1] != [CurveBoxRecord.kind]:
-        raise ValueError(f"{quoted(record)} is no box")
-    found: CurveBoxRecord = CurveBoxRecord.read(record, limits)
-    return found

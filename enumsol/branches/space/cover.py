@@ -23,17 +23,20 @@ from enumsol.search.space.piece_tree import OpenLeaf, PieceTree, joined
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.support.deadlines import look, remaining
 from enumsol.trusted.space.curve_chains import apart
+from enumsol.trusted.space.curve_parts import arcs_over
 from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
     from concurrent.futures import Executor
 
     from numpy.typing import NDArray
 
     from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.proof.space_records import CurvePart
     from enumsol.search.outcome import StopReason
     from enumsol.trusted.space.curve_chains import CurveChain
+    from enumsol.trusted.space.curve_parts import Run, Turn
 
     Array = NDArray[np.float64]
 
@@ -148,8 +151,11 @@ class SpaceCover:
         roots = enumerate_roots(self.problem, alpha, max_nodes=_SAMPLED, time_limit=left)
         return [np.concatenate([root.lambda_n, *root.lambda_t.T]) for root in roots]
 
-    def proof(self) -> Proof:
-        """Curves and tree for ``enumsol.verify``."""
+    def proof(self, cuts: Sequence[tuple[Sequence[Run | Turn], Sequence[CurvePart]]] | None = None) -> Proof:
+        """Curves and tree for ``enumsol.verify``.
+
+        ``cuts``: of every curve the parts into which it is cut, and their records, for a proof that has arcs.
+        """
         writer = ProofWriter()
         writer.write(
             {
@@ -164,18 +170,26 @@ class SpaceCover:
                 "steps": AlphaProblem.of(self.problem.enclosure).steps.tolist(),
             }
         )
-        for chain in self.chains:
+        arcs, open_parts = None if cuts is None else 0, 0
+        for number, chain in enumerate(self.chains):
             writer.write({"curve": len(chain.links)})
             for k, joint in enumerate(chain.joints):
                 writer.write(CurveBoxRecord.around(joint.box).write())
                 if k < len(chain.links):
                     writer.write(CurveBoxRecord.around(chain.links[k].curve.box).write())
+            if cuts is not None and arcs is not None:
+                parts, records = cuts[number]
+                writer.write({"parts": True})
+                for part in records:
+                    writer.write(part.write())
+                inside, gaps_between = arcs_over(parts, self.interval, closed=chain.closed)
+                arcs, open_parts = arcs + inside, open_parts + len(gaps_between)
         writer.write({"tree": True})
-        leaves, gaps = 0, len(self.ends)
+        leaves, gaps = 0, len(self.ends) + open_parts
         for record in self.records:
             is_open = isinstance(record, OpenLeaf)
             gaps += is_open
             leaves += is_open or record.kind not in ("a", "b")
             writer.write((UndecidedRecord(_OPEN) if is_open else record).write())
-        writer.write({"curves": len(self.chains), "leaves": leaves, "gaps": gaps})
+        writer.write({"curves": len(self.chains), "arcs": arcs, "leaves": leaves, "gaps": gaps})
         return writer.close()

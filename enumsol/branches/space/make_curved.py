@@ -13,8 +13,8 @@ from enumsol.arithmetic.algebraic import EnclosedAlpha
 from enumsol.arithmetic.rationals import rational
 from enumsol.branches.elements import Arc, ArcValues, VertexKind, make_vertex, sides_of, tangential, with_exact_zeros
 from enumsol.branches.remedies import END_ELSEWHERE, TOLD_APART
-from enumsol.branches.space.pieces import Run, Turn
 from enumsol.model.statuses import ContactStatus, space_status
+from enumsol.trusted.space.curve_parts import Run, Turn, ends_of, side_of
 from enumsol.trusted.space.solution_curve import AlphaProblem, curve_point
 
 if TYPE_CHECKING:
@@ -161,7 +161,7 @@ class CurvedGraph:
         for part in parts:
             if part in open_ends:
                 continue
-            if isinstance(part, Turn) and not part.settled and self._side(part.alphas) in (0, None):
+            if isinstance(part, Turn) and not part.settled and side_of(part.alphas, self.interval) in (0, None):
                 low, high = (float(end) for end in part.alphas)
                 self._leave_open(
                     f"between alpha = {low!r} and {high!r} it stayed open how a curve changes its statuses or turns, "
@@ -180,8 +180,8 @@ class CurvedGraph:
     def _tell_ends(self, ends: Sequence[Bounds], remedy: str) -> None:
         """Say where a curve that is not whole ends inside the interval."""
         a, b = self.interval
-        places = [(max(low, a) + min(high, b)) / 2 for low, high in ends if self._side((low, high)) in (0, None)]
-        inside = [f"{float(alpha):.8g}" for alpha in places]
+        near = [(max(low, a), min(high, b)) for low, high in ends if side_of((low, high), (a, b)) in (0, None)]
+        inside = [f"{float((low + high) / 2):.8g}" for low, high in near]
         if inside:
             self.reasons.append(f"a curve was not followed beyond its ends at alpha = {' and '.join(inside)}; {remedy}")
 
@@ -189,20 +189,18 @@ class CurvedGraph:
         run = parts[k]
         if not isinstance(run, Run):
             return
-        # in the order of alpha; a closed curve goes on from its end to its first turn
-        before, after = k - 1, (k + 1) % len(parts) if closed else k + 1
-        ends = [(before, run.start), (after, run.end)][:: run.rises]
-        sides = [self._side(self._alphas(parts, number, beyond)) for number, beyond in ends]
+        ends = ends_of(parts, k, closed=closed)
+        sides = [side_of(alphas, self.interval) for _, alphas, _ in ends]
         if sides[0] == 1 or sides[1] == -1:
             return
         numbers: list[int] = []
         inner: list[Fraction | None] = []
-        for (number, beyond), side, way in zip(ends, sides, (-1, 1), strict=True):
-            if side == way:
+        for (number, _, beyond), side, way in zip(ends, sides, (-1, 1), strict=True):
+            # an end that is not open is beyond the interval
+            if number is None or side == way:
                 numbers.append(self._border(run, self.interval[way > 0]))
                 inner.append(None)
                 continue
-            # an end that is not open is beyond the interval
             turn = cast("Turn", parts[number])
             if number not in known:
                 known[number] = self._turn(turn, settled=turn.settled and side == 0)
@@ -231,20 +229,6 @@ class CurvedGraph:
 
     def _limits(self, number: int, inner: Fraction | None) -> Fraction:
         return sum(self._places[number].alphas, Fraction(0)) / 2 if inner is None else inner
-
-    def _alphas(self, parts: Sequence[Run | Turn], number: int, beyond: Bounds) -> Bounds:
-        """Bounds of alpha at an end of a run."""
-        turn = parts[number] if 0 <= number < len(parts) else None
-        return turn.alphas if isinstance(turn, Turn) else beyond
-
-    def _side(self, alphas: Bounds) -> int | None:
-        """-1 below the interval, 0 inside, 1 above it; None where it may be either."""
-        (a, b), (low, high) = self.interval, alphas
-        if high < a:
-            return -1
-        if low > b:
-            return 1
-        return 0 if a < low and high < b else None
 
     def _border(self, run: Run, alpha: Fraction) -> int:
         x = self._values(run).point(float(alpha))

@@ -43,11 +43,15 @@ _CUTS = (0.5, 0.4375, 0.59375)
 
 
 def runs_and_turns(
-    problem: AlphaProblem, chain: CurveChain, found: list[Run | Turn] | None = None, records: list[CurvePart] | None = None
+    problem: AlphaProblem,
+    chain: CurveChain,
+    found: list[Run | Turn] | None = None,
+    records: list[CurvePart] | None = None,
 ) -> list[Run | Turn]:
     """Those of a curve, in its order; see ``in_order``.
 
-    ``found`` is filled on the way, so that it has what there is when the time is over; ``records`` with those of a proof.
+    ``found`` is filled on the way, so that it has what there is when the time is over, and ``records`` with those of a
+    proof.
     """
     found, nearness = [] if found is None else found, _TRIALS // 2
     for k, (link, start, end) in enumerate(zip(chain.links, chain.joints[:-1], chain.joints[1:], strict=True)):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from enumsol.branches.graph import BranchGraph
@@ -11,7 +12,7 @@ from enumsol.branches.graph_data import GraphStats
 from enumsol.branches.remedies import ANOTHER_INTERVAL, MORE_TIME, SHORT_INTERVAL
 from enumsol.branches.space.cover import SpaceCover
 from enumsol.branches.space.make_curved import CurvedGraph
-from enumsol.branches.space.pieces import Run, runs_and_turns
+from enumsol.branches.space.pieces import runs_and_turns
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.errors import Interrupted
 from enumsol.proof.space_records import CutPiece
@@ -19,6 +20,7 @@ from enumsol.search.outcome import Stop, StopReason
 from enumsol.search.space.piece_tree import joined
 from enumsol.support.deadlines import Deadline, TimeOverError, within
 from enumsol.support.messages import counted
+from enumsol.trusted.space.curve_parts import Run
 from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
@@ -27,8 +29,9 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
     from enumsol.branches.elements import Arc, Vertex
-    from enumsol.branches.space.pieces import Turn
     from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.proof.space_records import CurvePart
+    from enumsol.trusted.space.curve_parts import Turn
 
 #: Gaps that are named one by one.
 _NAMED = 5
@@ -84,7 +87,7 @@ def space_graph(
             search_seconds=searched - started,
             seconds=time.perf_counter() - started,
         ),
-        make_proof=None if reasons else cover.proof,
+        make_proof=None if reasons else partial(cover.proof, made.cuts),
         left_open=_left_open(cover, made),
     )
     if stop is not None and stop.interrupted:
@@ -101,6 +104,7 @@ class _Elements:
     reasons : what stayed open about the curves
     left_open : ranges of alpha outside of which nothing of that is missing; None where that is not known
     interrupted : whether somebody did that
+    cuts : of every curve the parts into which it is cut, and their records; None where the time was over before that
     """
 
     vertices: Sequence[Vertex] = ()
@@ -108,6 +112,7 @@ class _Elements:
     reasons: Sequence[str] = ()
     left_open: Sequence[tuple[Fraction, Fraction]] | None = ()
     interrupted: bool = False
+    cuts: Sequence[tuple[Sequence[Run | Turn], Sequence[CurvePart]]] | None = ()
 
 
 def _elements(
@@ -123,12 +128,16 @@ def _elements(
         return _Elements()
     given = AlphaProblem.of(cover.problem.enclosure)
     made, whole, interrupted = CurvedGraph(cover.problem, given, interval), True, False
+    cuts: list[tuple[Sequence[Run | Turn], Sequence[CurvePart]]] = []
     for k, chain in enumerate(curves):
         found: list[Run | Turn] = []
         try:
             if progress is not None:
                 progress("arcs", k / len(curves))
-            made.add(runs_and_turns(given, chain, found), chain.ends, remedy, closed=chain.closed)
+            records: list[CurvePart] = []
+            parts = runs_and_turns(given, chain, found, records)
+            made.add(parts, chain.ends, remedy, closed=chain.closed)
+            cuts.append((parts, records))
         except TimeOverError:
             cut = f"the time was over before curve {k + 1} of {len(curves)} was cut into arcs"
             made.reasons.append(f"{cut}; {MORE_TIME}")
@@ -142,7 +151,8 @@ def _elements(
         if progress is not None:
             progress("arcs", 1.0)
     vertices, arcs = made.made()
-    return _Elements(vertices, arcs, made.reasons, made.left_open if whole else None, interrupted)
+    left_open, known = (made.left_open, cuts) if whole else (None, None)
+    return _Elements(vertices, arcs, made.reasons, left_open, interrupted, known)
 
 
 def _ends_of(parts: Sequence[Run | Turn]) -> tuple[Any, Any]:

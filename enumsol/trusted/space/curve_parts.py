@@ -154,20 +154,23 @@ def arcs_over(parts: Sequence[Run | Turn], interval: Range, *, closed: bool) -> 
             if side is None or (side == 0 and not turn.settled):
                 gaps.append((max(turn.alphas[0], interval[0]), min(turn.alphas[1], interval[1])))
     ends = [ends_of(parts, k, closed=closed) for k, part in enumerate(parts) if isinstance(part, Run)]
-    sides = [[side_of(alphas, interval) for _, alphas in both] for both in ends]
+    sides = [[side_of(alphas, interval) for _, alphas, _ in both] for both in ends]
     return sum(low != 1 and high != -1 for low, high in sides), gaps
 
 
-def ends_of(parts: Sequence[Run | Turn], k: int, *, closed: bool) -> list[tuple[int | None, Range]]:
-    """The lower and the upper end of a run: the number of the turn there, if there is one, and bounds of alpha."""
+def ends_of(parts: Sequence[Run | Turn], k: int, *, closed: bool) -> list[tuple[int | None, Range, Range]]:
+    """The lower and the upper end of a run: the number of a turn there, bounds of alpha, and those of the run itself.
+
+    None in place of a number where there is no turn.
+    """
     run = parts[k]
     assert isinstance(run, Run)
     # a closed curve goes on from its end to its first turn
     numbers = k - 1, (k + 1) % len(parts) if closed else k + 1
-    found: list[tuple[int | None, Range]] = []
-    for number, beyond in zip(numbers, (run.start, run.end), strict=True):
+    found: list[tuple[int | None, Range, Range]] = []
+    for number, own in zip(numbers, (run.start, run.end), strict=True):
         turn = parts[number] if 0 <= number < len(parts) else None
-        found.append((number, turn.alphas) if isinstance(turn, Turn) else (None, beyond))
+        found.append((number, turn.alphas, own) if isinstance(turn, Turn) else (None, own, own))
     return found[:: run.rises]
 
 
@@ -328,7 +331,7 @@ class LinkParts:
         return Turn(alphas, 0.5 * (before.x + after.x), (one, other), settled=True)
 
     def behind(self, after: Place, end: Place) -> tuple[SolutionCurve | None, Place, Place, Codes | None]:
-        """What follows a corner: a curve that has both places and the statuses there, where these do not change again."""
+        """What follows a corner, as a part: the link's curve and the statuses, where these do not change again."""
         known = after.codes == end.codes
         return (self.curve if known else None), after, end, (end.codes if known else None)
 
