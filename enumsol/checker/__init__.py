@@ -53,8 +53,8 @@ What checker and search share
       ``trusted.space.curve_chains``, that boxes hold one curve, ``trusted.space.pieces``, what holds over a
       piece of alpha, ``trusted.space.leaf_arcs``, that the solutions of an assignment there are one arc,
       ``trusted.space.curve_runs``, bounds of a curve there, and ``trusted.space.piece_forms``, the test that it has
-      all solutions with some statuses (where such a curve changes its statuses or turns back is a matter of
-      ``trusted.space.curve_events``: a proof does not hold that, and it is not checked);
+      all solutions with some statuses; ``trusted.space.curve_parts``, into which arcs a curve is cut, with the
+      derivatives of ``trusted.space.curve_events``;
       ``model.sectors``, the ends of sectors; ``condensation.space_condensed``, balls for S and g in the
       variables in which friction is isotropic; of bodies that nothing holds the same with G and h,
       and ``trusted.space.resultants``, what multipliers and balance prove; ``model.problem3d``
@@ -64,7 +64,7 @@ What checker and search share
     - ``condensation.unloaded`` and ``condensation.free_displacements``: the alpha at which g vanishes, and for the
       search whether it does at all (then there is no proof), and the solution of A X = K in rationals;
       ``condensation.data``: F(alpha) and f(alpha) without rounding; of ``arithmetic.rationals`` the pivots of a
-      definite matrix, and floats as rationals;
+      definite matrix, and floats as rationals (that the search cuts intervals at simple numbers proves nothing);
     - ``proof.proof_file`` and of ``proof.reading`` what a fraction in a proof may be: the file;
     - ``proof.records`` and, for problems in 3D, ``proof.space_records``: what a record of each kind may say. The search
       writes records by these classes, the checkers read them by the same ones, strictly, and so does a search that

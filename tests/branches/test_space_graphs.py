@@ -34,11 +34,12 @@ from enumsol.branches.elements import VertexKind
 from enumsol.branches.space import chains, cover, pieces
 from enumsol.branches.space.chains import chain_through
 from enumsol.branches.space.make_curved import unordered
-from enumsol.branches.space.pieces import Run, Turn, orders, runs_and_turns
+from enumsol.branches.space.pieces import runs_and_turns
 from enumsol.continuation.path_data import PathStatus
 from enumsol.support.deadlines import TimeOverError, within
 from enumsol.trusted.space.curve_chains import CurveChain
 from enumsol.trusted.space.curve_events import CurveMotion
+from enumsol.trusted.space.curve_parts import Run, Turn, orders
 from enumsol.trusted.space.sector_rows import OPEN, STICK
 from enumsol.trusted.space.solution_curve import SLIP, AlphaProblem, curve_point
 

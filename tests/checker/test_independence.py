@@ -36,7 +36,9 @@ SEARCH = (
 #: What may write a false proof and accept it: of these modules the search uses no more than these names; None: all.
 SHARED = {
     "arithmetic.balls": {*("Ball", "SAFE", "TINY", "UNIT", "factor_above", "smaller", "solution", "upper_norm")},
-    "arithmetic.rationals": {"as_objects", "is_positive_definite", "rational", "rational_matrix", "to_fraction"},
+    "arithmetic.rationals": {
+        *("as_objects", "is_positive_definite", "rational", "rational_matrix", "simplest", "to_fraction")
+    },
     "condensation.data": {"Data", "EXACT_DOF_LIMIT", "ProblemData", "exactly_at"},
     "condensation.enclosure": {"CondensedEnclosure", "EnclosedSystem", "NotEnclosedError"},
     "condensation.free_displacements": {"solved"},
@@ -76,6 +78,7 @@ SHARED = {
     "trusted.space.solution_curve": None,
     "trusted.space.curve_chains": None,
     "trusted.space.curve_events": None,
+    "trusted.space.curve_parts": None,
     "trusted.space.curve_runs": {"CurveParts", "KnownCurve", "Run"},
     "trusted.space.piece_forms": {"PieceWeights", "how_far_off"},
     "trusted.space.pieces": {"AlphaPiece", "lie_along"},

@@ -75,18 +75,18 @@ def test_where_a_curve_ends_inside_the_interval_an_arc_says_nothing():
 def test_an_end_inside_the_interval_is_a_gap():
     problem, records = leaf_by_leaf(*ROWS)
     curve, place = cut_short(records), records.index({"tree": True}) - 2
-    tree = [{"tree": True}, ["u", "no time"], {"curves": 1, "leaves": 1, "gaps": 2}]
+    tree = [{"tree": True}, ["u", "no time"], {"curves": 1, "arcs": None, "leaves": 1, "gaps": 2}]
     report = accepted_report(problem, proof_of([*curve[:place], *tree]))
     assert (report.complete, report.curves, report.open) == (False, 1, 2)
     for gaps in (0, 1):
-        forged = [*curve[:place], *tree[:-1], {"curves": 1, "leaves": 1, "gaps": gaps}]
+        forged = [*curve[:place], *tree[:-1], {"curves": 1, "arcs": None, "leaves": 1, "gaps": gaps}]
         assert "the counts at the end" in why_refused(problem, forged)
 
 
 def test_a_curve_alone_says_nothing():
     problem, records = leaf_by_leaf(*ROWS)
     place = records.index({"tree": True}) + 1
-    claim = {"curves": 1, "leaves": 1, "gaps": 0}
+    claim = {"curves": 1, "arcs": None, "leaves": 1, "gaps": 0}
     assert "claimed where statuses are still open" in why_refused(problem, [*records[:place], ["n"], claim])
     assert "tree over alpha ends before all of it is decided" in why_refused(problem, records[:place])
 
@@ -135,7 +135,7 @@ def test_the_check_ends_after_many_failures():
     problem, records = leaf_by_leaf(*ROWS)
     place, parts, nothing = records.index({"tree": True}) + 1, 64, ["x", [], "", ""]
     cuts = [part for k in range(1, parts) for part in (["a", f"{k}/{parts}"], nothing)]
-    claim = {"curves": 1, "leaves": parts, "gaps": 0}
+    claim = {"curves": 1, "arcs": None, "leaves": parts, "gaps": 0}
     said = why_refused(problem, [*records[:place], *cuts, nothing, claim])
     assert said.count("its multipliers do not exclude it") == 20
     assert "the check ends after 20 failures" in said

@@ -58,7 +58,7 @@ class Parts:
         """Make the counts at the end those of the records."""
         leaves = [record for record in self.tree if record[0] not in "ab"]
         gaps = sum(record[0] == "u" for record in leaves)
-        self.counts = {"curves": len(self.curves), "leaves": len(leaves), "gaps": gaps}
+        self.counts = {"curves": len(self.curves), "arcs": None, "leaves": len(leaves), "gaps": gaps}
 
     def first_boxes(self):
         """The number of the first box of every curve, and that of all boxes."""
