@@ -110,6 +110,11 @@ def test_the_document_has_a_row_for_every_kind_of_leaf(number, kinds):
     assert set(re.findall(r'^\| `\["(\w)"', section(number), re.M)) == set(kinds)
 
 
+def test_the_document_has_a_line_for_every_kind_of_part_of_a_curve():
+    told = dict(re.findall(r'^- `\["(\w)", (.*?)\]`', section("7.8"), re.M))
+    assert {kind: len(boxes.split(",")) for kind, boxes in told.items()} == space_records.PARTS
+
+
 @pytest.mark.parametrize(
     ("number", "kinds"), [("5.6", records.FLOATING_LEAVES), ("7.7", space_records.FLOATING_LEAVES)]
 )
