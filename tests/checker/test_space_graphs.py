@@ -33,7 +33,7 @@ def test_a_proof_says_that_all_solutions_lie_on_its_curves(p, seed):
     assert report.complete
     assert f"every solution for every alpha in [0, 1] lies on {report.curves} curve" in repr(report)
     assert report.curves == len(cover.chains)
-    boxes = [box for chain in cover.chains for box in chain.boxes]
+    boxes = [link.curve.box for chain in cover.chains for link in chain.links]
     given = AlphaProblem.of(cover.problem.enclosure)
     for alpha in np.linspace(0.01, 0.99, 7):
         roots = all_roots(cover.problem, alpha)
