@@ -97,8 +97,8 @@ class GraphVerificationReport:
     data : str
         "problem": about the problem's own matrices; "condensed": about S and g as computed.
     arcs : int or None
-        Arcs of these selections, in 3D of the curves, all of them checked with their ends; None where the proof does
-        not hold them.
+        Arcs of these selections, in 3D those that the proof tells apart on the curves, all of them checked with their
+        ends; None where the proof does not hold them.
     open : int
         Short intervals of alpha in which the proof leaves open what some selection does.
     closed : int

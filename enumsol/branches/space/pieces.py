@@ -1,6 +1,7 @@
 """Cuts curves in 3D into runs, on which statuses hold and alpha goes one way, and turns between them.
 
-Where to cut is found in floats; what holds of the parts is shown in ``trusted.space.curve_parts`` (theory, 12.10).
+Where to cut is found in floats; what holds of the parts is shown in ``trusted.space.curve_parts``
+(theory, section 12.10).
 """
 
 from __future__ import annotations
