@@ -143,6 +143,7 @@ def mutated(rng, records):
     return found
 
 
+@pytest.mark.few(1, 3)
 @pytest.mark.parametrize("name", PROBLEMS)
 @pytest.mark.parametrize("seed", range(3))
 def test_mutants_say_nothing_wrong(name, seed):
