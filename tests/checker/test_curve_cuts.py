@@ -150,7 +150,7 @@ def test_mutants_say_nothing_wrong(name, seed):
     """What is accepted has as many arcs as the graph."""
     problem, graph, records = proven(name)
     rng, accepted = np.random.default_rng(seed), 0
-    for _ in range(25):
+    for _ in range(10):
         mutant = mutated(rng, records)
         try:
             report = verify(problem, proof_of(mutant))
@@ -158,7 +158,7 @@ def test_mutants_say_nothing_wrong(name, seed):
             continue
         accepted += report.ok
         assert not report.ok or report.arcs == len(graph.arcs)
-    assert accepted < 25
+    assert accepted < 10
 
 
 def test_folds_are_between_two_arcs():
