@@ -41,15 +41,12 @@ def parts_of(problem: AlphaProblem, chain: CurveChain, records: Iterator[Any], l
     RefusedError
         A record is no part, or does not prove what it says.
     """
-    links = (LinkCuts(problem, link, records, limits).parts(*ends) for link, ends in _with_ends(chain))
+    joined = zip(chain.links, chain.joints[:-1], chain.joints[1:], strict=True)
+    links = (LinkCuts(problem, link, records, limits).parts(*ends) for link, *ends in joined)
     found = in_order(links, closed=chain.closed)
     if found is None:
         raise RefusedError("a curve changes its statuses where two of its boxes meet")
     return found
-
-
-def _with_ends(chain: CurveChain) -> Iterator[tuple[CurveLink, tuple[SolutionCurve, SolutionCurve]]]:
-    return zip(chain.links, zip(chain.joints[:-1], chain.joints[1:], strict=True), strict=True)
 
 
 class LinkCuts(LinkParts):

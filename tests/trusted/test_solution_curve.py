@@ -9,6 +9,7 @@ from problems3d import SLIDING, forces, from_compliance, random_compliance, slid
 
 import enumsol
 from enumsol.arithmetic.balls import Ball
+from enumsol.branches.space.pieces import status_margin
 from enumsol.trusted.space.sector_rows import OPEN, STICK
 from enumsol.trusted.space.solution_curve import (
     SLIP,
@@ -18,7 +19,6 @@ from enumsol.trusted.space.solution_curve import (
     lies_in,
     only_curve,
     parameter_in,
-    status_margin,
 )
 
 GIVEN = AlphaProblem.of(SLIDING.enclosure)

@@ -16,7 +16,8 @@ from enumsol.proof.space_records import CurveBoxRecord, CurvePart
 from enumsol.support.deadlines import look, tell
 from enumsol.trusted.space.curve_events import CurveMotion
 from enumsol.trusted.space.curve_parts import LinkParts, Place, Run, Turn, in_order, put_behind
-from enumsol.trusted.space.solution_curve import curve_around, curve_point, status_margin
+from enumsol.trusted.space.sector_rows import OPEN, STICK
+from enumsol.trusted.space.solution_curve import SLIP, curve_around, curve_point
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -70,6 +71,16 @@ def _put(found: list[Run | Turn], parts: Sequence[Run | Turn]) -> None:
     """Put parts behind others."""
     if not put_behind(found, parts):
         raise AssertionError("a curve changes at a regular point")
+
+
+def status_margin(problem: AlphaProblem, z: Array, nodes: Sequence[int], codes: Sequence[int]) -> float:
+    """The least of the conditions of nodes' statuses at (z, alpha), negative where one does not hold."""
+    i = np.asarray(nodes)
+    normal, F = z[i], np.maximum(problem.F0 + z[-1] * problem.F1, 0.0)[i]
+    tangent = np.where(problem.places[i] >= 0, z[problem.places[i]], 0.0)
+    gap = np.linalg.norm(tangent, axis=1) - F * normal
+    status, sticks, slips = np.asarray(codes), np.minimum(normal, -gap), np.minimum(normal, gap)
+    return float(np.min(np.select([status == OPEN, status == STICK, status == SLIP], [-normal, sticks, slips], normal)))
 
 
 class LinkCutter(LinkParts):

@@ -637,9 +637,9 @@ class PieceTree:
                 for point in points_on(arc, known, parts, codes):
                     there, root = whole.root_at(*point)
                     number = None if root is None else self._box(there, root)
-                    if root is None or number is None or not arc.has(root, point[1]):
+                    if root is None or number is None or not self._runs_through(number, whole):
                         continue
-                    if not self._runs_through(number, whole):
+                    if not arc.has(root, point[1]):
                         continue
                     if self._has(whole, codes, found, root, point[1]):
                         ends = str(whole.low), str(whole.high)

@@ -568,16 +568,6 @@ def curve_point(problem: AlphaProblem, x: Array, border: Array) -> CurvePoint | 
     return CurvePoint(x * unit, found[:, 1] * unit, statuses, z) if np.all(np.isfinite(found)) else None
 
 
-def status_margin(problem: AlphaProblem, z: Array, nodes: Sequence[int], codes: Sequence[int]) -> float:
-    """The least of the conditions of nodes' statuses at (z, alpha), negative where one does not hold; no claim."""
-    i = np.asarray(nodes)
-    normal, F = z[i], np.maximum(problem.F0 + z[-1] * problem.F1, 0.0)[i]
-    tangent = np.where(problem.places[i] >= 0, z[problem.places[i]], 0.0)
-    gap = np.linalg.norm(tangent, axis=1) - F * normal
-    status, sticks, slips = np.asarray(codes), np.minimum(normal, -gap), np.minimum(normal, gap)
-    return float(np.min(np.select([status == OPEN, status == STICK, status == SLIP], [-normal, sticks, slips], normal)))
-
-
 def _projected(problem: AlphaProblem, z: Array) -> tuple[Array, Array]:
     """P of arguments (z, alpha) and a derivative of it, (3p,) and (3p, 3p + 1), in floats."""
     p, m = problem.p, len(z) - 1
@@ -768,7 +758,9 @@ class _CurveMap:
 
         None where its middle matrix is singular or there is no bound of derivatives.
         """
-        m, corners = len(self.c) - 1, self._corners(extent)
+        m = len(self.c) - 1
+        near = extent.near
+        corners = Discs(self.problem.places, self.problem.friction(near[m]), self.problem.F1).corners(near[:m], extent)
         if corners is None:
             return None
         B = self._bordered(corners)
@@ -792,10 +784,6 @@ class _CurveMap:
         pushed = 0.5 * (V @ d)[:, 0].size
         drifts = (rest.size + turning) * SAFE
         return Step(move, (E + turned) * SAFE, G, V, Y, drifts, first, (np.abs(along) + pushed) * SAFE)
-
-    def _corners(self, extent: Extent) -> Corners | None:
-        near, m = extent.near, len(self.c) - 1
-        return Discs(self.problem.places, self.problem.friction(near[m]), self.problem.F1).corners(near[:m], extent)
 
     @cached_property
     def _moved(self) -> Ball:
