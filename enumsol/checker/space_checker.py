@@ -25,13 +25,13 @@ from enumsol.trusted.space.product_forms import Ellipsoid, refines
 from enumsol.trusted.space.resultants import floating_margin, is_unbalanced_in_space, unbounded
 from enumsol.trusted.space.sector_rows import STICK, UNDECIDED, is_sector_covering, sector_margin
 from enumsol.trusted.space.slip_forms import SlipForm
-from enumsol.trusted.space.space_uniqueness import OnlySolution, lone_root, only_root, only_solution_in_space
+from enumsol.trusted.space.space_uniqueness import lone_root, only_root, only_solution_in_space
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from enumsol.checker.walk import Test
-    from enumsol.support.array_types import Codes, Floats, Mask
+    from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.space.space_uniqueness import LooseSolution
 
 
@@ -146,7 +146,7 @@ class SpaceChecker(TreeChecker):
         if found is None:
             return "it holds no root"
         self.roots.append((codes, found))
-        self._locate(found.y, np.array(codes) == STICK)
+        self._locate(found, codes)
         return self._placed(found, said.enclosure)
 
     def _missed(self, codes: Codes, said: space_records.MissedByProducts) -> str | None:
@@ -190,7 +190,7 @@ class SpaceChecker(TreeChecker):
         if not within(box):
             return "its roots are not proven to lie in its box"
         self.boxed.append((codes, found))
-        self._locate(found.y, ~(found.slip | found.open))
+        self._locate(found)
         return self._placed(found, said.enclosure)
 
     def _only(self, codes: Codes, said: space_records.OnlyRoot) -> str | None:
@@ -201,7 +201,7 @@ class SpaceChecker(TreeChecker):
             if found is None:
                 return "its root is not proven to be the only one in it"
             self.roots.append((said.leaf, found))
-            self._locate(found.y, np.array(said.leaf) == STICK)
+            self._locate(found, said.leaf)
             return self._placed(found, said.enclosure)
         if said.leaf:
             found = only_root(self.system, said.numbers, said.leaf)
@@ -210,8 +210,7 @@ class SpaceChecker(TreeChecker):
         if found is None:
             return "its solution is not proven to be the only one"
         self.regular += 1
-        statuses = np.array(said.leaf)
-        self._locate(found.y, ~(found.slip | found.open) if isinstance(found, OnlySolution) else statuses == STICK)
+        self._locate(found, said.leaf)
         return self._placed(found, said.enclosure)
 
     def _placed(self, found: SpaceRoot | LooseSolution, said: EnclosureRecord) -> str | None:
@@ -234,19 +233,24 @@ class SpaceChecker(TreeChecker):
     def locate_rational_roots(self) -> None:
         """Nothing: in 3D there are none."""
 
-    def _locate(self, y: Ball, still: Mask) -> None:
-        """Take note of a root's forces in the problem's units; ``still`` tells nodes that stick for certain."""
+    def _locate(self, found: SpaceRoot | LooseSolution, leaf: Codes = ()) -> None:
+        """Take note of a root's forces in the problem's units, and of its statuses."""
         if self.located is None:
             return
-        p, system = self.problem.p, self.system
+        p, system, y = self.problem.p, self.system, found.y
         forces = Ball(np.zeros(3 * p), np.zeros(3 * p))
         forces[:p] = Ball(y.mid[:p] * self.force, y.rad[:p] * self.force + TINY)
         for k in (0, 1):
             nodes = np.flatnonzero(system.tau[:, k] >= 0)
             part = y[system.tau[nodes, k]] * Ball(system.F[nodes, k], system.F_rad[nodes, k])
             forces[(1 + k) * p + nodes] = Ball(part.mid * self.force[nodes], part.rad * self.force[nodes] + TINY)
+        certain: tuple[int, ...] | None = tuple(leaf)
+        if isinstance(found, SpaceRoot):
+            still = np.array(leaf) == STICK
+        else:
+            certain, still = found.certain(np.any(system.tau >= 0, axis=1)), ~(found.slip | found.open)
         # where a coefficient is 0 a sticking node may move all the same
-        self.locate(forces, np.concatenate([still & (system.tau[:, k] >= 0) for k in (0, 1)]))
+        self.locate(forces, np.concatenate([still & (system.tau[:, k] >= 0) for k in (0, 1)]), certain)
 
     def _claim(self, isolated: int, families: int) -> dict[str, int]:
         return {"roots": self.regular + isolated, "undecided": self.undecided, "leaves": self.leaves}

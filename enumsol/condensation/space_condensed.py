@@ -210,6 +210,12 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
         """Radii of the discs of tau over lambda_n, shape (p,): one, but over a piece of alpha (see PieceSpace)."""
         return Ball.exact(np.ones(len(self.F)))
 
+    @cached_property
+    def inverse_friction(self) -> Ball:
+        """1 / F, shape (p, 2), 1 where F is 0: what takes an entry of w to the displacement of a row in its units."""
+        F = np.where(self.F > 0, self.F, 1.0)
+        return Ball(1.0 / F, (2.0 * self.F_rad / F + 2 * UNIT) / F * SAFE)
+
     @property
     def end_discs(self) -> tuple[Ball, ...]:
         """``discs`` at both ends of the piece, between which they are affine in alpha; once where there is no piece."""

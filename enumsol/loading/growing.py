@@ -49,6 +49,8 @@ if TYPE_CHECKING:
     Shape = tuple[tuple[Any, ...], ...]
 
 
+#: What may decide a step in 3D whose start is known too little.
+_CURE = "change the load of this step slightly, or hold the body by stiffer springs"
 #: Histories that are compared at most.
 _MOST = 20_000
 
@@ -425,7 +427,9 @@ class _Growing:
         known = f"its start is known within {radius:.1e} only"
         if not alone.complete:
             return f"{text}; {known}, and its midpoint alone leaves something undecided, too"
-        return f'{text}, because {known}: its midpoint alone is decided; arithmetic "exact" may decide it'
+        # in 3D there is no exact arithmetic
+        cure = 'arithmetic "exact" may decide it' if item.start.offset.ndim == 1 else _CURE
+        return f"{text}, because {known}: its midpoint alone is decided; {cure}"
 
     def _ends(self, stage: Stage, item: _Waiting, nodes: list[Node], following: list[_Waiting]) -> None:
         """Add where the followed roots of a stage leave the contact nodes to the starts of the next step."""

@@ -125,11 +125,29 @@ def _enclosed_positions(stage: Stage, root: Root) -> Ball | None:
     try:
         enclosure = stage.problem.enclosure
         forces = _forces(root)
-        codes = certain_statuses(forces, _middle(low, high)) if root.u_t.ndim == 1 else None
+        plane = root.u_t.ndim == 1
+        codes = (
+            certain_statuses(forces, _middle(low, high))
+            if plane
+            else _certain(root, stage.problem.friction_at(root.alpha))
+        )
         moved = tangential_positions(enclosure, Fraction(root.alpha), forces, still, before, codes)
     except NotEnclosedError:
         return None
     return moved if np.all(np.isfinite(moved.rad)) else None
+
+
+def _certain(root: Root, friction: Floats) -> tuple[int, ...] | None:
+    """Open, stick or slip for every node in 3D; None where a status is not certain."""
+    codes = []
+    for active, rubs in zip(root.active, np.any(friction > 0, axis=1).tolist(), strict=True):
+        known = (
+            active if rubs else {status if status is ContactStatus.OPEN else ContactStatus.SLIP for status in active}
+        )
+        if len(known) > 1:
+            return None
+        codes.append(_CODES.index(*known))
+    return tuple(codes)
 
 
 def _forces(root: Root) -> Ball:
@@ -156,6 +174,7 @@ def contact_displacements(problem: Any, root: Root) -> Floats:
     return np.concatenate([root.u_n + problem.gap, (root.u_t + problem.slip_offset).ravel()])
 
 
+_CODES = ContactStatus.OPEN, ContactStatus.STICK, ContactStatus.SLIP
 #: The number of a step, and of a root in it.
 Node = tuple[int, int]
 #: Before the first step.

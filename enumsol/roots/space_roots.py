@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, UNIT, Ball
+from enumsol.arithmetic.balls import SAFE, Ball
 from enumsol.condensation.condensed import Condensation, condensation_of
 from enumsol.condensation.floating import RigidRows
 from enumsol.condensation.space_condensed import FloatingSpace
@@ -133,7 +133,7 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         return scaled[: system.p] * unit, system.tangential(scaled) * system.F * unit[:, None]
 
     def _loose_bounds(self, found: LooseSolution) -> Enclosure:
-        return self._enclosure(found.y, Ball(found.w.mid, np.where(found.w.rad > 0, np.inf, 0.0)))
+        return self._enclosure(found.y, found.w)
 
     def _loose_angles(self, found: LooseSolution) -> Floats:
         return np.array([_around(*pair) for pair in zip(*loose_angles(self.solvers.enclosed, found), strict=True)])
@@ -194,8 +194,9 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         for k in range(3):
             occurs = np.arange(p) if k == 0 else np.flatnonzero(system.tau[:, k - 1] >= 0)
             part = occurs if k == 0 else system.tau[occurs, k - 1]
-            F = Ball.exact(np.ones(p)) if k == 0 else Ball(exact.F[occurs, k - 1], exact.F_rad[occurs, k - 1])
-            inverse = Ball(1.0 / F.mid, (2.0 * F.rad / F.mid + 2 * UNIT) / F.mid * SAFE)
+            F = inverse = Ball.exact(np.ones(p))
+            if k:
+                F, inverse = Ball(exact.F, exact.F_rad)[occurs, k - 1], exact.inverse_friction[occurs, k - 1]
             for ball, scaled, factor, unit in ((forces, y, F, system.force), (known, w, inverse, system.length)):
                 product = scaled[part] * factor
                 zero = (scaled.mid[part] == 0) & (scaled.rad[part] == 0)
@@ -216,8 +217,7 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         if self.arithmetic != "verified":
             return None
         y, w = with_zeros(self.solvers.enclosed, codes, found.y, found.w)
-        # displacements are those of the forces
-        return self._enclosure(y, Ball(w.mid, np.where(w.rad > 0, np.inf, 0.0)), found.rigid)
+        return self._enclosure(y, w, found.rigid)
 
     def _rest(self) -> Root:
         """The unloaded body: nothing moves, and every status holds."""

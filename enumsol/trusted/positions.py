@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.balls import Ball
+from enumsol.arithmetic.balls import Ball, smaller
 from enumsol.trusted.status_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def tangential_positions(
 
     A node with u_t = 0 for certain stays where it was: its ball is carried over unchanged. Any other is where the load
     and the forces move it, theory, (13.2), whatever its own offset was. Where this says little because the body is
-    held by weak springs, and the statuses of all nodes are certain, balls of many digits say it.
+    held by weak springs, and the statuses of all nodes are certain, balls of many digits say it, in 3D a leaf.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def tangential_positions(
     before : Ball of the same shape
         The slip offset [length].
     codes : p status codes or None
-        Those of the root, in 2D, if they are certain.
+        Those of the root, if they are certain; in 3D any one that is neither open nor stick means slip.
     share : float
         Of the radius from which on more digits are asked for.
     """
@@ -84,8 +84,17 @@ def tangential_positions(
     with np.errstate(over="ignore", invalid="ignore"):
         moved = (enclosure.moved_freely(alpha) - (S @ forces[:, None])[:, 0])[p:]
     if codes is not None and not np.max(moved.rad) <= share * _WELL_KNOWN * np.max(np.abs(moved.mid)):
-        moved = _by_many_digits(enclosure.problem, alpha, codes, before) or moved
+        if len(moved.mid) == p:
+            moved = _by_many_digits(enclosure.problem, alpha, codes, before) or moved
+        elif (found := _by_leaf(enclosure, alpha, forces, codes)) is not None:
+            moved = smaller(found, moved)
     return Ball(np.where(still, before.mid, moved.mid), np.where(still, before.rad, moved.rad))
+
+
+def _by_leaf(enclosure: CondensedEnclosure, alpha: Fraction, forces: Ball, codes: Sequence[int]) -> Ball | None:
+    from enumsol.trusted.space.leaf_positions import leaf_positions
+
+    return leaf_positions(enclosure, alpha, forces, codes)
 
 
 def _by_many_digits(problem: ContactProblem, alpha: Fraction, codes: Sequence[int], before: Ball) -> Ball | None:

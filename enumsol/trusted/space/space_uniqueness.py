@@ -56,6 +56,12 @@ class LooseSolution:
     slip: Flags
     index: int
 
+    def certain(self, rubs: Flags) -> tuple[int, ...] | None:
+        """Open, stick or contact (slip) of every node, the last also without friction; None where one is not certain."""
+        several = self.open & (self.stick | self.slip) | rubs & self.stick & self.slip
+        codes = np.where(self.open, OPEN, np.where(rubs & self.stick, STICK, CONTACT))
+        return None if np.any(several) else tuple(codes.tolist())
+
     @classmethod
     def of(cls, system: EnclosedSpace, y: Ball, w: Ball, index: int, **more: Any) -> Self:
         """By the statuses that may hold within balls; what vanishes by those that hold for certain is put to 0."""
