@@ -57,7 +57,7 @@ class LooseSolution:
     index: int
 
     def certain(self, rubs: Flags) -> tuple[int, ...] | None:
-        """Open, stick or contact (slip) of every node, the last also without friction; None where one is not certain."""
+        """Open, stick or contact (slip, or no friction) of every node; None where one is not certain."""
         several = self.open & (self.stick | self.slip) | rubs & self.stick & self.slip
         codes = np.where(self.open, OPEN, np.where(rubs & self.stick, STICK, CONTACT))
         return None if np.any(several) else tuple(codes.tolist())
