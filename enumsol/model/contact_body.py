@@ -433,10 +433,18 @@ def _check_row_rank(contact: Mapping[str, sp.csr_array]) -> None:
         involved = _dependent_rows(unit[members], gram[members][:, members].toarray())
         if len(involved):
             some = ", ".join(names[row] for row in members[involved][:6])
+            freedoms = len(np.unique(unit[members].indices))
             raise InvalidProblemError(
                 f"{stack} has linearly dependent rows ({some}); expected full rank {len(contact)}p = {len(names)} "
-                "(is a contact node listed twice, or held fixed?)"
+                + (_DEPENDENT if freedoms >= len(members) else _REDUNDANT.format(len(members), freedoms))
             )
+
+
+_DEPENDENT = "(is a contact node listed twice, or held fixed?)"
+_REDUNDANT = (
+    "({} rows act on {} degrees of freedom only, so equilibrium does not determine the contact forces; make the contacts "
+    "compliant, by an elastic body or by springs between a rigid one and its contact nodes, or take fewer of them)"
+)
 
 
 def _dependent_rows(unit: sp.csr_array, gram: Floats) -> Indices:

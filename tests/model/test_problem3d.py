@@ -67,6 +67,22 @@ def test_a_table_is_linear_between_and_constant_beyond():
     assert body.friction is table
 
 
+def test_more_contact_rows_than_freedoms_are_said_to_leave_the_forces_open():
+    # a rigid block on four feet: six freedoms
+    feet = np.array([[x, y, 0.0] for x in (-1, 1) for y in (-1, 1)])
+    arms = np.array([np.hstack([np.eye(3), -np.cross(np.eye(3), foot - [0, 0, 1])]) for foot in feet])
+    rows = np.vstack([-arms[:, 2], arms[:, 0], -arms[:, 1]])
+    mass, load = np.diag([1.0, 1.0, 1.0, 0.5, 0.5, 0.8]), np.array([0.3, 0, -1, 0, 0, 0])
+    message = "12 rows act on 6 degrees of freedom only, so equilibrium does not determine the contact forces"
+    bad_problem(message, ContactProblem3D, mass, *np.split(rows, 3), load, friction=0.5)
+    # what the message advises: a spring between the block and every row of its contact nodes
+    stretch, springs = np.hstack([rows, -np.eye(12)]), np.hstack([np.zeros((12, 6)), np.eye(12)])
+    A = 100.0 * stretch.T @ stretch
+    A[:6, :6] += mass
+    held = ContactProblem3D(A, *np.split(springs, 3), np.append(load, np.zeros(12)), friction=0.5)
+    assert enumsol.enumerate_roots(held, 0).unique
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
