@@ -442,8 +442,8 @@ def _check_row_rank(contact: Mapping[str, sp.csr_array]) -> None:
 
 _DEPENDENT = "(is a contact node listed twice, or held fixed?)"
 _REDUNDANT = (
-    "({} rows act on {} degrees of freedom only, so equilibrium does not determine the contact forces; make the contacts "
-    "compliant, by an elastic body or by springs between a rigid one and its contact nodes, or take fewer of them)"
+    "({} rows act on {} degrees of freedom only, so equilibrium does not determine the contact forces; make the "
+    "contacts compliant, by an elastic body or by springs between a rigid one and its contact nodes, or take fewer)"
 )
 
 
