@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from enumsol.model.contact_body import ContactBody
     from enumsol.proof.proof_file import Proof
     from enumsol.roots.root import Root, RootFamily
+    from enumsol.search.tree import TreeSearch
     from enumsol.support.array_types import Alpha
 
 _Solvers = TypeVar("_Solvers", bound=Searchable)
@@ -70,6 +71,7 @@ class Enumeration(ABC, Generic[_Solvers]):
         self.late = False
         self.outcome = SearchOutcome()
         self.unloaded = False
+        self.tree: TreeSearch | None = None
         self.writer: ProofWriter | None = None
         self._begun: BegunProof | None = None
         if self.arithmetic == "verified":
@@ -90,6 +92,8 @@ class Enumeration(ABC, Generic[_Solvers]):
             self._search(limits, executor)
         except KeyboardInterrupt as interruption:
             self.outcome.stopped = Stop(StopReason.INTERRUPTED, self._examined())
+            if self.tree is not None and not self.unloaded:
+                self.tree.add_known()
             partial = self._result()
             message = f"enumerate_roots was interrupted; {counted(len(partial), 'root')} so far"
             raise Interrupted(message, partial) from interruption
@@ -109,7 +113,7 @@ class Enumeration(ABC, Generic[_Solvers]):
     def _search(self, limits: SearchLimits, executor: Executor | None) -> None:
         """Search the tree."""
         solvers = self.solvers
-        search = solvers.search(self.certifier, limits, self.progress)
+        self.tree = search = solvers.search(self.certifier, limits, self.progress)
         earlier = () if self._begun is None or self.writer is None else (self._begun, self.writer.replace)
         self.outcome = search.outcome
         if solvers.unloaded():

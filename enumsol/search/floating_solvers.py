@@ -108,6 +108,9 @@ class FloatingSolvers(HeldByNothing, Solvers):
         """The body on weak springs (theory, section 14.5)."""
         return on_weak_springs(self.scaled, self.rows)
 
+    def _on_springs(self, stiffness: float) -> ScaledSystem:
+        return on_weak_springs(self.scaled, self.rows, stiffness)
+
     def _splitting(self, certifier: Certifier) -> PlaneSplitting:
         return PlaneSplitting(self.scaled.F)
 
@@ -147,17 +150,17 @@ class FloatingReader:
         return RecordedBound(np.zeros(0, dtype=np.intp), np.zeros(0))
 
 
-def on_weak_springs(scaled: ScaledSystem, rows: RigidRows) -> ScaledSystem:
+def on_weak_springs(scaled: ScaledSystem, rows: RigidRows, stiffness: float = WEAK) -> ScaledSystem:
     """The body on weak springs, which the relaxations of the search are about (theory, section 14.5)."""
-    S, g = weakly_held(scaled.S, scaled.g, rows)
+    S, g = weakly_held(scaled.S, scaled.g, rows, stiffness)
     cholesky = np.asarray(np.linalg.cholesky(S), dtype=np.float64)
     return ScaledSystem(S, g, scaled.F, scaled.force, scaled.length, cholesky)
 
 
-def weakly_held(S: Floats, g: Floats, rows: RigidRows) -> tuple[Floats, ...]:
+def weakly_held(S: Floats, g: Floats, rows: RigidRows, stiffness: float = WEAK) -> tuple[Floats, ...]:
     """S and g with weak springs in place of those that they have."""
     G, h = rows.G.mid, rows.h.mid
-    soft = G.T / WEAK
+    soft = G.T / stiffness
     S = S + soft @ G
     return 0.5 * (S + S.T), g + soft @ h
 

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from enumsol.errors import InvalidArgumentError
+from enumsol.search.certifiers.protocol import Refine, UndecidedPart, Unrecorded
 from enumsol.search.tree import TreeSearch
 
 if TYPE_CHECKING:
@@ -13,6 +15,10 @@ if TYPE_CHECKING:
 
     from enumsol.search.certifiers.protocol import Certifier
     from enumsol.search.outcome import SearchLimits, SearchProgress
+    from enumsol.support.array_types import Codes
+
+#: Stiffness of the springs by which a solution of a body that nothing holds is approached, relative to the body's own.
+_SPRINGS = tuple(2.0**-k for k in range(0, 21, 4))
 
 
 class SearchSetup(ABC):
@@ -45,7 +51,30 @@ class SearchSetup(ABC):
             progress=progress,
             closer=self._closer(certifier),
             forms=self._forms(),
+            known_root=lambda: self.known_root,
         )
+
+    @abstractmethod
+    def certifier(self, recorder: Any) -> Certifier:
+        """The certifier of this arithmetic, which writes to a recorder."""
+
+    @cached_property
+    def known_root(self) -> Codes | None:
+        """A complete selection that is proven to hold a root, found without the tree; None where that failed."""
+        certifier = self.certifier(Unrecorded())
+        for codes in self._suggested():
+            if not isinstance(certifier.selection(codes), UndecidedPart | Refine | None):
+                return codes
+        return None
+
+    def _suggested(self) -> list[Codes]:
+        """Complete selections that may hold a root, as far as floats tell, the likeliest first."""
+        found = self._solved(self.relaxed, None)
+        return [] if found is None else found[0]
+
+    @abstractmethod
+    def _solved(self, system: Any, near: Any) -> tuple[list[Codes], Any] | None:
+        """Selections, one of which holds at a solution of a system in floats, and that solution, near another one."""
 
     @abstractmethod
     def _splitting(self, certifier: Certifier) -> Any:
@@ -72,11 +101,24 @@ class HeldByNothing:
     has_solution = False
     offered = '"verified" or "exact"'
     problem: Any
+    #: The system on springs, relative to the body's own stiffness; and as of the solvers of a body that is held.
+    _on_springs: Callable[[float], Any]
+    _solved: Callable[[Any, Any], tuple[list[Codes], Any] | None]
 
     def __init__(self, problem: Any, alpha: Any, arithmetic: Any, *options: Any) -> None:
         if arithmetic == "fast":
             raise InvalidArgumentError(f'arithmetic is "fast" for a body that nothing holds; expected {self.offered}')
         super().__init__(problem, alpha, arithmetic, *options)  # type: ignore[call-arg]
+
+    def _suggested(self) -> list[Codes]:
+        """Those of the body on springs that become weaker and weaker, those on the weakest first."""
+        suggested, near = list[Any](), None
+        for stiffness in _SPRINGS:
+            found = self._solved(self._on_springs(stiffness), near)
+            if found is not None:
+                codes, near = found
+                suggested = codes + [other for other in suggested if other not in codes]
+        return suggested
 
     def _closer(self, certifier: Certifier) -> None:
         """There may be no solution: no certificate takes the place of a tree."""

@@ -11,11 +11,13 @@ import numpy as np
 from enumsol.condensation.data import EXACT_DOF_LIMIT, exactly_at
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.errors import InvalidArgumentError
+from enumsol.model.statuses import UNDECIDED
 from enumsol.proof.writer import Recorder, point_header, unit_exponents
 from enumsol.search.certifiers.float_certifier import FastCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier
-from enumsol.search.fathoming import Closer, Closing
+from enumsol.search.fathoming import Closer, Closing, propose
 from enumsol.search.form_policy import Forms
+from enumsol.search.reduction import WeightSource
 from enumsol.search.resume import PlaneReader, Reader
 from enumsol.search.setup import SearchSetup
 from enumsol.search.splitting import PlaneSplitting
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
     from enumsol.relaxation.engine import Engine
     from enumsol.search.certifiers.protocol import Certifier
     from enumsol.search.certifiers.rational_certifier import ExactCertifier
+    from enumsol.search.fathoming import Point
     from enumsol.selections.rational_selections import ExactSelections
     from enumsol.support.array_types import Alpha, Codes, Floats
     from enumsol.trusted.at_alpha import VerifiedSelection
@@ -189,6 +192,14 @@ class Solvers(SearchSetup):
     @cached_property
     def _engine(self) -> Engine:
         return make_engine(self.relaxed, self.engine)
+
+    def _solved(self, system: ScaledSystem, near: Point | None) -> tuple[list[Codes], Point] | None:
+        codes, none = (UNDECIDED,) * system.p, (np.zeros(2 * system.p), system.g)
+        for start in (none, None) if near is None else (near, none, None):
+            found = propose(system, codes, start, exactly=False, sought=WeightSource.PLAIN)
+            if found is not None:
+                return [found.selection], (found.force, system.g - system.S @ found.force)
+        return None
 
     def _splitting(self, certifier: Certifier) -> PlaneSplitting:
         return PlaneSplitting(self.scaled.F, sliding=certifier.sliding)

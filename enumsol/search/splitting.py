@@ -27,6 +27,12 @@ class Splitting(Protocol):
     def covers(self, node: int, code: int, children: Sequence[int]) -> bool:
         """Whether codes, in any order, cover a partial status of a node."""
 
+    def holds(self, code: int, final: int) -> bool:
+        """Whether a status allows a final one."""
+
+    def towards(self, codes: Codes, node: int, final: int) -> list[int]:
+        """Codes that cover the node's status, which allows a final one."""
+
     def above(self, code: int, deeper: Iterable[int]) -> int:
         """A code of which this one may be a child, and of which the others are parts."""
 
@@ -124,6 +130,15 @@ class PlaneSplitting:
     def covers(self, node: int, code: int, children: Sequence[int]) -> bool:
         """Whether codes, in any order, cover a partial status of a node."""
         return is_covering(code, children, friction=self.friction[node])
+
+    def holds(self, code: int, final: int) -> bool:
+        """Whether a status allows a final one."""
+        return refines(final, code) or final in SLIDING.get(code, ())
+
+    def towards(self, codes: Codes, node: int, final: int) -> list[int]:
+        """Codes of the node's children."""
+        del final
+        return self.children(codes, node, None)
 
     def above(self, code: int, deeper: Iterable[int]) -> int:
         """A code of which this one may be a child, and of which the others are parts."""

@@ -14,6 +14,7 @@ from __future__ import annotations
 import time
 import warnings
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from enumsol.condensation.condensed import ScaledSystem
@@ -27,7 +28,7 @@ from enumsol.search.certifiers.protocol import Bound, Certifier, Refine, Undecid
 from enumsol.search.form_policy import Forms
 from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
 from enumsol.search.splitting import ImposedRows, PlaneSplitting, Splitting, branching_node
-from enumsol.support.deadlines import Deadline, TimeOverError, over, tell, within
+from enumsol.support.deadlines import Deadline, Limited, TimeOverError, over, tell, within
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -41,6 +42,8 @@ if TYPE_CHECKING:
 
 #: Progress is reported and limits on time are looked at after this many nodes.
 _REPORT_EVERY = 64
+#: Contact nodes from which a root is sought before the tree, and otherwise where the tree is stopped, for so long [s].
+_MANY, _LATE = 24, 1.0
 
 
 @dataclass(slots=True)
@@ -97,6 +100,9 @@ class TreeSearch:
         Closes subtrees by their only possible solution.
     forms : Forms or SpaceForms, optional
         What a long search may bound with in place of the energy.
+    known_root : callable, optional
+        Gives the codes of a complete selection that is known to hold a root, or None. Where the search is stopped
+        before it came there, this root is proven by itself.
     """
 
     def __init__(
@@ -110,6 +116,7 @@ class TreeSearch:
         progress: Callable[[SearchProgress], object] | None = None,
         closer: Closer | SpaceCloser | None = None,
         forms: Forms | SpaceForms | None = None,
+        known_root: Callable[[], Codes | None] | None = None,
     ) -> None:
         self.system = system
         self.certifier = certifier
@@ -122,6 +129,7 @@ class TreeSearch:
         if closer is not None:
             closer.relaxed = self.relaxed
         self.forms = forms
+        self._known_root = known_root
         self.outcome = SearchOutcome()
         self._fallback: InteriorPointEngine | None = None
         self.splitting: Splitting = splitting or PlaneSplitting(system.F)
@@ -143,6 +151,8 @@ class TreeSearch:
         start = [self.first()]
         if self._one(start[0]):
             return self.outcome
+        if self.system.p >= _MANY:
+            self.known(self.limits)
         if self.forms is None:
             self.loop(start, None)
             return self.outcome
@@ -282,9 +292,46 @@ class TreeSearch:
     def _leave(self, items: Sequence[TreeNode]) -> None:
         for item in reversed(items):
             self.skip(item.codes)
+        self.outcome.count_unexamined()
 
     def skip(self, codes: Codes) -> None:
-        """Leave a subtree undecided, because the search was stopped."""
+        """Leave a subtree undecided, because the search was stopped; but for the root in it that is known."""
+        stopped, root = self.outcome.stopped, None
+        if stopped is None or stopped.reason is not StopReason.ENOUGH_ROOTS:
+            root = self.known(Deadline.after(time.perf_counter(), _LATE))
+        if root is None or not all(map(self.splitting.holds, codes, root)):
+            self._skip(codes)
+            return
+        for node, final in enumerate(root):
+            while codes[node] != final:
+                before, after = codes[:node], codes[node + 1 :]
+                # the one that holds the root comes last: what is beside it is left behind at once
+                children = self.splitting.towards(codes, node, final)
+                children.sort(key=partial(self.splitting.holds, final=final))
+                self.certifier.branching(node, children)
+                for code in children[:-1]:
+                    self._skip((*before, code, *after))
+                codes = (*before, children[-1], *after)
+        self._settle(TreeNode(None, codes, -1, last=False, weight=0.0))
+
+    def known(self, limits: Limited) -> Codes | None:
+        """Codes of a selection that holds a root, if one is found within limits."""
+        if self._known_root is None:
+            return None
+        try:
+            with within(limits):
+                return self._known_root()
+        except TimeOverError:
+            self._known_root = None
+            return None
+
+    def add_known(self) -> None:
+        """Add the root that is known, in a search that was interrupted before it came there."""
+        root = self.known(Deadline.after(time.perf_counter(), _LATE))
+        if root is not None and root not in self.certifier.certified.verified:
+            self._settle(TreeNode(None, root, -1, last=False, weight=0.0))
+
+    def _skip(self, codes: Codes) -> None:
         self.certifier.skipped(codes, str(self.outcome.stopped))
         part = UndecidedPart(codes, "the search was stopped before it got here", "raise the limit")
         self.outcome.undecided.append(part)

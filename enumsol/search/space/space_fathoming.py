@@ -179,14 +179,8 @@ class SpaceCloser:
     @cached_property
     def _point(self) -> Point | None:
         """A solution in floats."""
-        system = self._system
-        if np.max(np.maximum(system.unit, 1.0 / system.unit)) > LARGEST_UNIT:
-            return None
-        problem = Isotropic.of(system)
-        y = problem.solution()
-        if y is None:
-            return None
-        return Point.of(system, problem, y)
+        found = solved(self._system)
+        return None if found is None else found[0]
 
     def _whole(self) -> list[Any] | None:
         system, point = self._system, self._point
@@ -201,6 +195,15 @@ class SpaceCloser:
         if found is None and not self._regular:
             found = self._certifier.close(numbers, None, point.n)
         return found
+
+
+def solved(system: SpaceSystem, near: Floats | None = None) -> tuple[Point, Floats] | None:
+    """A solution in floats, and its forces (p, 3) in isotropic variables, near those of another one; or None."""
+    if np.max(np.maximum(system.unit, 1.0 / system.unit)) > LARGEST_UNIT:
+        return None
+    problem = Isotropic.of(system)
+    y = problem.solution(near)
+    return None if y is None else (Point.of(system, problem, y), y)
 
 
 @dataclass(frozen=True)
@@ -261,6 +264,11 @@ class Point:
         if len(axes) == 1:
             return SLIP_PLUS if direction[axes[0]] > 0 else SLIP_MINUS
         return SECTORS + _sector(direction, _LEVEL)
+
+    def leaf(self, level: int) -> Codes:
+        """``codes`` with sectors of a level that hold those there."""
+        up = _LEVEL - level
+        return tuple(SECTORS + (code - SECTORS >> up) if code > SECTORS else code for code in self.codes)
 
     # -- numbers ---------------------------------------------------------------------------------------------------
 

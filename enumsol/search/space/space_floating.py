@@ -15,7 +15,7 @@ from enumsol.proof.records import Exclusion, NoRoot, Unbalanced
 from enumsol.proof.space_records import FLOATING_LEAVES, ExcludedInSpace
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.certifiers.protocol import Bound, Refine, UndecidedPart, Unrecorded
-from enumsol.search.floating_solvers import FloatingReader, weakly_held
+from enumsol.search.floating_solvers import WEAK, FloatingReader, weakly_held
 from enumsol.search.setup import HeldByNothing
 from enumsol.search.space.space_search import SpaceCertifier
 from enumsol.search.space.space_setup import SpaceSolvers
@@ -45,9 +45,12 @@ class FloatingSpaceSolvers(HeldByNothing, SpaceSolvers):
     @cached_property
     def relaxed(self) -> SpaceSystem:
         """The body on weak springs (theory, section 14.5)."""
+        return self._on_springs(WEAK)
+
+    def _on_springs(self, stiffness: float) -> SpaceSystem:
         if not isinstance(self.enclosed, FloatingSpace):
             return self.system
-        S, g = weakly_held(self.system.S, self.system.g, self.enclosed.rows)
+        S, g = weakly_held(self.system.S, self.system.g, self.enclosed.rows, stiffness)
         return replace(self.system, S=S, g=g)
 
     @cached_property

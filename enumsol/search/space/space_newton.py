@@ -60,9 +60,11 @@ class Isotropic:
         """w, (p, 3)."""
         return (self.g - self.S @ y.ravel()).reshape(-1, 3)
 
-    def solution(self) -> Floats | None:
-        """A solution y, (p, 3), or None: by Newton's method from 0, else with discs that grow from nothing."""
-        found = self._newton(np.zeros_like(self.g), 1.0)
+    def solution(self, near: Floats | None = None) -> Floats | None:
+        """A solution y, (p, 3), or None: by Newton's method from one near it or from 0, else with growing discs."""
+        found = None if near is None else self._newton(near.ravel(), 1.0)
+        if found is None:
+            found = self._newton(np.zeros_like(self.g), 1.0)
         if found is None:
             found = self._grown()
         return None if found is None else found.reshape(-1, 3)

@@ -7,7 +7,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.condensation.enclosure import NotEnclosedError
-from enumsol.model.sectors import DEEPEST, RUN, SECTORS, around, direction, end_number, is_sector, level_of, nearest
+from enumsol.model.sectors import (
+    DEEPEST,
+    RUN,
+    SECTORS,
+    around,
+    direction,
+    end_number,
+    is_sector,
+    level_of,
+    nearest,
+    parts_around,
+    span,
+)
 from enumsol.model.statuses import CONTACT, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.proof import space_records
 from enumsol.proof.records import EnclosureRecord, Limits, NoRoot, RegularRoot, UndecidedRecord
@@ -76,6 +88,19 @@ class SpaceSplitting:
     def covers(self, node: int, code: int, children: Sequence[int]) -> bool:
         """Whether codes, in any order, cover a partial status of a node."""
         return is_sector_covering(code, children, self._engine.tangents[node])
+
+    def holds(self, code: int, final: int) -> bool:
+        """Whether a status allows a final one."""
+        return refines((final,), (code,))
+
+    def towards(self, codes: Codes, node: int, final: int) -> list[int]:
+        """Codes of the node's children, in a sector the final one's and what is beside it."""
+        code = codes[node]
+        if code < SECTORS or final < SECTORS:
+            return list(self._engine.children(node, code))
+        begin, end = span(final - SECTORS)
+        parts = parts_around(code - SECTORS, begin, end - 1, level_of(final - SECTORS))
+        return [SECTORS + part for part in parts]
 
     def above(self, code: int, deeper: Iterable[int]) -> int:
         """The code of which this one is a child."""

@@ -7,13 +7,15 @@ from fractions import Fraction
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, cast
 
+import numpy as np
+
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.proof.writer import Recorder, point_header, unit_exponents
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.certifiers.protocol import Certifier, Unrecorded
 from enumsol.search.setup import SearchSetup
-from enumsol.search.space.space_fathoming import SpaceCloser, SpaceClosing
+from enumsol.search.space.space_fathoming import SpaceCloser, SpaceClosing, solved
 from enumsol.search.space.space_forms import SpaceForms
 from enumsol.search.space.space_search import SpaceCertifier, SpaceReader, SpaceSplitting
 
@@ -22,7 +24,10 @@ if TYPE_CHECKING:
 
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.search.resume import Reader
-    from enumsol.support.array_types import Alpha, Floats
+    from enumsol.support.array_types import Alpha, Codes, Floats
+
+#: Level of the sectors in which a root is sought that floats suggest: they are three degrees wide.
+_WIDE = 7
 
 
 class SpaceSolvers(SearchSetup):
@@ -87,6 +92,12 @@ class SpaceSolvers(SearchSetup):
         if recorder is None or self.arithmetic == "fast":
             recorder = Unrecorded()
         return SpaceCertifier(self._engine, self.enclosed, recorder)
+
+    def _solved(self, system: SpaceSystem, near: Floats | None) -> tuple[list[Codes], Floats] | None:
+        with np.errstate(all="ignore"):
+            found = solved(system, near)
+        # directions of a body on springs are somewhat other ones
+        return None if found is None else ([found[0].leaf(_WIDE), found[0].codes], found[1])
 
     def _splitting(self, certifier: Certifier) -> SpaceSplitting:
         return SpaceSplitting(self._engine)
