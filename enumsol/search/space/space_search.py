@@ -91,7 +91,7 @@ class SpaceSplitting:
 
     def holds(self, code: int, final: int) -> bool:
         """Whether a status allows a final one."""
-        return refines((final,), (code,))
+        return code == UNDECIDED or refines((final,), (code,))
 
     def towards(self, codes: Codes, node: int, final: int) -> list[int]:
         """Codes of the node's children, in a sector the final one's and what is beside it."""

@@ -1,0 +1,113 @@
+"""A root that is found before the tree is listed and proven wherever the search is stopped."""
+
+import functools
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+from generators import dense_compliance, from_condensed, named
+from interruptions import CtrlC, interrupted
+
+import enumsol
+from enumsol import fem
+
+
+@functools.cache
+def half_plate(count=8):
+    """Half a plate on a floor, with rollers at its plane of symmetry: only contact holds it up."""
+    return fem.mesh_problem(
+        fem.rectangle(count, count).parted(), young=1000.0, poisson=0.2, contact="bottom", symmetry="right",
+        pressure={"top": 0.5, "left": 1.5}, friction=1.0, max_rigid_displacement="auto",
+    )  # fmt: skip
+
+
+@functools.cache
+def pressed_cube(count=2):
+    """A cube on a floor whose roof is guided upright: only contact holds it up."""
+    return fem.mesh_problem(
+        fem.box(count, count, 2), young=1000.0, poisson=0.3, contact="bottom", pressure={"top": 1.0}, friction=0.2,
+        displacement={"top": (0, 0, "free")}, max_rigid_displacement="auto",
+    )  # fmt: skip
+
+
+BODIES = {
+    "wedge": lambda: named("wedge-14-5"),
+    "wedge in 3D": lambda: named("wedge3d-2-3"),
+    "plate": lambda: (half_plate(), 0),
+    "cube": lambda: (pressed_cube(), 0),
+}
+
+
+def same(one, other):
+    return all(
+        np.allclose(getattr(one, name), getattr(other, name), rtol=1e-6, atol=1e-6 * (1 + np.max(np.abs(other.lambda_n))))
+        for name in ("lambda_n", "lambda_t")
+    )
+
+
+@pytest.mark.parametrize("nodes", [1, 5])
+@pytest.mark.parametrize("name", BODIES)
+def test_a_search_that_is_stopped_at_once_has_a_root_and_its_proof_too(name, nodes):
+    problem, alpha = BODIES[name]()
+    found = enumsol.enumerate_roots(problem, alpha, max_nodes=nodes)
+    report = enumsol.verify(problem, found.proof)
+    if found.complete:  # by one certificate
+        assert report.complete
+        return
+    assert len(found) >= 1
+    assert found.at_least >= 1
+    assert report.ok
+    assert report.roots == len(found)
+    assert not report.complete
+    assert "0 roots" not in str(found)
+    newton = enumsol.newton(problem, alpha, start=found[0])
+    assert newton is not None
+    assert same(newton, found[0])
+
+
+@pytest.mark.parametrize("name", ["plate", "cube"])
+def test_ctrl_c_keeps_the_root(name):
+    problem, alpha = BODIES[name]()
+    partial = interrupted("1 root so far", enumsol.enumerate_roots, problem, alpha, progress=CtrlC())
+    assert len(partial) == 1
+    assert not partial.complete
+
+
+def test_workers_leave_the_root_as_well():
+    with ThreadPoolExecutor(2) as executor:
+        found = enumsol.enumerate_roots(half_plate(), 0, max_nodes=40, executor=executor)
+    assert len(found) == 1
+    report = enumsol.verify(half_plate(), found.proof)
+    assert report.ok
+    assert report.roots == 1
+
+
+def test_a_search_goes_on_from_a_proof_that_has_the_root(tmp_path):
+    path = tmp_path / "plate.proof"
+    problem = half_plate(4)
+    first = enumsol.enumerate_roots(problem, 0, max_nodes=3, proof_path=path)
+    assert len(first) == 1
+    assert not first.complete
+    whole = enumsol.enumerate_roots(problem, 0, proof_path=path, resume=True)
+    assert whole.complete
+    assert len(whole) == 1
+    assert same(whole[0], first[0])
+    assert enumsol.verify(problem, whole.proof).complete
+
+
+@pytest.mark.few(6, 24)
+@pytest.mark.parametrize("seed", range(300))
+def test_roots_of_a_search_that_was_stopped_are_among_all(seed):
+    rng = np.random.default_rng([11, seed])
+    p = int(rng.integers(2, 6))
+    problem = from_condensed(dense_compliance(rng, p), rng.normal(size=2 * p), rng.uniform(0.1, 3.0, p))
+    every = enumsol.enumerate_roots(problem, 0, method="exhaustive", arithmetic="fast")
+    for nodes in (1, 2, 4, 9, 17):
+        found = enumsol.enumerate_roots(problem, 0, max_nodes=nodes)
+        report = enumsol.verify(problem, found.proof)
+        assert report.ok
+        assert report.roots == len(found)
+        # no two of them are one root
+        assert all(sum(same(root, other) for other in every) == 1 for root in found)
+        assert len({tuple(root.lambda_n.round(8)) + tuple(root.lambda_t.round(8)) for root in found}) == len(found)
+        assert len(found) >= 1 or found.undecided
