@@ -270,9 +270,11 @@ def _in_doubt(core: Codes) -> UndecidedPart:
     return UndecidedPart(core, "a root in it may be the same as another one", hint, examined=True)
 
 
-def _not_joined(codes: Codes) -> UndecidedPart:
-    reason = "the time was over before it was known with which others its solution is connected"
-    return UndecidedPart(codes, reason, "raise the limit", examined=True)
+def _not_joined(codes: Codes, stop: Stop) -> UndecidedPart:
+    when = "the search was ended" if stop.interrupted else "the time was over"
+    reason = f"{when} before it was known with which others its solution is connected"
+    ended = stop if stop.interrupted else Stop(StopReason.TIME_LIMIT)
+    return UndecidedPart(codes, reason, ended.remedy, examined=True)
 
 
 def _alone(solution: SelectionSolution) -> bool:
@@ -340,9 +342,10 @@ class _Enumeration(Enumeration[Solvers]):
             return self._components()
         except TimeOverError:
             outcome, self.late = self.outcome, True
-            outcome.undecided += [_not_joined(s.codes) for s in outcome.solutions if not _alone(s)]
-            outcome.solutions[:] = filter(_alone, outcome.solutions)
-            outcome.stopped = outcome.stopped or Stop(StopReason.TIME_LIMIT)
+            stop = outcome.stopped = outcome.stopped or Stop(StopReason.TIME_LIMIT)
+            left = [_not_joined(s.codes, stop) for s in outcome.solutions if not _alone(s)]
+            alone = list(filter(_alone, outcome.solutions))
+            outcome.undecided, outcome.solutions = [*outcome.undecided, *left], alone
             return self._components()
 
     def _components(self) -> list[tuple[list[RootComponent], SelectionSolver]]:

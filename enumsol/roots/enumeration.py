@@ -13,7 +13,7 @@ from enumsol.proof.begun import BegunProof, begun_proof
 from enumsol.proof.writer import ProofWriter
 from enumsol.roots.root_set import RigidBound, RootSet, SearchStats, Undecided
 from enumsol.search.certifiers.protocol import UndecidedPart
-from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
+from enumsol.search.outcome import HOLD, SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
 from enumsol.search.parallel import Searchable, Spread
 from enumsol.search.resume import resume
 from enumsol.support.deadlines import Deadline, within
@@ -111,6 +111,7 @@ class Enumeration(ABC, Generic[_Solvers]):
         search = solvers.search(self.certifier, limits, self.progress)
         earlier = () if self._begun is None or self.writer is None else (self._begun, self.writer.replace)
         self.outcome = search.outcome
+        search.otherwise = "" if self.problem.modes is None else HOLD
         if solvers.unloaded():
             self.certifier.unloaded()
             self.unloaded = True
@@ -203,7 +204,7 @@ def not_begun(
         alpha=alpha,
         roots=[],
         families=[],
-        undecided=[Undecided((None,) * problem.p, reason, "raise the limit")],
+        undecided=[Undecided((None,) * problem.p, reason, Stop(stop).remedy)],
         arithmetic=arithmetic,
         method=method,
         stopped=str(Stop(stop)),

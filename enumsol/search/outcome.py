@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from enumsol.selections.solution import SelectionSolution
 
 
+#: What helps where nothing holds a body and its searches do not come to an end.
+HOLD = "hold the body by a spring or a fixed point, or give a smaller max_rigid_displacement"
+
+
 @dataclass(frozen=True)
 class SearchProgress:
     """State of a running search, as handed to the ``progress`` callback.
@@ -152,6 +156,23 @@ class Stop:
     def interrupted(self) -> bool:
         """Whether it ended anywhere, by Ctrl-C or a lack of memory: the rest of the search is unaccounted for."""
         return self.reason in (StopReason.INTERRUPTED, StopReason.OUT_OF_MEMORY)
+
+    @property
+    def limited(self) -> bool:
+        """Whether a limit of nodes or time ended it."""
+        return self.reason in (StopReason.NODE_LIMIT, StopReason.TIME_LIMIT)
+
+    @property
+    def remedy(self) -> str:
+        """What lets a search get to what this one left."""
+        return {
+            StopReason.NODE_LIMIT: f"raise the limit of {self.unit}s",
+            StopReason.ENOUGH_ROOTS: "search without stop_after",
+            StopReason.TIME_LIMIT: "raise the time limit",
+            StopReason.INTERRUPTED: "let it run to its end",
+            StopReason.OUT_OF_MEMORY: "use more memory or a smaller problem",
+            StopReason.GRAPH_INCOMPLETE: "use enumerate_roots",
+        }[self.reason]
 
     def __str__(self) -> str:
         done = "" if self.count is None else counted(self.count, self.unit)

@@ -123,6 +123,8 @@ class TreeSearch:
             closer.relaxed = self.relaxed
         self.forms = forms
         self.outcome = SearchOutcome()
+        #: What helps where limits are reached, besides higher ones.
+        self.otherwise = ""
         self._fallback: InteriorPointEngine | None = None
         self.splitting: Splitting = splitting or PlaneSplitting(system.F)
         self._rows = ImposedRows(self.splitting, system.p)
@@ -285,9 +287,11 @@ class TreeSearch:
 
     def skip(self, codes: Codes) -> None:
         """Leave a subtree undecided, because the search was stopped."""
-        self.certifier.skipped(codes, str(self.outcome.stopped))
-        part = UndecidedPart(codes, "the search was stopped before it got here", "raise the limit")
-        self.outcome.undecided.append(part)
+        stop = self.outcome.stopped
+        assert stop is not None
+        self.certifier.skipped(codes, str(stop))
+        hint = f"{stop.remedy}, or {self.otherwise}" if stop.limited and self.otherwise else stop.remedy
+        self.outcome.undecided.append(UndecidedPart(codes, "the search was stopped before it got here", hint))
 
     def examine(self, item: TreeNode) -> list[TreeNode]:
         """Settle one node of the tree, or give its children, the one that is examined first last."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from enumsol.branches.graph import BranchGraph
 from enumsol.branches.graph_data import GraphStats
-from enumsol.branches.remedies import ANOTHER_INTERVAL, MORE_TIME, SHORT_INTERVAL
+from enumsol.branches.remedies import ANOTHER_INTERVAL, MORE_NODES, MORE_TIME, SHORT_INTERVAL
 from enumsol.branches.space.cover import SpaceCover
 from enumsol.branches.space.make_curved import CurvedGraph
 from enumsol.branches.space.pieces import runs_and_turns
@@ -133,7 +133,9 @@ class _Construction:
     def _elements(self, progress: Callable[[str, float], object] | None, stop: Stop | None) -> _Elements:
         """Those of all curves that were found; after an interruption while they were cut, of those that are cut."""
         # what the tree left open is told by its gaps
-        cover, remedy = self.cover, None if stop is None else MORE_TIME
+        cover, remedy = self.cover, None
+        if stop is not None:
+            remedy = MORE_NODES if stop.reason is StopReason.NODE_LIMIT else MORE_TIME
         curves = cover.chains
         if not curves:
             return _Elements()
