@@ -4,6 +4,15 @@ The public names stand in ``__init__.pyi``. A module is loaded when a name of it
 what it works with and no more: sparse matrices come with a problem, networkx and rational arithmetic with a graph.
 """
 
-import lazy_loader
+try:
+    import lazy_loader
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+    __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+except KeyboardInterrupt:
+    import os
+    import sys
+
+    # the command, or python -m enumsol: as in enumsol.cli
+    if os.path.basename(sys.argv[0]).partition(".")[0] in ("enumsol", "-m"):
+        sys.exit(130)
+    raise

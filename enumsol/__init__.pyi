@@ -50,6 +50,7 @@ from .errors import (
     InvalidProblemError as InvalidProblemError,
     MissingDependencyError as MissingDependencyError,
     NotHeldError as NotHeldError,
+    OutOfMemoryError as OutOfMemoryError,
     OutputError as OutputError,
     TooLargeError as TooLargeError,
 )

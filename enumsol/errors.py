@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 
 class EnumsolError(Exception):
@@ -95,7 +95,19 @@ class _PartialResultError(EnumsolError):
         return type(self), (str(self), self.partial)  # a worker process may send it back
 
 
-class Interrupted(_PartialResultError, KeyboardInterrupt):  # noqa: N818 (the name is part of the public interface)
+class _EndedError(_PartialResultError):
+    """Base of the errors that end a call from outside.
+
+    Attributes
+    ----------
+    happened : str
+        What became of the call, for messages.
+    """
+
+    happened: ClassVar[str]
+
+
+class Interrupted(_EndedError, KeyboardInterrupt):  # noqa: N818 (the name is part of the public interface)
     """Ctrl-C during a search; what was found so far is in ``partial``.
 
     Attributes
@@ -104,6 +116,20 @@ class Interrupted(_PartialResultError, KeyboardInterrupt):  # noqa: N818 (the na
         The roots found before the interruption, with ``complete`` False. For functions other than enumerate_roots: what
         they would have returned, as far as they got.
     """
+
+    happened = "was interrupted"
+
+
+class OutOfMemoryError(_EndedError, MemoryError):
+    """The memory did not suffice for a search; what was found so far is in ``partial``.
+
+    Attributes
+    ----------
+    partial : RootSet or None
+        As of Interrupted; None where the memory did not suffice to put it together either.
+    """
+
+    happened = "ran out of memory"
 
 
 class OutputError(_PartialResultError):

@@ -3,25 +3,30 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from typing import TYPE_CHECKING
 
 from enumsol.branches.graph import BranchGraph
 from enumsol.branches.graph_data import GraphStats
-from enumsol.branches.ways import Arithmetic, way_of
+from enumsol.branches.ways import Arithmetic, Made, Way, way_of
 from enumsol.condensation.data import EXACT_DOF_LIMIT, exactly_at
-from enumsol.errors import Interrupted, InvalidArgumentError, TooLargeError
+from enumsol.errors import InvalidArgumentError, TooLargeError
 from enumsol.model.problem import ContactProblem, check_is_problem
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.support import arguments
 from enumsol.support.deadlines import Deadline, TimeOverError, within
+from enumsol.support.keeping import keeping
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from concurrent.futures import Executor
 
     from enumsol.model.problem3d import AnyProblem, ContactProblem3D
-    from enumsol.support.array_types import AlphaLike
+    from enumsol.search.interval.subintervals import IntervalSearch
+    from enumsol.support.array_types import AlphaLike, Codes
+    from enumsol.support.keeping import Ending
 
 #: Of the time that is left when arcs are begun: for working them out, and for joining them too, where there is a limit.
 #: To join them takes a fifth as long as to work them out by exact algebra, to make a graph of them another tenth.
@@ -89,10 +94,10 @@ def branch_graph(
         Exact arithmetic was asked for and the problem is too large for it.
     MissingDependencyError
         The compiled solver of the relaxations is not installed.
-    Interrupted
-        On Ctrl-C during the search, or while arcs are worked out; ``partial`` is the graph of what was found so far,
-        which is not complete. Beyond 24 degrees of freedom only the arcs of some of the selections found are in it, if
-        there are many: ``partial.reasons`` says how many.
+    Interrupted, OutOfMemoryError
+        On Ctrl-C, or where the memory does not suffice; ``partial`` is the graph of what was found so far, which is not
+        complete. After an interrupted search only the arcs of some of the selections found are in it, if there are
+        many: ``partial.reasons`` says how many.
 
     Examples
     --------
@@ -115,43 +120,86 @@ def branch_graph(
     if problem.modes is not None:
         _check_floating(problem, arithmetic)
     _check_friction(problem, a, b)
-    try:
-        with within(limits):
-            way = way_of(problem, (a, b), arithmetic)
-            search = way.search((a, b), max_nodes, limits.deadline, _stage(progress, "search"))
-    except TimeOverError:
-        late = f"{Stop(StopReason.TIME_LIMIT)} before the body was condensed to its contact nodes"
-        stats = GraphStats(seconds=time.perf_counter() - started)
-        return BranchGraph(problem, None, (a, b), arithmetic, vertices=(), arcs=(), undecided=(late,), stats=stats)
-    candidates = way.candidates(search, executor)
-    searched = time.perf_counter()
-    limits = limits.extended(started)
-    stops = [] if search.stopped is None else [search.stopped]
-    with within(limits.part(_JOINED)):
-        made = way.made(search, candidates, _stage(progress, "arcs"), limits.part(_WORKED_OUT), stops)
-    stats = GraphStats(
-        pieces=len(search.pieces),
-        closed=sum(found.numbers is not None for found in search.pieces),
-        nodes=search.nodes,
-        selections=len(candidates),
-        search_seconds=searched - started,
-        seconds=time.perf_counter() - started,
-    )
-    graph = BranchGraph(
-        problem=problem,
-        exact=made.exact,
-        exact_interval=(a, b),
-        arithmetic=arithmetic,
-        vertices=tuple(made.vertices),
-        arcs=tuple(made.arcs),
-        undecided=(*map(str, made.stops), *made.reasons),
-        stats=stats,
-        pieces=tuple(search.pieces),
-        make_proof=made.proof(search, problem),
-    )
-    if any(stop.interrupted for stop in made.stops):
-        raise Interrupted("branch_graph was interrupted; the arcs found so far are kept", graph)
-    return graph
+    call = _Construction(problem, (a, b), arithmetic, started)
+    work = partial(call.run, progress, max_nodes, limits, executor)
+    return keeping("branch_graph", work, call.cut_short, lambda _: "; the arcs found so far are kept")
+
+
+@dataclass
+class _Construction:
+    """One call of branch_graph in 2D, and how far it came."""
+
+    problem: ContactProblem
+    interval: tuple[Fraction, Fraction]
+    arithmetic: Arithmetic
+    started: float
+    way: Way | None = None
+    search: IntervalSearch | None = None
+    candidates: set[Codes] | None = None
+    searched: float | None = None
+
+    def run(
+        self,
+        progress: Callable[[str, float], object] | None,
+        max_nodes: int | None,
+        limits: Deadline,
+        executor: Executor | None,
+    ) -> BranchGraph:
+        """Search, then work out arcs and join them."""
+        try:
+            with within(limits):
+                way = self.way = way_of(self.problem, self.interval, self.arithmetic)
+                search = way.search(self.interval, max_nodes, limits.deadline, _stage(progress, "search"))
+                self.search = search
+        except TimeOverError:
+            return self._nothing(StopReason.TIME_LIMIT)
+        found = way.candidates(search, executor)
+        self.searched = time.perf_counter()
+        self.candidates = found
+        limits = limits.extended(self.started)
+        with within(limits.part(_JOINED)):
+            made = way.made(search, found, _stage(progress, "arcs"), limits.part(_WORKED_OUT))
+        return self._graph(search, found, made)
+
+    def cut_short(self, ending: Ending) -> BranchGraph:
+        """The graph of what was found before something ended ``run``, wherever that was."""
+        reason, way, search = StopReason.of(ending), self.way, self.search
+        if way is None or search is None:
+            return self._nothing(reason)
+        if self.candidates is None and (search.stopped is None or not search.stopped.interrupted):
+            search.stopped = Stop(reason, search.nodes)
+        found = search.selections if self.candidates is None else self.candidates
+        return self._graph(search, found, way.made(search, found, ended=reason))
+
+    def _nothing(self, reason: StopReason) -> BranchGraph:
+        """What is known before the body is condensed."""
+        why = f"{Stop(reason)} before the body was condensed to its contact nodes"
+        given = self.problem, None, self.interval, self.arithmetic
+        stats = GraphStats(seconds=time.perf_counter() - self.started)
+        return BranchGraph(*given, vertices=(), arcs=(), undecided=(why,), stats=stats)
+
+    def _graph(self, search: IntervalSearch, candidates: set[Codes], made: Made) -> BranchGraph:
+        now = time.perf_counter()
+        stats = GraphStats(
+            pieces=len(search.pieces),
+            closed=sum(found.numbers is not None for found in search.pieces),
+            nodes=search.nodes,
+            selections=len(candidates),
+            search_seconds=(now if self.searched is None else self.searched) - self.started,
+            seconds=now - self.started,
+        )
+        return BranchGraph(
+            problem=self.problem,
+            exact=made.exact,
+            exact_interval=self.interval,
+            arithmetic=self.arithmetic,
+            vertices=tuple(made.vertices),
+            arcs=tuple(made.arcs),
+            undecided=(*map(str, made.stops), *made.reasons),
+            stats=stats,
+            pieces=tuple(search.pieces),
+            make_proof=made.proof(search, self.problem),
+        )
 
 
 def _in_space(

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 END_ELSEWHERE = "an interval that ends elsewhere decides it"
 ANOTHER_INTERVAL = "another interval, or data that differ by a little, may decide it"
 SHORT_INTERVAL = "a graph over a short interval around it may decide it"
-MORE_TIME = "more time may decide it"
+MORE_TIME, MORE_NODES = "more time may decide it", "more nodes may decide it"
 TOLD_APART = "data that differ by a little may tell it apart"
 FEWER = "data that differ by a little may leave fewer"
 #: Of what contradicts the search.

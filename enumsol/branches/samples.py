@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, Any
 import networkx as nx
 import numpy as np
 
-from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import ContactProblem, check_is_problem
 from enumsol.model.statuses import STATUSES, ContactStatus
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.roots.slips import affine_friction, ratios
 from enumsol.support.arguments import alpha_list, optional_callable, optional_executor
+from enumsol.support.keeping import keeping
 from enumsol.support.messages import counted
 from enumsol.support.workers import spread
 
@@ -317,8 +318,8 @@ def multiplicity_table(
     ------
     InvalidArgumentError
         ``alphas`` is one number, an alpha is not a finite number, or makes a friction coefficient negative.
-    Interrupted
-        On Ctrl-C; ``partial`` is the table of what was done.
+    Interrupted, OutOfMemoryError
+        On Ctrl-C, or where the memory does not suffice; ``partial`` is the table of what was done.
 
     Examples
     --------
@@ -336,16 +337,21 @@ def multiplicity_table(
         problem.friction_at(alpha)
     row = partial(table_row, problem, {"arithmetic": arithmetic, **options})
     done: dict[int, dict[str, Any]] = {}
-    try:
+
+    def work() -> pd.DataFrame:
         with closing(spread(executor, ((k, row, (alpha,)) for k, alpha in enumerate(chosen)))) as rows:
             for k, found in rows:
                 done[k] = found
                 if progress is not None:
                     progress(len(done), len(chosen))
-    except KeyboardInterrupt as interruption:
-        message = f"multiplicity_table was interrupted after {len(done)} of {len(chosen)} alphas"
-        raise Interrupted(message, _frame(problem, done)) from interruption
-    return _frame(problem, done)
+        return _frame(problem, done)
+
+    return keeping(
+        "multiplicity_table",
+        work,
+        lambda _: _frame(problem, done),
+        lambda _: f" after {len(done)} of {len(chosen)} alphas",
+    )
 
 
 def _frame(problem: AnyProblem, done: dict[int, dict[str, Any]]) -> pd.DataFrame:

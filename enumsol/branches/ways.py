@@ -19,6 +19,7 @@ from enumsol.branches.enclosed.following import Followed, TracedProblem, follow_
 from enumsol.branches.enclosed.make_traced import make_traced
 from enumsol.branches.enclosed.single_branches import ClosedPieces
 from enumsol.branches.exact.gluing import glue
+from enumsol.branches.exact.known_selections import KnownSelections
 from enumsol.branches.exact.make_elements import make_arcs, make_vertices
 from enumsol.branches.proof_records import write_graph_proof
 from enumsol.condensation.data import EXACT_DOF_LIMIT
@@ -43,6 +44,7 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
     from enumsol.branches.elements import Arc, Vertex
+    from enumsol.branches.enclosed.cutting import Trace
     from enumsol.condensation.condensed import CondensedProblem
     from enumsol.model.problem import ContactProblem
     from enumsol.proof.proof_file import Proof
@@ -87,6 +89,8 @@ class Made:
 class Way:
     """Base of the ways: the search over the interval, and the selections that it leaves.
 
+    A way keeps the arcs that it has worked out, so that an interruption loses none of them.
+
     Attributes
     ----------
     problem : ContactProblem
@@ -127,31 +131,43 @@ class Way:
         )
 
     def candidates(self, search: IntervalSearch, executor: Executor | None) -> set[Codes]:
-        """The selections that may hold somewhere; Ctrl-C keeps those that were found."""
+        """The selections that may hold somewhere."""
         if self.exact is not None and self.exact.unloaded:
             # lambda = 0 is the only solution at every alpha, and every selection holds there: one is enough
             return {(OPEN,) * self.exact.p}
-        try:
-            self.close(search)
-            if executor is None:
-                search.run()
-            else:
-                run_parallel(executor, search)
-        except KeyboardInterrupt:
-            search.stopped = Stop(StopReason.INTERRUPTED, search.nodes)
+        self.close(search)
+        if executor is None:
+            search.run()
+        else:
+            run_parallel(executor, search)
         return search.selections
 
     def close(self, search: IntervalSearch) -> None:
         """Find pieces that need no tree, while there is time; none are known here."""
 
     def made(
-        self, search: IntervalSearch, candidates: set[Codes], tick: Tick | None, limits: Limited, stops: list[Stop]
+        self,
+        search: IntervalSearch,
+        candidates: set[Codes],
+        tick: Tick | None = None,
+        limits: Limited | None = None,
+        ended: StopReason | None = None,
     ) -> Made:
-        """Arcs worked out by the deadline of ``limits``; what is not joined by the one that holds here stays open."""
+        """Arcs worked out by the deadline of ``limits``; what is not joined by the one that holds here stays open.
+
+        After an interruption, ``ended``, they are those that were worked out; some more if the search was interrupted.
+        """
         raise NotImplementedError
 
 
-@dataclass(frozen=True)
+def _some(search: IntervalSearch, ended: StopReason | None, few: int) -> int | None:
+    """How many arcs, or boxes of them, are worked out: after an interruption only as much as takes a moment."""
+    if ended is None:
+        return None
+    return few if search.stopped is not None and search.stopped.interrupted else 0
+
+
+@dataclass
 class ByAlgebra(Way):
     """Arcs as functions of alpha in rationals: nothing stays open but what the time does not suffice for."""
 
@@ -159,6 +175,7 @@ class ByAlgebra(Way):
     exact: ExactCondensed
     certifier: IntervalCertifier
     followed: Followed | None = None
+    known: KnownSelections | None = None
 
     @classmethod
     def of(cls, problem: ContactProblem, exact: ExactCondensed, arithmetic: Arithmetic) -> ByAlgebra:
@@ -176,15 +193,20 @@ class ByAlgebra(Way):
         return self.exact.zero
 
     def made(
-        self, search: IntervalSearch, candidates: set[Codes], tick: Tick | None, limits: Limited, stops: list[Stop]
+        self,
+        search: IntervalSearch,
+        candidates: set[Codes],
+        tick: Tick | None = None,
+        limits: Limited | None = None,
+        ended: StopReason | None = None,
     ) -> Made:
         """See ``Way.made``."""
-        a, b = (rational(end) for end in search.interval)
-        # after Ctrl-C only as much as takes a moment
+        if self.known is None:
+            a, b = (rational(end) for end in search.interval)
+            self.known = KnownSelections(self.exact, a, b, cut_short=search.stopped is not None)
         few = max(8, _SELECTIONS_AFTER_INTERRUPT // self.problem.p**2)
-        most = few if any(stop.interrupted for stop in stops) else None
-        gluing = glue(self.exact, candidates, a, b, tick, cut_short=bool(stops), most=most, limits=limits)
-        stops += [] if gluing.stopped is None else [gluing.stopped]
+        gluing = glue(self.known, candidates, tick, most=_some(search, ended, few), limits=limits, ended=ended)
+        stops = [stop for stop in (search.stopped, gluing.stopped) if stop is not None]
         arcs = make_arcs(gluing)
         return Made(make_vertices(gluing, arcs), arcs, gluing.reasons, stops, self.exact, self.followed)
 
@@ -215,6 +237,8 @@ class ByBalls(Way):
 
     def __init__(self, traced: TracedProblem) -> None:
         self.problem, self.traced, self.closed = traced.problem, traced, ClosedPieces()
+        self._traces: list[Trace] = []
+        self._algebra: ByAlgebra | None = None
         self.certifier = VerifiedIntervalCertifier(traced.problem, None, traced.origin)
 
     @property
@@ -229,28 +253,36 @@ class ByBalls(Way):
             self.closed.find(self.traced)
 
     def made(
-        self, search: IntervalSearch, candidates: set[Codes], tick: Tick | None, limits: Limited, stops: list[Stop]
+        self,
+        search: IntervalSearch,
+        candidates: set[Codes],
+        tick: Tick | None = None,
+        limits: Limited | None = None,
+        ended: StopReason | None = None,
     ) -> Made:
         """See ``Way.made``."""
+        if self._algebra is not None:
+            return self._algebra.made(search, candidates, tick, limits, ended)
         problem = self.problem
         followed = follow_selections(
             self.traced,
             search.pieces,
             tick,
             known=self.closed.traces,
-            cut_short=bool(stops),
-            # after Ctrl-C only as much as takes a moment
-            most=_BOXES_AFTER_INTERRUPT if any(stop.interrupted for stop in stops) else None,
+            done=self._traces,
+            cut_short=search.stopped is not None,
+            most=_some(search, ended, _BOXES_AFTER_INTERRUPT),
             limits=limits,
+            ended=ended,
         )
         joined = followed.joined
-        stops += [] if followed.stopped is None else [followed.stopped]
+        stops = [stop for stop in (search.stopped, followed.stopped) if stop is not None]
         large = over() or problem.n > EXACT_DOF_LIMIT or _exact_work(problem, candidates) > LARGEST_EXACT_WORK
         if (joined.ordered and not joined.open) or stops or large:
             return Made(*make_traced(self.traced, joined), followed.reasons, stops, followed=followed)
         # several conditions vanish at one alpha, or a selection is singular
-        algebra = ByAlgebra(problem, ExactCondensed.from_problem(problem), self.certifier, followed)
-        return algebra.made(search, candidates, tick, limits, stops)
+        self._algebra = ByAlgebra(problem, ExactCondensed.from_problem(problem), self.certifier, followed)
+        return self._algebra.made(search, candidates, tick, limits)
 
 
 def way_of(problem: ContactProblem, interval: tuple[Fraction, Fraction], arithmetic: Arithmetic) -> Way:

@@ -1,5 +1,28 @@
 """The command line ``enumsol``: one module a command, `enumsol.cli.app` joins them."""
 
-from enumsol.cli.app import main
+from __future__ import annotations
+
+TYPE_CHECKING = False  # typing takes a while to load
+if TYPE_CHECKING:
+    from collections.abc import Sequence
 
 __all__ = ["main"]
+
+#: As ``ExitStatus.INTERRUPTED``, whose module is loaded below.
+_INTERRUPTED = 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit status, also on Ctrl-C while its modules are loaded.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Default: those of the process.
+    """
+    try:
+        from enumsol.cli.app import run
+
+        return run(arguments)
+    except KeyboardInterrupt:
+        return _INTERRUPTED

@@ -76,8 +76,8 @@ def _enumsol(
         typer.echo(context.get_help())
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line and return its exit status.
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run a command and return its exit status.
 
     Parameters
     ----------
@@ -92,12 +92,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except OutputError as error:
             left = isinstance(error.__cause__, BrokenPipeError)
             return _refuse(str(error), ExitStatus.BROKEN_PIPE if left else ExitStatus.OUTPUT_FAILED)
+        except (KeyboardInterrupt, typer.Abort):
+            return ExitStatus.INTERRUPTED
+        except MemoryError as error:
+            known = isinstance(error, EnumsolError)
+            what = str(error) if known else "the memory does not suffice; expected a smaller problem or more memory"
+            return _refuse(what, ExitStatus.OUT_OF_MEMORY)
         except EnumsolError as error:
             return _refuse(str(error))
         except _UsageError as error:
             return _refuse(_in_a_sentence(error))
-        except (KeyboardInterrupt, typer.Abort):
-            return ExitStatus.INTERRUPTED
     return int(status or 0)
 
 

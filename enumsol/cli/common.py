@@ -13,7 +13,7 @@ import typer
 
 from enumsol.cli.progress import Display
 from enumsol.cli.streams import is_quiet
-from enumsol.errors import EnumsolError, Interrupted, InvalidArgumentError, OutputError
+from enumsol.errors import EnumsolError, Interrupted, InvalidArgumentError, OutOfMemoryError, OutputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -36,12 +36,13 @@ _MOST_ON_WINDOWS = 61
 
 
 class ExitStatus(enum.IntEnum):
-    """What the command line tells its caller; 74 is that of sysexits.h."""
+    """What the command line tells its caller; 71 and 74 are those of sysexits.h."""
 
     DONE = 0
     BAD_INPUT = 2
     INCOMPLETE = 3
     NOT_COMPARED = 4
+    OUT_OF_MEMORY = 71
     OUTPUT_FAILED = 74
     INTERRUPTED = 130
     BROKEN_PIPE = 141
@@ -200,7 +201,7 @@ def so_far(search: Callable[[], T]) -> tuple[T | Any, EnumsolError | None]:
     """What a search found, even if it ended early, and the error that ended it, if any."""
     try:
         return search(), None
-    except (Interrupted, OutputError) as error:
+    except (Interrupted, OutOfMemoryError, OutputError) as error:
         if error.partial is None:
             raise
         return error.partial, error

@@ -12,7 +12,7 @@ from enumsol.cli.common import ExitStatus, finish, load_problem, node_row, parse
 from enumsol.cli.graph import read_graph
 from enumsol.cli.output import check_outputs, check_plot, deliver, write_figure
 from enumsol.cli.progress import Display, SearchDisplay
-from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.errors import Interrupted, InvalidArgumentError, OutOfMemoryError
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
@@ -97,18 +97,20 @@ def follow(
     row = node_row(body, label)
     over = None if graph_file is None else read_graph(graph_file, body)
     followed = _Followed(body, (float(interval[0]), float(interval[1])), steps, tangent)
-    ended: Interrupted | None = None
+    ended: Interrupted | OutOfMemoryError | None = None
     try:
         followed.run(_starts(body, interval, alpha, arithmetic, root), signs, alone=root is not None)
     except KeyboardInterrupt:
         # wherever it came: the paths so far are kept
         ended = Interrupted("interrupted", followed)
+    except MemoryError:
+        ended = OutOfMemoryError("out of memory", followed)
     about = {"problem": problem, "start": alpha, "interval": interval}
     deliver(
         (plot_file if followed.paths else None, lambda path: write_figure(path, followed.draw(over, row, quantity))),
         json_file=json_file,
         csv_file=csv_file,
-        text=lambda: followed.as_text() + (" (interrupted)" if ended else ""),
+        text=lambda: followed.as_text() + (f" ({ended})" if ended else ""),
         content=lambda: {**about, **followed.content()},
         frame=followed.frame,
     )
@@ -206,7 +208,7 @@ class _Followed:
                 raise
             self.failures.append((number, sign, str(error)))
             return False
-        except Interrupted as interruption:
+        except (Interrupted, OutOfMemoryError) as interruption:
             self.found.append((number, sign, interruption.partial))
             raise
         self.found.append((number, sign, path))

@@ -89,8 +89,8 @@ def follow(
         The start is not a root or an argument is out of range.
     NotHeldError
         Some rigid displacement of a body that nothing holds moves no contact node.
-    Interrupted
-        On Ctrl-C; ``partial`` holds the path so far.
+    Interrupted, OutOfMemoryError
+        On Ctrl-C, or where the memory does not suffice; ``partial`` holds the path so far.
 
     Examples
     --------

@@ -24,8 +24,10 @@ from enumsol.continuation.transitions import (
     same_curve,
     turning_point,
 )
-from enumsol.errors import Interrupted, InvalidArgumentError, TooLargeError
+from enumsol.errors import InvalidArgumentError, TooLargeError
+from enumsol.search.outcome import Stop, StopReason
 from enumsol.support.deadlines import look
+from enumsol.support.keeping import keeping
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
 
     from enumsol.continuation.start import Start
     from enumsol.support.array_types import Codes, Floats
+    from enumsol.support.keeping import Ending
 
 _Path = TypeVar("_Path", bound=PathData)
 
@@ -95,16 +98,22 @@ class Follower(Generic[_Path]):
 
     def run(self) -> _Path:
         """Follow until a stop condition is met."""
-        try:
-            stop = None
-            while stop is None:
-                look()
-                stop = self._advance()
-        except KeyboardInterrupt as interruption:
-            message = f"interrupted at alpha = {self._alpha():g}; path.resume() continues"
-            partial = self._path(_Stop(PathStatus.INTERRUPTED, message))
-            raise Interrupted(f"follow was {message}", partial) from interruption
+        return keeping("follow", self._followed, self._cut_short, lambda path: f" {self._so_far}")
+
+    def _followed(self) -> _Path:
+        stop = None
+        while stop is None:
+            look()
+            stop = self._advance()
         return self._path(stop)
+
+    def _cut_short(self, ending: Ending) -> _Path:
+        """The path to its last point."""
+        return self._path(_Stop(PathStatus.INTERRUPTED, f"{Stop(StopReason.of(ending))} {self._so_far}"))
+
+    @property
+    def _so_far(self) -> str:
+        return f"at alpha = {self.equation.alpha(self.record.last.x):g}; path.resume() continues"
 
     def _path(self, stop: _Stop) -> _Path:
         return self._kind(
@@ -415,7 +424,7 @@ class Follower(Generic[_Path]):
         return None
 
     def _end(self, point: CurvePoint) -> None:
-        if self.equation.norm(point.x - self.record.points[-1].x) > FORWARD_TOLERANCE:
+        if self.equation.norm(point.x - self.record.last.x) > FORWARD_TOLERANCE:
             self.record.add(point, PointKind.END)
         self.current = point
 

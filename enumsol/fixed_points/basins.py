@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.errors import InvalidArgumentError
 from enumsol.fixed_points.state import scaled_unknowns, slips_of
 from enumsol.fixed_points.successive import successive_approximations
 from enumsol.fixed_points.system import ContactSystem, checked_problem
@@ -15,6 +15,7 @@ from enumsol.fixed_points.tresca import node_values, solve_scaled
 from enumsol.fixed_points.tresca_newton import TrescaData
 from enumsol.support.arguments import alpha_value, positive_integer, positive_number, shown
 from enumsol.support.array_arguments import plain_array, real_array
+from enumsol.support.keeping import keeping
 from enumsol.support.messages import counted
 from enumsol.support.plotting import axes_or_none, figure_of, new_figure
 
@@ -131,8 +132,8 @@ def basin_table(
     ------
     InvalidArgumentError
         There are no roots, they belong to different alpha, or starts have the wrong shape.
-    Interrupted
-        Ctrl-C; ``partial`` is the table so far.
+    Interrupted, OutOfMemoryError
+        On Ctrl-C, or where the memory does not suffice; ``partial`` is the table so far.
 
     Examples
     --------
@@ -152,33 +153,33 @@ def basin_table(
     known = np.array([scaled_unknowns(system, root, f"root {k}") for k, root in enumerate(roots)])[:, : system.m]
     bounds = _starts(starts, seed, roots, body.p)
     rows: list[dict[str, Any]] = []
-    stopped: KeyboardInterrupt | None = None
-    for k, bound in enumerate(bounds):
-        try:
+
+    def work() -> pd.DataFrame:
+        for k, bound in enumerate(bounds):
             found = successive_approximations(body, alpha, bound, tolerance, max_iterations, anderson)
-        except KeyboardInterrupt as error:
-            stopped = error
-            break
-        away = np.max(np.abs(known - scaled_unknowns(system, found)[: system.m]), axis=1)
-        nearest = int(np.argmin(away))
-        reached = found.converged and away[nearest] <= distance
-        rows.append(
-            {
-                "start": k,
-                "size": float(np.mean(bound)),
-                "outcome": found.outcome.value,
-                "iterations": found.iterations,
-                "contraction": found.contraction_factor,
-                "root": nearest if reached else pd.NA,
-                "away": float(away[nearest]),
-            }
-        )
-    names = ("start", "size", "outcome", "iterations", "contraction", "root", "away")
-    table = pd.DataFrame(rows, columns=names).astype({"root": "Int64"})
-    table.attrs["never"] = sorted(set(range(len(roots))) - set(table["root"].dropna().astype(int)))
-    if stopped is not None:
-        raise Interrupted(f"interrupted after {len(rows)} of {len(bounds)} starts", table) from None
-    return table
+            away = np.max(np.abs(known - scaled_unknowns(system, found)[: system.m]), axis=1)
+            nearest = int(np.argmin(away))
+            reached = found.converged and away[nearest] <= distance
+            rows.append(
+                {
+                    "start": k,
+                    "size": float(np.mean(bound)),
+                    "outcome": found.outcome.value,
+                    "iterations": found.iterations,
+                    "contraction": found.contraction_factor,
+                    "root": nearest if reached else pd.NA,
+                    "away": float(away[nearest]),
+                }
+            )
+        return table()
+
+    def table() -> pd.DataFrame:
+        names = ("start", "size", "outcome", "iterations", "contraction", "root", "away")
+        made = pd.DataFrame(rows, columns=names).astype({"root": "Int64"})
+        made.attrs["never"] = sorted(set(range(len(roots))) - set(made["root"].dropna().astype(int)))
+        return made
+
+    return keeping("basin_table", work, lambda _: table(), lambda made: f" after {len(made)} of {len(bounds)} starts")
 
 
 def _common_alpha(roots: Sequence[Any]) -> Alpha:

@@ -14,6 +14,7 @@ import scipy.sparse as sp
 from enumsol.errors import MissingDependencyError
 from enumsol.fixed_points.system import checked_problem
 from enumsol.fixed_points.tresca_newton import TrescaData, TrescaNotSolved
+from enumsol.relaxation.conic import conic_answer
 
 if TYPE_CHECKING:
     from enumsol.fixed_points.system import Problem
@@ -57,23 +58,19 @@ def interior_point(data: TrescaData) -> tuple[Floats | None, Floats]:
     offset[first::3] = bound[node_two] * least
     rows, columns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
     limits = sp.csc_matrix((values, (rows, columns)), shape=(size, int(np.sum(free))))
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.direct_solve_method = "faer"  # the Hessian is dense, for which the default is several times slower
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
-    settings.tol_infeas_abs = settings.tol_infeas_rel = TOLERANCE
-    answer = clarabel.DefaultSolver(
-        sp.csc_matrix(np.triu(system.S[np.ix_(free, free)])),
-        -system.g[free],
-        sp.csc_matrix(sp.vstack([system.G[:, free], limits])),
-        np.append(system.h, offset),
+    tolerances = ("tol_gap_abs", "tol_gap_rel", "tol_feas", "tol_infeas_abs", "tol_infeas_rel")
+    answer = conic_answer(
+        (sp.csc_matrix(np.triu(system.S[np.ix_(free, free)])), -system.g[free]),
+        (sp.csc_matrix(sp.vstack([system.G[:, free], limits])), np.append(system.h, offset)),
         [
             clarabel.ZeroConeT(system.modes),
             clarabel.NonnegativeConeT(first),
             *[clarabel.SecondOrderConeT(3)] * len(node_two),
         ],
-        settings,
-    ).solve()
+        system.S.size,
+        direct_solve_method="faer",  # the Hessian is dense, for which the default is several times slower
+        **dict.fromkeys(tolerances, TOLERANCE),
+    )
     found, rigid = np.array(answer.x), -np.array(answer.z)[: system.modes]
     if not (np.all(np.isfinite(found)) and np.all(np.isfinite(rigid))):
         return None, np.zeros(system.modes)

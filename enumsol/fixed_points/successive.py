@@ -8,11 +8,12 @@ from __future__ import annotations
 import time
 from collections import deque
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.errors import InvalidArgumentError
 from enumsol.fixed_points.result import FixedPoint, Outcome
 from enumsol.fixed_points.state import scaled_unknowns, slips_of
 from enumsol.fixed_points.system import ContactSystem, checked_problem
@@ -22,6 +23,8 @@ from enumsol.model.friction import warn_of_jumps
 from enumsol.model.problem3d import ContactProblem3D
 from enumsol.support.arguments import optional_callable, positive_integer, positive_number
 from enumsol.support.array_arguments import real_array
+from enumsol.support.keeping import keeping
+from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -154,8 +157,8 @@ def successive_approximations(
         A friction function returns something else than finite numbers >= 0.
     NotHeldError
         Some rigid displacement of a body that nothing holds moves no contact node.
-    Interrupted
-        Ctrl-C; ``partial`` is the FixedPoint of the last iterate.
+    Interrupted, OutOfMemoryError
+        On Ctrl-C, or where the memory does not suffice; ``partial`` is the FixedPoint of the last iterate.
 
     Warns
     -----
@@ -211,6 +214,15 @@ class _Iteration:
         self.data = TrescaData(system, self.bound, system.coefficients(self.slip))
         given = hasattr(start, "lambda_t")
         self.x = scaled_unknowns(system, start) if given else np.zeros(system.m + system.modes)
+        return keeping(
+            "successive_approximations",
+            partial(self._iterated, start, limit),
+            lambda _: self._result(Outcome.INTERRUPTED, None),
+            lambda found: f" after {counted(found.iterations, 'iteration')}",
+        )
+
+    def _iterated(self, start: Any, limit: int) -> FixedPoint:
+        system = self.system
         outcome, period = Outcome.ROUNDING, None
         try:
             if start is None and system.modes:
@@ -234,9 +246,6 @@ class _Iteration:
             outcome = Outcome.NOT_HELD if outcome is Outcome.NOT_HELD else Outcome.NOT_FEASIBLE
         except TrescaNotSolved:
             outcome = Outcome.NOT_SOLVED
-        except KeyboardInterrupt:
-            partial = self._result(Outcome.INTERRUPTED, None)
-            raise Interrupted(partial.why, partial) from None
         return self._result(outcome, period)
 
     def _iterate(self, limit: int) -> tuple[Outcome, int | None]:

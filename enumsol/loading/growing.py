@@ -17,7 +17,7 @@ import networkx as nx
 import numpy as np
 
 from enumsol.condensation.enclosure import NotEnclosedError
-from enumsol.errors import Interrupted, InvalidArgumentError, NotHeldError
+from enumsol.errors import InvalidArgumentError, NotHeldError
 from enumsol.loading.history import History
 from enumsol.loading.history_data import (
     HistoryData,
@@ -33,7 +33,9 @@ from enumsol.model.problem import ContactProblem, check_is_problem
 from enumsol.model.restart import SlipStart, restarted
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.roots.root import Root
+from enumsol.search.outcome import Stop, StopReason
 from enumsol.support import arguments
+from enumsol.support.keeping import keeping
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
@@ -42,6 +44,7 @@ if TYPE_CHECKING:
     from enumsol.loading.history_data import HistoryData, Node
     from enumsol.model.problem3d import AnyProblem
     from enumsol.roots.root_set import RootSet
+    from enumsol.support.keeping import Ending
 
     #: Of a parent's root (None in the first step) and the roots of the next step, those that are followed.
     Choice = Callable[[Root | None, RootSet], Any]
@@ -213,8 +216,8 @@ def histories(
         An argument cannot be used; of a step its number is named.
     NotHeldError
         Nothing holds the body, and arithmetic is not "exact" or the problem is one in 3D.
-    Interrupted
-        On Ctrl-C; ``partial`` is the history as far as it was found.
+    Interrupted, OutOfMemoryError
+        On Ctrl-C, or where the memory does not suffice; ``partial`` is the history as far as it was found.
 
     Examples
     --------
@@ -263,14 +266,22 @@ def histories(
     fitted = steps_of(problem, steps)
     search = {"arithmetic": arithmetic, "executor": executor, **options}
 
-    def grown(several: Sequence[LoadStep]) -> HistoryData:
-        return _Growing(problem, several, follow, tolerance, limits, search, progress).run()
+    begun = [_Growing(problem, fitted, follow, tolerance, limits, search, progress)]
+    halvings = arguments.optional_count(max_halvings, "max_halvings") or 0
 
-    if not refine:
-        return History(grown(fitted))
-    return History(
-        refined(grown, fitted, way_to(problem, fitted[0]), arguments.optional_count(max_halvings, "max_halvings") or 0)
-    )
+    def grown(several: Sequence[LoadStep]) -> HistoryData:
+        begun.append(_Growing(problem, several, follow, tolerance, limits, search, progress))
+        return begun[-1].run()
+
+    def work() -> History:
+        if not refine:
+            return History(grown(fitted))
+        return History(refined(grown, fitted, way_to(problem, fitted[0]), halvings))
+
+    def rest(ending: Ending) -> History:
+        return History(begun[-1].history(str(Stop(StopReason.of(ending)))))
+
+    return keeping("histories", work, rest, lambda _: begun[-1].so_far)
 
 
 @dataclass
@@ -326,34 +337,24 @@ class _Growing:
         self.node_of: dict[int, list[Node]] = {}  # of each stage, in the order of its roots
         self.bases: dict[bytes, Any] = {}
         self.ends: dict[Any, SlipStart] = {}
-        if search["arithmetic"] != "fast":
-            with suppress(NotEnclosedError):
-                _ = problem.on_springs.enclosure  # made once, for all steps
 
     def run(self) -> HistoryData:
         """Step by step, all starts of one before the next."""
+        if self.search["arithmetic"] != "fast":
+            with suppress(NotEnclosedError):
+                _ = self.problem.on_springs.enclosure  # made once, for all steps
         waiting = [_Waiting(SlipStart.of(self.problem), [])]
-        try:
-            for number, step in enumerate(self.steps, 1):
-                waiting = self._step(number, step, waiting)
-                if not waiting:
-                    break
-        except Interrupted as interruption:
-            raise self._interrupted() from interruption
-        except KeyboardInterrupt as interruption:
-            raise self._interrupted() from interruption
-        return self._history()
-
-    def _interrupted(self) -> Interrupted:
-        self.reasons.append("interrupted")
-        found = counted(sum(len(stage.roots) for stage in self.stages), "root")
-        return Interrupted(
-            f"histories was interrupted in step {self._reached}; {found} so far", History(self._history())
-        )
+        for number, step in enumerate(self.steps, 1):
+            waiting = self._step(number, step, waiting)
+            if not waiting:
+                break
+        return self.history()
 
     @property
-    def _reached(self) -> int:
-        return self.stages[-1].step if self.stages else 1
+    def so_far(self) -> str:
+        """How far it came."""
+        found = counted(sum(len(stage.roots) for stage in self.stages), "root")
+        return f" in step {self.stages[-1].step if self.stages else 1}; {found} so far"
 
     def _step(self, number: int, step: LoadStep, waiting: list[_Waiting]) -> list[_Waiting]:
         """Search a step from all its starts; the starts of the next step."""
@@ -366,9 +367,10 @@ class _Growing:
             stage = self._stage(number, step, item)
             nodes = [(number, count + j) for j in range(len(stage.roots))]
             count += len(nodes)
-            self.stages.append(stage)
-            self.parents.append(tuple(item.parents))
+            # whatever else is known of a stage is known before it is
+            self.parents[len(self.stages) :] = [tuple(item.parents)]
             self.node_of[stage.number] = nodes
+            self.stages.append(stage)
             self.reasons += [f"step {number}{self._whence(item)}: {reason}" for reason in stage.reasons]
             if number < len(self.steps):
                 self._ends(stage, item, nodes, following)
@@ -481,15 +483,16 @@ class _Growing:
         stage = next(s for s in self.stages if node in self.node_of[s.number])
         return stage.roots[self.node_of[stage.number].index(node)]
 
-    def _history(self) -> HistoryData:
+    def history(self, *more: str) -> HistoryData:
+        """What was found so far, with more reasons why something may be missing."""
         return HistoryData(
             self.problem,
             tuple(self.steps),
             self.search["arithmetic"],
             tuple(self.stages),
-            tuple(self.parents),
+            tuple(self.parents[: len(self.stages)]),
             frozenset(self.followed),
-            tuple(self.reasons),
+            (*self.reasons, *more),
             time.perf_counter() - self.limits.started,
         )
 

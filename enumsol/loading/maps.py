@@ -6,19 +6,21 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.branches.construction import branch_graph
-from enumsol.errors import Interrupted, InvalidArgumentError
+from enumsol.errors import InvalidArgumentError
 from enumsol.loading.strips import MapFold, MapRow, MapStrip, map_strip, ranges_of_one
 from enumsol.model.problem import ContactProblem
+from enumsol.search.outcome import Stop, StopReason
 from enumsol.support import arguments
 from enumsol.support.array_arguments import vector_of
 from enumsol.support.immutable import Immutable
+from enumsol.support.keeping import keeping
 from enumsol.support.messages import counted
 from enumsol.support.plotting import kept
 from enumsol.support.workers import spread
@@ -85,8 +87,8 @@ def multiplicity_map(
     ------
     InvalidArgumentError
         An argument cannot be used.
-    Interrupted
-        On Ctrl-C; ``partial`` is the map of the values done.
+    Interrupted, OutOfMemoryError
+        On Ctrl-C, or where the memory does not suffice; ``partial`` is the map of the values done.
 
     Examples
     --------
@@ -109,15 +111,13 @@ def multiplicity_map(
     most = arguments.nonnegative_integer(max_boxes, "max_boxes")
     if not isinstance(make, _Replaced) or make.problem.modes is not None or options.get("arithmetic") == "fast":
         most = 0
-    work = _Rows(name, interval, values, make, options, arguments.optional_seconds(time_limit), most)
-    try:
-        work.run(executor, progress)
-    except (KeyboardInterrupt, Interrupted) as interruption:
-        done = f"{len(work.done)} of {counted(len(values), 'value')}"
-        raise Interrupted(
-            f"multiplicity_map was interrupted after {done}", work.result("interrupted")
-        ) from interruption
-    return work.result()
+    rows = _Rows(name, interval, values, make, options, arguments.optional_seconds(time_limit), most)
+    return keeping(
+        "multiplicity_map",
+        partial(rows.run, executor, progress),
+        lambda ending: rows.result(str(Stop(StopReason.of(ending)))),
+        lambda found: f" after {len(found.rows)} of {counted(len(values), 'value')}",
+    )
 
 
 @dataclass
@@ -135,7 +135,7 @@ class _Rows:
     done: dict[int, MapRow] = field(default_factory=dict)
     strips: list[MapStrip] = field(default_factory=list)
 
-    def run(self, executor: Executor | None, progress: Callable[[int, int], object] | None) -> None:
+    def run(self, executor: Executor | None, progress: Callable[[int, int], object] | None) -> MultiplicityMap:
         """All rows, then the strips between them."""
         with closing(spread(executor, self._row_calls())) as found:
             for place, row in found:
@@ -146,6 +146,7 @@ class _Rows:
         if self.max_boxes and len(rows) == len(self.values):
             for _, strip in spread(executor, self._strip_calls(rows)):
                 self.strips.append(strip)
+        return self.result()
 
     def _row_calls(self) -> Iterator[Call[int]]:
         """Of map_row, while there is time; the options have what is left of it."""

@@ -214,7 +214,7 @@ def warn_of_jumps(law: FrictionLaw, reach: Floats, labels: tuple[Any, ...]) -> N
             f"friction jumps by {_size(at_high - at_low)[node]:.3g} near slip {high[node]:.6g} at contact node "
             f"{labels[node]}; expected a Lipschitz function of the slip, without which there may be no fixed point",
             FrictionJumpWarning,
-            stacklevel=7,  # the caller of successive_approximations
+            stacklevel=9,  # the caller of successive_approximations
         )
 
 

@@ -208,9 +208,10 @@ class ProofWriter:
 
     def close(self) -> Proof:
         """Finish the file and give the proof; a damaged one when there was a ``failure``."""
-        self._flush()
-        self._emit(self._checksum.end())
-        self._emit(self._digest.digest())
+        if not self._file.closed:  # by an earlier call, which was interrupted
+            self._flush()
+            self._emit(self._checksum.end())
+            self._emit(self._digest.digest())
         if self._path is None:
             return Proof(self._file.getvalue())  # type: ignore[attr-defined]
         if self.failure is None:
@@ -221,12 +222,14 @@ class ProofWriter:
                 self._attempt(lambda: beside.replace(path))
             else:
                 beside.unlink(missing_ok=True)
+            self._beside = None
         return Proof(self._path)
 
     def _flush(self) -> None:
         if self._pending:
-            self._append(Part.of(self._pending))
-            self._pending.clear()
+            # an interruption loses records at the end, and has none written twice
+            pending, self._pending = self._pending, []
+            self._append(Part.of(pending))
 
     def _append(self, part: Part) -> None:
         self._checksum.add(part)

@@ -8,6 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import solve_triangular
 
+from enumsol.relaxation.conic import conic_answer
 from enumsol.relaxation.engine import PRUNE_MARGIN, Relaxation, largest_violation
 from enumsol.relaxation.imposed_rows import EQUALITY, row_terms
 
@@ -54,16 +55,12 @@ class InteriorPointEngine:
         other = [row for row, mode in on.items() if mode != EQUALITY]
         order = np.array(equal + other, dtype=np.intp)
         scale = 1.0 / self.norms[order]
-        settings = clarabel.DefaultSettings()
-        settings.verbose = False
-        answer = clarabel.DefaultSolver(
-            sp.csc_matrix(np.triu(2.0 * self.system.S)),
-            -self.system.g,
-            sp.csc_matrix(-self.normals[order] * scale[:, None]),
-            -self.offsets[order] * scale,
+        answer = conic_answer(
+            (sp.csc_matrix(np.triu(2.0 * self.system.S)), -self.system.g),
+            (sp.csc_matrix(-self.normals[order] * scale[:, None]), -self.offsets[order] * scale),
             [clarabel.ZeroConeT(len(equal)), clarabel.NonnegativeConeT(len(other))],
-            settings,
-        ).solve()
+            self.system.S.size,
+        )
         found = clarabel.SolverStatus
         infeasible = answer.status in (found.PrimalInfeasible, found.AlmostPrimalInfeasible)
         solved = answer.status in (found.Solved, found.AlmostSolved)

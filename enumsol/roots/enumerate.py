@@ -27,6 +27,8 @@ from enumsol.selections.float_selections import SIGN_TOLERANCE
 from enumsol.selections.solution import PointValues, SelectionSolution, SelectionSolver
 from enumsol.support import arguments
 from enumsol.support.deadlines import Deadline, TimeOverError, within
+from enumsol.support.keeping import keeping
+from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -38,6 +40,7 @@ if TYPE_CHECKING:
     from enumsol.model.problem3d import AnyProblem, ContactProblem3D
     from enumsol.roots.root import Root, RootFamily
     from enumsol.support.array_types import Alpha, AlphaLike, Codes, Floats
+    from enumsol.support.keeping import Ending
 
 
 class AtRest:
@@ -155,8 +158,8 @@ def enumerate_roots(
         An argument is out of range, or the file to be resumed belongs to another search.
     TooLargeError
         The exhaustive method or exact arithmetic would take too long; the message says how long.
-    Interrupted
-        On Ctrl-C; ``partial`` holds what was found.
+    Interrupted, OutOfMemoryError
+        On Ctrl-C, or where the memory does not suffice; ``partial`` holds what was found.
     OutputError
         There was no space to write the whole proof; ``partial`` holds the result without it.
 
@@ -188,21 +191,32 @@ def enumerate_roots(
 
         check_supported(arithmetic, method, engine)
     _check_proof(arithmetic, method, proof_path, resume)
-    search: Enumeration[Any]
-    try:
-        with within(Deadline.after(started, seconds)):
-            if _is_in_space(problem):
-                in_space = solvers_in_space(problem, value, arithmetic)
-                _ = in_space.enclosed  # before a file is begun
-                search = SpaceEnumeration(in_space, progress, proof_path, resumed=resume, started=started)
-            else:
-                kind = Solvers if problem.modes is None else _floating_solvers()
-                solvers = kind(problem, value, arithmetic, tolerance, engine)
-                _ = solvers.enclosed  # as above
-                search = _Enumeration(solvers, progress, proof_path, method=method, resumed=resume, started=started)
-    except TimeOverError:
-        return not_begun(problem, value, arithmetic, method, time.perf_counter() - started)
-    return search.run(executor, *counts, seconds)
+    search: Enumeration[Any] | None = None
+
+    def nothing(stop: StopReason) -> RootSet:
+        return not_begun(problem, value, arithmetic, method, time.perf_counter() - started, stop)
+
+    def work() -> RootSet:
+        nonlocal search
+        try:
+            with within(Deadline.after(started, seconds)):
+                if _is_in_space(problem):
+                    in_space = solvers_in_space(problem, value, arithmetic)
+                    _ = in_space.enclosed  # before a file is begun
+                    search = SpaceEnumeration(in_space, progress, proof_path, resumed=resume, started=started)
+                else:
+                    kind = Solvers if problem.modes is None else _floating_solvers()
+                    solvers = kind(problem, value, arithmetic, tolerance, engine)
+                    _ = solvers.enclosed  # as above
+                    search = _Enumeration(solvers, progress, proof_path, method=method, resumed=resume, started=started)
+        except TimeOverError:
+            return nothing(StopReason.TIME_LIMIT)
+        return search.run(executor, *counts, seconds)
+
+    def rest(ending: Ending) -> RootSet:
+        return nothing(StopReason.of(ending)) if search is None else search.cut_short(ending)
+
+    return keeping("enumerate_roots", work, rest, lambda found: f"; {counted(len(found), 'root')} so far")
 
 
 def is_unique(problem: AnyProblem, alpha: AlphaLike, **options: Any) -> bool | None:
@@ -256,9 +270,11 @@ def _in_doubt(core: Codes) -> UndecidedPart:
     return UndecidedPart(core, "a root in it may be the same as another one", hint, examined=True)
 
 
-def _not_joined(codes: Codes) -> UndecidedPart:
-    reason = "the time was over before it was known with which others its solution is connected"
-    return UndecidedPart(codes, reason, "raise the limit", examined=True)
+def _not_joined(codes: Codes, stop: Stop) -> UndecidedPart:
+    when = "the search was ended" if stop.interrupted else "the time was over"
+    reason = f"{when} before it was known with which others its solution is connected"
+    ended = stop if stop.interrupted else Stop(StopReason.TIME_LIMIT)
+    return UndecidedPart(codes, reason, ended.remedy, examined=True)
 
 
 def _alone(solution: SelectionSolution) -> bool:
@@ -273,13 +289,13 @@ class _Enumeration(Enumeration[Solvers]):
     doubtful: Sequence[Codes] = ()
 
     def _enough(self, stop_after: int) -> Callable[[list[Any]], bool]:
-        counted = [0, 0]
+        known = [0, 0]
 
         def enough(solutions: list[Any]) -> bool:
             # several selections may hold at one root: count roots, and only when something was added
-            if len(solutions) >= stop_after and len(solutions) != counted[0]:
-                counted[:] = [len(solutions), sum(len(part) for part, _ in self._components())]
-            return counted[1] >= stop_after
+            if len(solutions) >= stop_after and len(solutions) != known[0]:
+                known[:] = [len(solutions), sum(len(part) for part, _ in self._components())]
+            return known[1] >= stop_after
 
         return enough
 
@@ -326,9 +342,10 @@ class _Enumeration(Enumeration[Solvers]):
             return self._components()
         except TimeOverError:
             outcome, self.late = self.outcome, True
-            outcome.undecided += [_not_joined(s.codes) for s in outcome.solutions if not _alone(s)]
-            outcome.solutions[:] = filter(_alone, outcome.solutions)
-            outcome.stopped = outcome.stopped or Stop(StopReason.TIME_LIMIT)
+            stop = outcome.stopped = outcome.stopped or Stop(StopReason.TIME_LIMIT)
+            left = [_not_joined(s.codes, stop) for s in outcome.solutions if not _alone(s)]
+            alone = list(filter(_alone, outcome.solutions))
+            outcome.undecided, outcome.solutions = [*outcome.undecided, *left], alone
             return self._components()
 
     def _components(self) -> list[tuple[list[RootComponent], SelectionSolver]]:

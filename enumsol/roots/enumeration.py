@@ -8,16 +8,15 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
-from enumsol.errors import Interrupted, OutputError
+from enumsol.errors import OutputError
 from enumsol.proof.begun import BegunProof, begun_proof
 from enumsol.proof.writer import ProofWriter
 from enumsol.roots.root_set import RigidBound, RootSet, SearchStats, Undecided
 from enumsol.search.certifiers.protocol import UndecidedPart
-from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
+from enumsol.search.outcome import HOLD, SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
 from enumsol.search.parallel import Searchable, Spread
 from enumsol.search.resume import resume
 from enumsol.support.deadlines import Deadline, within
-from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -28,6 +27,7 @@ if TYPE_CHECKING:
     from enumsol.roots.root import Root, RootFamily
     from enumsol.search.tree import TreeSearch
     from enumsol.support.array_types import Alpha
+    from enumsol.support.keeping import Ending
 
 _Solvers = TypeVar("_Solvers", bound=Searchable)
 
@@ -85,18 +85,10 @@ class Enumeration(ABC, Generic[_Solvers]):
     def run(
         self, executor: Executor | None, stop_after: int | None, max_nodes: int | None, time_limit: float | None
     ) -> RootSet:
-        """Search, then build the result; an interruption keeps what was found."""
+        """Search, then build the result."""
         until = Deadline.after(self.started, time_limit)
         limits = SearchLimits(None if stop_after is None else self._enough(stop_after), max_nodes, until.deadline)
-        try:
-            self._search(limits, executor)
-        except KeyboardInterrupt as interruption:
-            self.outcome.stopped = Stop(StopReason.INTERRUPTED, self._examined())
-            if self.tree is not None and not self.unloaded:
-                self.tree.add_known()
-            partial = self._result()
-            message = f"enumerate_roots was interrupted; {counted(len(partial), 'root')} so far"
-            raise Interrupted(message, partial) from interruption
+        self._search(limits, executor)
         if self.writer is not None:
             self.writer.replace()
         # a search that goes on with an earlier one has moved its deadline
@@ -105,6 +97,13 @@ class Enumeration(ABC, Generic[_Solvers]):
         if self.writer is not None and self.writer.failure is not None:
             raise OutputError(self.writer.failure, result)
         return result
+
+    def cut_short(self, ending: Ending) -> RootSet:
+        """The result of what was found before something ended ``run``, wherever that was."""
+        self.outcome.stopped = Stop(StopReason.of(ending), self._examined())
+        if self.tree is not None and not self.unloaded and not issubclass(ending, MemoryError):
+            self.tree.add_known()
+        return self._result()
 
     def _at_least(self, known: int) -> int:
         """What a number of roots is at least: a body that is proven stable has a solution (theory, section 12.6)."""
@@ -116,6 +115,7 @@ class Enumeration(ABC, Generic[_Solvers]):
         self.tree = search = solvers.search(self.certifier, limits, self.progress)
         earlier = () if self._begun is None or self.writer is None else (self._begun, self.writer.replace)
         self.outcome = search.outcome
+        search.otherwise = "" if self.problem.modes is None else HOLD
         if solvers.unloaded():
             self.certifier.unloaded()
             self.unloaded = True
@@ -198,17 +198,20 @@ class Enumeration(ABC, Generic[_Solvers]):
         return proof if whole and self.writer.failure is None else None
 
 
-def not_begun(problem: ContactBody, alpha: Alpha, arithmetic: str, method: str, seconds: float) -> RootSet:
-    """What is known of a body that is so large that the time was over before it was condensed: nothing."""
-    reason = "the time was over before the body was condensed to its contact nodes"
+def not_begun(
+    problem: ContactBody, alpha: Alpha, arithmetic: str, method: str, seconds: float, stop: StopReason
+) -> RootSet:
+    """What is known where the search was ended before the body was condensed: nothing."""
+    what = {StopReason.INTERRUPTED: "it was interrupted", StopReason.OUT_OF_MEMORY: "the memory did not suffice"}
+    reason = f"{what.get(stop, 'the time was over')} before the body was condensed to its contact nodes"
     return RootSet(
         alpha=alpha,
         roots=[],
         families=[],
-        undecided=[Undecided((None,) * problem.p, reason, "raise the limit")],
+        undecided=[Undecided((None,) * problem.p, reason, Stop(stop).remedy)],
         arithmetic=arithmetic,
         method=method,
-        stopped=str(Stop(StopReason.TIME_LIMIT)),
+        stopped=str(Stop(stop)),
         stats=SearchStats(seconds=seconds),
         node_ids=problem.node_ids,
         at_least=0,

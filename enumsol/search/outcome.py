@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from enumsol.selections.solution import SelectionSolution
 
 
+#: What helps where nothing holds a body and its searches do not come to an end.
+HOLD = "hold the body by a spring or a fixed point, or give a smaller max_rigid_displacement"
+
+
 @dataclass(frozen=True)
 class SearchProgress:
     """State of a running search, as handed to the ``progress`` callback.
@@ -116,7 +120,13 @@ class StopReason(enum.Enum):
     ENOUGH_ROOTS = enum.auto()
     TIME_LIMIT = enum.auto()
     INTERRUPTED = enum.auto()
+    OUT_OF_MEMORY = enum.auto()
     GRAPH_INCOMPLETE = enum.auto()
+
+    @classmethod
+    def of(cls, ending: type[BaseException]) -> StopReason:
+        """That of an error that ends a call anywhere, by Ctrl-C or a lack of memory."""
+        return cls.OUT_OF_MEMORY if issubclass(ending, MemoryError) else cls.INTERRUPTED
 
 
 @dataclass(frozen=True)
@@ -144,18 +154,37 @@ class Stop:
 
     @property
     def interrupted(self) -> bool:
-        """Whether the user pressed Ctrl-C: the rest of the search is unaccounted for."""
-        return self.reason is StopReason.INTERRUPTED
+        """Whether it ended anywhere, by Ctrl-C or a lack of memory: the rest of the search is unaccounted for."""
+        return self.reason in (StopReason.INTERRUPTED, StopReason.OUT_OF_MEMORY)
+
+    @property
+    def limited(self) -> bool:
+        """Whether a limit of nodes or time ended it."""
+        return self.reason in (StopReason.NODE_LIMIT, StopReason.TIME_LIMIT)
+
+    @property
+    def remedy(self) -> str:
+        """What lets a search get to what this one left."""
+        return {
+            StopReason.NODE_LIMIT: f"raise the limit of {self.unit}s",
+            StopReason.ENOUGH_ROOTS: "search without stop_after",
+            StopReason.TIME_LIMIT: "raise the time limit",
+            StopReason.INTERRUPTED: "let it run to its end",
+            StopReason.OUT_OF_MEMORY: "use more memory or a smaller problem",
+            StopReason.GRAPH_INCOMPLETE: "use enumerate_roots",
+        }[self.reason]
 
     def __str__(self) -> str:
         done = "" if self.count is None else counted(self.count, self.unit)
         if self.arcs_of is not None:
             done = f"the arcs of {self.count} of {self.arcs_of} selections"
+        after = f" after {done}" if done else ""
         text = {
             StopReason.NODE_LIMIT: f"stopped after max_nodes = {done}",
             StopReason.ENOUGH_ROOTS: "stopped after enough roots",
-            StopReason.TIME_LIMIT: "stopped by the time limit" + (f" after {done}" if done else ""),
-            StopReason.INTERRUPTED: f"interrupted after {done}",
+            StopReason.TIME_LIMIT: f"stopped by the time limit{after}",
+            StopReason.INTERRUPTED: f"interrupted{after}",
+            StopReason.OUT_OF_MEMORY: f"out of memory{after}",
             StopReason.GRAPH_INCOMPLETE: "the branch graph is not complete",
         }[self.reason]
         return text if self.unexamined is None else f"{text}, {counted(self.unexamined, 'subtree')} not examined"

@@ -131,6 +131,8 @@ class TreeSearch:
         self.forms = forms
         self._known_root = known_root
         self.outcome = SearchOutcome()
+        #: What helps where limits are reached, besides higher ones.
+        self.otherwise = ""
         self._fallback: InteriorPointEngine | None = None
         self.splitting: Splitting = splitting or PlaneSplitting(system.F)
         self._rows = ImposedRows(self.splitting, system.p)
@@ -332,9 +334,11 @@ class TreeSearch:
             self._settle(TreeNode(None, root, -1, last=False, weight=0.0))
 
     def _skip(self, codes: Codes) -> None:
-        self.certifier.skipped(codes, str(self.outcome.stopped))
-        part = UndecidedPart(codes, "the search was stopped before it got here", "raise the limit")
-        self.outcome.undecided.append(part)
+        stop = self.outcome.stopped
+        assert stop is not None
+        self.certifier.skipped(codes, str(stop))
+        hint = f"{stop.remedy}, or {self.otherwise}" if stop.limited and self.otherwise else stop.remedy
+        self.outcome.undecided.append(UndecidedPart(codes, "the search was stopped before it got here", hint))
 
     def examine(self, item: TreeNode) -> list[TreeNode]:
         """Settle one node of the tree, or give its children, the one that is examined first last."""

@@ -106,7 +106,7 @@ def look() -> None:
         raise TimeOverError
 
 
-def attended(work: Callable[[], _Result], size: int, name: str) -> _Result:
+def attended(work: Callable[[], _Result], size: int, name: str, given_up: threading.Event | None = None) -> _Result:
     """What one long call into compiled code returns; Ctrl-C and the end of the time end the wait for it at once.
 
     Nothing can interrupt such a call, so it runs in a thread of its own (it must release the interpreter's lock, as
@@ -117,6 +117,8 @@ def attended(work: Callable[[], _Result], size: int, name: str) -> _Result:
     work : callable
     size : number of entries that it works on; a short call needs no thread
     name : what is told of it
+    given_up : Event, optional
+        Set once nobody waits any longer, for a call that can be asked to end.
 
     Raises
     ------
@@ -135,10 +137,14 @@ def attended(work: Callable[[], _Result], size: int, name: str) -> _Result:
         except Exception as error:  # noqa: BLE001 (raised again where it is waited for)
             done.set_exception(error)
 
-    threading.Thread(target=run, daemon=True).start()
-    while not wait([done], _POLL).done:
-        look()
-    return done.result()
+    try:
+        threading.Thread(target=run, daemon=True).start()
+        while not wait([done], _POLL).done:
+            look()
+        return done.result()
+    finally:
+        if given_up is not None:
+            given_up.set()
 
 
 _listener: ContextVar[Listener | None] = ContextVar("listener", default=None)

@@ -137,7 +137,7 @@ def test_what_contradicts_a_search_is_told_as_a_defect():
     }
     assert joined
     for left_out in sorted(joined):
-        gluing = glue(exact, held - {left_out}, rational(0), rational(10))
+        gluing = glue(KnownSelections(exact, rational(0), rational(10), cut_short=False), held - {left_out})
         text = named(left_out)
         assert any(text in reason and reason.endswith("please report it") for reason in gluing.reasons), left_out
     assert named((0, 1)) == "the selection 1 open, 1 stick"

@@ -1,8 +1,16 @@
 """Ctrl-C pressed on the way, and what is kept of the result."""
 
+import sys
+from pathlib import Path
+
 from refusals import refusal
 
+import enumsol
 from enumsol import Interrupted
+from enumsol.support import keeping
+
+#: Where the lines are that may be interrupted.
+ROOT = str(Path(enumsol.__file__).parent)
 
 
 class CtrlC:
@@ -25,3 +33,42 @@ class CtrlC:
 def interrupted(message, call, /, *arguments, **options):
     """What is kept of a result, where the call says that it was interrupted, with this message (a pattern)."""
     return refusal(Interrupted, message, call, *arguments, **options).partial
+
+
+class AtLine:
+    """Raises an error once, at the so manieth line that is run inside of a call which keeps what it found.
+
+    Lines of `keeping` itself do not count, nor what a function does before: with no such line it only counts them.
+    """
+
+    def __init__(self, line=None, error=KeyboardInterrupt):
+        self.line, self.error, self.lines, self._depth = line, error, 0, 0
+
+    def __enter__(self):
+        self._before = sys.gettrace()
+        sys.settrace(self._call)
+        return self
+
+    def __exit__(self, *_):
+        sys.settrace(self._before)
+
+    def _call(self, frame, event, _):
+        name = frame.f_code.co_filename
+        if name == keeping.__file__:
+            if frame.f_code is not keeping.keeping.__code__:
+                return None
+            self._depth += 1
+            return self._outside
+        return self._inside if self._depth and name.startswith(ROOT) else None
+
+    def _outside(self, frame, event, _):
+        self._depth -= event == "return"
+        return self._outside
+
+    def _inside(self, frame, event, _):
+        if event == "line":
+            self.lines += 1
+            if self.lines == self.line:
+                sys.settrace(None)
+                raise self.error
+        return self._inside

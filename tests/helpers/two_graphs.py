@@ -9,6 +9,7 @@ from enumsol.branches.enclosed.following import TracedProblem, follow_selections
 from enumsol.branches.enclosed.joining import EventPlaceKind
 from enumsol.branches.enclosed.make_traced import make_traced
 from enumsol.branches.exact.gluing import glue
+from enumsol.branches.exact.known_selections import KnownSelections
 from enumsol.branches.exact.make_elements import make_arcs, make_vertices
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.search.certifiers.interval_certifiers import VerifiedIntervalCertifier
@@ -45,7 +46,7 @@ def two_graphs(problem, interval):
     search = IntervalSearch(problem.condensed, (a, b), exact.zero, certifier)
     search.run()
     followed = follow_selections(traced, search.pieces, cut_short=search.stopped is not None)
-    gluing = glue(exact, search.selections, rational(a), rational(b))
+    gluing = glue(KnownSelections(exact, rational(a), rational(b), cut_short=False), search.selections)
     arcs = make_arcs(gluing)
     ours = make_traced(traced, followed.joined)
     theirs = make_vertices(gluing, arcs), arcs

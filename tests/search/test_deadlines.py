@@ -3,13 +3,17 @@
 import inspect
 import signal
 import threading
+import time
 from itertools import count
 
+import clarabel
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from complete import accepted_report, all_roots
 from cut_short import false_claims_of_graph
 from graph_proofs import triangle
+from interruptions import CtrlC
 
 from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery, verify
 from enumsol.branches.enclosed.tracing import _Tracing
@@ -17,6 +21,7 @@ from enumsol.branches.exact import gluing
 from enumsol.branches.exact.known_selections import KnownSelections
 from enumsol.condensation import products
 from enumsol.condensation.factorization import Factorization
+from enumsol.relaxation.conic import conic_answer
 from enumsol.relaxation.convex_forms import FormAscent
 from enumsol.search import form_policy as forms
 from enumsol.search.interval.subintervals import IntervalSearch
@@ -298,3 +303,41 @@ def test_wherever_the_time_is_over_nothing_false_is_claimed(name, monkeypatch):
         ended.add(graph.complete)
         assert list(false_claims_of_graph(graph, whole)) == [], limit
     assert ended == {True, False}
+
+
+class Endless:
+    """A program of Clarabel's that goes on until it is asked to end."""
+
+    ended = threading.Event()
+
+    def __init__(self, *_):
+        self.asked = None
+
+    def set_termination_callback(self, asked):
+        self.asked = asked
+
+    def solve(self):
+        while not self.asked(None):
+            time.sleep(0.001)
+        self.ended.set()
+
+
+@pytest.mark.parametrize("error", [TimeOverError, KeyboardInterrupt])
+def test_a_conic_program_is_left_at_once_and_ends_with_its_iteration(monkeypatch, error):
+    monkeypatch.setattr(clarabel, "DefaultSolver", Endless)
+    monkeypatch.setattr("enumsol.support.deadlines.look", CtrlC(then=None) if error is KeyboardInterrupt else look)
+    Endless.ended.clear()
+    empty = sp.csc_matrix((1, 1))
+    with within(Deadline(0.0)), pytest.raises(error):
+        conic_answer((empty, np.zeros(1)), (empty, np.zeros(1)), [], 10**9)
+    assert Endless.ended.wait(60)
+
+
+def test_a_conic_program_is_solved_in_a_thread_as_it_is_without_one():
+    def answer(size):
+        limits = sp.csc_matrix([[1.0, 1.0], [-1.0, 0.0]]), np.array([1.0, 0.0])
+        objective = sp.identity(2, format="csc"), np.array([-1.0, -3.0])
+        return conic_answer(objective, limits, [clarabel.NonnegativeConeT(2)], size, max_iter=50)
+
+    small, large = answer(1), answer(10**9)
+    assert small.x == large.x == pytest.approx([0.0, 1.0], abs=1e-6)

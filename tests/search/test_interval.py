@@ -13,6 +13,7 @@ from refusals import bad_argument, refusal
 from enumsol import ContactProblem, gallery
 from enumsol.branches import branch_graph, ways
 from enumsol.branches.exact.gluing import glue
+from enumsol.branches.exact.known_selections import KnownSelections
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.errors import IncompleteGraphError, TooLargeError
 from enumsol.model.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
@@ -149,7 +150,7 @@ def test_a_selection_left_out_by_the_search_is_noticed(seed):
     graph = branch_graph(problem, (0.0, 6.0), "exact")
     present = {codes for arc in graph.arcs for codes in arc.selections}
     for codes in present:
-        gluing = glue(graph.exact, present - {codes}, fmpq(0), fmpq(6))
+        gluing = glue(KnownSelections(graph.exact, fmpq(0), fmpq(6), cut_short=False), present - {codes})
         neighbours = any(codes in v.selections and len(v.selections) > 1 for v in graph.vertices)
         assert bool(gluing.reasons) == neighbours
 
@@ -196,8 +197,10 @@ def test_a_selection_that_the_search_left_out_is_taken_in_and_told(name):
     whole = branch_graph(problem, (0.0, 5.0), "exact")
     selections = {codes for arc in whole.arcs for codes in arc.selections}
     for missing in sorted(selections)[:: max(1, len(selections) // 6)]:
-        given = whole.exact, selections - {missing}, fmpq(0), fmpq(5)
-        gluing, short = glue(*given), glue(*given, cut_short=True)
+        gluing, short = (
+            glue(KnownSelections(whole.exact, fmpq(0), fmpq(5), cut_short=cut_short), selections - {missing})
+            for cut_short in (False, True)
+        )
         assert any("left out" in reason for reason in gluing.reasons) or missing not in gluing.arcs
         assert all(edge.tail >= 0 and edge.head >= 0 for edge in (*gluing.edges, *short.edges))
         assert missing not in gluing.arcs or len(gluing.edges) == len(whole.arcs)

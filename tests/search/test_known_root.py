@@ -39,10 +39,8 @@ BODIES = {
 
 
 def same(one, other):
-    return all(
-        np.allclose(getattr(one, name), getattr(other, name), rtol=1e-6, atol=1e-6 * (1 + np.max(np.abs(other.lambda_n))))
-        for name in ("lambda_n", "lambda_t")
-    )
+    pairs = [(one.lambda_n, other.lambda_n), (one.lambda_t, other.lambda_t)]
+    return all(np.allclose(*pair, rtol=1e-6, atol=1e-6 * (1 + np.max(np.abs(other.lambda_n)))) for pair in pairs)
 
 
 @pytest.mark.parametrize("nodes", [1, 5])

@@ -175,3 +175,19 @@ def test_results_show_the_sentence_and_nothing_is_decided_by_it(monkeypatch):
     assert branch_graph(problem, (0.0, 1.0), max_nodes=5).reasons[0].endswith("NODE_LIMIT")
     partial = interrupted("interrupted", branch_graph, problem, (0.0, 1.0), progress=CtrlC())
     assert partial.reasons[0].endswith("INTERRUPTED")
+
+
+@pytest.mark.parametrize(
+    ("limit", "hint"),
+    [({"max_nodes": 1}, "raise the limit of nodes"), ({"stop_after": 1}, "search without stop_after")],
+)
+def test_what_a_search_left_is_told_with_what_lets_it_get_there(wedge, limit, hint):
+    hints = {part.hint for part in enumsol.enumerate_roots(*wedge, **limit).undecided}
+    assert hints == {hint}
+
+
+@pytest.mark.parametrize("problem", [gallery.block_on_table(), gallery.block_on_table3d()], ids=["2D", "3D"])
+def test_where_nothing_holds_a_body_it_is_told_what_may_hold_it(problem):
+    (hint,) = {part.hint for part in enumsol.enumerate_roots(problem, 1, max_nodes=1).undecided}
+    assert hint.startswith("raise the limit of nodes, or hold the body by a spring or a fixed point")
+    assert "smaller max_rigid_displacement" in hint

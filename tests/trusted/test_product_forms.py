@@ -1,5 +1,6 @@
 """Forms of products in 3D, and ellipsoids where they are not positive: against Newton's method and definitions."""
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,10 @@ from trees import products_at_once
 from enumsol import enumerate_roots, verify
 from enumsol.model.sectors import SECTORS, direction, end_number, nearest
 from enumsol.model.statuses import CONTACT, OPEN, STICK, UNDECIDED
+from enumsol.search.space import product_search
 from enumsol.search.space.product_search import Branched, Enclosed, Missed, ProductSearch
 from enumsol.search.space.space_setup import SpaceSolvers
+from enumsol.support.deadlines import Deadline, within
 from enumsol.trusted.space.boxed_solution import is_inside
 from enumsol.trusted.space.product_forms import CONE, FREE, Ellipsoid, Frame, node_products, refines
 
@@ -243,3 +246,32 @@ def test_what_is_no_assignment_of_statuses_is_refused():
     assert not refines((OPEN, STICK), (CONTACT, STICK))
     assert not refines((SECTORS + 4, STICK), (SECTORS + 8, STICK))
     assert refines((SECTORS + 8, STICK), (SECTORS + 4, CONTACT))
+
+
+def test_a_program_that_cannot_be_bounded_is_not_begun(monkeypatch):
+    """Nothing interrupts its preparation, and it may take all the time that is left: its rank tells how long."""
+    solvers, solutions = known(29, 3)
+    codes, begun = codes_of(solvers, solutions[0], 2), []
+
+    def program(matrices, kinds, size):
+        begun.append(matrices.shape[1] - 1)
+        return solved(matrices, kinds, size)
+
+    solved = product_search._solved
+    monkeypatch.setattr(product_search, "_solved", program)
+
+    def best(left=None):
+        begun.clear()
+        with within(Deadline.after(time.perf_counter(), left)):
+            return ProductSearch(solvers.enclosed).best(codes, 1.0)
+
+    assert best() is not None
+    (rank,) = set(begun)
+    assert best(1e6) is not None
+    monkeypatch.setattr(product_search, "_SECONDS", 1e7)
+    assert (best(1e6), begun) == (None, [])
+    assert best() is not None
+    monkeypatch.setattr(product_search, "_HIGHEST", rank)
+    assert best() is not None
+    monkeypatch.setattr(product_search, "_HIGHEST", rank - 1)
+    assert (best(), begun) == (None, [])

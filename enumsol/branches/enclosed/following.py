@@ -278,9 +278,11 @@ def follow_selections(
     tick: Callable[[float], object] | None = None,
     *,
     known: Sequence[Trace] = (),
+    done: list[Trace] | None = None,
     cut_short: bool = False,
     most: int | None = None,
     limits: Limited | None = None,
+    ended: StopReason | None = None,
 ) -> Followed:
     """Trace all surviving selections where they survive; after a search that was cut short, over the whole interval.
 
@@ -290,42 +292,48 @@ def follow_selections(
     pieces : sequence of SearchedPiece
     tick : called with the share of the selections done
     known : traces of selections that are taken over if they are as long
+    done : list of Trace, optional
+        Takes the traces, and has those of a call that was interrupted; their selections are not followed again.
     cut_short : the search was stopped before it had looked everywhere
     most : int, optional
-        No further selections are followed after so many boxes, as if Ctrl-C had been pressed.
+        No further selections are followed after so many boxes.
     limits : Limited, optional
         Selections that are not finished by this deadline are left out.
+    ended : StopReason, optional
+        Why there is a bound of boxes.
     """
     where: dict[Codes, list[Bounds]] = {}
     for found in pieces:
         for codes in found.selections:
             where.setdefault(codes, []).append((found.piece.a, found.piece.b))
     followed = Followed(traced.problem, traced.force, traced.length, cut_short=cut_short)
-    if not cut_short:
-        followed.traces += _taken_over(traced, where, known)
-    waiting = sorted(where)
+    traces, count = [] if done is None else done, len(where)
+    if not cut_short and not traces:
+        traces += _taken_over(traced, where, known)
+    followed_before = {trace.selection.rows.codes for trace in traces}
+    waiting = sorted(where.keys() - followed_before)
+    stopped = ended if most == 0 else None
     # their matrices grow with the square of the number of nodes
     together = min(max(_LEAST, _TOGETHER // traced.problem.p**2), _MOST) if most is None else _FEW
     for first in range(0, len(waiting), together):
         group = waiting[first : first + together]
-        enough = most is not None and sum(len(trace.boxes) for trace in followed.traces) >= most
-        reason = StopReason.INTERRUPTED if enough else None
+        if most is not None and sum(len(trace.boxes) for trace in traces) >= most:
+            stopped = ended
+            break
         places = {codes: [traced.interval] if cut_short else where[codes] for codes in group}
         try:
             with within(limits or Deadline()):
-                traced.trace({} if enough else places, followed.traces)
-            if tick is not None and not enough:
-                tick(min(first + together, len(waiting)) / len(waiting))
-        except KeyboardInterrupt:
-            reason = StopReason.INTERRUPTED
+                traced.trace(places, traces)
         except TimeOverError:
-            reason = StopReason.TIME_LIMIT
-        if reason is not None:
-            done = len({trace.selection.rows.codes for trace in followed.traces})
-            followed.stopped = Stop(reason, done, arcs_of=len(waiting))
+            stopped = ended or StopReason.TIME_LIMIT
             break
-    followed.traces.sort(key=lambda one: one.selection.rows.codes)
-    missing = cut_short or followed.stopped is not None
+        if tick is not None:
+            tick(min(first + together, len(waiting)) / len(waiting))
+    finished = len({trace.selection.rows.codes for trace in traces})
+    if stopped is not None:
+        followed.stopped = Stop(stopped, finished, arcs_of=count)
+    followed.traces = sorted(traces, key=lambda one: one.selection.rows.codes)
+    missing = cut_short or finished < count
     followed.joined = join(
         followed.traces, traced.interval, traced.origin, traced.sharpen, cut_short=missing, sparing=traced.sparing
     )

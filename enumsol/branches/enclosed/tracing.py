@@ -61,14 +61,14 @@ def trace(
         ``precise`` gives the same selection in balls of many digits, for short boxes, or None where there is none;
         ``side`` is that of the selection's system.
     found : list of Trace
-        Takes the traces; on Ctrl-C, or once the time is over, those of the selections that are finished.
+        Takes the traces; where an error ends this, as that the time is over, those of the selections that are finished.
     sharpened : bounds of events will be made narrower
     """
     traces = [Trace(selection, low, high, side) for selection, low, high, _, side in asked]
     tracings = [_Tracing(one, part[3], sharpened=sharpened) for one, part in zip(traces, asked, strict=True)]
     try:
         _answer([tracing.run() for tracing in tracings])
-    except (KeyboardInterrupt, TimeOverError):
+    except (KeyboardInterrupt, MemoryError, TimeOverError):
         pairs = list(zip(traces, tracings, strict=True))
         waiting = {one.selection.rows.codes for one, tracing in pairs if not tracing.finished}
         found += [one for one in traces if one.selection.rows.codes not in waiting]

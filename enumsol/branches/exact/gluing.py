@@ -111,35 +111,35 @@ class Gluing:
 
 
 def glue(
-    exact: ExactCondensed,
+    known: KnownSelections,
     candidates: Iterable[Codes],
-    a: Any,
-    b: Any,
     tick: Callable[[float], object] | None = None,
     *,
-    cut_short: bool = False,
     most: int | None = None,
     limits: Limited | None = None,
+    ended: StopReason | None = None,
 ) -> Gluing:
     """Vertices and arcs of the graph, from the selections that the search found.
 
     Parameters
     ----------
-    exact : ExactCondensed
+    known : KnownSelections
+        Takes them in; or has those of a call that was interrupted, which are not worked out again.
     candidates : codes of the selections that may hold somewhere in [a, b]; all do if g vanishes at every alpha
-    a, b : fmpq
     tick : called with the share of the candidates done
-    cut_short : the search was stopped: selections it did not find are left out, and arcs may end without neighbours
     most : int, optional
-        No further candidates are worked out after so many, as if Ctrl-C had been pressed.
+        No further candidates are worked out after so many.
     limits : Limited, optional
         Candidates that are not worked out by this deadline are left out. What is not joined by the one that holds where
         this is called is unsettled.
+    ended : StopReason, optional
+        Why there is a bound of candidates.
     """
-    known = KnownSelections(exact, a, b, cut_short=cut_short)
+    exact = known.exact
     # where all selections hold, with lambda = 0, one arc stands for them
     waiting = [(OPEN,) * exact.p] if exact.unloaded else sorted(set(candidates))
-    stopped = _work_out(known, waiting, tick, most, limits or Deadline())
+    stopped = _work_out(known, waiting, tick, most, limits or Deadline(), ended)
+    known.cut_short = known.cut_short or len(known.added) < len(waiting)
     for codes in list(known.arcs):
         try:
             known.close(codes)
@@ -150,7 +150,7 @@ def glue(
     edges = _edges(known, vertices)  # may unsettle vertices and add reasons
     if known.late and stopped is None:
         stopped = Stop(StopReason.TIME_LIMIT)
-    return Gluing(exact, a, b, known.arcs, vertices, edges, stopped, known.reasons)
+    return Gluing(exact, known.a, known.b, known.arcs, vertices, edges, stopped, known.reasons)
 
 
 def _work_out(
@@ -159,25 +159,24 @@ def _work_out(
     tick: Callable[[float], object] | None,
     most: int | None,
     limits: Limited,
+    ended: StopReason | None,
 ) -> Stop | None:
-    """Where the candidates hold; after Ctrl-C or the deadline the rest is left out, as if it had not been found."""
-    for k, codes in enumerate(candidates):
-        reason = StopReason.INTERRUPTED if k == most else None
+    """Where the candidates hold; what lies beyond a bound or the deadline is left out, as if it had not been found."""
+    reason = ended if most == 0 else None
+    for codes in (codes for codes in candidates if codes not in known.added):
+        if most is not None and len(known.added) >= most:
+            reason = ended
+            break
         try:
-            if reason is None:
-                with within(limits):
-                    look()
-                    known.add(codes)
-                if tick is not None:
-                    tick((k + 1) / len(candidates))
-        except KeyboardInterrupt:
-            reason = StopReason.INTERRUPTED
+            with within(limits):
+                look()
+                known.add(codes)
         except TimeOverError:
-            reason = StopReason.TIME_LIMIT
-        if reason is not None:
-            known.cut_short = True
-            return Stop(reason, k, arcs_of=len(candidates))
-    return None
+            reason = ended or StopReason.TIME_LIMIT
+            break
+        if tick is not None:
+            tick(len(known.added) / len(candidates))
+    return None if reason is None else Stop(reason, len(known.added), arcs_of=len(candidates))
 
 
 # -- joining events ----------------------------------------------------------------------------------------------------
@@ -185,9 +184,9 @@ def _work_out(
 
 def _joined(known: KnownSelections) -> list[list[SelectionEvent]]:
     """Events at which selections hold, grouped by connected sets of solutions."""
-    exact, union, waiting = known.exact, UnionFind(), known.waiting
+    exact, union = known.exact, UnionFind()
     seen: dict[SelectionEvent, None] = {}
-    waiting += [event for arcs in known.arcs.values() for event in arcs.events if event.holds]
+    waiting = known.waiting = [event for arcs in known.arcs.values() for event in arcs.events if event.holds]
     origin = exact.origin
     if origin is not None and known.a <= origin <= known.b:
         waiting += _hold_everywhere(known, CriticalAlpha.rational(origin), union)
@@ -202,6 +201,8 @@ def _joined(known: KnownSelections) -> list[list[SelectionEvent]]:
         event.active = tuple(frozenset((code,)) for code in event.codes)
         try:
             look()
+            if event.singular:
+                known.solve(event)
             tell("ends of arcs joined", len(seen), len(seen) + len(waiting))
             for active in known.active_at(event):
                 _join_members(known, event, active, union)
@@ -236,9 +237,6 @@ def _join_members(known: KnownSelections, event: SelectionEvent, active: ActiveS
             continue
         if new:
             known.waiting.append(other)
-            other.singular = arcs.functions.singular
-            if other.singular:
-                known.solve(other)
         union.union(event, other)
 
 

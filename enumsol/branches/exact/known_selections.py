@@ -131,6 +131,8 @@ class KnownSelections:
     Attributes
     ----------
     arcs : dict of SelectionArcs by codes
+    added : set of codes
+        Selections that were worked out, also those that hold nowhere.
     cut_short : bool
         The search was stopped: selections it did not find are left out, and arcs may end without neighbours.
     late : bool
@@ -145,6 +147,7 @@ class KnownSelections:
         self.exact, self.a, self.b, self.cut_short = exact, a, b, cut_short
         self.late = False
         self.arcs: dict[Codes, SelectionArcs] = {}
+        self.added: set[Codes] = set()
         self.waiting: list[SelectionEvent] = []
         self.reasons: list[str] = []
         self._refused: set[Codes] = set()
@@ -175,9 +178,10 @@ class KnownSelections:
         except VertexLimitError as error:
             self._refused.add(codes)
             self.complain(f"{named(codes)}: {error}; {FEWER}")
-            return
-        if not arcs.empty:
-            self.arcs[codes] = arcs
+        else:
+            if not arcs.empty:
+                self.arcs[codes] = arcs
+        self.added.add(codes)
 
     def close(self, codes: Codes) -> None:
         """Decide a selection's singular events: which have solutions, and the polytopes they form."""
@@ -194,6 +198,8 @@ class KnownSelections:
 
     def solve(self, event: SelectionEvent) -> bool:
         """Find the polytope of a selection at a singular event; False when it has no solution there."""
+        if event.polytope is not None:
+            return True
         look()
         solver = self._fiber(event.alpha)
         try:

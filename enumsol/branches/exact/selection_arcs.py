@@ -7,7 +7,7 @@ point the signs follow from those beside it and from what vanishes there. Nothin
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -123,11 +123,12 @@ class SelectionArcs:
                 return self.events[middle], False
             after, high = (middle + 1, high) if order < 0 else (after, middle)
         cell = self.cells[after - 1]
-        event = SelectionEvent(self.codes, alpha, cell.holds, bounded=self.bounded)
-        self.events.insert(after, event)
+        event = SelectionEvent(self.codes, alpha, cell.holds, self.functions.singular, bounded=self.bounded)
         left = rational_between(self.events[after - 1].alpha, alpha)
-        right = rational_between(alpha, self.events[after + 1].alpha)
-        self.cells[after - 1 : after] = [Cell(left, cell.holds, cell.det_sign), Cell(right, cell.holds, cell.det_sign)]
+        right = rational_between(alpha, self.events[after].alpha)
+        halves = [replace(cell, sample=left), replace(cell, sample=right)]
+        # together: an interruption comes before or after this
+        self.events[after:after], self.cells[after - 1 : after] = [event], halves
         return event, True
 
 

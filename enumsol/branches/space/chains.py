@@ -14,7 +14,7 @@ import numpy as np
 from enumsol.continuation.continuation_options import ContinuationOptions
 from enumsol.continuation.follow import follow
 from enumsol.continuation.path_data import PathStatus
-from enumsol.errors import EnumsolError, Interrupted
+from enumsol.errors import EnumsolError, Interrupted, OutOfMemoryError
 from enumsol.support.deadlines import TimeOverError, look, tell
 from enumsol.trusted.space.curve_chains import CurveChain, CurveLink, goes_on, link_between
 from enumsol.trusted.space.solution_curve import corner_steps, curve_around, curve_point, only_curve
@@ -110,7 +110,7 @@ def chain_through(
     builder = ChainBuilder(given, interval)
     try:
         return builder.chain(skeleton)
-    except (TimeOverError, KeyboardInterrupt):
+    except (TimeOverError, KeyboardInterrupt, MemoryError):
         if begun is not None and (part := builder.begun) is not None:
             begun(part)
         raise
@@ -124,7 +124,7 @@ def skeleton_through(problem: ContactProblem3D, x: Array, span: tuple[float, flo
         ahead = _path(problem, start, 1, span)
         closed = ahead.status == PathStatus.CLOSED
         paths = [ahead] if closed else [_path(problem, start, -1, span), ahead]
-    except Interrupted:
+    except (Interrupted, OutOfMemoryError):
         raise
     except EnumsolError:
         return None

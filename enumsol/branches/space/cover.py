@@ -68,6 +68,8 @@ class SpaceCover:
     nodes : int
     stopped : StopReason or None
         Why the tree was not searched to its end.
+    settled : bool
+        The records say of the whole tree what is open.
     """
 
     problem: ContactProblem3D
@@ -77,6 +79,7 @@ class SpaceCover:
     failed: int = 0
     nodes: int = 0
     stopped: StopReason | None = None
+    settled: bool = False
 
     @property
     def gaps(self) -> list[tuple[Fraction, Fraction]]:
@@ -131,6 +134,7 @@ class SpaceCover:
             tree.run(None if executor is None else partial(spread_over, executor))
         finally:
             self.records, self.nodes, self.stopped = tree.records, tree.nodes, tree.stopped
+            self.settled = tree.settled and bool(tree.records)
 
     def _is_of_use(self, chain: CurveChain) -> bool:
         alphas, (low, high) = [end for joint in chain.joints for end in joint.alphas], self.interval

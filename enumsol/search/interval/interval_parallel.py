@@ -27,14 +27,14 @@ def run_parallel(executor: Executor, search: IntervalSearch) -> None:
 
     Raises
     ------
-    KeyboardInterrupt
+    KeyboardInterrupt, MemoryError
         The search then holds what was found by then.
     """
     ahead = _Ahead(executor, search)
     try:
         ahead.run()
-    except KeyboardInterrupt:
-        search.stopped = Stop(StopReason.INTERRUPTED, ahead.nodes)
+    except (KeyboardInterrupt, MemoryError) as error:
+        search.stopped = Stop(StopReason.of(type(error)), ahead.nodes)
         search.run(ahead.known)
         raise
     finally:

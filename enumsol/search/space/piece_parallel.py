@@ -118,6 +118,7 @@ class _Spread:
         """Examine what waits; what no worker has examined when a limit is reached is open."""
         stack = self._crew.parts((), [_sent(item) for item in waiting])[::-1]
         try:
+            self._tree.away = True
             waiting.clear()
             self._crew.hand_out(stack)
             while stack and self._tree.stopped is None:
@@ -180,6 +181,7 @@ class _Spread:
             else:
                 self._tree.leave(stack[-1].roots)
                 stack.pop()
+        self._tree.away = False
 
 
 def _sent(item: Waiting) -> Waiting:

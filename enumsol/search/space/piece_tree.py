@@ -238,6 +238,10 @@ class PieceTree:
         self._points: OrderedDict[Fraction, AlphaPoint] = OrderedDict()
         self.records: list[Any] = []
         self.nodes, self.covered = 0, 0.0
+        #: Parts of the tree are neither examined nor left open, nor do they wait here.
+        self.away = False
+        #: The records are those of the whole tree.
+        self.settled = False
         #: Why the search ended early, if it did.
         self.stopped: StopReason | None = None
         #: How often a curve through the middle of a piece was looked for.
@@ -305,7 +309,7 @@ class PieceTree:
 
         Raises
         ------
-        KeyboardInterrupt
+        KeyboardInterrupt, MemoryError
             The records then say that what was not examined is open.
         """
         waiting = [((*self.interval, (UNDECIDED,) * self._enclosure.problem.p, None, -1, False, 0), 1.0)]
@@ -315,6 +319,7 @@ class PieceTree:
                 spread(self, waiting)
         finally:
             self.leave(waiting)
+            self.settled = not self.away
 
     def examined(self, waiting: list[Waiting], most: int | None = None) -> None:
         """Examine what waits, the last first, until a limit is reached or so many nodes more are; the rest still waits.

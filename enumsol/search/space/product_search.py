@@ -14,7 +14,8 @@ import scipy.sparse
 
 from enumsol.model.sectors import DEEPEST, SECTORS, cut, level_of, width_of
 from enumsol.model.statuses import CONTACT, UNDECIDED
-from enumsol.support.deadlines import look
+from enumsol.relaxation.conic import conic_answer
+from enumsol.support.deadlines import look, remaining
 from enumsol.trusted.space.boxed_solution import BoxedSolution, proposed_rho, solution_in_box
 from enumsol.trusted.space.product_forms import CONE, SIGNED, Ellipsoid, Frame
 from enumsol.trusted.space.sector_rows import sector_children
@@ -34,6 +35,12 @@ _GAIN = 1.0
 _STEEPEST = 1e3
 #: The radius of the ellipsoid that a program is scaled for should be within this of the one that it finds.
 _SCALED, _RESCALINGS = 30.0, 2
+#: Rank of the forms up to which a program is begun: beyond, its preparation alone takes more than a second, in which
+#: Python hears nothing, and the program minutes.
+_HIGHEST = 72
+#: Seconds that a program takes, by the sixth power of that rank (its matrix has rank^2 rows); measured: 0.13 for 28,
+#: 0.7 for 36, 2.7 for 44. One that would take all the time that is left is not begun.
+_SECONDS = 4e-10
 
 
 @dataclass(frozen=True)
@@ -181,7 +188,8 @@ class ProductSearch:
         norm = np.linalg.norm(rows, axis=1)
         scaled = rows / norm[:, None]
         inside = scipy.linalg.null_space(scaled)
-        if not products or not inside.shape[1]:
+        left, rank = remaining(), inside.shape[1]
+        if not products or not 0 < rank <= _HIGHEST or (left is not None and left < _SECONDS * rank**6):
             return None
         away = np.eye(len(self._system.g)) + self._rho[0][:, None] * self._system.S
         U, long, V = np.linalg.svd(away @ inside, full_matrices=False)
@@ -237,11 +245,9 @@ def _solved(matrices: Floats, kinds: list[int], size: float) -> tuple[Floats, Fl
     ]
     cones = [clarabel.NonnegativeConeT(len(signed) + 1)] + [clarabel.SecondOrderConeT(3)] * (len(triples) // 3)
     cones += [clarabel.PSDTriangleConeT(rank + 1), clarabel.PSDTriangleConeT(rank)]
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
     rows, right = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
     goal, none = np.append(np.zeros(count), -1.0), scipy.sparse.csc_matrix((count + 1, count + 1))
-    answer = clarabel.DefaultSolver(none, goal, scipy.sparse.csc_matrix(rows), right, cones, settings).solve()
+    answer = conic_answer((none, goal), (scipy.sparse.csc_matrix(rows), right), cones, len(right) ** 2)
     z = np.array(answer.x)[:count]
     if not np.all(np.isfinite(z)):
         return None

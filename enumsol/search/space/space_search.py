@@ -26,6 +26,7 @@ from enumsol.proof.records import EnclosureRecord, Limits, NoRoot, RegularRoot, 
 from enumsol.relaxation.engine import PRUNE_MARGIN, Relaxation
 from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
 from enumsol.search.certifiers.protocol import WIDEN, Bound, Certified, RecordingCertifier, Refine, UndecidedPart
+from enumsol.search.outcome import HOLD
 from enumsol.search.resume import RecordedBound
 from enumsol.search.space.known_boxes import KnownBoxes
 from enumsol.search.space.product_search import Branched, Enclosed, Missed
@@ -239,7 +240,7 @@ class SpaceCertifier(RecordingCertifier):
                 return Refine(answer.node)
             reason = answer.cause.value if answer.mode is None else f"{answer.cause.value} (rigid mode {answer.mode})"
             self._leaf(UndecidedRecord(reason))
-            hint = _HOLD if answer.cause is Cause.ROUNDING else _PERTURB
+            hint = {Cause.ROUNDING: _HOLD, Cause.RIGID: HOLD}.get(answer.cause, _PERTURB)
             return UndecidedPart(codes, reason, hint, examined=True)
         else:
             self._leaf(RegularRoot(self._ball(answer)))
