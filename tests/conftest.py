@@ -39,7 +39,7 @@ def wedge():
 @pytest.fixture(scope="session")
 def pulled_wedge():
     """A wedge with four contact nodes and friction 1; alpha is its pull."""
-    wedge = gallery.wedge(2, 2, friction=(1.0, 0.0))
+    wedge = gallery.wedge(2, 2, friction=1.0)
     return dataclasses.replace(wedge, f=0 * wedge.f, load_slope=wedge.f)
 
 

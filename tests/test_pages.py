@@ -60,7 +60,13 @@ def test_tutorial(tutorial):
 @pytest.mark.slow
 def test_the_wedge_of_the_tutorial_is_that_of_its_study(tutorial):
     mesh = fem.trapezoid(6, 4, bottom=1.0, top=1.8, height=1.0).parted()
-    acting = {"spring": {"top": (0.02, 0.02)}, "load": {"top": (1e-4, 1e-3)}, "gap": -5e-4, "friction": (0.0, 1.0)}
+    acting = {
+        "spring": {"top": (0.02, 0.02)},
+        "load": {"top": (1e-4, 1e-3)},
+        "gap": -5e-4,
+        "friction": 0.0,
+        "friction_slope": 1.0,
+    }
     wedge = fem.mesh_problem(mesh, young=2.5, poisson=0.25, contact=["left", "right"], **acting)
     roots = enumsol.enumerate_roots(wedge, 4)
     assert [root.statuses for root in roots] == [root.statuses for root in tutorial["roots"]]

@@ -40,7 +40,7 @@ def test_files(seen):
 
 def test_your_matrices(seen):
     A, Bn, Bt, f = (seen[name] for name in ("A", "Bn", "Bt", "f"))
-    roots = enumsol.enumerate_roots(enumsol.ContactProblem(A, Bn, Bt, f, friction=(0.0, 1.0)), alpha=2.2)
+    roots = enumsol.enumerate_roots(enumsol.ContactProblem(A, Bn, Bt, f, friction=0, friction_slope=1), alpha=2.2)
     assert len(seen["roots"]) == len(roots) == 3
     assert seen["roots"].complete
 

@@ -54,7 +54,7 @@ def frozen(problem: Problem, alpha: float = 0.0, friction: float | None = None) 
     In 3D friction becomes isotropic, as fclib has no other: the coefficient of the first axis.
     """
     F = problem.friction_at(alpha)
-    changes: dict[str, Any] = {"friction": (F if friction is None else friction, 0.0)}
+    changes: dict[str, Any] = {"friction": F if friction is None else friction, "friction_slope": 0.0}
     if isinstance(problem, enumsol.ContactProblem3D):
         mu = F[:, 0] if friction is None else friction
         changes = {"friction": (mu, mu), "friction_slope": 0.0}
@@ -64,8 +64,8 @@ def frozen(problem: Problem, alpha: float = 0.0, friction: float | None = None) 
 def several(*parts: Problem) -> Problem:
     """Problems in the plane side by side, without a coupling."""
     A, Bn, Bt = (sp.block_diag([getattr(part, name) for part in parts], "csc") for name in ("A", "Bn", "Bt"))
-    f, F = (np.concatenate(arrays) for arrays in zip(*((part.f, part.friction[0]) for part in parts), strict=True))
-    return enumsol.ContactProblem(A, Bn, Bt, f, friction=(F, 0.0))
+    f, F = (np.concatenate(arrays) for arrays in zip(*((part.f, part.friction) for part in parts), strict=True))
+    return enumsol.ContactProblem(A, Bn, Bt, f, friction=F)
 
 
 def random_problem(seed: int, p: int, friction: float, dimension: int) -> Problem:
@@ -77,14 +77,14 @@ def random_problem(seed: int, p: int, friction: float, dimension: int) -> Proble
     f = rng.integers(-16, 17, size) / 8.0
     rows = [S[k * p : (k + 1) * p] for k in range(dimension)]
     if dimension == 2:
-        return enumsol.ContactProblem(S, *rows, f, friction=(friction, 0.0))
+        return enumsol.ContactProblem(S, *rows, f, friction=friction)
     return enumsol.ContactProblem3D(S, *rows, f, friction=friction)
 
 
 def half_smooth_block() -> Problem:
     """A block every other contact node of which has no friction."""
     block = gallery.clamped_block(8, 4, traction=(-0.3, -1.0))
-    return frozen(block).replace(friction=(np.where(np.arange(block.p) % 2, 0.0, 0.8), 0.0))
+    return frozen(block).replace(friction=np.where(np.arange(block.p) % 2, 0.0, 0.8), friction_slope=0.0)
 
 
 def soft_box(cells: tuple[int, int, int], stiffness: float) -> Problem:

@@ -43,7 +43,7 @@ def _random(seed: int, p: int, *, degenerate: bool) -> ContactProblem:
         B = rng.normal(size=(n, n + 1))
         A, f, friction = B @ B.T, 3 * rng.normal(size=n), np.exp(rng.uniform(-2, 2, size=p))
     rows = np.eye(n)
-    return ContactProblem(0.5 * (A + A.T), rows[:p], rows[p : 2 * p], f, friction=(friction, 0.25))
+    return ContactProblem(0.5 * (A + A.T), rows[:p], rows[p : 2 * p], f, friction=friction, friction_slope=0.25)
 
 
 def _plane() -> Iterator[tuple[str, ContactProblem, float]]:

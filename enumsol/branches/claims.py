@@ -474,9 +474,7 @@ def ranges_text(ranges: Sequence[Range]) -> str:
 def uniqueness_bound(problem: ContactProblem | ContactProblem3D, interval: tuple[float, float]) -> float | None:
     """An alpha up to which uniqueness follows without any search (theory, section 5.6), if there is one."""
     (a, b), p, condensed = interval, problem.p, problem.condensed
-    # in 3D both coefficients of every node
-    lines = problem.friction if isinstance(problem, ContactProblem) else (problem.friction, problem.friction_slope)
-    F0, F1 = map(np.array, lines)
+    F0, F1 = problem.affine_friction
     if not condensed.definite:  # within rounding, and the bound nearly zero
         return None
     inverse = np.linalg.inv(condensed.S)

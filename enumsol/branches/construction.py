@@ -240,8 +240,8 @@ def _stage(progress: Callable[[str, float], object] | None, name: str) -> Callab
 
 def _check_friction(problem: ContactProblem, a: Fraction, b: Fraction) -> None:
     """Refuse negative and huge friction inside the interval; F is affine, so the two ends suffice."""
-    values = [exactly_at(end, *problem.friction) for end in (a, b)]
-    for node, *pair, F0, F1 in zip(problem.node_ids, *values, *problem.friction, strict=True):
+    values = [exactly_at(end, *problem.affine_friction) for end in (a, b)]
+    for node, *pair, F0, F1 in zip(problem.node_ids, *values, *problem.affine_friction, strict=True):
         for end, value in zip((a, b), pair, strict=True):
             if value < 0:
                 zero = -Fraction(F0) / Fraction(F1) if F1 else end

@@ -155,7 +155,8 @@ def _problem_record(problem: AnyProblem) -> dict[str, Any]:
     return {
         **{name: _matrix_record(getattr(problem, name)) for name in (*_ROWS[plane], "A")},
         **{name: getattr(problem, name).tolist() for name in ("f", "gap", "slip_offset")},
-        "friction": [part.tolist() for part in problem.friction],
+        # of saved graphs in 2D, "friction" has F0 and F1 of F0 + alpha F1
+        "friction": [part.tolist() for part in (problem.affine_friction if plane else problem.friction)],
         **({} if isinstance(problem, ContactProblem) else _space_record(problem)),
         "load_slope": None if problem.load_slope is None else problem.load_slope.tolist(),
         "node_ids": list(problem.node_ids),
@@ -218,6 +219,7 @@ def _problem(record: dict[str, Any]) -> AnyProblem:
     matrices: Any = [matrix(record[name]) for name in ("A", *_ROWS[plane])]
     data: Any = (*matrices, record["f"])
     if plane:
+        more["friction"], more["friction_slope"] = pair("friction")
         return ContactProblem(*data, **more)
     more |= {"friction_slope": pair("friction_slope"), "areas": record["areas"]}
     return ContactProblem3D(*data, **more)

@@ -59,7 +59,7 @@ def _roots_of(data: GraphData, alpha: Alpha, selections: Sequence[Codes]) -> Roo
     problem = data.problem
     if data.exact is None or problem.modes is not None:
         # those that are proven for the problem's data as given
-        positive = tuple(F > 0 for F in exactly_at(Fraction(alpha), *problem.friction))
+        positive = tuple(F > 0 for F in exactly_at(Fraction(alpha), *problem.affine_friction))
         return roots_of_selections(problem, alpha, _codes_at(selections, positive), whole=not data.reasons)
     floats = FloatSelections(problem.condensed.at(alpha).proposals)
     solver: Any = floats

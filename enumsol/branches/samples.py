@@ -17,7 +17,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import ContactProblem, check_is_problem
 from enumsol.model.statuses import STATUSES, ContactStatus
 from enumsol.roots.enumerate import enumerate_roots
-from enumsol.roots.slips import affine_friction, ratios
+from enumsol.roots.slips import ratios
 from enumsol.support.arguments import alpha_list, optional_callable, optional_executor
 from enumsol.support.keeping import keeping
 from enumsol.support.messages import counted
@@ -242,7 +242,7 @@ def _vanishing(problem: AnyProblem, root: Root, node: int, other: Root) -> float
     """
     if root.dlambda_dalpha is None or root.du_dalpha is None:
         return None
-    (F0, F1), p = affine_friction(problem), problem.p
+    (F0, F1), p = problem.affine_friction, problem.p
     F, dF = ((one.reshape(p, -1)[node]) for one in (F0 + float(root.alpha) * F1, F1))
     (force, force_rate), (move, move_rate) = (
         (np.append(normal[node], along[node]), rate[node])

@@ -326,7 +326,7 @@ def _exact_work(problem: ContactProblem, candidates: set[Codes]) -> float:
     Measured, within a factor of two, with dovetails, wedges and clips of 6 to 14 contact nodes and 56 to 210 degrees of
     freedom.
     """
-    varying = np.array(problem.friction[1]) != 0
+    varying = np.array(problem.friction_slope) != 0
     codes = np.array(sorted(candidates), dtype=np.intp).reshape(-1, problem.p)
     slips = np.sum(((codes == SLIP_PLUS) | (codes == SLIP_MINUS)) & varying, axis=1)
     sizes = np.sum(codes != OPEN, axis=1) + np.sum(codes == STICK, axis=1)

@@ -55,7 +55,7 @@ class RationalSystem:
         if not definite and not is_positive_definite(self.S):
             raise NotEnclosedError("the condensed compliance S is not positive definite in rational arithmetic")
         self.g: Vector = [x + a * y for x, y in zip(*free_displacements(problem), strict=True)]
-        self.F: Vector = [rational(F) for F in exactly_at(alpha, *problem.friction)]
+        self.F: Vector = [rational(F) for F in exactly_at(alpha, *problem.affine_friction)]
         self._S: list[Vector] = self.S.tolist()
         self._inverse: Any = None
         self.zero = fmpq(0)
@@ -132,7 +132,7 @@ class RationalBody:
         self.p, a = problem.p, rational(alpha)
         self._A, B = exact_matrices(problem)
         self._B: list[Vector] = B.tolist()
-        self.F: Vector = [rational(F) for F in exactly_at(alpha, *problem.friction)]
+        self.F: Vector = [rational(F) for F in exactly_at(alpha, *problem.affine_friction)]
         slope = [0.0] * problem.n if problem.load_slope is None else problem.load_slope.tolist()
         self._f = [rational(x) + a * rational(y) for x, y in zip(problem.f.tolist(), slope, strict=True)]
         self._offset = [rational(x) for x in problem.gap.tolist() + problem.slip_offset.tolist()]

@@ -164,12 +164,10 @@ def _same_problem(a: Any, b: Any) -> bool:
     rows = ("A", "Bn", "Bt") if plane else ("A", "Bn", "Bt1", "Bt2")
     if (a.n, a.p) != (b.n, b.p) or any((getattr(a, name) != getattr(b, name)).nnz for name in rows):
         return False
-    if not plane and not all(map(np.array_equal, a.friction_slope, b.friction_slope)):
-        return False
-
     pairs = [(getattr(a, name), getattr(b, name)) for name in ("f", "gap", "slip_offset")]
+    frictions = zip(a.affine_friction, b.affine_friction, strict=True)
     slopes = [np.zeros(a.n) if item.load_slope is None else item.load_slope for item in (a, b)]
-    return all(np.array_equal(x, y) for x, y in [*pairs, *zip(a.friction, b.friction, strict=True), tuple(slopes)])
+    return all(np.array_equal(x, y) for x, y in [*pairs, *frictions, tuple(slopes)])
 
 
 def graph_as_text(found: BranchGraph) -> str:

@@ -146,14 +146,16 @@ MESH_OPTIONS = {
     ),
     "friction": Given(
         _BODY,
-        "[NAME=]F0[,F1]",
-        "Coefficient of friction F0 + alpha F1, by contact parts; default: 0,1, which is alpha itself.",
+        "[NAME=]F",
+        "Coefficient of friction, by contact parts; without it and --friction-slope it is alpha itself.",
         _each(_one_or_two),
         True,
     ),
+    "friction_slope": Given(_BODY, "[NAME=]F", "The same, times alpha.", _each(_number), True),
     "friction2": Given(
-        _BODY, "[NAME=]F0[,F1]", "In 3D, coefficient of friction along the second axis.", _each(_one_or_two), True
+        _BODY, "[NAME=]F", "In 3D, coefficient of friction along the second axis.", _each(_one_or_two), True
     ),
+    "friction2_slope": Given(_BODY, "[NAME=]F", "The same, times alpha.", _each(_number), True),
     "axis": Given(_BODY, "x,y,z", "In 3D, direction of the first axis of friction.", _numbers),
     "gap": Given(
         _BODY, "[NAME=]LENGTH", "Initial gap, by contact parts; negative is a press fit.", _each(_number), True
@@ -312,6 +314,7 @@ def _scene(mesh: str, options: dict[str, Any]) -> Scene:
     """What the mesh and the options, or a TOML file, describe."""
     from enumsol import fem  # numpy: not for --help
     from enumsol.fem.mesh_problems import check_keys
+    from enumsol.fem.scenes import refuse_old_friction
     from enumsol.io import SUFFIXES
     from enumsol.support.arguments import file_path
     from enumsol.support.files import unreadable
@@ -326,6 +329,7 @@ def _scene(mesh: str, options: dict[str, Any]) -> Scene:
     if place.suffix in SUFFIXES or mesh.startswith(GALLERY):
         raise InvalidArgumentError(f"{mesh} is a problem; expected a mesh (enumsol roots {mesh} solves a problem)")
     refuse_misspelt(mesh, meshes=True)
+    refuse_old_friction(options, lambda name, part, number: f"{_flags(name)[0]} {part and f'{part}='}{number}")
     if (found := unreadable(place)) is not None:
         raise InvalidArgumentError(f"{mesh}: {found}; expected a mesh with named parts, or a {TOML} file")
     check_keys(options, lambda name: _flags(name)[0])

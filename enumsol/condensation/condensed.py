@@ -262,12 +262,12 @@ class CondensedProblem(Condensation):
     @property
     def F0(self) -> Floats:  # noqa: N802 (the field's letter)
         """Friction coefficients at alpha = 0, shape (p,) [-]."""
-        return self.problem.friction[0]
+        return self.problem.friction
 
     @property
     def F1(self) -> Floats:  # noqa: N802 (as above)
         """Derivatives of the friction coefficients with respect to alpha, shape (p,) [-]."""
-        return self.problem.friction[1]
+        return self.problem.friction_slope
 
     def at(self, alpha: Alpha) -> CondensedSystem:
         """The condensed system at one alpha.

@@ -69,12 +69,17 @@ class ProblemData(CondensableData, Protocol):
 
     Attributes
     ----------
-    friction : pair of (p,) arrays, F(alpha) = F0 + alpha F1
+    friction, friction_slope : (p,) arrays, F(alpha) = friction + alpha friction_slope
     node_ids : tuple of p labels
     """
 
-    friction: tuple[Floats, Floats]
+    friction: Floats
+    friction_slope: Floats
     node_ids: tuple[Any, ...]
+
+    @property
+    def affine_friction(self) -> tuple[Floats, Floats]:
+        """Both friction and friction_slope."""
 
     @property
     def p(self) -> int:
@@ -97,5 +102,5 @@ class FloatingData(CondensableData, Protocol):
 
 
 def exactly_at(alpha: Fraction, first: Floats, slope: Floats) -> list[Fraction]:
-    """The values first + alpha slope of floats, exactly: F(alpha) for the parts of ``problem.friction``."""
+    """The values first + alpha slope of floats, exactly: F(alpha) for the parts of ``problem.affine_friction``."""
     return [Fraction(x) + alpha * Fraction(y) for x, y in zip(first.tolist(), slope.tolist(), strict=True)]

@@ -135,7 +135,7 @@ class CondensedEnclosure(Sealed):
     def at(self, alpha: AlphaLike, force: Floats, length: Floats) -> EnclosedSystem:
         """The enclosed system of a 2D problem at one alpha, in units given by powers of two (see ScaledSystem)."""
         a = alpha if isinstance(alpha, Fraction) else Fraction(alpha_value(alpha))
-        exact = exactly_at(a, *self.problem.friction)
+        exact = exactly_at(a, *self.problem.affine_friction)
         F, inexact = nearest_floats(exact)
         F_rad = np.where(inexact, 2 * UNIT * F + TINY, 0.0)
         S, S_rad, g, g_rad = self.in_units(a, force, length)

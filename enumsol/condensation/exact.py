@@ -129,7 +129,7 @@ class UncondensedSystem:
         _check_size(problem)
         self._problem, self._alpha, self.p, self.index = problem, alpha, problem.p, index
         a = rational(alpha)
-        self.F = tuple(rational(x) + a * rational(y) for x, y in zip(*problem.friction, strict=True))
+        self.F = tuple(rational(x) + a * rational(y) for x, y in zip(*problem.affine_friction, strict=True))
         self._moved: dict[tuple[Any, ...], list[Any]] = {}
 
     @cached_property
@@ -434,7 +434,7 @@ class _Given:
         start = problem.slip_offset if problem.exact_offset is None else problem.exact_offset
         A, B = (rational_matrix(M.toarray()) for M in (problem.A, problem.contact_rows))
         loads = rational_matrix(np.column_stack([problem.f, slope]))
-        offset, *friction = ([rational(x) for x in part] for part in ((*problem.gap, *start), *problem.friction))
+        offset, *friction = ([rational(x) for x in part] for part in ((*problem.gap, *start), *problem.affine_friction))
         return cls(A, B, loads, offset, tuple(map(tuple, friction)))
 
     @property

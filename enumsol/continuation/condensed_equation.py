@@ -135,7 +135,7 @@ class PiecewiseSmoothEquation:
         _, lambda_n, _ = self.split(x)
         problem, r = self.problem, self.r
         closed, slips, count = pieces(self._rows(signs))
-        F, slope = problem.friction_at(alpha), problem.friction[1]
+        F, slope = problem.friction_at(alpha), problem.friction_slope
         load = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
         p, diag = problem.p, sp.diags_array
         column = np.concatenate([-load, np.zeros(p), -slips * slope * lambda_n])

@@ -12,7 +12,6 @@ import numpy as np
 from enumsol.condensation.condensed import RHS_BLOCK, FloatingCondensation, condensation_of
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import check_is_problem
-from enumsol.roots.slips import affine_friction
 from enumsol.support.arguments import alpha_value, optional_callable
 from enumsol.support.array_arguments import real_array
 
@@ -77,12 +76,11 @@ class SmoothPath:
         """The problem, in 2D or 3D, with friction and load frozen at alpha, to enumerate roots on the path."""
         check_is_problem(problem)
         exact = alpha_value(alpha)
-        value, shape = float(exact), affine_friction(problem)[0].shape
+        value, shape = float(exact), problem.affine_friction[0].shape
         F = problem.friction_at(exact) if self.F is None else _coefficients(self.F, value, "F", shape)
         f = problem.load_at(exact) if self.f is None else _evaluate(self.f, value, "f", (problem.n,))
-        if len(shape) == 1:
-            return problem.replace(f=f, load_slope=None, friction=(F, 0.0))
-        return problem.replace(f=f, load_slope=None, friction=(F[:, 0], F[:, 1]), friction_slope=0.0)
+        friction = F if len(shape) == 1 else (F[:, 0], F[:, 1])
+        return problem.replace(f=f, load_slope=None, friction=friction, friction_slope=0.0)
 
 
 @dataclass(frozen=True)
@@ -100,12 +98,12 @@ class PathValues:
 
 
 class AffinePath:
-    """The problem's own F0 + alpha F1 and f + alpha load_slope, also where friction would be negative (iterates)."""
+    """The problem's own friction and load, affine in alpha, also where friction would be negative (iterates)."""
 
     def __init__(self, problem: AnyProblem) -> None:
         self.problem: Any = problem
         self.condensed = condensed = condensation_of(problem)
-        self.friction = affine_friction(problem)
+        self.friction = problem.affine_friction
         h = condensed.h if isinstance(condensed, FloatingCondensation) else (np.zeros(0), np.zeros(0))
         self._load = np.append(condensed.g0, h[0]), np.append(condensed.g1, h[1])
 

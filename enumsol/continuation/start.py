@@ -14,7 +14,6 @@ from enumsol.continuation.path_data import PathData
 from enumsol.continuation.space_equation import SpaceEquation
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import ContactProblem, check_is_problem
-from enumsol.roots.slips import affine_friction
 from enumsol.support.arguments import alpha_value, instance_of, unbounded_interval
 from enumsol.support.array_arguments import real_array
 
@@ -159,7 +158,7 @@ def _interval(
 
 def friction_domain(problem: AnyProblem) -> tuple[float, float]:
     """The range of alpha in which no coefficient F0 + alpha F1 is negative."""
-    F0, F1 = affine_friction(problem)
+    F0, F1 = problem.affine_friction
     with np.errstate(divide="ignore", invalid="ignore"):
         zero = -F0 / F1
     low = np.max(zero[F1 > 0], initial=-math.inf)

@@ -199,7 +199,8 @@ def contact_problem(
     forces: ArrayLike | None = None,
     forces_slope: ArrayLike | None = None,
     gap: ArrayLike = 0.0,
-    friction: float | tuple[ArrayLike, ArrayLike] = (0.0, 1.0),
+    friction: ArrayLike | None = None,
+    friction_slope: ArrayLike | None = None,
     slip_offset: ArrayLike = 0.0,
     node_ids: Sequence[Any] | None = None,
 ) -> ContactProblem:
@@ -225,7 +226,7 @@ def contact_problem(
         support where nothing is held.
     forces, forces_slope : (N, 2) array_like or None
         Nodal forces and their derivative with respect to alpha (sums of `edge_forces` and `body_forces`).
-    gap, friction, slip_offset
+    gap, friction, friction_slope, slip_offset
         As in `ContactProblem`.
     node_ids : sequence or None
         Labels of the contact nodes; default their node numbers.
@@ -274,6 +275,7 @@ def contact_problem(
         supports,
         gap=gap,
         friction=friction,
+        friction_slope=friction_slope,
         slip_offset=slip_offset,
         node_ids=[int(node) for node in touching] if node_ids is None else node_ids,
         coordinates=nodes[touching],

@@ -67,7 +67,7 @@ def basis_contact_problem(
     gap : float, (p,) array_like, or callable of a position
         Initial gap along the normals [length].
     **more
-        friction, slip_offset, node_ids and, in 3D, friction_slope and areas, as in `ContactProblem` and
+        friction, friction_slope, slip_offset, node_ids and, in 3D, areas, as in `ContactProblem` and
         `ContactProblem3D`.
 
     Returns

@@ -8,7 +8,7 @@ import tomllib
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.fem.scenes import Scene
+from enumsol.fem.scenes import Scene, refuse_old_friction
 from enumsol.support.arguments import file_path, shown
 from enumsol.support.files import unreadable
 from enumsol.support.messages import shortened
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     Names = str | Sequence[str]
     Vectors = Mapping[str, ArrayLike] | None
     Plane = Literal["strain", "stress"]
-    Coefficient = float | Sequence[float]
 
 T = TypeVar("T")
 #: Largest TOML file that is read; one that describes a problem has a thousandth of that [bytes].
@@ -43,8 +42,10 @@ def mesh_problem(
     pairs: Sequence[Sequence[Any]] = (),
     plane: Plane | Mapping[str, Plane] = "strain",
     thickness: float | Mapping[str, float] = 1.0,
-    friction: Coefficient | Mapping[str, Coefficient] = (0.0, 1.0),
-    friction2: Coefficient | Mapping[str, Coefficient] | None = None,
+    friction: float | Mapping[str, float] | None = None,
+    friction_slope: float | Mapping[str, float] | None = None,
+    friction2: float | Mapping[str, float] | None = None,
+    friction2_slope: float | Mapping[str, float] | None = None,
     axis: ArrayLike | None = None,
     clamp: Names = (),
     symmetry: Names = (),
@@ -92,11 +93,12 @@ def mesh_problem(
     thickness : float, or mapping of names to float
         In 2D, of the whole body or of every part of it; all forces and stiffnesses are multiplied by it. By default
         they are per unit thickness [length].
-    friction : float or (F0, F1), or mapping of names to them
-        Coefficient F0 + alpha F1 [-], of all contact nodes or of every contact part and of the first part of every
-        pair. A node of two parts has the coefficient of the one that `contact` names first.
-    friction2 : as friction, optional
-        In 3D, coefficient along the second axis; default as the first.
+    friction, friction_slope : float, or mapping of names to float, optional
+        Coefficient friction + alpha friction_slope [-], of all contact nodes or of every contact part and of the first
+        part of every pair (the slope is 0 for parts that are not named). A node of two parts has the coefficient of the
+        one that `contact` names first. Without both the coefficient is alpha; without one of them that one is 0.
+    friction2, friction2_slope : as friction and friction_slope, optional
+        In 3D, coefficient along the second axis; without both as along the first.
     axis : (3,) array_like, optional
         In 3D, direction whose projection on the tangent plane is the first axis; default as `solid_contact_problem`.
     clamp : name or names
@@ -250,6 +252,7 @@ def _of_file(path: Any, made: Callable[[Scene], T]) -> T:
         name = file_path(options.pop("mesh", None), "mesh", "the name of a mesh file in quotes")
         options.pop("steps", None)  # of enumsol history
         check_keys(options, also=(_PAIRS,))
+        refuse_old_friction(options, lambda name, part, number: f"{name}{part and f'.{part}'} = {number}")
         return made(mesh_scene(place.parent / name, **options))
     except (InvalidArgumentError, InvalidProblemError) as error:
         raise InvalidProblemError(f"{place}: {error}") from error

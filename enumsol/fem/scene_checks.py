@@ -246,7 +246,7 @@ def _friction(scene: Any) -> list[str]:
     notes = []
     for name, value in given.items():
         each = value.values() if isinstance(value, Mapping) else [value]
-        steep = max((float(np.ravel(own)[0]) for own in each if own is not None), default=0.0)
+        steep = max((float(own) for own in each if own is not None), default=0.0)
         if steep > _STEEP:
             notes.append(f"{name} is {steep:g}; coefficients of friction above 1 are rare")
     return notes

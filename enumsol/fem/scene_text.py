@@ -110,19 +110,17 @@ def _contact(scene: Any) -> list[str]:
     for group, gaps in scene.gaps_of_groups:
         gap = f"gap {gaps[0]:.6g}" if np.ptp(gaps) == 0 else f"gaps from {gaps.min():.6g} to {gaps.max():.6g}"
         lines.append(f"{counted(group.count, 'contact node')} of {group}, {gap}")
-    return [*lines, f"friction {_said(scene.options['friction'])}"]
+    coefficients = {
+        name: scene.options[name] for name in ("friction", "friction_slope", "friction2", "friction2_slope")
+    }
+    return [*lines, *(f"{name} {_said(value)}" for name, value in coefficients.items() if value is not None)]
 
 
 def _said(value: Any) -> str:
-    """A number, two, a word, or one of these for each of several parts."""
+    """A number, a word, or one of these for each of several parts."""
     if isinstance(value, Mapping):
         return ", ".join(f"{_said(own)} ({part})" for part, own in value.items())
-    if isinstance(value, str):
-        return value
-    if np.ndim(value) == 0:
-        return f"{float(value):.6g}"
-    first, second = value
-    return f"{float(first):.6g} + alpha {float(second):.6g}"
+    return value if isinstance(value, str) else f"{float(value):.6g}"
 
 
 def _vector(values: Floats) -> str:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -25,7 +25,8 @@ from enumsol.fem.restrained import ContactNodes, axes_of, plain_dofs, problem_of
 from enumsol.fem.scene_checks import refuse_pairs, refuse_walls, scene_notes
 from enumsol.fem.scene_text import described, draw_scene, sections_of
 from enumsol.model.mesh import BodyMesh
-from enumsol.support.arguments import exact_number, finite_number, one_of, positive_number, shown
+from enumsol.model.problem import given_friction, old_friction
+from enumsol.support.arguments import finite_number, one_of, positive_number, shown
 from enumsol.support.array_arguments import short_vector
 
 if TYPE_CHECKING:
@@ -76,6 +77,8 @@ class Scene:
         InvalidArgumentError
             As `mesh_problem`.
         """
+        if options["friction"] is options["friction_slope"] is None:
+            options = {**options, **dict(zip(("friction", "friction_slope"), given_friction(None, None), strict=True))}
         mesh = source if isinstance(source, PartedMesh) else read_mesh(source, options["groups"])
         coefficients = lame_of(mesh, options["young"], options["poisson"], options["plane"])
         thickness = thickness_of(mesh, options["thickness"])
@@ -91,6 +94,7 @@ class Scene:
         scene = cls(mesh, options, body, held, contacts, forces, slope, springs, coefficients, pieces)
         refuse_walls(scene)
         refuse_pairs(scene)
+        scene.coefficients  # noqa: B018 (refuses those that cannot be used)
         return scene
 
     @property
@@ -102,6 +106,11 @@ class Scene:
     def gaps(self) -> Floats:
         """Gaps of the contact nodes, (p,) [length]."""
         return self.contacts.gaps + of_rows(self.options["gap"], "gap", self.contacts.parts, finite_number, 0.0)
+
+    @cached_property
+    def coefficients(self) -> dict[str, Any]:
+        """The coefficients of friction and their slopes, as arguments of the problem."""
+        return _coefficients(self.dimension, self.contacts.parts, self.options)
 
     @property
     def gaps_of_groups(self) -> list[tuple[Group, Floats]]:
@@ -138,7 +147,7 @@ class Scene:
             "gap": self.gaps,
             "node_ids": nodes.nodes.tolist(),
             "coordinates": mesh.points[nodes.nodes],
-            **_coefficients(self.dimension, contacts.parts, options["friction"], options["friction2"]),
+            **self.coefficients,
         }
         surface = contacts.facets if any(group.pair is not None for group in contacts.groups) else None
         if self.dimension == 3:
@@ -218,27 +227,53 @@ def _moved(nodes: ContactNodes, axes: tuple[Floats, ...], values: Floats, gaps: 
     return {"gap": gaps + normal, "slip_offset": slips[0] if len(slips) == 1 else np.stack(slips, axis=1)}
 
 
-def _coefficients(dimension: int, parts: Sequence[str], friction: Any, second: Any) -> dict[str, Any]:
-    """F0 + alpha F1 as the arguments of the problem."""
-    F0, F1 = of_rows(friction, "friction", parts, _line).T
+def _coefficients(dimension: int, parts: Sequence[str], options: Mapping[str, Any]) -> dict[str, Any]:
+    """Coefficients and their slopes as the arguments of the problem."""
+
+    def along(name: str) -> tuple[Floats, Floats]:
+        F, slope = given_friction(options[name], options[f"{name}_slope"])
+        other = None if options[name] is None else 0.0
+        return (
+            of_rows(F, name, parts, finite_number),
+            of_rows(slope, f"{name}_slope", parts, finite_number, other),
+        )
+
+    refuse_old_friction(options, _in_python)
+    F, slope = along("friction")
+    second = [name for name in ("friction2", "friction2_slope") if options[name] is not None]
     if dimension == 2:
-        if second is not None:
-            raise InvalidArgumentError("friction2 is given for a plane body, which has one tangent; expected it in 3D")
-        return {"friction": (F0, F1)}
-    G0, G1 = (F0, F1) if second is None else of_rows(second, "friction2", parts, _line).T
-    return {"friction": (F0, G0), "friction_slope": (F1, G1)}
+        if second:
+            raise InvalidArgumentError(
+                f"{second[0]} is given for a plane body, which has one tangent; expected it in 3D"
+            )
+        return {"friction": F, "friction_slope": slope}
+    F2, slope2 = along("friction2") if second else (F, slope)
+    return {"friction": (F, F2), "friction_slope": (slope, slope2)}
 
 
-def _line(value: Any, name: str) -> tuple[float, float]:
-    if exact_number(value) is not None:
-        return finite_number(value, name), 0.0
-    try:
-        F0, F1 = short_vector(value, name, 2)
-    except InvalidArgumentError:
-        raise InvalidArgumentError(
-            f"{name} is {shown(value)}; expected a number, or two: F0 and F1 of F0 + alpha F1"
-        ) from None
-    return float(F0), float(F1)
+def refuse_old_friction(options: Mapping[str, Any], written: Callable[[str, str, str], str]) -> None:
+    """Refuse pairs, which once stood for F0 + alpha F1 and in 3D would be taken for coefficients along two axes.
+
+    ``written`` is how a number is given for an option and a part, "" for all parts.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The sentence says what to write.
+    """
+    for name in ("friction", "friction2"):
+        value = options.get(name)
+        for part, own in value.items() if isinstance(value, Mapping) else [("", value)]:
+            instead = old_friction(own, *(partial(written, option, str(part)) for option in (name, f"{name}_slope")))
+            if instead:
+                raise InvalidArgumentError(
+                    f"{name}{part and f' of {part}'} is the pair {shown(own)}; expected one coefficient "
+                    f"(in 3D, friction2 is that along the second axis): {instead}"
+                )
+
+
+def _in_python(option: str, part: str, number: str) -> str:
+    return f'{option}={{"{part}": {number}}}' if part else f"{option}={number}"
 
 
 def _axes(nodes: ContactNodes, axis: Any, dimension: int) -> tuple[Floats, ...]:

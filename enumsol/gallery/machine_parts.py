@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from enumsol.model.problem import ContactProblem
     from enumsol.support.array_types import Floats, Integers
 
-    Friction = float | tuple[float, float]
 
 _STEEL: dict[str, Any] = {"young": 210e3, "poisson": 0.3}
 
@@ -51,7 +50,8 @@ def dovetail(
     press: float = 0.0,
     *,
     flank_angle: float = 45.0,
-    friction: Friction = (0.0, 1.0),
+    friction: float | None = None,
+    friction_slope: float | None = None,
 ) -> ContactProblem:
     """Dovetail root of a blade, pulled into the flanks of its slot by the centrifugal force: one solution.
 
@@ -76,9 +76,8 @@ def dovetail(
         Interference with both flanks, along the normals [mm].
     flank_angle : float
         Angle between a flank and the direction of the blade, between 5 and 85 [degrees].
-    friction : float or (F0, F1)
-        Coefficient F0 + alpha F1 of all contact nodes; a single number is a constant coefficient; default F(alpha) =
-        alpha.
+    friction, friction_slope : float or None
+        As in `enumsol.fem.mesh_problem`; without both F(alpha) = alpha.
 
     Raises
     ------
@@ -113,11 +112,18 @@ def dovetail(
         spring={"foot": (1.0, 1.0)},
         gap=-finite_number(press, "press"),
         friction=friction,
+        friction_slope=friction_slope,
     )
 
 
 def brake_shoe(
-    nx: int = 4, ny: int = 3, pull: float = 50.0, turn: float = 0.1, *, friction: Friction = (0.0, 1.0)
+    nx: int = 4,
+    ny: int = 3,
+    pull: float = 50.0,
+    turn: float = 0.1,
+    *,
+    friction: float | None = None,
+    friction_slope: float | None = None,
 ) -> ContactProblem:
     """Brake shoe on a drum, pulled off by its return spring: it is released, or the drum has locked it.
 
@@ -141,9 +147,8 @@ def brake_shoe(
         Force of the return spring on the shoe at rest; positive lifts it [N].
     turn : float
         By how much the drum has turned, on its rim [mm].
-    friction : float or (F0, F1)
-        Coefficient F0 + alpha F1 of all contact nodes; a single number is a constant coefficient; default F(alpha) =
-        alpha.
+    friction, friction_slope : float or None
+        As in `enumsol.fem.mesh_problem`; without both F(alpha) = alpha.
 
     Raises
     ------
@@ -179,13 +184,20 @@ def brake_shoe(
         load={"eye": (0.0, finite_number(pull, "pull") / area)},
         spring={"eye": (_RETURN / area, _RETURN / area)},
         friction=friction,
+        friction_slope=friction_slope,
     )
     # the tangent points to the right, and slip is counted from where the drum has gone
     return shoe.replace(slip_offset=np.full(shoe.p, -finite_number(turn, "turn")))
 
 
 def clip(
-    nx: int = 8, ny: int = 1, pull: float = 10.0, press: float = 0.1, *, friction: Friction = (0.0, 1.0)
+    nx: int = 8,
+    ny: int = 1,
+    pull: float = 10.0,
+    press: float = 0.1,
+    *,
+    friction: float | None = None,
+    friction_slope: float | None = None,
 ) -> ContactProblem:
     """Spring clip on a round bar, pulled off: it grips the bar, or it has sprung off.
 
@@ -206,9 +218,8 @@ def clip(
         Force on the crown, off the bar [N].
     press : float
         By how much the radius of the clip is smaller than that of the bar [mm].
-    friction : float or (F0, F1)
-        Coefficient F0 + alpha F1 of all contact nodes; a single number is a constant coefficient; default F(alpha) =
-        alpha.
+    friction, friction_slope : float or None
+        As in `enumsol.fem.mesh_problem`; without both F(alpha) = alpha.
 
     Raises
     ------
@@ -243,13 +254,20 @@ def clip(
         spring={"crown": (_LINE / area, _LINE / area)},
         gap=-finite_number(press, "press"),
         friction=friction,
+        friction_slope=friction_slope,
     )
     force = finite_number(pull, "pull")
     return unit.replace(f=force / np.sum(unit.f) * unit.f)
 
 
 def pressed_rings(
-    nx: int = 8, ny: int = 1, torque: float = 60e3, press: float = 0.01, *, friction: Friction = (0.0, 1.0)
+    nx: int = 8,
+    ny: int = 1,
+    torque: float = 60e3,
+    press: float = 0.01,
+    *,
+    friction: float | None = None,
+    friction_slope: float | None = None,
 ) -> ContactProblem:
     """Two rings of steel pressed onto each other, the outer one loaded by a torque: one solution.
 
@@ -270,9 +288,8 @@ def pressed_rings(
         Torque on the outer ring, counterclockwise [N mm].
     press : float
         Interference of the radii [mm].
-    friction : float or (F0, F1)
-        Coefficient F0 + alpha F1 of all contact nodes; a single number is a constant coefficient; default F(alpha) =
-        alpha.
+    friction, friction_slope : float or None
+        As in `enumsol.fem.mesh_problem`; without both F(alpha) = alpha.
 
     Raises
     ------
@@ -306,6 +323,7 @@ def pressed_rings(
         spring={"rim": (_HELD, _HELD)},
         gap=-finite_number(press, "press"),
         friction=friction,
+        friction_slope=friction_slope,
     )
     shape = body_shape(unit)
     (x, y), (fx, fy) = shape.points.T, (shape.motion @ unit.f).reshape(-1, 2).T
@@ -313,7 +331,13 @@ def pressed_rings(
 
 
 def lap_joint(
-    nx: int = 4, ny: int = 1, stretch: float = 0.01, clamping: float = 20e3, *, friction: Friction = (0.0, 1.0)
+    nx: int = 4,
+    ny: int = 1,
+    stretch: float = 0.01,
+    clamping: float = 20e3,
+    *,
+    friction: float | None = None,
+    friction_slope: float | None = None,
 ) -> ContactProblem:
     """Lap joint of two plates that bolts press together and that are pulled apart: one solution.
 
@@ -333,9 +357,8 @@ def lap_joint(
         Displacement of the end of the upper plate, to the right [mm].
     clamping : float
         Force of all bolts, > 0 [N].
-    friction : float or (F0, F1)
-        Coefficient F0 + alpha F1 of all contact nodes; a single number is a constant coefficient; default F(alpha) =
-        alpha.
+    friction, friction_slope : float or None
+        As in `enumsol.fem.mesh_problem`; without both F(alpha) = alpha.
 
     Raises
     ------
@@ -377,6 +400,7 @@ def lap_joint(
         displacement={"grip": (finite_number(stretch, "stretch"), 0.0)},
         pressure={"nut": pressure, "head": pressure},
         friction=friction,
+        friction_slope=friction_slope,
     )
 
 

@@ -19,8 +19,6 @@ from enumsol.support.array_arguments import short_vector
 if TYPE_CHECKING:
     from enumsol.support.array_types import ArrayLike, Floats
 
-    Friction = float | tuple[ArrayLike, ArrayLike]
-
 Pair = tuple[float, float]
 #: Largest number of triangles in a chain.
 _MOST_TRIANGLES = 1_000_000
@@ -68,7 +66,8 @@ def two_node_square(
     f1: Pair = (1.0, -3.0),
     f2: Pair = (1.0, -1.0),
     lame: Pair = (1.0, 1.0),
-    friction: Friction = (0.0, 1.0),
+    friction: ArrayLike | None = None,
+    friction_slope: ArrayLike | None = None,
     load_slope: tuple[Pair, Pair] | None = None,
 ) -> ContactProblem:
     """Two contact nodes on one square: up to five roots, several branches, and loading paths (n = 4, p = 2).
@@ -93,8 +92,8 @@ def two_node_square(
         Loads of node 0 and node 1 in their own (normal, tangential) directions at alpha = 0 [force].
     lame : (float, float)
         Lame coefficients l, m [force / length^2].
-    friction : float or tuple (F0, F1)
-        As in `ContactProblem`; default F(alpha) = alpha.
+    friction, friction_slope : float or (p,) array_like, or None
+        As in `ContactProblem`; without both F(alpha) = alpha.
     load_slope : ((float, float), (float, float)) or None
         Derivatives of f1 and f2 with respect to alpha.
 
@@ -129,6 +128,7 @@ def two_node_square(
         np.eye(4)[[1, 3]],
         np.concatenate([short_vector(f1, "f1", 2), short_vector(f2, "f2", 2)]),
         friction=friction,
+        friction_slope=friction_slope,
         load_slope=slope,
         coordinates=corners[:2],
         mesh=BodyMesh(corners, [[0, 1, 2], [1, 3, 2]], np.vstack([turn.T, np.zeros((4, 4))])),
@@ -143,7 +143,8 @@ def clamped_block(
     lame: Pair = (1.0, 1.0),
     *,
     traction: Pair = (0.3, -1.0),
-    friction: Friction = (0.0, 1.0),
+    friction: ArrayLike | None = None,
+    friction_slope: ArrayLike | None = None,
     gap: float = 0.0,
     contact: int | None = None,
 ) -> ContactProblem:
@@ -164,8 +165,8 @@ def clamped_block(
         Lame coefficients l, m [force / length^2].
     traction : (float, float)
         Force per length of the top in x and y [force / length].
-    friction : float or tuple (F0, F1)
-        As in `ContactProblem`; default F(alpha) = alpha.
+    friction, friction_slope : float or (p,) array_like, or None
+        As in `ContactProblem`; without both F(alpha) = alpha.
     gap : float
         Initial gap below all contact nodes [length]; negative is a press fit.
     contact : int or None
@@ -199,6 +200,7 @@ def clamped_block(
         forces=fem.edge_forces(mesh.points, fem.edges_along(mesh.top), short_vector(traction, "traction", 2)),
         gap=finite_number(gap, "gap"),
         friction=friction,
+        friction_slope=friction_slope,
     )
 
 
@@ -280,7 +282,8 @@ def wedge(
     height: float = 1.0,
     half_angle: float = 20.0,
     lame: Pair = (1.0, 1.0),
-    friction: Friction = (0.0, 1.0),
+    friction: ArrayLike | None = None,
+    friction_slope: ArrayLike | None = None,
 ) -> ContactProblem:
     """Elastic wedge pressed into a rigid notch and pulled out of it: it may stay jammed or come out (3 or 5 roots).
 
@@ -315,8 +318,8 @@ def wedge(
         Inclination of the sides to the axis, between 0 and 80 [degrees].
     lame : (float, float)
         Lame coefficients l, m [force / length^2].
-    friction : float or tuple (F0, F1)
-        As in `ContactProblem`; default F(alpha) = alpha.
+    friction, friction_slope : float or (p,) array_like, or None
+        As in `ContactProblem`; without both F(alpha) = alpha.
 
     Raises
     ------
@@ -347,10 +350,18 @@ def wedge(
         forces=fem.edge_forces(mesh.points, fem.edges_along(mesh.top), short_vector(pull, "pull", 2)),
         gap=-finite_number(press, "press"),
         friction=friction,
+        friction_slope=friction_slope,
     )
 
 
-def taper(nx: int, ny: int, pull: Pair = (0.0, 50.0), *, friction: Friction = (0.0, 1.0)) -> ContactProblem:
+def taper(
+    nx: int,
+    ny: int,
+    pull: Pair = (0.0, 50.0),
+    *,
+    friction: ArrayLike | None = None,
+    friction_slope: ArrayLike | None = None,
+) -> ContactProblem:
     """Self-holding taper of steel in N and mm, pressed into its socket and pulled: it holds, slides out or is free.
 
     A `wedge` of 60 mm, 20 mm wide at its tip, whose sides are inclined by 3 degrees; plane strain, E = 210 GPa and
@@ -365,8 +376,8 @@ def taper(nx: int, ny: int, pull: Pair = (0.0, 50.0), *, friction: Friction = (0
         Cells across and along the height, at least 1; p = 2 ny.
     pull : (float, float)
         Force per area of the top in x and y; positive y is out of the socket [N / mm^2].
-    friction : float or tuple (F0, F1)
-        As in `ContactProblem`; default F(alpha) = alpha.
+    friction, friction_slope : float or (p,) array_like, or None
+        As in `ContactProblem`; without both F(alpha) = alpha.
 
     Raises
     ------
@@ -390,6 +401,7 @@ def taper(nx: int, ny: int, pull: Pair = (0.0, 50.0), *, friction: Friction = (0
         half_angle=3.0,
         lame=fem.lame(210e3, 0.3),
         friction=friction,
+        friction_slope=friction_slope,
     )
 
 

@@ -10,6 +10,7 @@ import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.gallery.problems import holding, inclination
+from enumsol.model.problem import given_friction
 from enumsol.support.arguments import finite_number, nonnegative_number, positive_integer, positive_number
 from enumsol.support.array_arguments import real_array, short_vector
 
@@ -77,6 +78,7 @@ def block3d(
     gap: float = 0.0,
     multipliers: Literal["nodes", "elements"] = "nodes",
     ratio: int = 1,
+    friction_slope: Any = None,
 ) -> ContactProblem3D:
     """Elastic block clamped at its left side (x = 0), pressed onto the floor z = 0 and sheared by a traction on top.
 
@@ -90,8 +92,8 @@ def block3d(
         Cells along x, y and z, at least 1.
     pull : (3,) array_like
         Force per area of the top [force / length^2].
-    friction
-        As in `ContactProblem3D`; default F1 = alpha, F2 = 0.6 alpha.
+    friction, friction_slope
+        As in `ContactProblem3D`; without both F1 = alpha, F2 = 0.6 alpha, and without one of them that one is 0.
     lame : (float, float)
         Lame coefficients l, m [force / length^2].
     size : (3,) array_like
@@ -130,8 +132,7 @@ def block3d(
         held=mesh.nodes("left"),
         forces=facet_forces(mesh.points, mesh.facets["top"], short_vector(pull, "pull", 3)),
         gap=finite_number(gap, "gap"),
-        friction=0.0 if friction is None else friction,
-        friction_slope=(1.0, 0.6) if friction is None else 0.0,
+        **_friction(friction, friction_slope),
         multipliers=multipliers,
         ratio=ratio,
     )
@@ -230,6 +231,7 @@ def wedge3d(
     half_angle: float = 20.0,
     multipliers: Literal["nodes", "elements"] = "elements",
     ratio: int = 1,
+    friction_slope: Any = None,
 ) -> ContactProblem3D:
     """Elastic wedge pressed into a rigid notch and pulled out of it or along it: 3, 5 or 9 roots.
 
@@ -258,8 +260,8 @@ def wedge3d(
         Interference with both walls, along the normals [length].
     springs : (3,) array_like
         Total stiffness of the springs between the top and the ground in x, y and z, > 0 [force / length].
-    friction
-        As in `ContactProblem3D`; default F1 = alpha, F2 = 0.6 alpha.
+    friction, friction_slope
+        As in `ContactProblem3D`; without both F1 = alpha, F2 = 0.6 alpha, and without one of them that one is 0.
     lame : (float, float)
         Lame coefficients l, m [force / length^2].
     size : (3,) array_like
@@ -309,11 +311,16 @@ def wedge3d(
         springs=_top_springs(points, top, springs),
         forces=facet_forces(points, top, short_vector(pull, "pull", 3)),
         gap=-finite_number(press, "press"),
-        friction=0.0 if friction is None else friction,
-        friction_slope=(1.0, 0.6) if friction is None else 0.0,
+        **_friction(friction, friction_slope),
         multipliers=multipliers,
         **rows,
     )
+
+
+def _friction(friction: Any, slope: Any) -> dict[str, Any]:
+    if friction is None and slope is None:
+        slope = (1.0, 0.6)
+    return dict(zip(("friction", "friction_slope"), given_friction(friction, slope), strict=True))
 
 
 def _lower_layers(mesh: SolidMesh, side: str, layers: int) -> Integers:

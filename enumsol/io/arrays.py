@@ -223,7 +223,7 @@ def problem_from_arrays(arrays: Mapping[str, Any], layout: Layout) -> AnyProblem
 def arrays_of(problem: AnyProblem) -> dict[str, Any]:
     """All matrices and arrays of numbers of a problem, by the names they have in files."""
     if isinstance(problem, ContactProblem):
-        F0, F1 = problem.friction
+        F0, F1 = problem.affine_friction
         arrays: dict[str, Any] = {name: getattr(problem, name) for name in (*LAYOUT_2D.required, "gap")}
         arrays |= {"friction0": F0, "friction1": F1, "slip_offset": problem.slip_offset}
     else:
@@ -257,9 +257,10 @@ def _rigid(arrays: Mapping[str, Any]) -> dict[str, Any]:
 
 def _plane_friction(arrays: Mapping[str, Any]) -> dict[str, Any]:
     if "friction" in arrays:
-        return {"friction": (_constant(arrays["friction"], LAYOUT_2D), 0.0)}
+        return {"friction": _constant(arrays["friction"], LAYOUT_2D)}
     if "friction0" in arrays or "friction1" in arrays:
-        return {"friction": (arrays.get("friction0", 0.0), arrays.get("friction1", 0.0))}
+        coefficients = (np.asarray(arrays.get(name, 0.0)) for name in ("friction0", "friction1"))
+        return dict(zip(("friction", "friction_slope"), coefficients, strict=True))
     return {}
 
 

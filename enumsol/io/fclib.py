@@ -91,7 +91,8 @@ def write(problem: Problem, path: Path) -> None:
 def _isotropic(problem: Problem) -> Floats:
     """The coefficient of every node."""
     if isinstance(problem, ContactProblem):
-        return problem.friction[0]
+        F: Floats = problem.friction
+        return F
     if problem.depends_on_solution:
         raise InvalidProblemError(
             "friction depends on the slip, which fclib cannot hold; expected constant coefficients"
@@ -138,7 +139,7 @@ def _problem(
 ) -> Problem:
     """The problem whose rows and offsets come contact by contact."""
     if dimension == 2:
-        return ContactProblem(A, B[0::2], B[1::2], f, gap=w[0::2], friction=(mu, 0.0), slip_offset=w[1::2])
+        return ContactProblem(A, B[0::2], B[1::2], f, gap=w[0::2], friction=mu, slip_offset=w[1::2])
     from enumsol.model.problem3d import ContactProblem3D  # not for problems in 2D
 
     offsets = w.reshape(-1, 3)

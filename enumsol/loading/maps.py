@@ -429,7 +429,9 @@ class _Replaced:
         """The problem at this value."""
         if self.name == "load":
             return self.problem.replace(f=self.problem.f + value * self.direction)
-        return self.problem.replace(**{self.name: value})
+        if self.name == "friction":
+            return self.problem.replace(friction=value, friction_slope=0.0)
+        return self.problem.replace(gap=value)
 
 
 def _parameter(problem: Any, over: Any) -> tuple[str, Callable[[float], ContactProblem], list[float]]:

@@ -218,8 +218,7 @@ def _cell(value: Any, name: str) -> Any:
 
 def _friction_varies(problem: Problem) -> bool:
     """Whether the coefficients change with alpha."""
-    slopes = problem.friction[1:] if isinstance(problem, ContactProblem) else problem.friction_slope
-    return any(np.any(slope) for slope in slopes)
+    return bool(np.any(problem.friction_slope))
 
 
 def _array(value: Any, name: str) -> Any:

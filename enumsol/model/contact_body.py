@@ -55,6 +55,8 @@ class ContactBody(Immutable):
     """
 
     _instead = "build a new problem, or one with other data by dataclasses.replace or problem.replace"
+    friction: Any
+    friction_slope: Any
     slip_offset: Floats
     #: How far the slip offset may be from ``slip_offset``, and its value where no floats hold it: a step of a history
     #: starts where the step before it ended (see enumsol.model.restart).
@@ -257,13 +259,16 @@ class ContactBody(Immutable):
     def replace(self, **changes: Any) -> Self:
         """The same problem with other data; what depends on A, Bn and Bt alone is not computed again.
 
-        ``dataclasses.replace`` makes an equal problem that shares nothing with this one.
+        ``dataclasses.replace`` makes a problem that shares nothing with this one, and keeps ``friction_slope`` if only
+        ``friction`` is named.
 
         Parameters
         ----------
         **changes
             Arguments of the class by their names, such as ``f``, ``friction``, ``gap`` or ``slip_offset``. A problem
-            with another A shares nothing, and one with other rows Bn or Bt only the factorization of A.
+            with another A shares nothing, and one with other rows Bn or Bt only the factorization of A. What is not
+            named is kept, such as ``load_slope``. Where ``friction_slope`` is not 0, it has to be given with
+            ``friction``: 0 for a coefficient that does not depend on alpha.
 
         Raises
         ------
@@ -283,6 +288,11 @@ class ContactBody(Immutable):
         [1.]
         [1.5]
         """
+        if "friction" in changes and "friction_slope" not in changes and np.any(self.friction_slope):
+            raise InvalidProblemError(
+                "friction is given without friction_slope, which is not 0 in this problem; expected both, "
+                "friction_slope=0 for a coefficient that does not depend on alpha"
+            )
         other = object.__new__(type(self))
         given = {name: getattr(self, name) for name in self.__dataclass_fields__} | changes
         matrices = {"A": self._A, **self._rows}
@@ -297,6 +307,11 @@ class ContactBody(Immutable):
         if "slip_offset" not in changes:
             other.__dict__.update(offset_radius=self.offset_radius, exact_offset=self.exact_offset)
         return other
+
+    @property
+    def affine_friction(self) -> tuple[Floats, Floats]:
+        """Coefficients at alpha = 0 and their derivatives, (p,) both, in 3D (p, 2)."""
+        raise NotImplementedError
 
     @staticmethod
     def constant_friction(values: Floats) -> dict[str, Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numbers
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -17,6 +16,8 @@ from enumsol.support.arguments import alpha_value, exact_number, instance_of, sh
 from enumsol.support.immutable import sealed
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from enumsol.condensation.condensed import CondensedProblem
     from enumsol.support.array_types import AlphaLike, ArrayLike, Floats
 
@@ -31,8 +32,8 @@ class ContactProblem(ContactBody):
         |lambda_t| <= F lambda_n,  u_t = Bt u - slip_offset
         u_t > 0 => lambda_t = F lambda_n;  u_t < 0 => lambda_t = -F lambda_n
 
-    with F(alpha) = F0 + alpha F1 and f(alpha) = f + alpha load_slope. The object is immutable: its arrays are
-    read-only, and every access to A, Bn or Bt gives a new sparse matrix, made in O(1) on read-only parts.
+    with F(alpha) = friction + alpha friction_slope and f(alpha) = f + alpha load_slope. The object is immutable: its
+    arrays are read-only, and every access to A, Bn or Bt gives a new sparse matrix, made in O(1) on read-only parts.
     ``problem.replace(f=2 * problem.f)`` makes another one, the same but for what is named.
 
     Data are taken exactly as given: what float64 cannot hold (an integer above 2^53, digits of a longdouble) is
@@ -48,8 +49,9 @@ class ContactProblem(ContactBody):
         Load at alpha = 0 [force].
     gap : float or (p,) array_like
         Initial normal gap [length]; negative is a press fit.
-    friction : float or tuple (F0, F1)
-        Coulomb coefficient [-]. A number is constant; otherwise exactly two entries, each a number or a (p,) array.
+    friction, friction_slope : float or (p,) array_like, or None
+        Coulomb coefficient at alpha = 0, and its derivative with respect to alpha [-]. One that is not given is 0;
+        without both F(alpha) = alpha.
     load_slope : (n,) array_like or None
         Derivative of the load with respect to alpha [force / unit of alpha].
     slip_offset : float or (p,) array_like
@@ -80,10 +82,10 @@ class ContactProblem(ContactBody):
     --------
     >>> import enumsol
     >>> A, Bn, Bt, f = [[2, -1], [-1, 2]], [[1, 0]], [[0, 1]], [1.5, -4]
-    >>> enumsol.ContactProblem(A, Bn, Bt, f, friction=(0.5, 1))
+    >>> enumsol.ContactProblem(A, Bn, Bt, f, friction=0.5, friction_slope=1)
     ContactProblem with 1 contact node
       degrees of freedom  2  (A: 4 nonzeros)
-      friction            F0 + alpha F1,  F0 in 0.5, F1 in 1
+      friction            0.5 + alpha 1
       load                constant,  max |f| = 4
       gap                 0
     """
@@ -95,7 +97,8 @@ class ContactProblem(ContactBody):
         Bt: ArrayLike | sp.sparray | sp.spmatrix,
         f: ArrayLike,
         gap: ArrayLike = 0.0,
-        friction: float | tuple[ArrayLike, ArrayLike] = (0.0, 1.0),
+        friction: ArrayLike | None = None,
+        friction_slope: ArrayLike | None = None,
         load_slope: ArrayLike | None = None,
         slip_offset: ArrayLike = 0.0,
         node_ids: Any = None,
@@ -105,7 +108,7 @@ class ContactProblem(ContactBody):
         max_rigid_displacement: float | None = None,
     ) -> None:
         super().__init__(A, {"Bn": Bn, "Bt": Bt}, f, gap, load_slope, node_ids, coordinates)
-        self.friction = _friction(friction, self.p)
+        self.friction, self.friction_slope = _friction(*given_friction(friction, friction_slope), self.p)
         self.slip_offset = vector(slip_offset, "slip_offset", self.p, broadcast=True)
         self.mesh = None if mesh is None else instance_of(mesh, BodyMesh, "mesh").check(self.n, self.p, 2)
         self._hold(rigid_modes, max_rigid_displacement)
@@ -120,7 +123,7 @@ class ContactProblem(ContactBody):
     @property
     def depends_on_alpha(self) -> bool:
         """Whether friction or load change with alpha."""
-        return self.load_slope is not None or bool(np.any(self.friction[1]))
+        return self.load_slope is not None or bool(np.any(self.friction_slope))
 
     @cached_property
     def condensed(self) -> CondensedProblem:
@@ -172,14 +175,20 @@ class ContactProblem(ContactBody):
             A @ (condensed.g0 + offset),
             gap=self.gap,
             friction=self.friction,
+            friction_slope=self.friction_slope,
             load_slope=None if self.load_slope is None else A @ condensed.g1,
             slip_offset=self.slip_offset,
             node_ids=self.node_ids,
             coordinates=self.coordinates,
         )
 
+    @property
+    def affine_friction(self) -> tuple[Floats, Floats]:
+        """Coefficients at alpha = 0 and their derivatives, (p,) both."""
+        return self.friction, self.friction_slope
+
     def friction_at(self, alpha: AlphaLike) -> Floats:
-        """Coefficients F(alpha) = F0 + alpha F1, shape (p,).
+        """Coefficients F(alpha) = friction + alpha friction_slope, shape (p,).
 
         Raises
         ------
@@ -187,7 +196,7 @@ class ContactProblem(ContactBody):
             alpha is not finite, or a coefficient is negative there (the node and its value are named).
         """
         a = Fraction(alpha_value(alpha))
-        F = friction_values(a, *self.friction)
+        F = friction_values(a, *self.affine_friction)
         if np.any(F < 0):
             node = int(np.argmin(F))
             where = f"at alpha = {float(a):g} is {F[node]:g} at contact node {self.node_ids[node]}"
@@ -197,32 +206,46 @@ class ContactProblem(ContactBody):
     @staticmethod
     def constant_friction(values: Floats) -> dict[str, Any]:
         """The attributes of a problem with coefficients that do not depend on alpha, for ``model.restart``."""
-        return {"friction": (sealed(values), sealed(np.zeros_like(values)))}
+        return {"friction": sealed(values), "friction_slope": sealed(np.zeros_like(values))}
 
     @cached_property
     def fingerprint(self) -> str:
         """SHA-256 of all data, as 64 hexadecimal digits; proofs are bound to it."""
-        return self._digest(b"enumsol problem 1", self.friction)
+        return self._digest(b"enumsol problem 1", self.affine_friction)
 
     def __repr__(self) -> str:
-        F0, F1 = self.friction
-        return self._text(f"F0 + alpha F1,  F0 in {span(F0)}, F1 in {span(F1)}")
+        slope = f" + alpha {span(self.friction_slope)}" if np.any(self.friction_slope) else ""
+        return self._text(f"{span(self.friction)}{slope}")
 
 
-def _friction(value: Any, p: int) -> tuple[Floats, Floats]:
-    hint = "expected a number, or a tuple (F0, F1) of exactly two, each a number or an array of shape (p,)"
-    if isinstance(value, tuple):
-        if len(value) != 2:
-            raise InvalidProblemError(f"friction is a tuple of {len(value)} entries; {hint}")
-        first, second = value
-    elif exact_number(value) is not None:
-        first, second = value, 0.0
-    elif isinstance(value, (str, bytes, bool, np.generic, numbers.Number)) or getattr(value, "ndim", 1) == 0:
-        raise InvalidProblemError(f"friction is {shown(value)}; {hint}")
-    else:
-        raise InvalidProblemError(f"friction is a bare {type(value).__name__}, which is ambiguous; {hint}")
-    F0 = vector(first, "friction F0", p, broadcast=True)
-    F1 = vector(second, "friction F1", p, broadcast=True)
+def given_friction(friction: Any, slope: Any) -> tuple[Any, Any]:
+    """Coefficients and their derivatives: what is not given is 0, and without both F(alpha) = alpha."""
+    if friction is None and slope is None:
+        return 0.0, 1.0
+    return 0.0 if friction is None else friction, 0.0 if slope is None else slope
+
+
+def old_friction(value: Any, written: Callable[[str], str], slope_written: Callable[[str], str]) -> str:
+    """What to write for a pair (F0, F1), which once stood for F(alpha) = F0 + alpha F1; "" for anything else.
+
+    ``written`` and ``slope_written`` are how a number is given for the coefficient and for its slope.
+    """
+    if not isinstance(value, (tuple, list)) or len(value) != 2:
+        return ""
+    plain = all(exact_number(part) is not None for part in value)
+    F0, F1 = (shown(part).removesuffix(".0") for part in value) if plain else ("F0", "F1")
+    return f"for F(alpha) = {F0} + {F1} alpha write {written(F0)} and {slope_written(F1)}"
+
+
+def _friction(friction: Any, slope: Any, p: int) -> tuple[Floats, Floats]:
+    if instead := old_friction(friction, "friction={}".format, "friction_slope={}".format):
+        array = ", for coefficients of two contact nodes friction=np.array([...])" if p == 2 else ""
+        raise InvalidProblemError(
+            f"friction is the pair {shown(friction)}; expected one coefficient, or one for each contact node: "
+            f"{instead}{array}"
+        )
+    F0 = vector(friction, "friction", p, broadcast=True)
+    F1 = vector(slope, "friction_slope", p, broadcast=True)
     if not np.any(F1) and np.any(F0 < 0):
         node = int(np.argmin(F0))
         raise InvalidProblemError(f"friction is {F0[node]:g} at contact node {node}; expected F >= 0")

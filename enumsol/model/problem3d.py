@@ -245,6 +245,19 @@ class ContactProblem3D(ContactBody):
         return sealed(self._slope[:, 0]), sealed(self._slope[:, 1])
 
     @property
+    def affine_friction(self) -> tuple[Floats, Floats]:
+        """Coefficients at alpha = 0 and their derivatives, (p, 2) both.
+
+        Raises
+        ------
+        InvalidArgumentError
+            They depend on the solution.
+        """
+        if not isinstance(self.law, ConstantFriction):
+            raise self._no_constants()
+        return self.law.values, self._slope
+
+    @property
     def depends_on_solution(self) -> bool:
         """Whether the coefficients are functions of the slip: then only successive approximations are offered."""
         return self.law.depends_on_slip

@@ -184,7 +184,7 @@ def codes_from(texts: Any, p: int) -> NDArray[np.uint8]:
 
 def friction_at(problem: ContactProblem, alpha: Fraction) -> list[Fraction]:
     """The friction coefficients at an alpha, exactly; ValueError where one is negative."""
-    exact = exactly_at(alpha, *problem.friction)
+    exact = exactly_at(alpha, *problem.affine_friction)
     if min(exact) < 0:
         raise ValueError(f"friction is negative at alpha = {shown_alpha(alpha)}")
     return exact

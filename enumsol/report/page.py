@@ -193,8 +193,7 @@ def _combinations(problem: ContactProblem | ContactProblem3D) -> str:
 def _friction(problem: ContactProblem | ContactProblem3D) -> str:
     """The coefficients as functions of alpha."""
     if isinstance(problem, ContactProblem):
-        F0, F1 = problem.friction
-        return f"F0 + alpha F1, F0 = {span_words(F0)}, F1 = {span_words(F1)}"
+        return f"F = {span_words(problem.friction)} + alpha {span_words(problem.friction_slope)}"
     slopes = (f" + alpha {span_words(slope)}" if np.any(slope) else "" for slope in problem.friction_slope)
     pairs = enumerate(zip(problem.friction, slopes, strict=True), 1)
     return ", ".join(f"F{k} = {span_words(F)}{slope}" for k, (F, slope) in pairs)

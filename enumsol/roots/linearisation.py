@@ -15,7 +15,6 @@ import numpy as np
 from enumsol.condensation.condensed import Condensation, FloatingCondensation, condensation_of
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK, ContactStatus
-from enumsol.roots.slips import affine_friction
 from enumsol.support.immutable import Sealed
 
 if TYPE_CHECKING:
@@ -68,7 +67,7 @@ class SelectionTangent(Sealed):
         floats: FloatSelections | None = None,
     ) -> SelectionTangent:
         """That of a problem at an alpha."""
-        F0, F1 = affine_friction(problem)
+        F0, F1 = problem.affine_friction
         return cls(condensation_of(problem), (F0 + float(alpha) * F1, F1), codes, force, w, floats)
 
     def condition(self) -> float:

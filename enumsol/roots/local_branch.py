@@ -24,7 +24,7 @@ from enumsol.model.statuses import (
     contact_status,
     space_status,
 )
-from enumsol.roots.slips import NodeSlips, affine_friction, ratios
+from enumsol.roots.slips import NodeSlips, ratios
 from enumsol.support.array_types import Alpha, Codes, Floats
 from enumsol.support.messages import counted
 
@@ -148,7 +148,7 @@ def local_branch_test(problem: AnyProblem, root: SolutionPoint) -> LocalBranchTe
 
 def branch_test(condensed: Any, root: SolutionPoint) -> LocalBranchTest:
     """The test at a root of a condensation; see local_branch_test."""
-    alpha, (F0, F1) = float(root.alpha), affine_friction(condensed.problem)
+    alpha, (F0, F1) = float(root.alpha), condensed.problem.affine_friction
     frictionless = (F0 == 0) & (F1 == 0)
     frictionless = frictionless if frictionless.ndim == 1 else np.all(frictionless, axis=1)
     active = []

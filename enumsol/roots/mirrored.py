@@ -173,9 +173,8 @@ def _condensed(problem: Any, alpha: Alpha) -> tuple[Floats, Floats, Floats, Floa
 
 def _relative_friction(problem: Any, alpha: Alpha, mirror: Mirror) -> Floats:
     """By how much the coefficients of friction change, relative to the largest, (p,); exact but for a rounding."""
-    pairs = [problem.friction] if mirror.dimension == 2 else zip(problem.friction, problem.friction_slope, strict=True)
     changes = np.zeros(problem.p)
-    for pair in pairs:
+    for pair in zip(*(np.atleast_2d(part.T) for part in problem.affine_friction), strict=True):
         F = exactly_at(Fraction(alpha), *pair)
         most = max(*F, Fraction(1, 10**300))
         changes = np.maximum(changes, [float(abs(F[k] - F[image]) / most) for k, image in enumerate(mirror.nodes)])

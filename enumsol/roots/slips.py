@@ -7,27 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.model.problem import ContactProblem
 from enumsol.support.immutable import Sealed
 
 if TYPE_CHECKING:
-    from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import Floats
-
-
-def affine_friction(problem: AnyProblem) -> tuple[Floats, Floats]:
-    """Coefficients at alpha = 0 and their derivatives, (p,) both, in 3D (p, 2).
-
-    Raises
-    ------
-    InvalidArgumentError
-        They depend on the solution.
-    """
-    if isinstance(problem, ContactProblem):
-        return problem.friction
-    if problem.depends_on_solution:
-        problem.friction_at(0)  # refuses
-    return np.column_stack(problem.friction), np.column_stack(problem.friction_slope)
 
 
 @dataclass(frozen=True)

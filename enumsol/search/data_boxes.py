@@ -118,7 +118,7 @@ class BoxSearch:
         """The box and the problem at its middle."""
         alpha, share = 0.5 * sum(box.alphas), 0.5 * sum(box.shares)
         loads = [enclosure.g0 + alpha * enclosure.g1 for enclosure in self._enclosures]
-        bounds = [enclosure.problem.friction for enclosure in self._enclosures]
+        bounds = [enclosure.problem.affine_friction for enclosure in self._enclosures]
         F = [first + alpha * slope for first, slope in bounds]
         g, F_middle = ((1.0 - share) * one + share * other for one, other in (loads, F))
         S = self._enclosures[0].S

@@ -77,7 +77,7 @@ class Solvers(SearchSetup):
         self.floats = FloatSelections(self.scaled, tolerance)
         if exactly and not body.condensed.definite:
             _ = self.exact  # definite, or refused
-        exact = exactly_at(Fraction(alpha), *problem.friction)
+        exact = exactly_at(Fraction(alpha), *problem.affine_friction)
         lost = [not F and x != 0 for F, x in zip(self.scaled.F, exact, strict=True)]
         if any(lost):
             node = problem.node_ids[lost.index(True)]

@@ -119,7 +119,7 @@ class DataBox:
             for e in enclosures
         ]
         g = _bilinear(corners[0], corners[1], s, s_rad, t, t_rad)
-        coefficients = [[Ball.exact(part) for part in e.problem.friction] for e in enclosures]
+        coefficients = [[Ball.exact(part) for part in e.problem.affine_friction] for e in enclosures]
         F = _bilinear(coefficients[0], coefficients[1], s, s_rad, t, t_rad)
         g_ball, F_ball = g.ball, F.ball
         system = EnclosedSystem(first.S, first.S_rad, g_ball.mid, g_ball.rad, F_ball.mid, F_ball.rad)

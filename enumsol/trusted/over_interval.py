@@ -71,7 +71,7 @@ class EnclosedPiece:
         Solutions at alpha are then alpha's distance from the origin times those of that constant load.
         """
         systems = [enclosure.at(alpha, force, length) for alpha in (a, b)]
-        constant = np.array(enclosure.problem.friction[1]) == 0
+        constant = np.array(enclosure.problem.friction_slope) == 0
         # a coefficient near the largest float has no upper bound, nor has any product with it
         with np.errstate(over="ignore"):
             low = np.min([s.F - s.F_rad * SAFE for s in systems], axis=0)

@@ -99,7 +99,7 @@ def padded(problem: ContactProblem, count: int) -> ContactProblem:
     zeros = np.zeros(count)
     slope = None if problem.load_slope is None else np.concatenate([problem.load_slope, zeros])
     f, gap, offset = np.concatenate([problem.f, zeros]), problem.gap, problem.slip_offset
-    return ContactProblem(A, wider(problem.Bn), wider(problem.Bt), f, gap, problem.friction, slope, offset)
+    return ContactProblem(A, wider(problem.Bn), wider(problem.Bt), f, gap, *problem.affine_friction, slope, offset)
 
 
 def in_single(problem: ContactProblem) -> ContactProblem:
@@ -128,7 +128,9 @@ def in_single(problem: ContactProblem) -> ContactProblem:
     K = 0.5 * (K + K.T)
     eye = np.eye(2 * problem.p)
     rows = eye[: problem.p], eye[problem.p :]
-    return ContactProblem(K, *rows, K @ g0, friction=problem.friction, load_slope=K @ g1)
+    return ContactProblem(
+        K, *rows, K @ g0, friction=problem.friction, friction_slope=problem.friction_slope, load_slope=K @ g1
+    )
 
 
 # -- scenes --------------------------------------------------------------------------------------------------------
@@ -158,7 +160,7 @@ def planted_family(seed: int, p: int) -> ContactProblem:
         f = A @ w + np.concatenate([n, slip * F * n])
         eye = np.eye(2 * p)
         problem = ContactProblem(
-            A, eye[:p], eye[p:], f, friction=(F, 0.0), load_slope=rng.integers(-2, 3, size=2 * p).astype(float)
+            A, eye[:p], eye[p:], f, friction=F, load_slope=rng.integers(-2, 3, size=2 * p).astype(float)
         )
         if enumerate_roots(problem, 0, "exact").families:
             return problem
@@ -272,7 +274,14 @@ def with_close_nodes(problem: ContactProblem, distance: float) -> ContactProblem
     rows = [np.array(B.toarray()) for B in (problem.Bn, problem.Bt)]
     for B in rows:
         B[1] = B[0] + distance * B[1]
-    return ContactProblem(problem.A, *rows, problem.f, friction=problem.friction, load_slope=problem.load_slope)
+    return ContactProblem(
+        problem.A,
+        *rows,
+        problem.f,
+        friction=problem.friction,
+        friction_slope=problem.friction_slope,
+        load_slope=problem.load_slope,
+    )
 
 
 def at_places(problem: ContactProblem, interval: tuple[float, float], distance: Fraction) -> Iterator[Case]:

@@ -35,7 +35,7 @@ def random_square(rng):
 
     loads = [(draw(0, 4), draw(-6, 6)) for _ in range(2)]
     slopes = tuple((draw(-1.5, 0.5), draw(-1, 1)) for _ in range(2))
-    return loads, {"friction": (draw(0, 1), draw(0.5, 2)), "load_slope": slopes}
+    return loads, {"friction": draw(0, 1), "friction_slope": draw(0.5, 2), "load_slope": slopes}
 
 
 def squares(count):

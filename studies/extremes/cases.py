@@ -62,7 +62,7 @@ def frictions() -> Iterator[Case]:
     rng = np.random.default_rng(11)
 
     def with_friction(base: ContactProblem, F: np.ndarray) -> ContactProblem:
-        return ContactProblem(base.A, base.Bn, base.Bt, base.f, gap=base.gap, friction=(F, 0.0))
+        return ContactProblem(base.A, base.Bn, base.Bt, base.f, gap=base.gap, friction=F)
 
     for name in ("two-node-5", "chain-2-coupled", "chain-4-coupled"):
         base = gallery.get(name).build()
@@ -323,7 +323,7 @@ def mixture(seed: int) -> ContactProblem:
     if rng.random() < 0.4:
         F = F * 10.0 ** rng.uniform(-12, 12, p)
     gap = 10.0 ** rng.uniform(-14, 6, p) * rng.choice([-1.0, 0.0, 0.0, 1.0], p)
-    base = ContactProblem(A, np.eye(2 * p)[:p], np.eye(2 * p)[p:], f, gap=gap, friction=(F, 0.0))
+    base = ContactProblem(A, np.eye(2 * p)[:p], np.eye(2 * p)[p:], f, gap=gap, friction=F)
     stiffness, load = 10.0 ** rng.uniform(-12, 12, 2)
     nodes = np.ldexp(1.0, rng.integers(-40, 41, p)) if rng.random() < 0.5 else None
     dofs = np.ldexp(1.0, rng.integers(-20, 21, 2 * p)) if rng.random() < 0.5 else None

@@ -226,8 +226,8 @@ def _judge_graph(build: Callable[[], ContactProblem], interval: tuple[float, flo
 
 
 def _scaled_friction(base: ContactProblem, size: float) -> ContactProblem:
-    F0, F1 = base.friction
-    return ContactProblem(base.A, base.Bn, base.Bt, base.f, friction=(F0, size * F1))
+    F0, F1 = base.affine_friction
+    return ContactProblem(base.A, base.Bn, base.Bt, base.f, friction=F0, friction_slope=size * F1)
 
 
 def _near_rows(seed: int, exponent: int) -> ContactProblem:
@@ -247,11 +247,11 @@ def _random(seed: int) -> ContactProblem:
     A = X @ X.T + np.eye(2 * p) * int(rng.integers(1, 3))
     f = rng.integers(-2, 3, size=2 * p).astype(float) if seed % 2 else rng.normal(size=2 * p)
     f[:p] += 1.0
-    data: dict[str, Any] = {"friction": (0.0, rng.uniform(0.2, 3.0, p))}
+    data: dict[str, Any] = {"friction": 0.0, "friction_slope": rng.uniform(0.2, 3.0, p)}
     if seed % 4 == 1:
-        data = {"friction": (rng.uniform(0.2, 3.0, p), 0.0), "load_slope": rng.normal(size=2 * p)}
+        data = {"friction": rng.uniform(0.2, 3.0, p), "friction_slope": 0.0, "load_slope": rng.normal(size=2 * p)}
     elif seed % 4 == 2:
-        data = {"friction": (0.0, 10.0 ** rng.uniform(-6, 6, p))}
+        data = {"friction": 0.0, "friction_slope": 10.0 ** rng.uniform(-6, 6, p)}
     elif seed % 4 == 3:
         data["gap"] = 10.0 ** rng.uniform(-14, 4, p) * rng.choice([-1.0, 0.0, 1.0], p)
     base = ContactProblem(A, np.eye(2 * p)[:p], np.eye(2 * p)[p:], f, **data)

@@ -33,6 +33,7 @@ def rescaled(
         load * d * problem.f,
         gap=length * c * problem.gap,
         friction=problem.friction,
+        friction_slope=problem.friction_slope,
         load_slope=slope,
         slip_offset=length * c * problem.slip_offset,
     )
@@ -49,7 +50,8 @@ def permuted(problem: ContactProblem, order: Any) -> ContactProblem:
         problem.Bt[order][:, back],
         problem.f[back],
         gap=problem.gap[order],
-        friction=tuple(part[order] for part in problem.friction),
+        friction=problem.friction[order],
+        friction_slope=problem.friction_slope[order],
         load_slope=slope,
         slip_offset=problem.slip_offset[order],
     )
@@ -64,6 +66,7 @@ def mirrored(problem: ContactProblem) -> ContactProblem:
         problem.f,
         gap=problem.gap,
         friction=problem.friction,
+        friction_slope=problem.friction_slope,
         load_slope=problem.load_slope,
         slip_offset=-problem.slip_offset,
     )

@@ -119,7 +119,7 @@ def fretting(run: Run) -> None:
 
 
 def pulled(ny: int) -> enumsol.ContactProblem:
-    wedge = enumsol.gallery.wedge(2, ny, friction=(1.0, 0.0))
+    wedge = enumsol.gallery.wedge(2, ny, friction=1.0)
     return dataclasses.replace(wedge, f=0 * wedge.f, load_slope=wedge.f)
 
 
@@ -191,7 +191,7 @@ def _between(found: enumsol.MultiplicityMap) -> float:
 
 def cost(run: Run) -> None:
     p = 8 if run.smoke else 64
-    block = enumsol.gallery.clamped_block(p, 2 if run.smoke else 4, 4.0, friction=(0.5, 0.0))
+    block = enumsol.gallery.clamped_block(p, 2 if run.smoke else 4, 4.0, friction=0.5)
     loads = [factor * block.f for factor in (1.0, 1.5, 2.0, 1.0, 0.5, -0.5, -1.0, 0.5)]
     started = time.perf_counter()
     history = enumsol.histories(block, loads)

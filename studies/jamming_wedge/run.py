@@ -37,7 +37,8 @@ def wedge(nx: int, ny: int) -> enumsol.ContactProblem:
         poisson=0.25,
         contact=["left", "right"],
         gap=-5e-4,
-        friction=(0.0, 1.0),
+        friction=0.0,
+        friction_slope=1.0,
         spring={"top": (0.02, 0.02)},
         load={"top": (1e-4, 1e-3)},
     )

@@ -12,7 +12,7 @@ import numpy as np
 import enumsol
 
 
-def on_its_way(problem, friction, *, start=0.0):
+def on_its_way(problem, friction, *, slope=0.0, start=0.0):
     """A body whose load grows over alpha, from ``start`` times the load."""
     return enumsol.ContactProblem(
         problem.A,
@@ -21,6 +21,7 @@ def on_its_way(problem, friction, *, start=0.0):
         start * problem.f,
         gap=problem.gap,
         friction=friction,
+        friction_slope=slope,
         load_slope=problem.f,
         node_ids=problem.node_ids,
     )
@@ -49,7 +50,7 @@ def cases(*, smoke, large):
         return
     yield "wedge-14-5, friction", gallery.get("wedge-14-5").build, (0, 5), True
     yield "wedge p = 14, load", lambda: on_its_way(wedge(), 2.2), (0, 1), True
-    yield "wedge p = 14, load and friction", lambda: on_its_way(wedge(), (0.5, 2.0), start=0.1), (0, 1), True
+    yield "wedge p = 14, load and friction", lambda: on_its_way(wedge(), 0.5, slope=2.0, start=0.1), (0, 1), True
     yield "block p = 16, friction", lambda: gallery.clamped_block(16, 8), (0.1, 3), True
     if not large:
         return

@@ -22,7 +22,7 @@ def thin_problem(length):
     """One node with a closed branch of that length."""
     c = 1.5 * (4.0 - 0.25 * length**2)
     A = [[2.0, -1.0], [-1.0, 2.0]]
-    return ContactProblem(A, [[1, 0]], [[0, 1]], [4.0, -c], friction=(0.0, 1.5), load_slope=[-1.0, 0.0])
+    return ContactProblem(A, [[1, 0]], [[0, 1]], [4.0, -c], friction=0.0, friction_slope=1.5, load_slope=[-1.0, 0.0])
 
 
 def row(graph, seconds, length, samples):

@@ -72,7 +72,7 @@ def row(body, problem, areas, H, h):
 
 def plane(n):
     """The clamped block in plane strain, n cells a side; an area is a length here."""
-    problem = gallery.clamped_block(n, n, friction=(F, 0.0))
+    problem = gallery.clamped_block(n, n, friction=F)
     areas = np.full(n, 1.0 / n)
     areas[-1] /= 2
     return row("2D, nodes", problem, areas, 1.0 / n, 1.0 / n)

@@ -32,7 +32,9 @@ def test_a_load_that_passes_zero_has_every_selection_there():
     assert len(origin.active[0]) == 4
     assert (origin.index_left, origin.index_right) == (1, 1)
     graph = balanced(
-        branch_graph(one_node((0.0, 0.0), friction=(2.0, 1.0), load_slope=[1.5, -4.0]), (-1.0, 2.0), "exact")
+        branch_graph(
+            one_node((0.0, 0.0), friction=2.0, friction_slope=1.0, load_slope=[1.5, -4.0]), (-1.0, 2.0), "exact"
+        )
     )
     assert [v.alpha for v in graph.folds] == [pytest.approx(2 / 3, abs=1e-15)]
     assert len(graph.roots_at(0.0)) == 1

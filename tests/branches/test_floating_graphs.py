@@ -19,7 +19,7 @@ import enumsol
 def varying(seed):
     """A random body of which load or friction depend on alpha."""
     problem = random_body(seed)
-    if problem.load_slope is None and not np.any(problem.friction[1]):
+    if problem.load_slope is None and not np.any(problem.friction_slope):
         slope = np.random.default_rng(seed + 10**6).integers(-1, 2, problem.n)
         problem = problem.replace(load_slope=slope.astype(float))
     return problem

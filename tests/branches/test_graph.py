@@ -37,7 +37,7 @@ VERY_SHORT = 1.5 * (4 - 2.5e-13)
 
 def sticks_for_a_while(c):
     """F = 1.5 alpha, f_n = 4 - alpha, f_t = -c: stick and slip- exist where 1.5 alpha (4 - alpha) > c."""
-    return one_node((4.0, -c), friction=(0.0, 1.5), load_slope=[-1.0, 0.0])
+    return one_node((4.0, -c), friction=0.0, friction_slope=1.5, load_slope=[-1.0, 0.0])
 
 
 def only_loop(graph):
@@ -69,7 +69,7 @@ def test_a_branch_on_an_alpha_interval_of_length_1e_6_is_missed_by_samples():
 
 def test_pinned_closed_branch_of_the_two_node_square():
     problem = gallery.two_node_square(
-        (3.7, -5.0), (1.1, 3.4), friction=(0.9, 1.7), load_slope=((-0.8, -0.1), (-1.0, 0.6))
+        (3.7, -5.0), (1.1, 3.4), friction=0.9, friction_slope=1.7, load_slope=((-0.8, -0.1), (-1.0, 0.6))
     )
     graph = balanced(whole_graph(problem, (0.0, 5.0), "exact"))
     closed = only_loop(graph)

@@ -27,7 +27,9 @@ def fold_beside_grazing(c):
     A = np.kron(np.eye(2), [[2.0, -1.0], [-1.0, 2.0]])
     A[1, 2] = A[2, 1] = c
     rows = np.eye(4)
-    return ContactProblem(A, rows[0::2], rows[1::2], [1.5, -4.0, 1.0, -2.0], friction=([0.0, 5.0], [1.0, 0.0]))
+    return ContactProblem(
+        A, rows[0::2], rows[1::2], [1.5, -4.0, 1.0, -2.0], friction=np.array([0.0, 5.0]), friction_slope=[1.0, 0.0]
+    )
 
 
 def beside_grazing(rng):
@@ -43,7 +45,7 @@ def beside_grazing(rng):
         friction.append(int(rng.integers(0, 6)))
     rows, slope = np.eye(2 * p), np.zeros(p)
     slope[0] = 1.0
-    return ContactProblem(A, rows[0::2], rows[1::2], f, friction=(friction, slope))
+    return ContactProblem(A, rows[0::2], rows[1::2], f, friction=friction, friction_slope=slope)
 
 
 @pytest.mark.parametrize("arithmetic", ["verified", "exact", "fast"])
@@ -61,7 +63,9 @@ def test_an_arc_of_degree_zero_may_begin_alone(arithmetic):
 
 def test_it_may_end_alone_too():
     """The same body with a friction that falls: a load increase has to leave the branch there."""
-    graph = whole_graph(fold_beside_grazing(0.25).replace(friction=([5.0, 5.0], [-1.0, 0.0])), (0, 5))
+    graph = whole_graph(
+        fold_beside_grazing(0.25).replace(friction=np.array([5.0, 5.0]), friction_slope=[-1.0, 0.0]), (0, 5)
+    )
     (vertex,) = (v for v in graph.vertices if v.kind == "terminal")
     assert vertex.alpha == pytest.approx(7 / 3, abs=1e-15)
     assert vertex in graph.jumps

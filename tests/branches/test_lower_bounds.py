@@ -46,7 +46,13 @@ def padded(problem, n):
     A[: problem.n, : problem.n] = problem.A.toarray()
     rows = [np.hstack([matrix.toarray(), np.zeros((problem.p, more))]) for matrix in (problem.Bn, problem.Bt)]
     slope = None if problem.load_slope is None else np.append(problem.load_slope, np.zeros(more))
-    data = {"gap": problem.gap, "slip_offset": problem.slip_offset, "friction": problem.friction, "load_slope": slope}
+    data = {
+        "gap": problem.gap,
+        "slip_offset": problem.slip_offset,
+        "friction": problem.friction,
+        "friction_slope": problem.friction_slope,
+        "load_slope": slope,
+    }
     return ContactProblem(A, *rows, np.append(problem.f, np.zeros(more)), **data)
 
 
@@ -55,8 +61,8 @@ def copies(problem, count):
     several = [np.kron(np.eye(count), matrix.toarray()) for matrix in (problem.A, problem.Bn, problem.Bt)]
     slope = None if problem.load_slope is None else np.tile(problem.load_slope, count)
     data = {"gap": np.tile(problem.gap, count), "slip_offset": np.tile(problem.slip_offset, count)}
-    friction = tuple(np.tile(part, count) for part in problem.friction)
-    return ContactProblem(*several, np.tile(problem.f, count), friction=friction, load_slope=slope, **data)
+    data |= {name: np.tile(getattr(problem, name), count) for name in ("friction", "friction_slope")}
+    return ContactProblem(*several, np.tile(problem.f, count), load_slope=slope, **data)
 
 
 def _repeated(rng, p, kind):
@@ -172,7 +178,7 @@ def graphs_of(seed):
 def wedged(n, count=2):
     """Bodies that stick and slide, all at the same alphas, padded to n degrees of freedom."""
     A, B = [[2.0, -1.0], [-1.0, 2.0]], np.eye(2)
-    one = ContactProblem(A, B[:1], B[1:], [3.0, -2.0], friction=(3.0, -0.75))
+    one = ContactProblem(A, B[:1], B[1:], [3.0, -2.0], friction=3.0, friction_slope=-0.75)
     return padded(copies(one, count), n)
 
 
@@ -187,7 +193,7 @@ def at_rest(n, p=1):
 def sliding(n):
     """One node that slips below alpha = 1/3 and sticks above."""
     B = np.eye(2)
-    return padded(ContactProblem(B, B[:1], B[1:], [1.0, 1.0], friction=(0.0, 3.0)), n)
+    return padded(ContactProblem(B, B[:1], B[1:], [1.0, 1.0], friction=0.0, friction_slope=3.0), n)
 
 
 def check(seeds, count):
@@ -270,7 +276,7 @@ def test_a_fold_is_not_counted_on_its_empty_side():
 
 def test_where_all_selections_hold_a_search_cut_short_knows_no_kind():
     A, B = [[5.0, -4.0], [-4.0, 5.0]], np.eye(2)
-    problem = ContactProblem(A, B[:1], B[1:], [0.0, 0.0], load_slope=[0.0, 1.0], friction=(2.0, 0.5))
+    problem = ContactProblem(A, B[:1], B[1:], [0.0, 0.0], load_slope=[0.0, 1.0], friction=2.0, friction_slope=0.5)
     for interval in ((0.0, 5.0), (-1.0, 1.0)):
         graph = branch_graph(padded(problem, 25), interval, max_nodes=2)
         assert {v.kind.value for v in graph.vertices if v.alpha == 0.0} == {"unsettled"}

@@ -54,7 +54,7 @@ def over_a_long_interval(rng, p, kind):
 def in_other_units(rng, p, kind):
     problem = generic_problem(rng, p, kind)
     stiff, load = (2.0 ** int(rng.integers(-150, 151)) for _ in range(2))
-    data = {"gap": load / stiff * problem.gap, "friction": problem.friction}
+    data = {"gap": load / stiff * problem.gap, "friction": problem.friction, "friction_slope": problem.friction_slope}
     if problem.load_slope is not None:
         data["load_slope"] = load * problem.load_slope
     A = stiff * problem.A.toarray()
@@ -69,8 +69,8 @@ def unloaded_somewhere(rng, p, kind):
     """Load and gap vanish together inside the interval or at one of its ends."""
     zero = Fraction(int(rng.integers(-3, 4)), int(rng.choice((1, 2, 3, 5))))
     ends = ((0, 2), (-2, 0), (-2, 2), (-1, Fraction(7, 3)))[int(rng.integers(4))]
-    friction = float(rng.integers(0, 4)) if kind == "load" else (6.0, float(rng.choice((-0.5, 1.0))))
-    problem = vanishing_problem(rng, p, zero, inner=int(rng.integers(0, 3)), friction=friction)
+    F0, F1 = (float(rng.integers(0, 4)), 0.0) if kind == "load" else (6.0, float(rng.choice((-0.5, 1.0))))
+    problem = vanishing_problem(rng, p, zero, inner=int(rng.integers(0, 3)), friction=F0, friction_slope=F1)
     return problem, tuple(zero + end for end in ends)
 
 
@@ -267,7 +267,8 @@ def jamming(cells, kind, angle, spring, seed):
         load={"top": (0.0, -1.0)},
         spring={"bottom": (spring, spring)},
         gap=-0.01,
-        friction=(0.0, 1.0),
+        friction=0.0,
+        friction_slope=1.0,
     )
 
 

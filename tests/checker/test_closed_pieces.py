@@ -107,7 +107,7 @@ def test_forged_numbers(name):
     p = body.p
     for k in of_kind(records, "m")[:1]:
         _, mu, kappa, nu = records[k]
-        F = np.maximum(*body.friction) if name == "everything" else np.ones(p)
+        F = np.maximum(*body.affine_friction) if name == "everything" else np.ones(p)
         wrong = [
             ["m"], ["m", mu, kappa], ["m", mu, kappa, nu, nu], ["m", mu[1:], kappa, nu], ["m", mu, [*kappa, 1.0], nu],
             ["m", mu, kappa, []], ["m", None, kappa, nu], ["m", "1" * p, kappa, nu], ["m", mu, kappa, 0.0],
@@ -210,7 +210,7 @@ def test_a_piece_that_is_not_whole(name):
     head = closed_heads(records)[0]
     a, b = map(Fraction, records[head]["piece"])
     inside = records[head + 1 : end_of(records, head)]
-    code = "4" if body.friction[0][0] == body.friction[1][0] == 0 else "5"
+    code = "4" if body.friction[0] == body.friction_slope[0] == 0 else "5"
     parts = [code + "6" * (body.p - 1), "0" + "6" * (body.p - 1)]
     for roots in (parts, parts[:1], ["6" * body.p]):
         changed = [*records[: head + 1], *(["c", root] for root in roots)]

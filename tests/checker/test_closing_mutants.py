@@ -153,7 +153,7 @@ def test_forged_numbers_are_refused(kind):
             for x in (0.0, -1.0, 1e200, 1e-200, True, "1", None):
                 forgeries += [[*numbers[:n], x, *numbers[n + 1 :]] for n in ((0, len(mu)) if kappa else (0,))]
             if kappa:
-                most = [2.0 * mu[0] / F for F in problem.friction[0][:1]] * len(nu)
+                most = [2.0 * mu[0] / F for F in problem.friction[:1]] * len(nu)
                 forgeries += [mu, [*mu, *kappa], [*mu, *kappa, *most, *share, *tau]]
                 forgeries += [[*mu, *kappa, *nu, *([1.5] * len(nu)), *tau]]
             # theta does not serve nodes that may have any
@@ -168,7 +168,7 @@ def test_forged_numbers_are_refused(kind):
 def test_a_lone_root_is_no_other_and_no_wider():
     for problem, records in cases("a"):
         for k in leaves(records, "a"):
-            record, p, rubbing = records[k], problem.p, int(np.count_nonzero(problem.friction[0]))
+            record, p, rubbing = records[k], problem.p, int(np.count_nonzero(problem.friction))
             forgeries = [record[:-1], [*record, 1], put(record, (8,), -record[8]), put(record, (7,), [-1.0] * (2 * p))]
             forgeries += [put(record, (3,), wrong) for wrong in ([-1.0] * (2 * p), [1.0] * p, [1e3] * (2 * p))]
             for forged in forgeries:

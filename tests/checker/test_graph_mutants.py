@@ -25,7 +25,7 @@ def two_loads():
     """Two nodes, load and friction vary, in several pieces."""
     problem = gallery.two_node_square((1.0, -3.0), (1.0, -1.0))
     slope = np.array([0.1, -0.3, 0.2, 0.1])
-    return problem.replace(friction=(0.5, 0.8), load_slope=slope), (0.0, 6.0)
+    return problem.replace(friction=0.5, friction_slope=0.8, load_slope=slope), (0.0, 6.0)
 
 
 PATHS = {"friction": GRAPHS["friction"], "loading": GRAPHS["load"], "unloaded": GRAPHS["unloaded"], "both": two_loads}

@@ -35,7 +35,7 @@ GRAPHS = [name for name in BEFORE if name.startswith("graph")]
 def before(name):
     """A problem and its proof as an earlier version wrote it."""
     data = dict(BEFORE[name]["problem"])
-    data["friction"] = tuple(np.array(part, dtype=float) for part in data["friction"])
+    data["friction"], data["friction_slope"] = (np.array(part, dtype=float) for part in data["friction"])
     return ContactProblem(**data), Proof(base64.b64decode(BEFORE[name]["proof"]))
 
 
@@ -222,7 +222,9 @@ def test_the_header_comes_first(name, monkeypatch):
 def test_a_tree_is_walked_to_its_end_before_anything_is_computed(monkeypatch):
     problem, proof = before("rational leaves")
     records = records_of(proof)
-    fresh = ContactProblem(problem.A, problem.Bn, problem.Bt, problem.f, friction=problem.friction)
+    fresh = ContactProblem(
+        problem.A, problem.Bn, problem.Bt, problem.f, friction=problem.friction, friction_slope=problem.friction_slope
+    )
     assert fresh.fingerprint == problem.fingerprint
     solves = []
     fresh.factorization  # noqa: B018 (made here, so that only solves with it are counted)

@@ -189,7 +189,7 @@ def random_graph(make, seed, p):
     """A problem on a path along which load, friction, or both vary, one that g vanishes on among them; its interval."""
     rng = np.random.default_rng([seed, p, 77])
     problem = make(rng, p)
-    F, kind = problem.friction[0], seed % 4
+    F, kind = problem.friction, seed % 4
     slope = rng.integers(-2, 3, size=problem.n).astype(float)
     if make is random_problem:
         slope = rng.normal(size=problem.n) * np.max(np.abs(problem.f))
@@ -197,7 +197,10 @@ def random_graph(make, seed, p):
         slope = -problem.f
     F1 = rng.integers(0, 3, size=p) + 0.25 * rng.integers(0, 2, size=p) if kind in (1, 2) else 0.0
     load = {"load_slope": slope} if kind != 1 else {}
-    return ContactProblem(problem.A, problem.Bn, problem.Bt, problem.f, friction=(F, F1), **load), (0.0, 2.0)
+    return ContactProblem(problem.A, problem.Bn, problem.Bt, problem.f, friction=F, friction_slope=F1, **load), (
+        0.0,
+        2.0,
+    )
 
 
 @pytest.mark.few(0, 1)
@@ -271,7 +274,7 @@ def test_empty_selections_at_single_alphas_and_between(seed):
     problem = singular_problem(rng, 2)
     F1 = rng.integers(0, 2, size=2).astype(float)
     load = rng.integers(-1, 2, size=4).astype(float)
-    data = Data(problem.replace(friction=(problem.friction[0], F1), load_slope=load))
+    data = Data(problem.replace(friction=problem.friction, friction_slope=F1, load_slope=load))
     samples, seen = [fmpq(k, 2) for k in range(-1, 3)], set()
     for codes in product(range(4), repeat=2):
         selection = Selection(data, codes, 0)

@@ -50,7 +50,7 @@ def planted(rng, p):
             force[i], force_rate[i] = 0.0, 1.0
             force[p + i], force_rate[p + i] = 0.0, turn * F[i]
     rows, slope = np.eye(2 * p), A @ move_rate + force_rate
-    return ContactProblem(A, rows[:p], rows[p:], A @ move + force, friction=(F, 0.0), load_slope=slope)
+    return ContactProblem(A, rows[:p], rows[p:], A @ move + force, friction=F, load_slope=slope)
 
 
 def distances(rng):

@@ -135,7 +135,7 @@ def shaken(rng, problem, radius, *, corner):
     f, free = problem.f + 0.499 * radius / largest * change, 0.499 * radius * root * size * step(rng, len(root), corner)
     gap, offset = problem.gap + free[: problem.p], problem.slip_offset + free[problem.p :]
     F = problem.friction_at(0) * (1 + 0.999 * radius * step(rng, problem.p, corner))
-    return problem.replace(f=f, gap=gap, slip_offset=offset, friction=(F, 0.0))
+    return problem.replace(f=f, gap=gap, slip_offset=offset, friction=F, friction_slope=0.0)
 
 
 @pytest.mark.few(0, 4)
@@ -143,7 +143,7 @@ def shaken(rng, problem, radius, *, corner):
 def test_perturbed_bodies_that_nothing_holds_have_the_same_roots(seed):
     rng = np.random.default_rng(seed)
     problem = random_body(seed + 500)
-    problem = problem.replace(friction=(problem.friction_at(0), 0.0))
+    problem = problem.replace(friction=problem.friction_at(0), friction_slope=0.0)
     roots = enumerate_roots(problem, 0.0)
     radius = stability_radius(problem, roots.proof)
     if roots.families or not all(root.regular for root in roots):

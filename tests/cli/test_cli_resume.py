@@ -32,7 +32,7 @@ def test_a_search_in_two_parts(capsys, tmp_path):
 def test_solve(capsys, tree_only, tmp_path):
     mesh, proof, report = tmp_path / "body.msh", tmp_path / "b.proof", tmp_path / "b.json"
     mesh.write_text(BODY)
-    search = ("solve", mesh, *OPTIONS, "--friction", "0.5,0", "--proof", proof, "--json", report, "--resume")
+    search = ("solve", mesh, *OPTIONS, "--friction", "0.5", "--proof", proof, "--json", report, "--resume")
     assert run(capsys, *search, "--max-nodes", 1)[0] == 3
     for _ in range(2):
         assert run(capsys, *search)[0] == 0

@@ -83,10 +83,10 @@ def test_a_forgotten_load_is_noted(here, capsys, options, rests):
 
 def test_friction_and_loads_may_depend_on_alpha(here, capsys):
     command = ("solve", "body.msh", *OPTIONS, "--load-slope", "lid=0,-1", "--pressure-slope", "lid=-0.5")
-    status, out, _ = run(capsys, *command, "--friction", "0.2,0.3", "-o", "p.npz")
+    status, out, _ = run(capsys, *command, "--friction", "0.2", "--friction-slope", "0.3", "-o", "p.npz")
     assert (status, out) == (0, "")  # it depends on alpha and is written only
     problem = read_problem("p.npz")
-    assert np.array_equal(problem.friction, [[0.2] * 3, [0.3] * 3])
+    assert np.array_equal(problem.affine_friction, [[0.2] * 3, [0.3] * 3])
     assert problem.load_slope.sum() == pytest.approx(-2 + 1)
     out = printed(capsys, "solve", "body.msh", *OPTIONS, "--friction", "0.5")
     assert "RootSet at alpha = 0: 1 root" in out
@@ -186,24 +186,26 @@ def test_materials_and_friction_by_part_in_a_file_on_the_command_line_and_in_a_c
     text = (
         "mesh = 'two.msh'\nyoung.pad = 5e3\nyoung.disc = 2e5\npoisson.pad = 0.45\npoisson.disc = 0.3\n"
         "thickness.pad = 2.0\nthickness.disc = 1.0\nplane = 'stress'\n"
-        "friction.upper = 0.2\nfriction.floor = [0.1, 0.5]\n"
+        "friction.upper = 0.2\nfriction.floor = 0.1\nfriction_slope.floor = 0.5\n"
         "gap.floor = 0.5\nbody_force.disc = [0, -1]\ncontact = 'floor'\ncontact_pair = [['upper', 'lower']]\n"
         "clamp = 'roof'\nspring.lower = [1, 1]\n"
     )
     (two_bodies / "two.toml").write_text(text)
     command = (
         "solve two.msh --young pad=5e3 --young disc=2e5 --poisson pad=0.45 --poisson disc=0.3 --thickness pad=2 "
-        "--thickness disc=1 --plane stress --friction upper=0.2 --friction floor=0.1,0.5 --gap floor=0.5 "
-        "--body-force disc=0,-1 --contact floor --pair upper:lower --clamp roof --spring lower=1,1 -o two.npz"
+        "--thickness disc=1 --plane stress --friction upper=0.2 --friction floor=0.1 --friction-slope floor=0.5 "
+        "--gap floor=0.5 --body-force disc=0,-1 --contact floor --pair upper:lower --clamp roof --spring lower=1,1 "
+        "-o two.npz"
     )
     printed(capsys, *command.split(), note="wrote a problem")
     direct = fem.mesh_problem(
         "two.msh", young={"pad": 5e3, "disc": 2e5}, poisson={"pad": 0.45, "disc": 0.3},
-        thickness={"pad": 2, "disc": 1}, plane="stress", friction={"upper": 0.2, "floor": (0.1, 0.5)},
-        gap={"floor": 0.5}, body_force={"disc": (0, -1)}, contact="floor", pairs=[("upper", "lower")], clamp="roof",
-        spring={"lower": (1, 1)},
+        thickness={"pad": 2, "disc": 1}, plane="stress", friction={"upper": 0.2, "floor": 0.1},
+        friction_slope={"floor": 0.5}, gap={"floor": 0.5}, body_force={"disc": (0, -1)}, contact="floor",
+        pairs=[("upper", "lower")], clamp="roof", spring={"lower": (1, 1)},
     )  # fmt: skip
-    assert direct.friction[0].tolist() == [0.1, 0.1, 0.2, 0.2]
+    assert direct.friction.tolist() == [0.1, 0.1, 0.2, 0.2]
+    assert direct.friction_slope.tolist() == [0.5, 0.5, 0.0, 0.0]
     assert read_problem("two.npz").fingerprint == direct.fingerprint == fem.read_mesh_problem("two.toml").fingerprint
 
 

@@ -31,7 +31,9 @@ def test_compliance_and_load_agree_with_dense_algebra(seed, p):
     rng = np.random.default_rng(100 + seed)
     n = 3 * p + 10
     gap, offset, slope = rng.normal(size=p), rng.normal(size=p), rng.normal(size=n)
-    problem = random_problem(seed, n, p, gap=gap, slip_offset=offset, load_slope=slope, friction=(0.2, 0.1))
+    problem = random_problem(
+        seed, n, p, gap=gap, slip_offset=offset, load_slope=slope, friction=0.2, friction_slope=0.1
+    )
     B = np.vstack([problem.Bn.toarray(), problem.Bt.toarray()])
     A = problem.A.toarray()
     condensed = problem.condensed
@@ -168,7 +170,7 @@ def test_selections_are_solved_alike_with_and_without_condensing(rng):
         B = np.linalg.qr(rng.normal(size=(n, n)))[0][: 2 * p] if rng.random() < 0.5 else np.eye(n)[: 2 * p]
         F, gap = rng.integers(0, 4, size=p) / 2, rng.integers(0, 2, size=p).astype(float)
         f = rng.integers(-2, 3, size=n).astype(float)
-        problem = ContactProblem(A, B[:p], B[p:], f, gap=gap, load_slope=f / 3, friction=(F, 0.25))
+        problem = ContactProblem(A, B[:p], B[p:], f, gap=gap, load_slope=f / 3, friction=F, friction_slope=0.25)
         alpha = Fraction(int(rng.integers(0, 3)), 3)
         ours = ExactSelections(UncondensedSystem(problem, alpha))
         condensed = ExactSelections(ExactSystem.from_problem(problem, alpha))

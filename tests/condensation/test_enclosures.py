@@ -41,7 +41,8 @@ def dense_problem(rng, n, p, decades):
     size = 10 ** rng.uniform(-3, 3, size=4)
     return ContactProblem(
         0.5 * (A + A.T), rows[:p], rows[p:], size[0] * rng.normal(size=n), gap=size[1] * rng.normal(size=p),
-        friction=(rng.uniform(0, 2, size=p), rng.uniform(0, 1, size=p)), load_slope=size[2] * rng.normal(size=n),
+        friction=rng.uniform(0, 2, size=p), friction_slope=rng.uniform(0, 1, size=p),
+        load_slope=size[2] * rng.normal(size=n),
         slip_offset=size[3] * rng.normal(size=p),
     )  # fmt: skip
 
@@ -75,7 +76,7 @@ def test_condensed_data(make):
 
 
 def test_sparse_body():
-    problem = gallery.clamped_block(3, 2, gap=1e-5, friction=(0.25, 0.5))
+    problem = gallery.clamped_block(3, 2, gap=1e-5, friction=0.25, friction_slope=0.5)
     assert not misses(problem, Fraction(22, 7))
 
 

@@ -18,7 +18,7 @@ def random_equation(rng, n=8, p=3, *, r=None):
     X = rng.normal(size=(n, n))
     problem = enumsol.ContactProblem(
         X @ X.T + np.eye(n), rng.normal(size=(p, n)), rng.normal(size=(p, n)), rng.normal(size=n),
-        gap=rng.normal(size=p), friction=(rng.uniform(0, 2, size=p), rng.uniform(0, 2, size=p)),
+        gap=rng.normal(size=p), friction=rng.uniform(0, 2, size=p), friction_slope=rng.uniform(0, 2, size=p),
         load_slope=rng.normal(size=n), slip_offset=rng.normal(size=p),
     )  # fmt: skip
     return PiecewiseSmoothEquation(problem, float(np.exp(rng.normal())) if r is None else r)

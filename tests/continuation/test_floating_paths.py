@@ -57,7 +57,7 @@ def test_a_block_slides_until_it_meets_a_wall():
     A, N = 16.0 * np.array([[1, 0, -1, 0], [0, 1, 0, -1], [-1, 0, 1, 0], [0, -1, 0, 1]]), np.tile(np.eye(2), (2, 1))
     problem = enumsol.ContactProblem(
         *(A, [[0, -1, 0, 0], [0, 0, 1, 0]], [[1, 0, 0, 0], [0, 0, 0, 1]], [0, -1, 0, 0]), gap=[0, 5],
-        friction=([0.25, 0.0], 0.0), load_slope=[0.25, 0, 0, 0], rigid_modes=N, max_rigid_displacement=50.0,
+        friction=np.array([0.25, 0.0]), load_slope=[0.25, 0, 0, 0], rigid_modes=N, max_rigid_displacement=50.0,
     )  # fmt: skip
     path = follow(problem, newton(problem, 0.2), interval=(0, 2))
     assert path.status == "interval left"
@@ -194,7 +194,8 @@ def test_files_frames_and_a_larger_bound(tmp_path):
 def test_a_body_that_contact_cannot_hold_is_refused():
     # one node touches: turning about it moves no contact node
     problem = block_on_table(1)
-    one = problem.replace(Bn=problem.Bn[:1], Bt=problem.Bt[:1], gap=0, slip_offset=0, friction=0.25, node_ids=None)
+    data = {"gap": 0, "slip_offset": 0, "friction": 0.25, "friction_slope": 0, "node_ids": None}
+    one = problem.replace(Bn=problem.Bn[:1], Bt=problem.Bt[:1], **data)
     refusal(enumsol.NotHeldError, "moves no contact node", newton, one, 0)
 
 

@@ -166,7 +166,7 @@ def test_a_problem_in_2d_with_a_second_tangent_that_nothing_loads_has_the_same_p
     A, rows = np.linalg.inv(M @ M.T + 0.3 * np.eye(2 * p)), np.eye(2 * p)
     f, slope = A @ (3 * rng.normal(size=2 * p)), A @ rng.normal(size=2 * p)
     F = rng.uniform(0.3, 3, p)
-    flat = enumsol.ContactProblem(0.5 * (A + A.T), rows[:p], rows[p:], f, friction=(F, 0.0), load_slope=slope)
+    flat = enumsol.ContactProblem(0.5 * (A + A.T), rows[:p], rows[p:], f, friction=F, load_slope=slope)
     solid = in_space(flat).replace(friction=(F, across * F))
     for root in enumsol.enumerate_roots(flat, 0.1, "fast"):
         plane = follow(flat, root, 1, (-3, 3))

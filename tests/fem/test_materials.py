@@ -127,20 +127,22 @@ def test_forces_on_a_part_of_the_body():
 def test_friction_and_gap_by_contact_part():
     mesh = grid(2, 2, 4)
     given = {**STEEL, "contact": ["left", "bottom"], "clamp": "right"}
-    problem = fem.mesh_problem(mesh, **given, friction={"left": 0.2, "bottom": (0.1, 0.5)}, gap={"bottom": -0.01})
+    problem = fem.mesh_problem(
+        mesh, **given, friction={"left": 0.2, "bottom": 0.1}, friction_slope={"bottom": 0.5}, gap={"bottom": -0.01}
+    )
     on_left = problem.coordinates[:, 0] == 0  # with the corner, since left is named first
-    assert np.array_equal(problem.friction[0], np.where(on_left, 0.2, 0.1))
-    assert np.array_equal(problem.friction[1], np.where(on_left, 0.0, 0.5))
+    assert np.array_equal(problem.friction, np.where(on_left, 0.2, 0.1))
+    assert np.array_equal(problem.friction_slope, np.where(on_left, 0.0, 0.5))
     assert np.array_equal(problem.gap, np.where(on_left, 0.0, -0.01))
-    given |= {"contact": ["bottom", "left"], "friction": {"left": 0.2, "bottom": (0.1, 0.5)}}
+    given |= {"contact": ["bottom", "left"], "friction": {"left": 0.2, "bottom": 0.1}}
     turned = fem.mesh_problem(mesh, **given)
-    assert np.array_equal(turned.friction[0], np.where(turned.coordinates[:, 1] == 0, 0.1, 0.2))
+    assert np.array_equal(turned.friction, np.where(turned.coordinates[:, 1] == 0, 0.1, 0.2))
 
 
 def test_friction_by_contact_part_in_3d():
     problem = fem.mesh_problem(
         fem.box(2, 2, 1), **STEEL, contact=["bottom", "top"], clamp="left",
-        friction={"bottom": 0.5, "top": (0.1, 1.0)}, friction2={"bottom": 0.25, "top": 0.3},
+        friction={"bottom": 0.5, "top": 0.1}, friction_slope={"top": 1.0}, friction2={"bottom": 0.25, "top": 0.3},
     )  # fmt: skip
     low = problem.coordinates[:, 2] == 0
     assert np.array_equal(np.stack(problem.friction), [np.where(low, 0.5, 0.1), np.where(low, 0.25, 0.3)])
@@ -155,7 +157,7 @@ def test_friction_of_a_pair_goes_by_its_first_part():
         mesh, young={"low": 1.0, "high": 3.0}, poisson=0.3, contact="low.bottom", pairs=[("high.bottom", "low.top")],
         clamp=["low.left", "high.top"], friction={"low.bottom": 0.1, "high.bottom": 0.7}, gap={"high.bottom": 0.2},
     )  # fmt: skip
-    assert np.array_equal(problem.friction[0], [0.1, 0.1, 0.7, 0.7, 0.7])
+    assert np.array_equal(problem.friction, [0.1, 0.1, 0.7, 0.7, 0.7])
     assert np.array_equal(problem.gap, [0, 0, 0.2, 0.2, 0.2])
 
 
@@ -175,7 +177,7 @@ def test_friction_of_a_pair_goes_by_its_first_part():
         ({"body_force": {"top": (1, 0)}}, "the mesh has no cells named 'top'; expected one of pad, disc"),
         ({"friction": {"left": 1}}, "friction is given for left, which has no contact nodes; expected some of bottom"),
         ({"friction": {}}, "friction is not given for bottom; expected it for all contact parts"),
-        ({"friction": {"bottom": "x"}}, "friction of bottom is 'x'; expected a number, or two"),
+        ({"friction": {"bottom": "x"}}, "friction of bottom is 'x'; expected a finite number"),
         ({"gap": {"left": 0.1}}, "gap is given for left, which has no contact nodes"),
         ({"gap": {"bottom": None}}, "gap of bottom is None; expected a finite number"),
     ],

@@ -186,7 +186,8 @@ young = 2.5
 poisson = 0.25
 contact = "floor"
 clamp = ["lid"]
-friction = [0.1, 0.5]
+friction = 0.1
+friction_slope = 0.5
 load.floor = [0.0, -1e-3]
 """
 
@@ -205,7 +206,8 @@ def toml(tmp_path):
 def test_a_toml_file_is_a_call(toml, tmp_path):
     one = fem.read_mesh_problem(toml(TOML))
     two = fem.mesh_problem(
-        tmp_path / "body.msh", young=2.5, poisson=0.25, contact="floor", clamp=["lid"], friction=(0.1, 0.5),
+        tmp_path / "body.msh", young=2.5, poisson=0.25, contact="floor", clamp=["lid"], friction=0.1,
+        friction_slope=0.5,
         load={"floor": (0, -1e-3)},
     )  # fmt: skip
     assert one.fingerprint == two.fingerprint

@@ -151,7 +151,7 @@ def test_there_are_thirty_of_them():
     [
         (one, {}),
         (two, {}),
-        (one, {"obstacle": {"plane": (0, -0.1, 0, 1)}, "friction": (0, 1)}),
+        (one, {"obstacle": {"plane": (0, -0.1, 0, 1)}, "friction": 0, "friction_slope": 1}),
         (one, {"obstacle": {"circle": (0.5, -3, 2.9)}}),
         (one, {"obstacle": {"hole": (0.5, 1.0, 1.5)}}),
         (one, {"contact": ["bottom", "right"], "gap": -1e-3}),
@@ -165,7 +165,9 @@ def test_right_scenes_are_neither(mesh, changes):
 
 def test_a_scene_in_words():
     mesh = two()
-    scene = fem.mesh_scene(mesh, **PAIR, friction={"upper.bottom": (0.1, 0.5)}, load_slope={"upper.left": (0.0, -2.0)})
+    scene = fem.mesh_scene(
+        mesh, **PAIR, friction={"upper.bottom": 0.1}, friction_slope=0.5, load_slope={"upper.left": (0.0, -2.0)}
+    )
     said = str(scene)
     for line in (
         "mesh      21 nodes, 10 quadrilaterals, from (0, 0) to (2, 2)",
@@ -178,7 +180,8 @@ def test_a_scene_in_words():
         "loads     resultant (0.01, 0)",
         "times alpha: resultant (0, -2)",
         "contact   4 contact nodes of the pair upper.bottom:lower.top, gap 0",
-        "friction 0.1 + alpha 0.5 (upper.bottom)",
+        "          friction 0.1 (upper.bottom)",
+        "          friction_slope 0.5",
     ):
         assert line in said
     assert "note" not in said

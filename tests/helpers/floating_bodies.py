@@ -16,7 +16,7 @@ def pushed_block(cells=2, press=1.0, **options):
 def held_by_springs(problem, stiffness):
     """The same body with a spring at every degree of freedom, and without rigid modes."""
     A = sp.csc_array(problem.A + stiffness * sp.eye_array(problem.n))
-    data = {"friction": problem.friction, "load_slope": problem.load_slope}
+    data = {"friction": problem.friction, "friction_slope": problem.friction_slope, "load_slope": problem.load_slope}
     return ContactProblem(A, problem.Bn, problem.Bt, problem.f, **data)
 
 

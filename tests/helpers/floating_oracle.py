@@ -93,7 +93,8 @@ def random_body(seed, bodies=None):
         Bt,
         f,
         gap=gap,
-        friction=(friction, rng.choice([0.0, 0.25])),
+        friction=friction,
+        friction_slope=rng.choice([0.0, 0.25]),
         load_slope=slope,
         slip_offset=offset,
         rigid_modes=N,
@@ -148,7 +149,7 @@ class Oracle:
         alpha = rational(alpha)
         self.problem, self.n, self.p = problem, problem.n, problem.p
         A, Bn, Bt = (M.toarray() for M in (problem.A, problem.Bn, problem.Bt))
-        F0, F1 = problem.friction
+        F0, F1 = problem.affine_friction
         self.F = [rational(a) + alpha * rational(b) for a, b in zip(F0, F1, strict=True)]
         self.size = n = self.n + 2 * self.p
         f = [rational(x) for x in problem.f]

@@ -20,7 +20,7 @@ def from_condensed(S, g, F):
     A = np.linalg.inv(S)
     p = len(F)
     rows = np.eye(2 * p)
-    return ContactProblem(0.5 * (A + A.T), rows[:p], rows[p:], A @ g, friction=(np.asarray(F, dtype=float), 0.0))
+    return ContactProblem(0.5 * (A + A.T), rows[:p], rows[p:], A @ g, friction=np.asarray(F, dtype=float))
 
 
 def dense_compliance(rng, p):
@@ -96,7 +96,7 @@ def integer_problem(rng, p):
     f = rng.integers(-2, 3, size=2 * p).astype(float)
     F = rng.integers(0, 4, size=p).astype(float)
     rows = np.eye(2 * p)
-    return ContactProblem(A, rows[:p], rows[p:], f, friction=(F, 0.0))
+    return ContactProblem(A, rows[:p], rows[p:], f, friction=F)
 
 
 def singular_problem(rng, p):
@@ -128,7 +128,7 @@ def _integer_trial(rng, p):
     w = np.concatenate([np.where(codes == 0, -rng.integers(0, 2, size=p), 0), rng.integers(0, 3, size=p) * slip])
     w[p:] += np.where(codes == 0, rng.integers(-1, 2, size=p), 0)
     eye = np.eye(2 * p)
-    return ContactProblem(A, eye[:p], eye[p:], A @ w + np.concatenate([n, t]), friction=(F, 0.0))
+    return ContactProblem(A, eye[:p], eye[p:], A @ w + np.concatenate([n, t]), friction=F)
 
 
 def through_the_unloaded_state():
@@ -138,7 +138,7 @@ def through_the_unloaded_state():
     return ContactProblem(triangle.A, triangle.Bn, triangle.Bt, [0.0, 0.0], **load), (-1.0, 2.0)
 
 
-def vanishing_problem(rng, p, zero, *, inner=0, friction=0.0):
+def vanishing_problem(rng, p, zero, *, inner=0, friction=0.0, friction_slope=0.0):
     """Small integers for which g vanishes exactly at the rational ``zero``, mostly by load, gap and slip together.
 
     ``inner`` degrees of freedom are not in contact; loads on them may cancel what others do to the contact nodes.
@@ -156,5 +156,5 @@ def vanishing_problem(rng, p, zero, *, inner=0, friction=0.0):
     slope[np.flatnonzero(B.any(axis=0))[0]] = 1
     f = A @ rest - zero.numerator * slope
     slope = zero.denominator * slope
-    data = {"gap": B[:p] @ rest, "slip_offset": B[p:] @ rest, "load_slope": slope, "friction": friction}
-    return ContactProblem(A, B[:p], B[p:], f, **data)
+    data = {"gap": B[:p] @ rest, "slip_offset": B[p:] @ rest, "load_slope": slope}
+    return ContactProblem(A, B[:p], B[p:], f, friction=friction, friction_slope=friction_slope, **data)

@@ -25,14 +25,18 @@ def three_with_everything():
     """Gap, press fit, slip offset, a node without friction, load and friction that vary."""
     block = gallery.clamped_block(3, 1)
     rng = np.random.default_rng(5)
-    path = {"friction": ([0.0, 0.2, 0.3], [0.0, 0.5, 1.0]), "load_slope": 0.1 * rng.normal(size=block.n)}
+    path = {
+        "friction": [0.0, 0.2, 0.3],
+        "friction_slope": [0.0, 0.5, 1.0],
+        "load_slope": 0.1 * rng.normal(size=block.n),
+    }
     return ContactProblem(block.A, block.Bn, block.Bt, block.f, [1e-3, -2e-3, 0.0], slip_offset=1e-3, **path)
 
 
 GRAPHS = {
     "load": lambda: (gallery.get("two-node-6.7-minus").build(), (-3.0, 3.0)),
     "friction": lambda: (gallery.get("two-node-6.4").build(), (0.0, 6.0)),
-    "both": lambda: (triangle(f=[1.0, -2.5], load_slope=[0.2, -0.5], friction=(0.5, 0.7)), (0.0, 6.0)),
+    "both": lambda: (triangle(f=[1.0, -2.5], load_slope=[0.2, -0.5], friction=0.5, friction_slope=0.7), (0.0, 6.0)),
     "unloaded": through_the_unloaded_state,
     "frictionless": lambda: (triangle(load_slope=[-1.0, 0.5], friction=0.0), (0.0, 4.0)),
     "everything": lambda: (three_with_everything(), (0.0, 3.0)),

@@ -21,7 +21,7 @@ def condense(problem, alpha):
     f = problem.f + (0.0 if problem.load_slope is None else alpha * problem.load_slope)
     X = np.linalg.solve(A, np.column_stack([B.T, f]))
     g = B @ X[:, -1] - np.concatenate([problem.gap, problem.slip_offset])
-    return B @ X[:, :-1], g, problem.friction[0] + alpha * problem.friction[1]
+    return B @ X[:, :-1], g, problem.friction + alpha * problem.friction_slope
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ def exact_condense(problem, alpha):
     X = [row[n:] for row in solved]
     product = [[sum(B[r][i] * X[i][k] for i in range(n)) for k in range(size + 1)] for r in range(size)]
     offset = [Fraction(v) for v in (*problem.gap, *problem.slip_offset)]
-    F = [Fraction(a) + Fraction(alpha) * Fraction(b) for a, b in zip(*problem.friction, strict=True)]
+    F = [Fraction(a) + Fraction(alpha) * Fraction(b) for a, b in zip(*problem.affine_friction, strict=True)]
     return [row[:-1] for row in product], [row[-1] - o for row, o in zip(product, offset, strict=True)], F
 
 

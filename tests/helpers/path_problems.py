@@ -7,16 +7,17 @@ import numpy as np
 from enumsol import ContactProblem
 
 
-def one_node(f, *, lame=(1.0, 1.0), friction=(0.0, 1.0), load_slope=None):
+def one_node(f, *, lame=(1.0, 1.0), friction=None, friction_slope=None, load_slope=None):
     """The paper's one-node problem; Lame coefficients with exact halves of their sums keep its data exact."""
     lam, mu = lame
     a, b = 0.5 * (lam + 3 * mu), -0.5 * (lam + mu)
-    return ContactProblem([[a, b], [b, a]], [[1.0, 0.0]], [[0.0, 1.0]], f, friction=friction, load_slope=load_slope)
+    data = {"friction": friction, "friction_slope": friction_slope, "load_slope": load_slope}
+    return ContactProblem([[a, b], [b, a]], [[1.0, 0.0]], [[0.0, 1.0]], f, **data)
 
 
 def closed_branch():
     """One node, F = 4 - alpha, f = (1, -3.5) + alpha (1, -3): a closed branch of stick and slip-, alpha^2 < 1/2."""
-    return one_node((1.0, -3.5), friction=(4.0, -1.0), load_slope=[1.0, -3.0])
+    return one_node((1.0, -3.5), friction=4.0, friction_slope=-1.0, load_slope=[1.0, -3.0])
 
 
 def sheet_of_one_node():
@@ -40,7 +41,7 @@ def generic_problem(rng, p, kind):
     if kind == "load":
         options["friction"] = float(rng.uniform(0.3, 4.0))
     else:
-        options["friction"] = (rng.uniform(0.0, 1.0, p), rng.uniform(0.1, 1.0, p))
+        options |= {"friction": rng.uniform(0.0, 1.0, p), "friction_slope": rng.uniform(0.1, 1.0, p)}
     gap = 0.3 * rng.normal(size=p)
     return ContactProblem(G @ G.T / n + 0.1 * np.eye(n), B[:p], B[p:], 2.0 * rng.normal(size=n), gap=gap, **options)
 
@@ -54,9 +55,9 @@ def integer_problem(rng, p, kind):
             break
     options = {} if kind == "friction" else {"load_slope": rng.integers(-1, 2, size=2 * p)}
     if kind == "load":
-        options["friction"] = (rng.integers(0, 3, size=p).astype(float), 0.0)
+        options["friction"] = rng.integers(0, 3, size=p).astype(float)
     else:
-        options["friction"] = tuple(rng.integers(0, 2, size=p).astype(float) for _ in range(2))
+        options |= {name: rng.integers(0, 2, size=p).astype(float) for name in ("friction", "friction_slope")}
     f = rng.integers(-2, 3, size=2 * p)
     gap = rng.integers(0, 2, size=p) * int(rng.integers(0, 2))
     offset = rng.integers(-1, 2, size=p) * int(rng.integers(0, 2))
@@ -72,7 +73,8 @@ def mirrored_problem(rng, *, load):
     f, slope = (np.array([a, b, a, -b]) for a, b in rng.integers(-4, 5, size=(2, 2)).tolist())
     options = {}
     if load:
-        options = {"load_slope": slope, "friction": tuple(float(v) for v in (rng.integers(0, 4), rng.integers(0, 2)))}
+        F0, F1 = (float(v) for v in (rng.integers(0, 4), rng.integers(0, 2)))
+        options = {"load_slope": slope, "friction": F0, "friction_slope": F1}
     return ContactProblem(A + mirror @ A @ mirror.T, np.eye(4)[[0, 2]], np.eye(4)[[1, 3]], f, **options)
 
 
@@ -128,7 +130,7 @@ def planted_corner(rng, p, kind, *, at=None):
     f = A @ w.ravel() + lam.ravel() - alpha * slope
     B = np.eye(2 * p)
     load = {} if kind == "friction" else {"load_slope": slope}
-    return ContactProblem(A, B[:p], B[p:], f, friction=(F - alpha * steps, steps), **load)
+    return ContactProblem(A, B[:p], B[p:], f, friction=F - alpha * steps, friction_slope=steps, **load)
 
 
 def together(rng, *, push=0.0, nodes=2):
@@ -150,9 +152,8 @@ def together(rng, *, push=0.0, nodes=2):
         F1.append(slope)
     B = np.eye(2 * nodes)
     order = rng.permutation(nodes)
-    data = (np.array(part)[order] for part in (loads, F0, F1))
-    f, *friction = data
-    return ContactProblem(np.kron(np.eye(nodes), S), B[0::2], B[1::2], f.ravel(), friction=tuple(friction))
+    f, F0, F1 = (np.array(part)[order] for part in (loads, F0, F1))
+    return ContactProblem(np.kron(np.eye(nodes), S), B[0::2], B[1::2], f.ravel(), friction=F0, friction_slope=F1)
 
 
 def grazing_problem(rng, p):
@@ -166,16 +167,16 @@ def grazing_problem(rng, p):
         w[0, i] = -1.0 if code == 1 else 0.0
         lam[:, i] = (1.0, int(rng.integers(-2, 3)) / 2) if code == 2 else (0.0, 0.0)
     B = np.eye(2 * p)
-    return ContactProblem(A, B[:p], B[p:], A @ w.ravel() + lam.ravel(), friction=(0.0, 1.0))
+    return ContactProblem(A, B[:p], B[p:], A @ w.ravel() + lam.ravel(), friction=0.0, friction_slope=1.0)
 
 
 def without_friction_somewhere(rng, p, kind):
     """A generic problem in which nodes have F = 0 throughout, or at alpha = 0."""
     problem = generic_problem(rng, p, kind)
-    F0, F1 = (part.copy() for part in problem.friction)
+    F0, F1 = (part.copy() for part in problem.affine_friction)
     F0[rng.random(p) < 0.6] = 0.0
     F1[(F0 == 0.0) & (rng.random(p) < 0.5)] = 0.0
-    data = {"gap": problem.gap, "friction": (F0, F1)}
+    data = {"gap": problem.gap, "friction": F0, "friction_slope": F1}
     if problem.load_slope is not None:
         data["load_slope"] = problem.load_slope
     return ContactProblem(problem.A, problem.Bn, problem.Bt, problem.f, **data)
@@ -189,7 +190,7 @@ def stable_problem(seed, loading=False):
     M = rng.normal(size=(n, n))
     B = np.linalg.qr(rng.normal(size=(n, n)))[0][: 2 * p]
     f = rng.normal(size=n) * 3
-    data = {"friction": (0.0, rng.uniform(0.3, 1.5, p))}
+    data = {"friction": 0.0, "friction_slope": rng.uniform(0.3, 1.5, p)}
     if loading:
-        data = {"friction": (rng.uniform(0.3, 6, p), 0.0), "load_slope": rng.normal(size=n)}
+        data = {"friction": rng.uniform(0.3, 6, p), "friction_slope": 0.0, "load_slope": rng.normal(size=n)}
     return ContactProblem(M @ M.T + 0.3 * np.eye(n), B[:p], B[p:], f, **data)

@@ -202,14 +202,14 @@ def random_plane_over_alpha(p, seed):
     A, rows = 0.5 * (A + A.T), np.eye(2 * p)
     g, F = rng.standard_normal(2 * p), 10 ** rng.uniform(-0.5, 0.6, p)
     slope = A @ rng.standard_normal(2 * p) if seed % 3 else None
-    friction = ((0 * F, F), (F, 0 * F), (F, 0.5 * F))[seed % 3]
-    return ContactProblem(A, rows[:p], rows[p:], A @ g, friction=friction, load_slope=slope)
+    F0, F1 = ((0 * F, F), (F, 0 * F), (F, 0.5 * F))[seed % 3]
+    return ContactProblem(A, rows[:p], rows[p:], A @ g, friction=F0, friction_slope=F1, load_slope=slope)
 
 
 def in_space(problem):
     """A problem in 2D written in 3D: every node has a second tangent with a stiffness of its own, without load."""
     p, n = problem.p, problem.n
-    F0, F1 = (np.broadcast_to(np.asarray(F, dtype=float), p) for F in problem.friction)
+    F0, F1 = problem.affine_friction
     slope = problem.load_slope
     A, Bn, Bt = (M.toarray() for M in (problem.A, problem.Bn, problem.Bt))
     return ContactProblem3D(

@@ -91,7 +91,7 @@ def fingerprint(problem):
         add(row, "<i8")
         add(dense[row, column], "<f8")
     slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
-    for vector in (problem.f, problem.gap, *problem.friction, slope, problem.slip_offset):
+    for vector in (problem.f, problem.gap, *problem.affine_friction, slope, problem.slip_offset):
         add(vector, "<f8")
     if free:
         add(problem.rigid_modes.ravel(), "<f8")
@@ -123,7 +123,7 @@ class Data:
         free = (B * A.solve(matrix_of(problem.f[:, None]))).entries()
         self.g0 = [value - exact(shift) for value, shift in zip(free, offset, strict=True)]
         self.g1 = (B * A.solve(matrix_of(slope[:, None]))).entries()
-        self.F0, self.F1 = ([exact(value) for value in part.tolist()] for part in problem.friction)
+        self.F0, self.F1 = ([exact(value) for value in part.tolist()] for part in problem.affine_friction)
 
     def stiffness(self, problem):
         """A."""

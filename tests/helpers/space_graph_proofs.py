@@ -25,7 +25,7 @@ _CENTRE, _DIRECTION, _BORDER, _RADIUS, _RHO, _HALF = range(1, 7)
 
 def closed_branch():
     """A problem of two nodes with a branch that is closed, for alpha from 0.953 to 1.441."""
-    options = {"friction": (0.5, 1.7), "load_slope": ((-1.1, -0.2), (-0.8, 0.3))}
+    options = {"friction": 0.5, "friction_slope": 1.7, "load_slope": ((-1.1, -0.2), (-0.8, 0.3))}
     return in_space(gallery.two_node_square((3.7, -5.3), (1.1, 0.9), **options))
 
 

@@ -20,7 +20,7 @@ def beside_a_loaded_node(k, *, slides, grazing, friction=0.5):
     u[p] = float(slides)
     u[p + 1 :] = float(grazing)
     eye = np.eye(2 * p)
-    return ContactProblem(A, eye[:p], eye[p:], A @ u + force, friction=(friction, 0.0))
+    return ContactProblem(A, eye[:p], eye[p:], A @ u + force, friction=friction)
 
 
 def touching_problem(rng, p, *, inner=0):
@@ -40,7 +40,7 @@ def touching_problem(rng, p, *, inner=0):
     whole = np.eye(2 * p + inner)
     whole[: 2 * p, : 2 * p] = A
     eye = np.eye(2 * p, 2 * p + inner)
-    return ContactProblem(whole, eye[:p], eye[p:], np.concatenate([f, np.zeros(inner)]), friction=(F, 0.0))
+    return ContactProblem(whole, eye[:p], eye[p:], np.concatenate([f, np.zeros(inner)]), friction=F)
 
 
 def row_of_discs(count, *, weights=(2.0,), pull=3.0, friction=0.9, stiffness=64.0):
@@ -64,7 +64,7 @@ def row_of_discs(count, *, weights=(2.0,), pull=3.0, friction=0.9, stiffness=64.
     f[1:bodies:3] = -np.resize(weights, count)
     f[0] = -pull
     B = np.hstack([np.zeros((2 * p, bodies)), np.eye(2 * p)])
-    return ContactProblem(A, B[:p], B[p:], f, friction=(friction, 0.0))
+    return ContactProblem(A, B[:p], B[p:], f, friction=friction)
 
 
 def problem_of_any_kind(rng, p, kind, friction, *, planted=True):

@@ -124,7 +124,7 @@ def test_global_problems_round_trip_exactly(tmp_path):
     X = rng.normal(size=(9, 9))
     problem = enumsol.ContactProblem(
         X @ X.T + np.eye(9), rng.normal(size=(3, 9)), sp.random_array((3, 9), density=0.5, rng=rng), rng.normal(size=9),
-        gap=rng.normal(size=3), slip_offset=rng.normal(size=3), friction=(rng.random(3), 0.0),
+        gap=rng.normal(size=3), slip_offset=rng.normal(size=3), friction=rng.random(3),
     )  # fmt: skip
     for _ in range(2):  # the file replaces itself
         write_problem(problem, tmp_path / "p.h5")

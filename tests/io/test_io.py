@@ -45,7 +45,8 @@ def awkward_problem(node_ids=None):
     f[:3] = (5e-324, -0.0, np.nextafter(1.0, 2.0))
     return ContactProblem(
         sp.csc_array(0.5 * (A + A.T)), sp.csr_array(sp.random_array((p, n), density=0.5, rng=rng)),
-        rng.normal(size=(p, n)), f, gap=rng.normal(size=p) / 3, friction=(rng.random(p), rng.random(p) * 1e-17),
+        rng.normal(size=(p, n)), f, gap=rng.normal(size=p) / 3, friction=rng.random(p),
+        friction_slope=rng.random(p) * 1e-17,
         load_slope=rng.normal(size=n), slip_offset=rng.normal(size=p), node_ids=node_ids,
         coordinates=rng.normal(size=(p, 2)),
     )  # fmt: skip
@@ -163,7 +164,9 @@ def test_dense_arrays_and_numpy_savez(tmp_path):
     assert_same(read_problem(tmp_path / "plain.npz"), ContactProblem(**DENSE))
     options = {"gap": 0.125, "load_slope": np.ones(4), "slip_offset": np.ones(2), "coordinates": [[0, 0], [1, 0]]}
     np.savez(tmp_path / "more.npz", **DENSE, **options, friction0=0.5, friction1=np.array([1.0, 2.0]), _note="mine")
-    assert_same(read_problem(tmp_path / "more.npz"), ContactProblem(**DENSE, **options, friction=(0.5, [1.0, 2.0])))
+    assert_same(
+        read_problem(tmp_path / "more.npz"), ContactProblem(**DENSE, **options, friction=0.5, friction_slope=[1.0, 2.0])
+    )
 
 
 @pytest.mark.parametrize(
@@ -178,9 +181,9 @@ def test_dense_arrays_and_numpy_savez(tmp_path):
 )
 def test_friction_in_files(tmp_path, stored, meant):
     np.savez(tmp_path / "p.npz", **DENSE, **stored)
-    assert_same(read_problem(tmp_path / "p.npz"), ContactProblem(**DENSE, friction=meant))
+    assert_same(read_problem(tmp_path / "p.npz"), ContactProblem(**DENSE, friction=meant[0], friction_slope=meant[1]))
     write_matrix_market(tmp_path, DENSE | stored)
-    assert_same(read_problem(tmp_path), ContactProblem(**DENSE, friction=meant))
+    assert_same(read_problem(tmp_path), ContactProblem(**DENSE, friction=meant[0], friction_slope=meant[1]))
 
 
 def write_matrix_market(folder, arrays):

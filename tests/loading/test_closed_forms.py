@@ -101,7 +101,7 @@ def pad():
     A, push = np.block([[K, 0 * K], [0 * K, K]]), K @ np.ones(p)
     rows, gap = np.eye(2 * p), 0.5 * x**2
     load, slope = np.r_[0.3 * push, np.zeros(p)], np.r_[np.zeros(p), push]
-    return ContactProblem(0.5 * (A + A.T), rows[:p], rows[p:], load, gap, SLIDING_FRICTION, slope), C, gap
+    return ContactProblem(0.5 * (A + A.T), rows[:p], rows[p:], load, gap, SLIDING_FRICTION, 0.0, slope), C, gap
 
 
 def pressed(C, gap, approach):

@@ -239,7 +239,7 @@ def test_the_first_step_is_halved_from_no_load():
 
 def test_increments_that_matter_are_told():
     # one step over a turn of the load misses the slip on the way
-    A, options = [[1.0, 0.3], [0.3, 1.0]], {"friction": (0.5, 0.0), "load_slope": [1.0, 0.0]}
+    A, options = [[1.0, 0.3], [0.3, 1.0]], {"friction": 0.5, "friction_slope": 0.0, "load_slope": [1.0, 0.0]}
     problem = ContactProblem(A, [[1, 0]], [[0, 1]], [0.0, 0.0], **options)
     steps = [np.array([1.0, 0.0]), np.array([1.0, 0.4]), np.array([4.0, 3.0]), np.array([0.1, 0.0])]
     history = histories(problem, steps, refine=True, max_halvings=2)

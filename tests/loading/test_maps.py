@@ -100,12 +100,18 @@ def _with_gap(value):
 
 def test_problems_of_a_map_share_their_factors_and_their_data_are_those_replaced():
     block = enumsol.gallery.get("clamped-block-8").build()
-    block = enumsol.ContactProblem(block.A, block.Bn, block.Bt, block.f, friction=(0.1, 1.0), load_slope=-block.f)
+    block = enumsol.ContactProblem(
+        block.A, block.Bn, block.Bt, block.f, friction=0.1, friction_slope=1.0, load_slope=-block.f
+    )
     for name, value in (("friction", 0.5), ("gap", 1e-3), ("load", 0.25)):
         made = _Replaced(block, name, np.arange(block.n, dtype=float))(value)
         data = {"f": block.f + value * np.arange(block.n)} if name == "load" else {name: value}
+        data |= {"friction_slope": 0.0} if name == "friction" else {}
         again = enumsol.ContactProblem(
-            block.A, block.Bn, block.Bt, **{"f": block.f, "friction": (0.1, 1.0), "load_slope": -block.f, **data}
+            block.A,
+            block.Bn,
+            block.Bt,
+            **{"f": block.f, "friction": 0.1, "friction_slope": 1.0, "load_slope": -block.f, **data},
         )
         assert made.fingerprint == again.fingerprint
         assert made.factorization is block.factorization

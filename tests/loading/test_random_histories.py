@@ -19,7 +19,7 @@ def integer_history(rng, p):
             break
     rows, load, slope = np.eye(2 * p), rng.integers(-3, 4, size=2 * p), rng.integers(-2, 3, size=2 * p)
     F = (rng.integers(0, 4, size=p) / 2, rng.integers(0, 2, size=p) * float(rng.random() < 0.3))
-    problem = ContactProblem(A, rows[:p], rows[p:], load, rng.integers(-1, 2, size=p), F, slope)
+    problem = ContactProblem(A, rows[:p], rows[p:], load, rng.integers(-1, 2, size=p), *F, slope)
     return problem, [float(alpha) for alpha in rng.integers(0, 5, size=4)]
 
 
@@ -32,7 +32,7 @@ def pressed_history(rng, p):
     load, rows = short(rng.normal(size=2 * p), 64), np.eye(2 * p)
     load[:p] += short(rng.uniform(0, 2), 64)
     F = short(np.exp(rng.uniform(np.log(0.1), np.log(8), size=p)), 64)
-    problem = ContactProblem(A, rows[:p], rows[p:], load, 0.0, (F, 0.0), short(rng.normal(size=2 * p), 64))
+    problem = ContactProblem(A, rows[:p], rows[p:], load, 0.0, F, 0.0, short(rng.normal(size=2 * p), 64))
     return problem, short(1.5 * rng.normal(size=4), 64).tolist()
 
 
@@ -46,9 +46,11 @@ def branching_history(rng, p):
         return pressed_history(rng, p)
     rows = np.eye(2 * p) / D[:, None]
     load = planted.f * D / np.max(np.abs(planted.f * D))
-    F = (short(planted.friction[0], 64), 0.0)
+    F = short(planted.friction, 64)
     rows /= np.max(rows)
-    problem = ContactProblem(A, rows[:p], rows[p:], short(load, 1024), 0.0, F, short(rng.normal(size=2 * p) / 4, 1024))
+    problem = ContactProblem(
+        A, rows[:p], rows[p:], short(load, 1024), 0.0, F, 0.0, short(rng.normal(size=2 * p) / 4, 1024)
+    )
     return problem, [0.0, *short(rng.normal(size=3), 16).tolist()]
 
 

@@ -24,7 +24,8 @@ DATA = {
     "Bn": lambda problem: 2 * problem.Bn,
     "f": lambda problem: problem.f + 1,
     "gap": lambda problem: problem.gap + 0.25,
-    "friction": lambda problem: (0.25, 0.5),
+    "friction": lambda problem: 0.25,
+    "friction_slope": lambda problem: 0.5,
     "load_slope": lambda problem: np.arange(problem.n) + 1.0,
     "slip_offset": lambda problem: problem.slip_offset + 0.25,
     "rigid_modes": lambda problem: 2 * problem.rigid_modes,
@@ -34,7 +35,6 @@ PLANE = DATA | {"Bt": lambda problem: 2 * problem.Bt}
 SPACE = DATA | {
     "Bt1": lambda problem: 2 * problem.Bt1,
     "Bt2": lambda problem: 2 * problem.Bt2,
-    "friction_slope": lambda problem: (0.5, 0.5),
 }
 #: What no proof is about.
 OTHERS = {
@@ -63,7 +63,8 @@ NOT_KEPT = {"A", "Bn", "Bt", "f", "load_slope", "mesh", *HELD_BY_NOTHING}
 def changed(name, argument):
     """A problem, and the same with another value of one argument."""
     problem = (FREE if argument in HELD_BY_NOTHING else BODIES)[name]()
-    return problem, problem.replace(**{argument: CHANGES[name][argument](problem)})
+    kept = {"friction_slope": problem.friction_slope}  # without it replace refuses another friction
+    return problem, problem.replace(**kept | {argument: CHANGES[name][argument](problem)})
 
 
 def alike(one, other):

@@ -45,10 +45,8 @@ BAD = {
     "slip offset": ({"slip_offset": [[0.0, 1.0]]}, r"slip_offset has shape \(1, 2\); expected \(2,\)"),
     "load slope": ({"load_slope": [1.0]}, r"load_slope has shape \(1,\); expected \(4,\)"),
     "load slope NaN": ({"load_slope": with_entry(F, 0, np.nan)}, "load_slope has the value nan"),
-    "friction list": ({"friction": [0.1, 0.2]}, r"friction is a bare list, which is ambiguous; expected a number, or"),
-    "friction None": ({"friction": None}, "friction is a bare NoneType"),
-    "friction shape": ({"friction": ([0.1, 0.2, 0.3], 0.0)}, r"friction F0 has shape \(3,\); expected \(2,\)"),
-    "friction NaN": ({"friction": (0.0, np.nan)}, "friction F1 has the value nan"),
+    "friction shape": ({"friction": [0.1, 0.2, 0.3]}, r"friction has shape \(3,\); expected \(2,\) or a single"),
+    "friction NaN": ({"friction_slope": np.nan}, "friction_slope has the value nan"),
     "friction negative": ({"friction": -0.3}, "friction is -0.3 at contact node 0; expected F >= 0"),
     "coordinates NaN": ({"coordinates": [[0, np.nan], [1, 0]]}, r"coordinates has the value nan at index \(0, 1\)"),
 }
@@ -86,13 +84,13 @@ def test_a_singular_matrix_is_not_called_indefinite():
 
 
 def test_negative_friction_at_alpha_names_the_node():
-    p = problem(friction=([1.0, 2.0], [0.5, -1.0]), node_ids=["left", "right"])
+    p = problem(friction=np.array([1.0, 2.0]), friction_slope=[0.5, -1.0], node_ids=["left", "right"])
     assert np.array_equal(p.friction_at(2.0), [2.0, 0.0])
     bad_argument(re.escape("friction at alpha = 3 is -1 at contact node right; expected F >= 0"), enumerate_roots, p, 3)
 
 
 def test_paths_over_alpha():
-    p = problem(friction=(0.25, [1.0, 0.5]), load_slope=2 * F)
+    p = problem(friction=0.25, friction_slope=[1.0, 0.5], load_slope=2 * F)
     assert np.array_equal(p.friction_at(Fraction(3, 2)), [1.75, 1.0])
     assert np.array_equal(p.load_at(0.5), 2 * F)
     assert np.array_equal(problem(friction=0.3).friction_at(-100.0), [0.3, 0.3])
@@ -106,7 +104,7 @@ def test_fields_and_defaults():
     assert np.array_equal(p.Bn.toarray(), BN)
     assert np.array_equal(p.gap, [0.25, 0.25])
     assert np.array_equal(p.slip_offset, [0.0, 1.0])
-    assert np.array_equal(p.friction, [[0.0, 0.0], [1.0, 1.0]])
+    assert np.array_equal(p.affine_friction, [[0.0, 0.0], [1.0, 1.0]])
     assert (p.node_ids, p.load_slope, p.coordinates) == ((0, 1), None, None)
     assert "2 contact nodes" in repr(p)
     assert "degrees of freedom  4" in repr(p)

@@ -60,7 +60,7 @@ def near(rng, p, low, high):
     problem = singular_problem(rng, p)
     step = 10 ** rng.uniform(low, high)
     f = problem.f + step * rng.normal(size=2 * p)
-    return problem.replace(f=f, friction=(problem.friction[0] * (1 + step * rng.normal(size=p)), 0.0))
+    return problem.replace(f=f, friction=problem.friction * (1 + step * rng.normal(size=p)), friction_slope=0.0)
 
 
 @pytest.mark.long
@@ -146,7 +146,7 @@ def test_exact_data_decide_and_not_their_roundings(method):
 @pytest.mark.parametrize("method", ["tree", "exhaustive"])
 def test_friction_that_only_rounds_to_zero(method):
     # F = 3/10 - float(0.3) > 0 is 0 in floats
-    problem = ContactProblem([[2, -1], [-1, 2]], [[1, 0]], [[0, 1]], [1.5, 4.0], friction=(-0.3, 1.0))
+    problem = ContactProblem([[2, -1], [-1, 2]], [[1, 0]], [[0, 1]], [1.5, 4.0], friction=-0.3, friction_slope=1.0)
     (root,) = enumsol.enumerate_roots(problem, Fraction(3, 10), "exact", method)
     assert root.statuses[0].value == "slip+"
     assert root.lambda_t[0] > 0

@@ -19,7 +19,7 @@ def separate_nodes(loads, frictions, blocks=None):
         A[np.ix_([i, p + i], [i, p + i])] = TRIANGLE if blocks is None else blocks[i]
     f = np.array(loads, dtype=float).T.ravel()
     eye = np.eye(2 * p)
-    return ContactProblem(A, eye[:p], eye[p:], f, friction=(np.array(frictions, dtype=float), 0.0))
+    return ContactProblem(A, eye[:p], eye[p:], f, friction=np.array(frictions, dtype=float))
 
 
 def assert_all_roots(problem, family):
@@ -83,7 +83,7 @@ def test_family_and_isolated_root_apart(arithmetic, method):
     # node 0 in contact pushes node 1's friction below its fold: found by planting a segment, then adding a far root
     A = np.array([[5.0, 1.0, 0.0, -1.0], [1.0, 4.0, 1.0, 1.0], [0.0, 1.0, 3.0, -1.0], [-1.0, 1.0, -1.0, 4.0]])
     eye = np.eye(4)
-    problem = ContactProblem(A, eye[:2], eye[2:], [0.0, 2.0, -3.0, 8.0], friction=(np.array([2.0, 4.0]), 0.0))
+    problem = ContactProblem(A, eye[:2], eye[2:], [0.0, 2.0, -3.0, 8.0], friction=np.array([2.0, 4.0]))
     roots = enumsol.enumerate_roots(problem, 0.0, arithmetic, method)
     (root,), (family,) = roots, roots.families
     assert (family.dimension, roots.index_sum) == (1, 1)

@@ -120,7 +120,9 @@ def test_weak_springs_tend_to_the_body_that_nothing_holds(push):
     errors = []
     for weak in (1e-3, 1e-5, 1e-7, 1e-9):
         A = sp.csc_array(problem.A + weak * sp.eye_array(problem.n))
-        held = enumsol.ContactProblem(A, problem.Bn, problem.Bt, problem.f, friction=problem.friction)
+        held = enumsol.ContactProblem(
+            A, problem.Bn, problem.Bt, problem.f, friction=problem.friction, friction_slope=problem.friction_slope
+        )
         (root,) = enumsol.enumerate_roots(held, 0)
         assert (root.statuses, root.index) == (free.statuses, free.index)
         errors.append(max(np.max(np.abs(root.lambda_n - free.lambda_n)), np.max(np.abs(root.u - free.u))))

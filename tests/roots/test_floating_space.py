@@ -69,7 +69,7 @@ def test_friction_along_one_axis_is_that_of_the_plane(seed):
     problem = known_body(seed, plane=True).problem
     (F, _), offset = problem.friction, problem.slip_offset[:, 0]
     matrices = problem.A, problem.Bn, problem.Bt1, problem.f
-    given = {"gap": problem.gap, "friction": (F, np.zeros(problem.p)), "slip_offset": offset}
+    given = {"gap": problem.gap, "friction": F, "slip_offset": offset}
     modes = {"rigid_modes": problem.rigid_modes, "max_rigid_displacement": problem.max_rigid_displacement}
     plane = enumsol.enumerate_roots(enumsol.ContactProblem(*matrices, **given, **modes), 0)
     space = checked(problem)

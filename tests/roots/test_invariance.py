@@ -13,7 +13,7 @@ FLIPPED = {"open": "open", "stick": "stick", "slip+": "slip-", "slip-": "slip+"}
 
 
 def rebuild(problem, **changes):
-    names = "A", "Bn", "Bt", "f", "gap", "friction", "load_slope", "slip_offset"
+    names = "A", "Bn", "Bt", "f", "gap", "friction", "friction_slope", "load_slope", "slip_offset"
     return ContactProblem(**({name: getattr(problem, name) for name in names} | changes))
 
 
@@ -74,10 +74,10 @@ def test_length_unit(problem, alpha, factor):
 @each
 def test_numbering_of_contact_nodes(problem, alpha):
     order = np.random.default_rng(1).permutation(problem.p)
-    F0, F1 = problem.friction
+    F0, F1 = problem.affine_friction
     permuted = rebuild(
         problem, Bn=sp.csr_array(problem.Bn)[order], Bt=sp.csr_array(problem.Bt)[order], gap=problem.gap[order],
-        slip_offset=problem.slip_offset[order], friction=(F0[order], F1[order]),
+        slip_offset=problem.slip_offset[order], friction=F0[order], friction_slope=F1[order],
     )  # fmt: skip
     assert statuses(found(permuted, alpha)) == {tuple(s[i] for i in order) for s in statuses(found(problem, alpha))}
 
@@ -117,6 +117,8 @@ def test_offsets_shift_the_load():
 
 def test_alpha_paths_add_up():
     problem = random_problem(np.random.default_rng(7), 3, planted=1.0)
-    F = problem.friction[0]
-    split = rebuild(problem, f=0.25 * problem.f, load_slope=0.375 * problem.f, friction=(0.5 * F, 0.25 * F))
+    F = problem.friction
+    split = rebuild(
+        problem, f=0.25 * problem.f, load_slope=0.375 * problem.f, friction=0.5 * F, friction_slope=0.25 * F
+    )
     assert statuses(found(split, 2.0)) == statuses(found(problem, 0.0))

@@ -101,7 +101,7 @@ def test_a_mesh_in_2d():
     # a press fit, symmetric about x = 0, whose two sides hold or slip
     mesh = fem.trapezoid(2, 3, bottom=1.0, top=1.7, height=1.0).parted()
     where = {"contact": ["left", "right"], "spring": {"top": (0.02, 0.02)}, "load": {"top": (0.0, 1e-3)}}
-    problem = fem.mesh_problem(mesh, young=2.5, poisson=0.25, gap=-5e-4, friction=(0.0, 1.0), **where)
+    problem = fem.mesh_problem(mesh, young=2.5, poisson=0.25, gap=-5e-4, friction=0.0, friction_slope=1.0, **where)
     roots = enumsol.enumerate_roots(problem, 2)
     images = roots.mirrored("x").mirror_images
     assert (images.images, images.missing) == (images_by_hand(problem, roots, 0), ())
@@ -122,7 +122,7 @@ def test_data_that_are_not_symmetric_are_refused(wedge):
     ("changed", "what"),
     [
         ({"A": np.diag([2.0, 2.0, 2.0, 3.0])}, "the compliance changes by 0.33"),
-        ({"friction": (np.array([0.5, 0.6]), 0.0)}, "the friction changes by 0.17"),
+        ({"friction": np.array([0.5, 0.6]), "friction_slope": 0.0}, "the friction changes by 0.17"),
         ({"gap": [0.0, 0.1]}, "the free displacement changes by"),
     ],
 )

@@ -99,7 +99,8 @@ def test_a_vertex_at_an_irrational_alpha_names_its_frictionless_node_exactly():
     A = np.array([[2.0, -1, 0, 0], [-1, 2, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
     rows = np.eye(4)
     problem = ContactProblem(
-        A, rows[[0, 2]], rows[[1, 3]], [1.5, -4.0, 1.0, -1.5], friction=(np.zeros(2), np.array([1.0, 0.0])),
+        A, rows[[0, 2]], rows[[1, 3]], [1.5, -4.0, 1.0, -1.5], friction=np.zeros(2),
+        friction_slope=np.array([1.0, 0.0]),
         load_slope=[1.0, 1.0, 0.0, 1.0],
     )  # fmt: skip
     graph = whole_graph(problem, (0.0, 4.0), "exact")

@@ -39,7 +39,7 @@ def rest(p=1):
 def test_the_body_without_load_at_alpha_rests_exactly(capsys, tmp_path):
     problem = ContactProblem(
         [[3, -1, 0], [-1, 3, 2], [0, 2, 4]], [[-1, 0, 0]], [[0, 1, 0]], [0, -3, 0], load_slope=[0, 1, 0],
-        friction=(0.5, 2.0),
+        friction=0.5, friction_slope=2.0,
     )  # fmt: skip
     for arithmetic in ("verified", "exact"):
         roots = enumerate_roots(problem, 3.0, arithmetic)

@@ -70,7 +70,10 @@ def paths():
     for S, g, F in planted[:5]:
         base = from_condensed(S, g, F)
         slope = 0.1 * base.A @ rng.normal(size=6)
-        yield ContactProblem(base.A, base.Bn, base.Bt, base.f, friction=(F, 0.1 * F), load_slope=slope), 0.0
+        yield (
+            ContactProblem(base.A, base.Bn, base.Bt, base.f, friction=F, friction_slope=0.1 * F, load_slope=slope),
+            0.0,
+        )
 
 
 @pytest.mark.parametrize(("problem", "alpha"), list(paths()))

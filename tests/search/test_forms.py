@@ -334,6 +334,6 @@ def test_the_stability_radius_counts_leaves_with_forms(eager):
         change = rng.uniform(-1, 1, size=S.shape)
         other = S + 0.9 * radius * 0.5 * (change + change.T) * np.outer(root, root)
         load = g + 0.9 * radius * rng.uniform(-1, 1, size=g.shape) * root * np.max(np.abs(g) / root)
-        F = problem.friction[0] * (1 + 0.9 * radius * rng.uniform(-1, 1, size=problem.p))
+        F = problem.friction * (1 + 0.9 * radius * rng.uniform(-1, 1, size=problem.p))
         near = enumerate_roots(from_condensed(other, load, F), 1.0)
         assert [root.statuses for root in near] == [root.statuses for root in found]

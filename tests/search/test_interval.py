@@ -131,7 +131,7 @@ def test_bad_arguments_are_refused_by_name():
 
 def test_negative_friction_in_the_interval_is_refused_with_node_and_alpha():
     bad_argument(r"node 0 .* alpha = -1 .*zero at alpha = 0", branch_graph, one_node((1.5, -4.0)), (-1.0, 1.0))
-    falling = one_node((1.5, -4.0), friction=(4.0, -1.0))
+    falling = one_node((1.5, -4.0), friction=4.0, friction_slope=-1.0)
     bad_argument(r"node 0 .* alpha = 5 .*zero at alpha = 4", branch_graph, falling, (0.0, 5.0))
     branch_graph(falling, (0.0, 4.0))
 

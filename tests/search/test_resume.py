@@ -54,7 +54,15 @@ def beyond_rationals():
     small, m = integer_problem(np.random.default_rng(34), 2), EXACT_DOF_LIMIT
     A, none = sp.block_diag([small.A, sp.eye(m)]), np.zeros((2, m))
     Bn, Bt = sp.hstack([small.Bn, none]), sp.hstack([small.Bt, none])
-    return ContactProblem(A, Bn, Bt, np.append(small.f, np.zeros(m)), gap=small.gap, friction=small.friction), 0.0
+    return ContactProblem(
+        A,
+        Bn,
+        Bt,
+        np.append(small.f, np.zeros(m)),
+        gap=small.gap,
+        friction=small.friction,
+        friction_slope=small.friction_slope,
+    ), 0.0
 
 
 def nearly_singular():

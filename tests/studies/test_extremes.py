@@ -64,14 +64,14 @@ def test_rows_that_are_almost_dependent(exponent):
 
 def test_friction_that_vanishes_at_a_fraction():
     # exactly zero at 1/3, positive to the right, negative to the left; floats near 1/3 are on one side
-    problem = gallery.clamped_block(3, 2, friction=(-1.0, 3.0))
+    problem = gallery.clamped_block(3, 2, friction=-1.0, friction_slope=3.0)
     assert is_right(problem, Fraction(1, 3), expected=1)
     assert is_right(problem, Fraction(1, 3) + Fraction(1, 10**25), expected=1)
     bad_argument("expected F >= 0", enumerate_roots, problem, 1 / 3)
 
 
 def test_friction_that_underflows_is_refused():
-    slight = gallery.one_node_triangle().replace(friction=(0.0, 1e-300))
+    slight = gallery.one_node_triangle().replace(friction=0.0, friction_slope=1e-300)
     bad_argument("too small for float64", enumerate_roots, slight, Fraction(1, 10**100))
 
 

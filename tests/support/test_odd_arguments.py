@@ -84,7 +84,7 @@ CALLS = [
     (
         enumsol.ContactProblem,
         {"A": np.eye(2), "Bn": [[1.0, 0.0]], "Bt": [[0.0, 1.0]], "f": [1.0, 2.0]},
-        "A Bn Bt f gap friction load_slope slip_offset node_ids coordinates",
+        "A Bn Bt f gap friction friction_slope load_slope slip_offset node_ids coordinates",
     ),
     (PROBLEM.friction_at, {}, "alpha"),
     (PROBLEM.load_at, {}, "alpha"),
@@ -169,27 +169,35 @@ CALLS = [
     (collection.export, {"folder": "collection", "names": ["triangle-3"]}, "folder names"),
     (answered, {}, "solutions tolerance"),
     (gallery.one_node_triangle, {}, "f lame"),
-    (gallery.two_node_square, {}, "f1 f2 lame friction load_slope"),
-    (gallery.clamped_block, {"nx": 1, "ny": 1}, "nx ny length height lame traction friction gap contact"),
-    (gallery.wedge, {"nx": 1, "ny": 1}, "nx ny pull press springs width height half_angle lame friction"),
+    (gallery.two_node_square, {}, "f1 f2 lame friction friction_slope load_slope"),
+    (
+        gallery.clamped_block,
+        {"nx": 1, "ny": 1},
+        "nx ny length height lame traction friction friction_slope gap contact",
+    ),
+    (
+        gallery.wedge,
+        {"nx": 1, "ny": 1},
+        "nx ny pull press springs width height half_angle lame friction friction_slope",
+    ),
     (gallery.chain, {"p": 1}, "p coupling f lame"),
-    (gallery.dovetail, {"nx": 1, "ny": 1}, "nx ny pull press flank_angle friction"),
-    (gallery.brake_shoe, {"nx": 1, "ny": 1}, "nx ny pull turn friction"),
-    (gallery.clip, {"nx": 2, "ny": 1}, "nx ny pull press friction"),
-    (gallery.pressed_rings, {"nx": 4, "ny": 1}, "nx ny torque press friction"),
-    (gallery.lap_joint, {"nx": 1, "ny": 1}, "nx ny stretch clamping friction"),
+    (gallery.dovetail, {"nx": 1, "ny": 1}, "nx ny pull press flank_angle friction friction_slope"),
+    (gallery.brake_shoe, {"nx": 1, "ny": 1}, "nx ny pull turn friction friction_slope"),
+    (gallery.clip, {"nx": 2, "ny": 1}, "nx ny pull press friction friction_slope"),
+    (gallery.pressed_rings, {"nx": 4, "ny": 1}, "nx ny torque press friction friction_slope"),
+    (gallery.lap_joint, {"nx": 1, "ny": 1}, "nx ny stretch clamping friction friction_slope"),
     (fem.lame, {"young": 2.5, "poisson": 0.25}, "young poisson plane"),
     (
         fem.mesh_problem,
         {"mesh": fem.rectangle(2, 1).parted(), "young": 2.5, "poisson": 0.25, **BOTTOM, "pressure": {"left": 1}},
-        "mesh young poisson contact plane friction friction2 axis clamp symmetry displacement spring load load_slope "
-        "pressure pressure_slope body_force gap obstacle",
+        "mesh young poisson contact plane friction friction_slope friction2 friction2_slope axis clamp symmetry "
+        "displacement spring load load_slope pressure pressure_slope body_force gap obstacle",
     ),
     (fem.read_mesh_problem, {}, "path"),
     (
         fem.basis_contact_problem,
         {"basis": BASIS, "stiffness": linear_elasticity(1, 1).assemble(BASIS), "contact": "bottom", "held": TOP},
-        "basis stiffness contact held displacements normals tangents forces forces_slope gap friction",
+        "basis stiffness contact held displacements normals tangents forces forces_slope gap friction friction_slope",
     ),
     (fem.stiffness, {"points": POINTS, "cells": TRIANGLES, "lame": (1, 1)}, "points cells lame"),
     (fem.triangle_stiffness, {"corners": POINTS, "lame": (1, 1)}, "corners lame"),
@@ -198,7 +206,8 @@ CALLS = [
     (
         fem.contact_problem,
         {"points": POINTS, "cells": TRIANGLES, "lame": (1, 1), "contact": [0], "normals": (0, -1), "held": [1, 2]},
-        "points cells lame contact normals tangents held springs forces forces_slope gap friction slip_offset node_ids",
+        "points cells lame contact normals tangents held springs forces forces_slope gap friction friction_slope "
+        "slip_offset node_ids",
     ),
     (fem.rectangle, {"nx": 1, "ny": 1}, "nx ny length height"),
     (fem.trapezoid, {"nx": 1, "ny": 1, "bottom": 1, "top": 1, "height": 1}, "nx ny bottom top height"),
@@ -277,7 +286,11 @@ CALLS = [
         "points cells lame contact normals axes held springs forces forces_slope gap friction friction_slope "
         "slip_offset node_ids multipliers ratio patches",
     ),
-    (gallery.block3d, {"nx": 1, "ny": 1, "nz": 1}, "nx ny nz pull friction lame size cells gap multipliers ratio"),
+    (
+        gallery.block3d,
+        {"nx": 1, "ny": 1, "nz": 1},
+        "nx ny nz pull friction lame size cells gap multipliers ratio friction_slope",
+    ),
     (gallery.one_node_3d, {}, "W q friction"),
 ]
 CASES = [(function, good, name) for function, good, names in CALLS for name in names.split()]

@@ -24,7 +24,7 @@ def told_by(work):
 def closed_gap(n=30):
     """A body that touches without load: a degenerate root, which only rationals decide."""
     A = np.diag(np.arange(1.0, n + 1)) + 0.1
-    return ContactProblem(A, np.eye(n)[:1], np.eye(n)[1:2], A @ np.eye(n)[1], friction=(0.5, 0.0))
+    return ContactProblem(A, np.eye(n)[:1], np.eye(n)[1:2], A @ np.eye(n)[1], friction=0.5)
 
 
 def test_who_listens_hears_and_who_does_not_is_left_alone():

@@ -35,7 +35,7 @@ class Body:
         p = int(rng.integers(1, (min(most, 2) if make is integer_problem else most) + 1))
         problem = make(rng, p, KINDS[int(rng.integers(3))])
         if seed % 7 == 3:
-            data = {"load_slope": problem.f, "friction": problem.friction}
+            data = {"load_slope": problem.f, "friction": problem.friction, "friction_slope": problem.friction_slope}
             problem = ContactProblem(problem.A, problem.Bn, problem.Bt, -0.5 * problem.f, **data)
         return cls(problem, float(rng.integers(2, 9)))
 
@@ -194,7 +194,7 @@ def planned(rng, p):
             w[:, i], w[:, p + i] = -rng.uniform(0, 1, size=2), 2.0 * rng.normal(size=2)
     g = w + force @ S
     # with A = S and B = S the condensed compliance is S, and g is the load
-    problem = ContactProblem(S, S[:p], S[p:], g[0], load_slope=g[1] - g[0], friction=(F, 0.0))
+    problem = ContactProblem(S, S[:p], S[p:], g[0], load_slope=g[1] - g[0], friction=F)
     return problem, tuple(codes.tolist())
 
 

@@ -27,7 +27,7 @@ def test_what_is_proven_is_so(seed):
     for _ in range(6):
         problem = touching_problem(rng, int(rng.integers(1, 4)))
         system, scaled, forms = system_of(problem)
-        friction = [F > 0 for F in problem.friction[0]]
+        friction = [F > 0 for F in problem.friction]
         selection = tuple(int(rng.integers(4)) if positive else int(rng.choice([0, 4])) for positive in friction)
         free = tuple(i for i in range(problem.p) if rng.random() < 0.7)
         # units of lambda are powers of two: forces of size one
@@ -52,7 +52,7 @@ def test_what_is_proven_is_so(seed):
             if selection[i] in (2, 3):
                 share[k], tau[k] = 5 - 2 * selection[i], 0.0
             elif selection[i] == 1 and tau[k] == 0 and rng.random() < 0.8:
-                share[k] = np.clip(force[problem.p + i] / force[i] / problem.friction[0][i], -1, 1)
+                share[k] = np.clip(force[problem.p + i] / force[i] / problem.friction[i], -1, 1)
         mu = rng.choice([0.5, 1.0, 1.5], size=len(reduced.free))
         numbers = np.concatenate([mu, kappa, nu, share, tau])
         ball = closed_solution(system, selection, free, numbers, force)
@@ -84,9 +84,9 @@ def test_an_exact_solution_that_is_the_only_one():
         rng = np.random.default_rng(seed)
         problem = touching_problem(rng, int(rng.integers(1, 4)))
         if seed % 2:
-            problem = problem.replace(friction=(8.0 * problem.friction[0], 0.0))
+            problem = problem.replace(friction=8.0 * problem.friction, friction_slope=0.0)
         system, _, forms = system_of(problem)
-        friction, free = [F > 0 for F in problem.friction[0]], tuple(range(problem.p))
+        friction, free = [F > 0 for F in problem.friction], tuple(range(problem.p))
         reduced = Reduced(forms, (6,) * problem.p, friction)
         points, rubbing = reduced.solutions(), [i for i in free if friction[i]]
         for point in points:

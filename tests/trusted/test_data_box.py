@@ -32,7 +32,7 @@ class Pair:
         load, slope = body.f, short(rng.normal(size=body.n) / 4, 1024) * np.max(np.abs(body.f))
         # half of them with little friction: one solution, and boxes in which statuses change
         little = short(rng.uniform(0.05, 0.8, size=p), 64)
-        F = [little if seed % 8 > 3 else body.friction[0]] * 2
+        F = [little if seed % 8 > 3 else body.friction] * 2
         gap = [np.zeros(p), np.zeros(p)]
         loads = [load, load]
         if seed % 3 == 0:
@@ -45,7 +45,7 @@ class Pair:
         turn = short(rng.uniform(0, 1, size=p), 64) * (seed % 2 or seed % 4 == 2)
         self.problems = tuple(
             # sometimes the friction of one problem only changes with alpha
-            ContactProblem(body.A, body.Bn, body.Bt, loads[k], gap[k], (F[k], (k or seed % 4 < 2) * turn), slope)
+            ContactProblem(body.A, body.Bn, body.Bt, loads[k], gap[k], F[k], (k or seed % 4 < 2) * turn, slope)
             for k in (0, 1)
         )
         self.p, self.rng, self._known = p, rng, {}
@@ -158,7 +158,7 @@ def test_the_form_is_definite_for_every_theta_within_reach(seed):
     rng = np.random.default_rng(seed)
     X = rng.normal(size=(4, 4))
     A, F, load = X @ X.T + np.eye(4), rng.uniform(0.2, 1.5, size=2), rng.normal(size=4) + np.array([1, 1, 0, 0])
-    pair = [ContactProblem(A, np.eye(4)[:2], np.eye(4)[2:], load * k, friction=(F, 0.0)) for k in (1.0, 1.3)]
+    pair = [ContactProblem(A, np.eye(4)[:2], np.eye(4)[2:], load * k, friction=F) for k in (1.0, 1.3)]
     search = BoxSearch(tuple(pair))
     data, system = search._data(Box((0.0, 1.0), (0.0, 1.0)))
     unknown = Expansion(*(Ball.exact(np.zeros(4)) for _ in range(3)), np.ones(4))

@@ -23,7 +23,7 @@ def body(seed):
     B = rng.integers(-8, 9, (6, 6)) / 4.0
     A, rows = B.T @ B + SPRINGS * np.eye(6), np.eye(6)
     A[:2, :2] += 2 * np.eye(2)
-    return enumsol.ContactProblem(A, rows[:3], rows[3:], rng.integers(-20, 20, 6) / 4.0, friction=(0.25, 0.0))
+    return enumsol.ContactProblem(A, rows[:3], rows[3:], rng.integers(-20, 20, 6) / 4.0, friction=0.25)
 
 
 def mixed():

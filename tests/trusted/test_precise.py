@@ -261,7 +261,7 @@ def test_condensed_data_of_entries_of_all_sizes_lie_in_their_balls():
         A = (A + A.T) / 2
         f = np.array([1e-30, 0.0, 1e3, 1.0, -3.0, 1e-300]) * size
         rows = np.eye(6)[:4]
-        problem = ContactProblem(A, rows[:2], rows[2:], f, load_slope=np.zeros(6), friction=(0.5, 0.0))
+        problem = ContactProblem(A, rows[:2], rows[2:], f, load_slope=np.zeros(6), friction=0.5)
         ours, exact = PreciseSystem.of(problem), ExactCondensed.from_problem(problem)
         assert ours is not None
         with ctx.workprec(4 * PRECISION):

@@ -27,7 +27,7 @@ def nearly_singular(n, **changes):
     """
     A = sp.block_diag([np.array([[20.0, 3.0], [3.0, 1.0]]), sp.eye(n - 2)]).tocsr()
     rows = sp.eye(n).tocsr()
-    data = {"gap": -(2.0**-57), "friction": (1 / 3, 0.0)} | changes
+    data = {"gap": -(2.0**-57), "friction": 1 / 3, "friction_slope": 0.0} | changes
     return ContactProblem(A, rows[:1], rows[1:2], np.array([3.0, 1.0, *np.zeros(n - 2)]), **data)
 
 
@@ -44,7 +44,7 @@ def test_balls_hold_the_solution_in_rationals_and_know_its_signs(rng):
         A, F = X @ X.T + np.eye(n), rng.integers(0, 4, size=p) / 2
         f, gap = rng.integers(-2, 3, size=n).astype(float), rng.integers(0, 2, size=p).astype(float)
         rows = np.eye(n)[: 2 * p]
-        problem = ContactProblem(A, rows[:p], rows[p:], f, gap=gap, load_slope=f / 3, friction=(F, 0.1))
+        problem = ContactProblem(A, rows[:p], rows[p:], f, gap=gap, load_slope=f / 3, friction=F, friction_slope=0.1)
         alpha = Fraction(int(rng.integers(0, 4)), 3)
         system, precise = scaled(problem, alpha)
         exact = ExactSelections(ExactSystem.from_problem(problem, alpha))
@@ -66,7 +66,7 @@ def test_balls_hold_the_solution_in_rationals_and_know_its_signs(rng):
 
 
 def test_a_singular_selection_is_none():
-    problem = ContactProblem([[2.0, 1.0], [1.0, 1.0]], [[1, 0]], [[0, 1]], [1.0, 0.5], friction=(1.0, 0.0))
+    problem = ContactProblem([[2.0, 1.0], [1.0, 1.0]], [[1, 0]], [[0, 1]], [1.0, 0.5], friction=1.0)
     _, precise = scaled(problem, 0.0)
     # S = (1 -1; -1 2), so that S_nn + F S_nt = 0
     assert precise.solve((2,)) is None

@@ -117,6 +117,6 @@ def _slip_signs(
 def _active(traced: TracedProblem, place: EventPlace) -> ActiveSets:
     """Codes that hold at every node, or may hold where the place was left open."""
     if place.kind is EventPlaceKind.ORIGIN:
-        F0, F1 = traced.problem.friction
+        F0, F1 = traced.problem.affine_friction
         return tuple(frozenset(FINAL[rubs]) for rubs in ((F0 != 0) | (F1 != 0)).tolist())
     return tuple(frozenset(codes) for codes in zip(*place.members, strict=True))

@@ -88,7 +88,7 @@ class PreciseSystem:
             offset = np.concatenate([problem.gap, problem.slip_offset.ravel(order="F")]).tolist()
             S = matrix([row[:size] for row in table])
             g0 = [row[size] - arb(x) for row, x in zip(table, offset, strict=True)]
-            F0, F1 = ([arb(float(x)) for x in part] for part in problem.friction)
+            F0, F1 = ([arb(float(x)) for x in part] for part in problem.affine_friction)
             return cls(S, g0, [row[size + 1] for row in table], F0, F1)
 
     @cached_property

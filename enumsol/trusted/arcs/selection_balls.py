@@ -45,7 +45,7 @@ class ArcSystem:
         pair = force[:, None] / length[None, :]
         if not np.all(pair >= _LEAST_PAIR):
             raise NotEnclosedError("the units of the arcs underflow float64; expected data in other units")
-        F0, F1 = (np.asarray(part, dtype=np.float64) for part in enclosure.problem.friction)
+        F0, F1 = (np.asarray(part, dtype=np.float64) for part in enclosure.problem.affine_friction)
 
         def in_units(value: Floats, radius: Floats) -> Ball:
             return Ball(value / length, radius / length + TINY)
