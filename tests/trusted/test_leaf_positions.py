@@ -18,11 +18,11 @@ from enumsol.trusted.space.sector_rows import OPEN, STICK
 DIGITS, STEPS = 400, 24
 
 
-def cube(spring, move=0.0, friction=0.2):
+def cube(spring, move=0.0, **friction):
     """A cube of one cell on the floor, held sideways at its roof and vertically by springs."""
     return fem.mesh_problem(
-        fem.box(1, 1, 1), young=2.1e5, poisson=0.3, contact="bottom", friction=friction, pressure={"top": 100.0},
-        displacement={"top": (0.0, move, "free")}, spring={"top": (spring, 0.0)},
+        fem.box(1, 1, 1), young=2.1e5, poisson=0.3, contact="bottom", pressure={"top": 100.0},
+        displacement={"top": (0.0, move, "free")}, spring={"top": (spring, 0.0)}, **{"friction": 0.2} | friction,
     )  # fmt: skip
 
 
@@ -125,10 +125,10 @@ def test_displacements_of_a_root_are_enclosed_as_closely_as_rounding_allows(spri
     assert np.max(found.rad) < 1e-12 * 100.0 / spring
 
 
-@pytest.mark.parametrize(("spring", "friction"), [(1.0, 0.2), (30.0, (0.2, 0.15))])
+@pytest.mark.parametrize(("spring", "friction"), [(1.0, {}), (30.0, {"friction2": 0.15, "friction2_slope": 0.0})])
 def test_every_offset_in_a_ball_leads_into_the_ball_of_positions(spring, friction):
     rng = np.random.default_rng(3)
-    driven, radius = cube(spring, 4e-5, friction), 1e-10
+    driven, radius = cube(spring, 4e-5, **friction), 1e-10
     offset = np.round(rng.uniform(-4e-5, 4e-5, (4, 2)), 7)
     start = SlipStart(offset, np.full((4, 2), radius))
     problem = restarted(driven, start)
