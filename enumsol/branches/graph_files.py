@@ -7,6 +7,7 @@ import re
 from dataclasses import asdict
 from fractions import Fraction
 from functools import partial
+from io import BytesIO
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import networkx as nx
@@ -29,7 +30,7 @@ from enumsol.model.problem3d import ContactProblem3D
 from enumsol.model.statuses import ContactStatus
 from enumsol.roots.root import Polytope, RootFamily
 from enumsol.support.arguments import file_path
-from enumsol.support.files import writing
+from enumsol.support.files import write_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -68,9 +69,7 @@ def save_graph(data: GraphData, file: str | Path) -> None:
         "vertices": [_vertex_record(v) for v in data.vertices],
         "arcs": [_arc_record(arc, data.vertices) for arc in data.arcs],
     }
-    place = file_path(file, "file")
-    with writing(place, "file"):
-        place.write_text(json.dumps(record), encoding="utf-8")
+    write_file(file_path(file, "file"), json.dumps(record), "file")
 
 
 def load_graph(kind: type[_Graph], file: str | Path) -> _Graph:
@@ -380,6 +379,6 @@ def write_graphml(data: GraphData, file: str | Path) -> None:
             dimension=arc.dimension,
             branch=data.branch_of[arc.number],
         )
-    place = file_path(file, "file")
-    with writing(place, "file"):
-        nx.write_graphml(plain, place)
+    text = BytesIO()
+    nx.write_graphml(plain, text)
+    write_file(file_path(file, "file"), text.getvalue(), "file")

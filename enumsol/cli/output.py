@@ -14,7 +14,6 @@ import sys
 from dataclasses import fields
 from fractions import Fraction
 from importlib.util import find_spec
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +21,7 @@ import typer
 
 from enumsol.cli.streams import is_quiet
 from enumsol.errors import InvalidArgumentError, MissingDependencyError, OutputError
-from enumsol.support.files import writing
+from enumsol.support.files import write_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -67,8 +66,7 @@ def write_text(path: str, text: str) -> None:
     if path == "-":
         typer.echo(text, nl=not text.endswith("\n"))
         return
-    with writing(Path(path), "file"):
-        Path(path).write_text(text if text.endswith("\n") else text + "\n", encoding="utf-8")
+    write_file(Path(path), text if text.endswith("\n") else text + "\n", "file")
 
 
 def deliver(
@@ -232,12 +230,11 @@ def write_figure(path: str, figure: Any) -> None:
     Raises
     ------
     OutputError, InvalidArgumentError
-        The file cannot be written, see `writing`.
+        The file cannot be written, see `kept`.
     """
-    drawn = BytesIO()  # not all of matplotlib's formats survive a file that cannot be written
-    figure.savefig(drawn, dpi=150, format=Path(path).suffix.removeprefix(".").lower())
-    with writing(Path(path), "file"):
-        Path(path).write_bytes(drawn.getvalue())
+    from enumsol.support.plotting import kept  # numpy: not for --help
+
+    kept(figure, path)
 
 
 def as_json(content: Any) -> str:

@@ -15,6 +15,7 @@ mu is isotropic and depends neither on alpha nor on the slip. Equality constrain
 
 from __future__ import annotations
 
+from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +24,7 @@ import scipy.sparse as sp
 from enumsol.errors import InvalidProblemError, MissingDependencyError
 from enumsol.io.arrays import refusing
 from enumsol.model.problem import ContactProblem
+from enumsol.support.files import write_file
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -76,7 +78,8 @@ def write(problem: Problem, path: Path) -> None:
     interleaved = np.arange(dimension * problem.p).reshape(dimension, -1).T.ravel()
     H = sp.csc_array(-problem.contact_rows[interleaved].T)
     mu = _isotropic(problem)
-    with h5py.File(path, "w") as file:
+    written = BytesIO()
+    with h5py.File(written, "w") as file:
         group = file.create_group("fclib_global")
         group["spacedim"] = np.array([dimension], dtype=np.int32)
         _write_matrix(group.create_group("M"), problem.A)
@@ -86,6 +89,7 @@ def write(problem: Problem, path: Path) -> None:
         vectors["w"] = offsets.ravel()
         vectors["mu"] = mu
         group.create_group("info")["title"] = np.bytes_(f"contact problem with {problem.p} nodes, written by enumsol")
+    write_file(path, written.getvalue(), "path")
 
 
 def _isotropic(problem: Problem) -> Floats:

@@ -12,6 +12,7 @@ import scipy.sparse as sp
 
 from enumsol.errors import InvalidProblemError
 from enumsol.io.arrays import LAYOUT_2D, LAYOUT_3D, arrays_of, check_names, layout_of, problem_from_arrays, refusing
+from enumsol.support.files import Content, write_files
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -57,25 +58,25 @@ def write(problem: AnyProblem, path: Path) -> None:
         kept = False
     if not kept:
         raise InvalidProblemError("node_ids cannot be kept in node_ids.json; expected integers, floats or strings")
-    path.mkdir(exist_ok=True)
-    stale = [file for file in path.glob("*.mtx") if file.stem not in columns]
-    if stale:
-        _remove(stale)
+    stale = [file for file in path.glob("*.mtx") if file.stem not in columns and not file.name.startswith("_")]
+    names = [file.stem for file in stale]
+    layout = LAYOUT_2D if all(name in LAYOUT_2D.known for name in names) else LAYOUT_3D
+    check_names([*layout.required, *names], layout, ".mtx")
+    files: dict[Path, Content] = {path / _LABELS: labels + "\n"}
     for name, matrix in columns.items():
         text = BytesIO()  # scipy's writer ignores errors of the disk
         mmwrite(text, matrix, field="real", precision=_DIGITS)
-        (path / f"{name}.mtx").write_bytes(text.getvalue())
-    (path / _LABELS).write_text(labels + "\n", encoding="utf-8")
-
-
-def _remove(files: list[Path]) -> None:
-    """Delete files of an earlier problem that this one lacks, unless there are foreign files."""
-    names = [file.stem for file in files if not file.name.startswith("_")]
-    layout = LAYOUT_2D if all(name in LAYOUT_2D.known for name in names) else LAYOUT_3D
-    check_names([*layout.required, *names], layout, ".mtx")
-    for file in files:
-        if not file.name.startswith("_"):
-            file.unlink()
+        files[path / f"{name}.mtx"] = text.getvalue()
+    is_new = not path.exists()
+    path.mkdir(exist_ok=True)
+    try:
+        write_files(files)
+    except OSError:
+        if is_new:
+            path.rmdir()
+        raise
+    for file in stale:  # of an earlier problem
+        file.unlink()
 
 
 def _values(name: str, file: Path, layout: Layout) -> sp.coo_array | NDArray[Any]:

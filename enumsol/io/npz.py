@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zipfile
 import zlib
+from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import scipy.sparse as sp
 
 from enumsol.errors import InvalidProblemError
 from enumsol.io.arrays import FORMAT_VERSION, arrays_of, check_names, layout_of, problem_from_arrays, refusing
+from enumsol.support.files import write_file
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -69,8 +71,9 @@ def write(problem: AnyProblem, path: Path) -> None:
             "node_ids cannot be kept in a .npz file; expected labels that are all integers, all floats or all strings"
         )
     arrays["node_ids"] = labels
-    with path.open("wb") as file:
-        np.savez_compressed(file, allow_pickle=False, **arrays)
+    packed = BytesIO()
+    np.savez_compressed(packed, allow_pickle=False, **arrays)
+    write_file(path, packed.getvalue(), "path")
 
 
 def _load(path: Path) -> dict[str, NDArray[Any]]:

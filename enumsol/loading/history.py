@@ -23,7 +23,7 @@ from enumsol.proof.proof_file import Proof
 from enumsol.roots.root import Enclosure, Polytope, Root, RootFamily, summary
 from enumsol.roots.root_set import RootSet, SearchStats, Undecided
 from enumsol.support.arguments import file_path, positive_integer, shown
-from enumsol.support.files import reading, writing
+from enumsol.support.files import reading, write_file
 from enumsol.support.immutable import Immutable
 from enumsol.support.plotting import kept
 
@@ -56,10 +56,7 @@ def save_history(data: history_data.HistoryData, file: str | Path) -> None:
         "seconds": data.seconds,
         "refinement": None if data.refinement is None else asdict(data.refinement),
     }
-    place = file_path(file, "file")
-    text = json.dumps(record)
-    with writing(place, "file"):
-        place.write_text(text, encoding="utf-8")
+    write_file(file_path(file, "file"), json.dumps(record), "file")
 
 
 def load_history(file: str | Path, problem: Any) -> history_data.HistoryData:

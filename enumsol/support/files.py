@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
+import io
 import json
 import os
+import secrets
 import zipfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -39,6 +42,72 @@ def writing(place: Path, name: str) -> Iterator[None]:
         raise InvalidArgumentError(
             f"{name} {place} cannot be written ({error.strerror or error}); expected a path for a new file"
         ) from error
+
+
+#: What is written to a file, or what writes it there.
+Content = bytes | str | Callable[[Path], object]
+
+
+def write_files(files: Mapping[Path, Content]) -> None:
+    """Write files, of which none is changed unless all can be written; within ``writing``.
+
+    Each is written beside its place and renamed, with the mode and the owner of the file that it replaces. What is no
+    regular file (a pipe, a device, or the process's own stdout) is written where it is, and a link is followed.
+    """
+    made: dict[Path, Path] = {}
+    try:
+        for place, content in files.items():
+            target = Path(os.path.realpath(place))
+            if _is_written_in_place(place, target):
+                _write(place, content)
+            else:
+                made[target] = beside = target.with_name(f".{secrets.token_hex(8)}.part")
+                _write_beside(beside, target, content)
+        for target, beside in made.items():
+            beside.replace(target)
+    finally:
+        for beside in made.values():
+            beside.unlink(missing_ok=True)
+
+
+def write_file(place: Path, content: Content, name: str) -> None:
+    """Write one file, which the argument ``name`` of a call is (see ``write_files``; errors as of ``writing``)."""
+    with writing(place, name):
+        write_files({place: content})
+
+
+def _is_written_in_place(place: Path, target: Path) -> bool:
+    """Whether a file cannot be replaced by another one; PermissionError where it may not be written at all."""
+    try:
+        status = place.stat()
+    except FileNotFoundError:
+        return False
+    if not os.access(place, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    streams = []
+    for number in (0, 1, 2):
+        with contextlib.suppress(OSError):  # it is closed
+            streams.append(os.fstat(number))
+    is_open = any(os.path.samestat(status, stream) for stream in streams)
+    return is_open or not place.is_file() or not os.access(target.parent, os.W_OK)
+
+
+def _write(place: Path, content: Content) -> None:
+    if callable(content):
+        content(place)
+    else:
+        place.write_bytes(content.encode() if isinstance(content, str) else content)
+
+
+def _write_beside(beside: Path, target: Path, content: Content) -> None:
+    _write(beside, content)
+    with beside.open("rb+") as file:
+        os.fsync(file.fileno())  # some systems notice only here that there is no room
+    if target.exists():
+        status = target.stat()
+        with contextlib.suppress(OSError, AttributeError):  # another user's file, or a system without owners
+            os.chown(beside, status.st_uid, status.st_gid)
+        beside.chmod(status.st_mode & 0o7777)
 
 
 def unreadable(place: Path) -> str | None:
@@ -84,8 +153,9 @@ def write_arrays(place: Path, version: int, report: Mapping[str, Any], arrays: M
     import numpy as np  # what writes other files does without
 
     meta = np.array(json.dumps({"format": version, **report}))
-    with writing(place, "path"), place.open("wb") as stream:
-        np.savez_compressed(stream, allow_pickle=False, meta=meta, **arrays)
+    packed = io.BytesIO()
+    np.savez_compressed(packed, allow_pickle=False, meta=meta, **arrays)
+    write_file(place, packed.getvalue(), "path")
 
 
 def read_arrays(place: Path, version: int, names: Sequence[str]) -> tuple[dict[str, Any], dict[str, Any]]:
