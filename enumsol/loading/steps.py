@@ -14,6 +14,7 @@ from enumsol.model.problem import ContactProblem
 from enumsol.support.arguments import alpha_value, exact_number, shown
 from enumsol.support.array_arguments import plain_array, real_array
 from enumsol.support.immutable import Sealed, sealed
+from enumsol.support.saved import table_text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -165,7 +166,7 @@ def read_steps(file: str | Path) -> pd.DataFrame:
     import pandas as pd
 
     try:
-        return pd.read_csv(file, skipinitialspace=True, dtype=str, keep_default_na=False, comment="#")
+        return pd.read_csv(table_text(file), skipinitialspace=True, dtype=str, keep_default_na=False, comment="#")
     except OSError as error:
         raise InvalidArgumentError(f"steps {file} cannot be read ({error.strerror}); expected a CSV file") from error
     except ValueError as error:

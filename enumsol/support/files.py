@@ -8,16 +8,37 @@ import io
 import json
 import os
 import secrets
+import struct
 import zipfile
+import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from enumsol.errors import InvalidArgumentError, OutputError
+from enumsol.support.messages import shortened
 
 #: Errors of the operating system for a file that can be opened but not written to.
 _NO_ROOM = frozenset((errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EPIPE))
+
+
+#: What Python and its libraries raise on files that are damaged or are something else.
+_DAMAGE = (
+    ArithmeticError,
+    AssertionError,
+    AttributeError,
+    EOFError,
+    LookupError,
+    MemoryError,
+    RuntimeError,
+    SyntaxError,
+    TypeError,
+    ValueError,
+    struct.error,
+    zipfile.BadZipFile,
+    zlib.error,
+)
 
 
 @contextmanager
@@ -144,8 +165,12 @@ def reading(place: Path, content: str, writer: str) -> Iterator[None]:
     except OSError as error:
         reason = error.strerror or error
         raise InvalidArgumentError(f"{place} cannot be read ({reason}); expected a file of {writer}") from error
-    except (LookupError, ValueError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as error:
-        raise InvalidArgumentError(f"{place} does not hold {content} ({error}); expected a file of {writer}") from error
+    except _DAMAGE as error:
+        missing = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+        reason = shortened(missing).rstrip(".") or type(error).__name__
+        raise InvalidArgumentError(
+            f"{place} does not hold {content} ({reason}); expected a file of {writer}"
+        ) from error
 
 
 def write_arrays(place: Path, version: int, report: Mapping[str, Any], arrays: Mapping[str, Any]) -> None:
@@ -166,11 +191,12 @@ def read_arrays(place: Path, version: int, names: Sequence[str]) -> tuple[dict[s
     InvalidArgumentError
         The file has another version.
     """
-    import numpy as np  # as above
+    from enumsol.support.saved import archive_arrays, json_from  # numpy, which is not imported for --help
 
-    with np.load(place, allow_pickle=False) as data:
-        report = json.loads(str(data["meta"]))
-        arrays = {name: data[name] for name in names}
+    with place.open("rb") as file:
+        data = archive_arrays(file)
+    report = json_from(str(data["meta"]))
+    arrays = {name: data[name] for name in names}
     if report["format"] != version:
         raise InvalidArgumentError(f"{place} has format {report['format']!r}; this version reads format {version}")
     return report, arrays
