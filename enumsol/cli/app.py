@@ -25,6 +25,7 @@ from enumsol.cli import (
     verify,
 )
 from enumsol.cli.common import ExitStatus
+from enumsol.cli.files import FileCommand
 from enumsol.cli.streams import guarded_streams, loud_again
 from enumsol.errors import EnumsolError, OutputError
 from enumsol.support.messages import listed
@@ -43,16 +44,16 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("solve")(solve.solve)
-app.command("roots")(roots.roots)
-app.command("table")(table.table)
-app.command("graph")(graph.graph)
-app.command("history")(history.history)
-app.command("report")(report.report)
-app.command("follow")(follow.follow)
-app.command("audit")(audit.audit)
-app.command("fixed-point")(fixed_point.fixed_point)
-app.command("verify")(verify.verify)
+app.command("solve", cls=FileCommand)(solve.solve)
+app.command("roots", cls=FileCommand)(roots.roots)
+app.command("table", cls=FileCommand)(table.table)
+app.command("graph", cls=FileCommand)(graph.graph)
+app.command("history", cls=FileCommand)(history.history)
+app.command("report", cls=FileCommand)(report.report)
+app.command("follow", cls=FileCommand)(follow.follow)
+app.command("audit", cls=FileCommand)(audit.audit)
+app.command("fixed-point", cls=FileCommand)(fixed_point.fixed_point)
+app.command("verify", cls=FileCommand)(verify.verify)
 app.add_typer(gallery.app, name="gallery")
 app.add_typer(collection.app, name="collection")
 

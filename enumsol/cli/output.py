@@ -45,11 +45,11 @@ def check_writable(path: str | None, option: str) -> None:
     if path is None or path == "-":
         return
     place = Path(path)
-    if place.is_dir():
+    if os.path.isdir(place):
         raise InvalidArgumentError(
             f"{option} is {path}, a directory; expected the name of a file, or - for the terminal"
         )
-    if not place.parent.is_dir() or not os.access(place if place.exists() else place.parent, os.W_OK):
+    if not os.path.isdir(place.parent) or not os.access(place if os.path.exists(place) else place.parent, os.W_OK):
         raise InvalidArgumentError(
             f"{option} is {path}, which cannot be written; expected a file in a writable directory"
         )

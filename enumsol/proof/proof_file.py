@@ -30,7 +30,7 @@ import numpy as np
 from enumsol.errors import EnumsolError, InvalidArgumentError
 from enumsol.support.arguments import file_path
 from enumsol.support.array_types import Floats, Indices
-from enumsol.support.files import unreadable, write_file
+from enumsol.support.files import check_replaceable, write_file
 from enumsol.support.messages import html_lines
 
 MAGIC = b"enumsol-proof 1\n"
@@ -54,24 +54,6 @@ _WHOLE_DIGITS = 18
 
 class ProofFormatError(EnumsolError, ValueError):
     """A proof file is damaged, truncated or of another version."""
-
-
-def check_replaceable(place: Path, name: str) -> None:
-    """Refuse the name of a new proof under which there is a file of something else.
-
-    Raises
-    ------
-    InvalidArgumentError
-        The file is not empty and does not begin as a proof does; ``name`` says which argument it is.
-    """
-    if unreadable(place) is None:
-        with place.open("rb") as file:
-            start = file.read(len(MAGIC))
-        if not (MAGIC.startswith(start) or start.startswith(MAGIC[:14])):
-            raise InvalidArgumentError(
-                f"{name} is {place}, a file that is not a proof; expected a new name, or a proof to be replaced "
-                "(delete the file first if it is no longer needed)"
-            )
 
 
 def packed(rows: Indices, values: Floats) -> tuple[str, str]:
@@ -144,7 +126,7 @@ class Proof:
             The proof's own file cannot be read any more.
         """
         place = file_path(path, "path")
-        check_replaceable(place, "path")
+        check_replaceable(place, "path", MAGIC[:14], "a proof")
         write_file(place, self.content(), "path")
 
     def content(self) -> bytes:

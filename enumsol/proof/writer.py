@@ -19,9 +19,9 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Protocol
 
 import numpy as np
 
-from enumsol.proof.proof_file import MAGIC, Proof, check_replaceable
+from enumsol.proof.proof_file import MAGIC, Proof
 from enumsol.proof.reading import rational_text
-from enumsol.support.files import writing
+from enumsol.support.files import check_replaceable, writing
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -231,7 +231,7 @@ class ProofWriter:
     def _opened(self, path: Path) -> BinaryIO:
         if self._beside is not None:
             return self._beside.open("wb")
-        check_replaceable(path, "proof_path")
+        check_replaceable(path, "proof_path", MAGIC[:14], "a proof")
         if not path.is_file() or not path.stat().st_size or not os.access(path, os.W_OK):
             return path.open("wb")
         target = Path(os.path.realpath(path))

@@ -149,6 +149,24 @@ def unreadable(place: Path) -> str | None:
         return f"it cannot be read ({error.strerror or error})"
 
 
+def check_replaceable(place: Path, name: str, start: bytes, kind: str) -> None:
+    """Refuse the name of a new file of some kind under which there is a file of another kind.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The file is not empty and does not begin as files of that kind do; ``name`` says which argument it is.
+    """
+    if unreadable(place) is None:
+        with place.open("rb") as file:
+            found = file.read(len(start))
+        if not start.startswith(found):
+            raise InvalidArgumentError(
+                f"{name} is {place}, a file that is not {kind}; expected a new name, or {kind} to be replaced (delete "
+                "the file first if it is no longer needed)"
+            )
+
+
 @contextmanager
 def reading(place: Path, content: str, writer: str) -> Iterator[None]:
     """A block that reads a file of ``content`` that ``writer`` wrote.
