@@ -26,7 +26,7 @@ from enumsol.cli import (
 )
 from enumsol.cli.common import ExitStatus
 from enumsol.cli.files import FileCommand
-from enumsol.cli.streams import guarded_streams, loud_again
+from enumsol.cli.streams import guarded_streams, loud_again, say
 from enumsol.errors import EnumsolError, OutputError
 from enumsol.support.messages import listed
 
@@ -62,7 +62,7 @@ def _version(value: bool) -> None:
     if value:
         from enumsol import __version__  # found when it is asked for
 
-        typer.echo(f"enumsol {__version__}")
+        say(f"enumsol {__version__}")
         raise typer.Exit
 
 
@@ -74,7 +74,7 @@ def _enumsol(
     ] = False,
 ) -> None:
     if context.invoked_subcommand is None:
-        typer.echo(context.get_help())
+        say(context.get_help())
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -123,9 +123,9 @@ def _refuse(message: str, status: ExitStatus = ExitStatus.BAD_INPUT) -> ExitStat
     # quotes, names and capitals of our own messages stay as they are
     if sentence.startswith(("Missing ", "No such ", "Invalid ", "Got ", "Option ")):
         sentence = sentence[0].lower() + sentence[1:]
-    typer.echo(f"enumsol: error: {sentence}", err=True)
+    say(f"enumsol: error: {sentence}", err=True)
     return status
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
-    typer.echo(f"enumsol: warning: {' '.join(str(message).split())}", err=True)
+    say(f"enumsol: warning: {' '.join(str(message).split())}", err=True)

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from enumsol.cli.streams import is_quiet
+from enumsol.cli.streams import is_quiet, pour, say
 from enumsol.errors import InvalidArgumentError, MissingDependencyError, OutputError
 from enumsol.support.files import write_file
 
@@ -64,7 +64,7 @@ def write_text(path: str, text: str) -> None:
         It cannot be written, see `writing`.
     """
     if path == "-":
-        typer.echo(text, nl=not text.endswith("\n"))
+        pour(text)
         return
     write_file(Path(path), text if text.endswith("\n") else text + "\n", "file")
 
@@ -87,7 +87,7 @@ def deliver(
         Some could not be written, after all the others were.
     """
     outputs: tuple[Output, ...] = (
-        (None if "-" in (json_file, csv_file) or is_quiet() else "-", lambda path: write_text(path, text())),
+        (None if "-" in (json_file, csv_file) or is_quiet() else "-", lambda _: say(text())),
         (json_file, lambda path: write_text(path, as_json(content()))),
         (csv_file, lambda path: write_text(path, _csv(frame))),
         *more,
@@ -262,7 +262,7 @@ def named_group(text: str) -> typer.Typer:
     @app.callback(invoke_without_command=True)
     def _group(context: typer.Context) -> None:
         if context.invoked_subcommand is None:
-            typer.echo(context.get_help())
+            say(context.get_help())
 
     return app
 
@@ -283,7 +283,7 @@ def list_entries(
         # for other programs: one line per problem, however long
         widths = [max(len(row[k]) for row in rows) for k in range(len(columns) - 1)]
         # written at once: nothing is left to write when a reader has read enough (| head)
-        typer.echo(
+        say(
             "\n".join(
                 "  ".join(
                     [

@@ -117,7 +117,7 @@ def _write(place: Path, content: Content) -> None:
     if callable(content):
         content(place)
     else:
-        place.write_bytes(content.encode() if isinstance(content, str) else content)
+        place.write_bytes(content.encode(errors="backslashreplace") if isinstance(content, str) else content)
 
 
 def _write_beside(beside: Path, target: Path, content: Content) -> None:
