@@ -11,6 +11,7 @@ import pytest
 
 import enumsol
 from enumsol import EnumsolError, fem, gallery, read_problem, write_problem
+from enumsol.loading.steps import read_steps, steps_of
 
 CASES = 60
 #: By how much the peak of memory may grow with one file of some kilobytes [kilobytes].
@@ -193,7 +194,7 @@ def changed_archive(content, seed):
     rng = random.Random(seed)
     with np.load(io.BytesIO(content)) as archive:
         arrays = dict(archive)
-    if rng.random() < 0.5:
+    if "meta" in arrays and rng.random() < 0.5:
         arrays["meta"] = np.array(changed(str(arrays["meta"]), seed))
     else:
         name = rng.choice(sorted(arrays))
@@ -270,6 +271,32 @@ def test_what_was_saved(tmp_path, kind):
         place.write_bytes(altered.encode() if isinstance(altered, str) else altered)
         found.add(ours(read, place))
     assert False in found
+
+
+def test_tables_of_steps(tmp_path):
+    place = tmp_path / "steps.csv"
+    place.write_text("alpha,friction\n1,0.5\n2,0.25\n")
+    triangle = gallery.one_node_triangle()
+    assert outcomes(place, CASES, lambda file: steps_of(triangle, read_steps(file)), place) == {True, False}
+
+
+@pytest.mark.few(1)
+@pytest.mark.parametrize("kind", ["json", "npz", "csv"])
+def test_solutions_of_others(tmp_path, kind):
+    place, forces = tmp_path / f"triangle-3.{kind}", {"lambda_n": [[0.0], [0.5]], "lambda_t": [[0.0], [-1.0]]}
+    if kind == "json":
+        place.write_text(json.dumps(forces))
+    elif kind == "npz":
+        np.savez(place, **forces)
+    else:
+        place.write_text("solution,node,lambda_n,lambda_t\n0,0,0,0\n1,0,0.5,-1\n")
+    content = place.read_bytes()
+    assert outcomes(place, CASES, enumsol.collection.check, str(place)) >= {False}
+    change = {"json": changed, "npz": changed_archive, "csv": damaged}[kind]
+    for seed in range(CASES):
+        altered = change(content, seed)
+        place.write_bytes(altered.encode() if isinstance(altered, str) else altered)
+        ours(lambda: repr(enumsol.collection.check(str(place))))
 
 
 def test_the_damage_is_some(tmp_path):

@@ -18,6 +18,7 @@ from enumsol.io.fclib import child, numbers
 from enumsol.support.array_arguments import real_array
 from enumsol.support.array_types import Floats
 from enumsol.support.files import reading, unreadable
+from enumsol.support.messages import shortened
 from enumsol.support.saved import archive_arrays, json_from, table_text
 
 #: Arrays that give solutions, the first ones that are there count: forces, those in the order of fclib, displacements.
@@ -167,7 +168,7 @@ def _csv(file: Path) -> dict[str, Any]:
     normal, tangential = "lambda_n", [name for name in frame.columns if name.startswith("lambda_t")]
     missing = [name for name in ("node", normal) if name not in frame] + ([] if tangential else ["lambda_t"])
     if missing:
-        found = ", ".join(map(str, frame.columns))
+        found = shortened(", ".join(map(str, frame.columns)))
         raise InvalidArgumentError(
             f"{file}: the column {missing[0]} is missing (found {found}); expected solution, node, lambda_n and "
             "lambda_t, in 3D lambda_t1 and lambda_t2"

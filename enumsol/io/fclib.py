@@ -10,7 +10,8 @@ r_N >= 0 presses, and friction acts against u_T, so that its (u_N, u_T) are our 
   [Bn; Bt] = W and load -q: nothing is inverted, forces and contact displacements are those of the file, while the
   problem's u means nothing. W must be positive definite.
 
-mu is isotropic and depends neither on alpha nor on the slip. Equality constraints (G, b; V, R, s) are refused.
+mu is isotropic and depends neither on alpha nor on the slip. Equality constraints (G, b; V, R, s) are refused, and
+so is what leads to another file: external storage, links, virtual datasets.
 """
 
 from __future__ import annotations
