@@ -15,6 +15,7 @@ from enumsol.continuation.path import Path
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import ContactProblem
 from enumsol.support.messages import counted
+from enumsol.support.saved import table_text
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -148,7 +149,7 @@ def _read_csv(source: str | os.PathLike[str] | IO[str], name: str) -> pd.DataFra
 
     try:
         # a header of its own: a row longer than the names would otherwise shift the columns under them
-        table = pd.read_csv(source, header=None, dtype=str, na_filter=False, skipinitialspace=True)
+        table = pd.read_csv(table_text(source), header=None, dtype=str, na_filter=False, skipinitialspace=True)
     except OSError as error:
         raise InvalidArgumentError(
             f"{name} cannot be read ({error.strerror or error}); expected a CSV file of points"

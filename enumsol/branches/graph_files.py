@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from fractions import Fraction
 from functools import partial
+from io import BytesIO
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import networkx as nx
@@ -29,7 +30,8 @@ from enumsol.model.problem3d import ContactProblem3D
 from enumsol.model.statuses import ContactStatus
 from enumsol.roots.root import Polytope, RootFamily
 from enumsol.support.arguments import file_path
-from enumsol.support.files import writing
+from enumsol.support.files import reading, write_file
+from enumsol.support.saved import Array, Maybe, check_kind, check_shape, is_fraction, is_label, is_number, json_from
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -49,7 +51,18 @@ _ROWS = ("Bn", "Bt1", "Bt2"), ("Bn", "Bt")
 _VALUES = ("lambda_n", "lambda_t", "u_n", "u_t")
 #: What the file holds of an arc as it is.
 _OF_ARC = ("tail", "head", "index", "dimension", "grazing")
-_FRACTION = re.compile(r"-?\d+(/\d+)?", re.ASCII)
+_WHOLE = re.compile(r"-?[0-9]{1,100000}", re.ASCII)
+_STATUS = {status.value for status in ContactStatus}
+_MATRIX = {"shape": (range(1 << 62),) * 2, "row": Array(None), "col": Array(None), "value": Array(None)}
+#: Kinds of what the file holds of the problem; numbers and shapes of its arrays are checked where it is made of them.
+_PROBLEM = {
+    **dict.fromkeys(("A", "Bn"), _MATRIX),
+    **dict.fromkeys(("Bt?", "Bt1?", "Bt2?"), _MATRIX),
+    "f": Array(None),
+    "node_ids": [is_label],
+    "mesh?": Maybe({"motion": _MATRIX}),
+    "max_rigid_displacement?": Maybe(float),
+}
 
 
 def save_graph(data: GraphData, file: str | Path) -> None:
@@ -68,9 +81,7 @@ def save_graph(data: GraphData, file: str | Path) -> None:
         "vertices": [_vertex_record(v) for v in data.vertices],
         "arcs": [_arc_record(arc, data.vertices) for arc in data.arcs],
     }
-    place = file_path(file, "file")
-    with writing(place, "file"):
-        place.write_text(json.dumps(record), encoding="utf-8")
+    write_file(file_path(file, "file"), json.dumps(record), "file")
 
 
 def load_graph(kind: type[_Graph], file: str | Path) -> _Graph:
@@ -82,28 +93,24 @@ def load_graph(kind: type[_Graph], file: str | Path) -> _Graph:
         The file cannot be read or is not such a graph.
     """
     place = file_path(file, "file")
-    try:
-        record = json.loads(place.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InvalidArgumentError(f"graph {file} cannot be read ({error.strerror}); expected a saved graph") from error
-    except ValueError as error:
-        raise InvalidArgumentError(f"graph {file} is not a JSON file ({error}); expected a saved graph") from error
-    if not isinstance(record, dict) or record.get("format") != FORMAT or record.get("version") not in _READ:
-        raise InvalidArgumentError(f"graph {file} has another format; expected {FORMAT}, version {VERSION}")
-    try:
+    with reading(place, "a graph", "BranchGraph.save"):
+        content = place.read_bytes()
+        record = json_from(content)
+        if not isinstance(record, dict) or record.get("format") != FORMAT or record.get("version") not in _READ:
+            raise InvalidArgumentError(f"graph {file} has another format; expected {FORMAT}, version {VERSION}")
         if record["version"] == 1 and record["reasons"]:
             raise InvalidArgumentError(
                 f"graph {file} is not complete and was saved by an earlier version, which claimed more about such "
                 "graphs than is known; expected a complete one, or one saved by this version"
             )
-        return _from_record(kind, record)
-    except (LookupError, TypeError, ValueError, AttributeError) as error:
-        raise InvalidArgumentError(f"graph {file} is damaged (at {error}); expected a saved graph") from error
+        return _from_record(kind, record, len(content))
 
 
-def _from_record(kind: type[_Graph], record: dict[str, Any]) -> _Graph:
-    problem = _problem(record["problem"])
-    first, last = (_fraction(end) for end in record["interval"])
+def _from_record(kind: type[_Graph], record: dict[str, Any], size: int) -> _Graph:
+    check_kind(record["problem"], _PROBLEM, "problem")
+    problem = _problem(record["problem"], size)
+    check_kind(record, _graph_kind(problem, record["vertices"]), "graph")
+    first, last = (Fraction(end) for end in record["interval"])
     exact, values = _values(problem, record, (first, last))
     balls = exact is None
     vertices = tuple(_vertex(k, item, balls=balls) for k, item in enumerate(record["vertices"]))
@@ -111,9 +118,47 @@ def _from_record(kind: type[_Graph], record: dict[str, Any]) -> _Graph:
     reasons, stats = tuple(record["reasons"]), GraphStats(**record["stats"])
     left_open = None
     if "left_open" in record:
-        left_open = tuple((_fraction(low), _fraction(high)) for low, high in record["left_open"])
+        left_open = tuple((Fraction(low), Fraction(high)) for low, high in record["left_open"])
     named = record["arithmetic"]
     return kind(problem, exact, (first, last), named, vertices, arcs, reasons, stats, left_open=left_open)
+
+
+def _graph_kind(problem: AnyProblem, vertices: Any) -> dict[str, Any]:
+    """Kinds of what the file holds beside the problem."""
+    plane, p = isinstance(problem, ContactProblem), problem.p
+    statuses, vector = ({*_STATUS},) * p, Array(p)
+    pair, tangent = (is_fraction,) * 2, vector if plane else Array(p, 2)
+    selections = [(range(10 if plane else 1 << 62),) * p]
+    family = {
+        "statuses": statuses,
+        "vertices": Array(None, p, 2),
+        "dimension": range(3 * p + 7),
+        "rigid_coordinates?": Array(None, 0 if problem.modes is None else problem.modes.r),
+    }
+    vertex = {
+        **dict.fromkeys(("lo", "hi"), is_fraction),
+        **{"alpha": float, "kind": {kind.value for kind in VertexKind}, "border": bool, "bounded?": bool},
+        **{"polynomial": Maybe([_is_whole]), "statuses": statuses, "active": ([{*_STATUS}],) * p},
+        **dict(zip(_VALUES, (vector, tangent) * 2, strict=True)),
+        **{"family": Maybe([family]), "selections": selections},
+        **dict.fromkeys(("family_index", "index_left", "index_right"), Maybe(int)),
+    }
+    ends = range(len(vertices) if isinstance(vertices, list) else 0)
+    arc = {
+        **{"statuses": statuses, "selections": selections, "sample": is_fraction, "from?": is_fraction},
+        **{"to?": is_fraction, "tail": ends, "head": ends, "index": Maybe(int), "grazing": bool},
+        **{"dimension": range(3 * p + 7)},
+        **dict.fromkeys(("knots?", "borders?"), Array(None, 3 * p + 1)),
+    }
+    return {
+        **{"interval": pair, "left_open?": [pair], "arithmetic": {"verified", "exact", "fast"}, "reasons": [str]},
+        **{"arcs_by?": {"exact", "balls"}, "condensed_exactly": bool, "vertices": [vertex], "arcs": [arc]},
+        "stats": dict.fromkeys((f"{item.name}?" for item in fields(GraphStats)), is_number),
+    }
+
+
+def _is_whole(value: Any) -> bool:
+    return type(value) is str and _WHOLE.fullmatch(value) is not None
 
 
 def _values(
@@ -137,7 +182,7 @@ def _values(
         return None, along
 
     def of_selection(make: Callable[[Codes, Fraction], ArcValues], item: dict[str, Any]) -> ArcValues:
-        return make(tuple(item["selections"][0]), _fraction(item["sample"]))
+        return make(tuple(item["selections"][0]), Fraction(item["sample"]))
 
     if record.get("arcs_by", "exact") == "balls":
         traced = TracedProblem(problem, interval, vanishing_alpha(problem, "problem"))
@@ -194,8 +239,9 @@ def _matrix_record(matrix: Any) -> dict[str, Any]:
     return {"shape": list(coo.shape), "row": rows.tolist(), "col": columns.tolist(), "value": coo.data.tolist()}
 
 
-def _problem(record: dict[str, Any]) -> AnyProblem:
+def _problem(record: dict[str, Any], size: int) -> AnyProblem:
     def matrix(item: dict[str, Any]) -> sp.csc_array:
+        check_shape("a matrix", item["shape"], size)
         return sp.csc_array(sp.coo_array((item["value"], (item["row"], item["col"])), shape=tuple(item["shape"])))
 
     def pair(name: str) -> tuple[Any, Any]:
@@ -264,13 +310,6 @@ def _vertex_record(v: Vertex) -> dict[str, Any]:
     }
 
 
-def _fraction(text: str) -> Fraction:
-    """The fraction written like "-8/3"; other texts are refused, such as numbers with an exponent."""
-    if _FRACTION.fullmatch(text) is None:
-        raise ValueError(f"{text[:20]!r}, which is not a fraction")
-    return Fraction(text)
-
-
 def _kind(item: dict[str, Any]) -> VertexKind:
     """The kind of a vertex, by its name of today."""
     kind, degrees = VertexKind(item["kind"]), (item["index_left"], item["index_right"])
@@ -278,9 +317,11 @@ def _kind(item: dict[str, Any]) -> VertexKind:
 
 
 def _vertex(number: int, item: dict[str, Any], *, balls: bool) -> Vertex:
-    lo, hi = (fmpq(*_fraction(item[end]).as_integer_ratio()) for end in ("lo", "hi"))
+    lo, hi = (fmpq(*Fraction(item[end]).as_integer_ratio()) for end in ("lo", "hi"))
     coefficients = item["polynomial"]
     poly = None if coefficients is None else fmpz_poly([fmpz(c) for c in coefficients])
+    if lo > hi or (poly is not None and poly(lo) * poly(hi) >= 0) or (poly is None and not balls and lo != hi):
+        raise ValueError(f"the bounds of vertex {number}")
     family = None
     if item["family"] is not None:
         parts = [
@@ -328,7 +369,7 @@ def _arc_record(arc: Arc, vertices: Sequence[Vertex]) -> dict[str, Any]:
 
 def _arc(number: int, item: dict[str, Any], vertices: Sequence[Vertex], values: ArcValues) -> Arc:
     selections = tuple(tuple(codes) for codes in item["selections"])
-    sample = _fraction(item["sample"])
+    sample = Fraction(item["sample"])
     lo, begin = _arc_end(item.get("from"), vertices[item["tail"]])
     hi, end = _arc_end(item.get("to"), vertices[item["head"]])
     return Arc(
@@ -349,7 +390,7 @@ def _arc_end(known: str | None, vertex: Vertex) -> tuple[float, CriticalAlpha]:
     """Where an arc ends: at its vertex, or beside it as far as it is known to hold."""
     if known is None:
         return vertex.alpha, vertex.exact
-    value = fmpq(*_fraction(known).as_integer_ratio())
+    value = fmpq(*Fraction(known).as_integer_ratio())
     return float(Fraction(known)), EnclosedAlpha(value, value)
 
 
@@ -382,6 +423,6 @@ def write_graphml(data: GraphData, file: str | Path) -> None:
             dimension=arc.dimension,
             branch=data.branch_of[arc.number],
         )
-    place = file_path(file, "file")
-    with writing(place, "file"):
-        nx.write_graphml(plain, place)
+    text = BytesIO()
+    nx.write_graphml(plain, text)
+    write_file(file_path(file, "file"), text.getvalue(), "file")

@@ -25,7 +25,8 @@ from enumsol.cli import (
     verify,
 )
 from enumsol.cli.common import ExitStatus
-from enumsol.cli.streams import guarded_streams, loud_again
+from enumsol.cli.files import FileCommand
+from enumsol.cli.streams import guarded_streams, loud_again, say
 from enumsol.errors import EnumsolError, OutputError
 from enumsol.support.messages import listed
 
@@ -43,16 +44,16 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("solve")(solve.solve)
-app.command("roots")(roots.roots)
-app.command("table")(table.table)
-app.command("graph")(graph.graph)
-app.command("history")(history.history)
-app.command("report")(report.report)
-app.command("follow")(follow.follow)
-app.command("audit")(audit.audit)
-app.command("fixed-point")(fixed_point.fixed_point)
-app.command("verify")(verify.verify)
+app.command("solve", cls=FileCommand)(solve.solve)
+app.command("roots", cls=FileCommand)(roots.roots)
+app.command("table", cls=FileCommand)(table.table)
+app.command("graph", cls=FileCommand)(graph.graph)
+app.command("history", cls=FileCommand)(history.history)
+app.command("report", cls=FileCommand)(report.report)
+app.command("follow", cls=FileCommand)(follow.follow)
+app.command("audit", cls=FileCommand)(audit.audit)
+app.command("fixed-point", cls=FileCommand)(fixed_point.fixed_point)
+app.command("verify", cls=FileCommand)(verify.verify)
 app.add_typer(gallery.app, name="gallery")
 app.add_typer(collection.app, name="collection")
 
@@ -61,7 +62,7 @@ def _version(value: bool) -> None:
     if value:
         from enumsol import __version__  # found when it is asked for
 
-        typer.echo(f"enumsol {__version__}")
+        say(f"enumsol {__version__}")
         raise typer.Exit
 
 
@@ -73,7 +74,7 @@ def _enumsol(
     ] = False,
 ) -> None:
     if context.invoked_subcommand is None:
-        typer.echo(context.get_help())
+        say(context.get_help())
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
@@ -126,9 +127,9 @@ def _refuse(message: str, status: ExitStatus = ExitStatus.BAD_INPUT) -> ExitStat
     # quotes, names and capitals of our own messages stay as they are
     if sentence.startswith(("Missing ", "No such ", "Invalid ", "Got ", "Option ")):
         sentence = sentence[0].lower() + sentence[1:]
-    typer.echo(f"enumsol: error: {sentence}", err=True)
+    say(f"enumsol: error: {sentence}", err=True)
     return status
 
 
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
-    typer.echo(f"enumsol: warning: {' '.join(str(message).split())}", err=True)
+    say(f"enumsol: warning: {' '.join(str(message).split())}", err=True)

@@ -50,7 +50,9 @@ def audit(
     points: PointsArgument,
     first: Annotated[str | None, number("--from", "First alpha; default: that of the points.")] = None,
     last: Annotated[str | None, number("--to", "Last alpha; default: that of the points.")] = None,
-    graph_file: Annotated[str | None, file("--graph", "A graph written by enumsol graph --save.", None)] = None,
+    graph_file: Annotated[
+        str | None, file("--graph", "A graph written by enumsol graph --save.", None, "GRAPH")
+    ] = None,
     arithmetic: Annotated[Arithmetic, typer.Option(help="Arithmetic of the graph, as in enumsol graph.")] = "verified",
     tolerance: Tolerance = 1e-5,
     columns: NamedBy = "auto",

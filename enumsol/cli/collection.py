@@ -7,13 +7,14 @@ from typing import Annotated
 import typer
 
 from enumsol.cli.common import ExitStatus
+from enumsol.cli.files import FileCommand
 from enumsol.cli.options import JsonFile, Quiet, csv
 from enumsol.cli.output import check_outputs, deliver, list_entries, named_group
 
 app = named_group("Problems with certified solutions, and a check of what other solvers find.")
 
 
-@app.command("list")
+@app.command("list", cls=FileCommand)
 def list_(json_file: JsonFile = None) -> None:
     """List the problems, each with its dimension, its contact nodes and the number of its solutions."""
     from enumsol.collection import COLLECTION  # numpy: not for --help
@@ -28,7 +29,7 @@ def list_(json_file: JsonFile = None) -> None:
     list_entries(columns, rows, json_file=json_file, content=list(COLLECTION.values()), hint=hint)
 
 
-@app.command()
+@app.command(cls=FileCommand)
 def export(
     folder: Annotated[
         str, typer.Argument(metavar="FOLDER", help="Folder to write to; it is made if need be.", show_default=False)
@@ -54,7 +55,7 @@ def export(
     )
 
 
-@app.command()
+@app.command(cls=FileCommand)
 def check(
     solutions: Annotated[
         str,

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 import typer
 
 from enumsol.cli.progress import Display
-from enumsol.cli.streams import is_quiet
+from enumsol.cli.streams import is_quiet, say
 from enumsol.errors import EnumsolError, Interrupted, InvalidArgumentError, OutOfMemoryError, OutputError
+from enumsol.support.messages import visible
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -186,7 +187,7 @@ def node_row(problem: AnyProblem, label: str | None) -> int:
         return 0
     labels = [str(node) for node in problem.node_ids]
     if label not in labels:
-        some = ", ".join(labels[:8]) + (", ..." if len(labels) > 8 else "")
+        some = ", ".join(map(visible, labels[:8])) + (", ..." if len(labels) > 8 else "")
         raise InvalidArgumentError(f"there is no contact node {label}; expected one of {some}")
     return labels.index(label)
 
@@ -194,7 +195,7 @@ def node_row(problem: AnyProblem, label: str | None) -> int:
 def note(text: str) -> None:
     """Say something on stderr that is no error."""
     if not is_quiet():
-        typer.echo(f"enumsol: note: {text}", err=True)
+        say(f"enumsol: note: {text}", err=True)
 
 
 def so_far(search: Callable[[], T]) -> tuple[T | Any, EnumsolError | None]:

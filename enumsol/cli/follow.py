@@ -70,7 +70,9 @@ def follow(
     plot_file: options.PlotFile = None,
     graph_file: Annotated[
         str | None,
-        options.file("--graph", "Draw the paths over this graph, written by enumsol graph --save.", options.PLOT),
+        options.file(
+            "--graph", "Draw the paths over this graph, written by enumsol graph --save.", options.PLOT, "GRAPH"
+        ),
     ] = None,
     quantity: options.DrawnQuantity = "lambda_n",
     label: Annotated[str | None, options.node("--node", "LABEL", "Contact node to draw; default: the first.")] = None,

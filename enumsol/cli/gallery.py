@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from enumsol.cli.files import FileCommand
 from enumsol.cli.options import JsonFile, Quiet
 from enumsol.cli.output import check_outputs, deliver, list_entries, named_group
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 app = named_group("Named problems to experiment with.")
 
 
-@app.command("list")
+@app.command("list", cls=FileCommand)
 def list_(json_file: JsonFile = None) -> None:
     """List the problems, each with an alpha of interest and the number of its roots there."""
     from enumsol import gallery  # numpy and scipy: not for --help
@@ -33,7 +34,7 @@ def _count(entry: GalleryEntry) -> str:
     return str(entry.roots)
 
 
-@app.command()
+@app.command(cls=FileCommand)
 def write(
     name: Annotated[str, typer.Argument(metavar="NAME", help="Name as in enumsol gallery list.", show_default=False)],
     file: Annotated[

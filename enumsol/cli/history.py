@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -175,8 +174,10 @@ def _steps(problem: str, steps: str | None) -> Any:
 
 def _told(place: Path) -> Any:
     """What a TOML file says of steps; what is wrong with the file is said where the problem is read."""
+    from enumsol.support.saved import toml_from  # numpy: not for --help
+
     try:
-        return tomllib.loads(place.read_text(encoding="utf-8")).get("steps")
+        return toml_from(place.read_bytes()).get("steps")
     except (OSError, ValueError):
         return None
 

@@ -30,9 +30,9 @@ def seconds(text: str) -> Any:
     return typer.Option(metavar="SECONDS", help=text, rich_help_panel=LIMITS)
 
 
-def file(name: str, text: str, panel: str | None = OUTPUT) -> Any:
-    """An option that takes the name of a file."""
-    return typer.Option(name, metavar="FILE", help=text, rich_help_panel=panel)
+def file(name: str, text: str, panel: str | None = OUTPUT, metavar: str = "FILE") -> Any:
+    """An option that takes the name of a file to write; of one that is read with another ``metavar`` (cli.files)."""
+    return typer.Option(name, metavar=metavar, help=text, rich_help_panel=panel)
 
 
 def step(metavar: str | None, text: str) -> Any:

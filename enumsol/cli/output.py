@@ -14,15 +14,14 @@ import sys
 from dataclasses import fields
 from fractions import Fraction
 from importlib.util import find_spec
-from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from enumsol.cli.streams import is_quiet
+from enumsol.cli.streams import is_quiet, pour, say
 from enumsol.errors import InvalidArgumentError, MissingDependencyError, OutputError
-from enumsol.support.files import writing
+from enumsol.support.files import write_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -46,11 +45,11 @@ def check_writable(path: str | None, option: str) -> None:
     if path is None or path == "-":
         return
     place = Path(path)
-    if place.is_dir():
+    if os.path.isdir(place):
         raise InvalidArgumentError(
             f"{option} is {path}, a directory; expected the name of a file, or - for the terminal"
         )
-    if not place.parent.is_dir() or not os.access(place if place.exists() else place.parent, os.W_OK):
+    if not os.path.isdir(place.parent) or not os.access(place if os.path.exists(place) else place.parent, os.W_OK):
         raise InvalidArgumentError(
             f"{option} is {path}, which cannot be written; expected a file in a writable directory"
         )
@@ -65,10 +64,9 @@ def write_text(path: str, text: str) -> None:
         It cannot be written, see `writing`.
     """
     if path == "-":
-        typer.echo(text, nl=not text.endswith("\n"))
+        pour(text)
         return
-    with writing(Path(path), "file"):
-        Path(path).write_text(text if text.endswith("\n") else text + "\n", encoding="utf-8")
+    write_file(Path(path), text if text.endswith("\n") else text + "\n", "file")
 
 
 def deliver(
@@ -89,7 +87,7 @@ def deliver(
         Some could not be written, after all the others were.
     """
     outputs: tuple[Output, ...] = (
-        (None if "-" in (json_file, csv_file) or is_quiet() else "-", lambda path: write_text(path, text())),
+        (None if "-" in (json_file, csv_file) or is_quiet() else "-", lambda _: say(text())),
         (json_file, lambda path: write_text(path, as_json(content()))),
         (csv_file, lambda path: write_text(path, _csv(frame))),
         *more,
@@ -232,12 +230,11 @@ def write_figure(path: str, figure: Any) -> None:
     Raises
     ------
     OutputError, InvalidArgumentError
-        The file cannot be written, see `writing`.
+        The file cannot be written, see `kept`.
     """
-    drawn = BytesIO()  # not all of matplotlib's formats survive a file that cannot be written
-    figure.savefig(drawn, dpi=150, format=Path(path).suffix.removeprefix(".").lower())
-    with writing(Path(path), "file"):
-        Path(path).write_bytes(drawn.getvalue())
+    from enumsol.support.plotting import kept  # numpy: not for --help
+
+    kept(figure, path)
 
 
 def as_json(content: Any) -> str:
@@ -265,7 +262,7 @@ def named_group(text: str) -> typer.Typer:
     @app.callback(invoke_without_command=True)
     def _group(context: typer.Context) -> None:
         if context.invoked_subcommand is None:
-            typer.echo(context.get_help())
+            say(context.get_help())
 
     return app
 
@@ -286,7 +283,7 @@ def list_entries(
         # for other programs: one line per problem, however long
         widths = [max(len(row[k]) for row in rows) for k in range(len(columns) - 1)]
         # written at once: nothing is left to write when a reader has read enough (| head)
-        typer.echo(
+        say(
             "\n".join(
                 "  ".join(
                     [

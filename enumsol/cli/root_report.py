@@ -7,6 +7,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from enumsol.cli.output import plain
+from enumsol.support.messages import visible
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -26,7 +27,7 @@ def roots_as_text(found: RootSet) -> str:
         return repr(found)
     from enumsol.roots.root import node_heading  # numpy: not for --help
 
-    width = max(4, *(len(str(label)) for label in found.node_ids))
+    width = max(4, *(len(visible(label)) for label in found.node_ids))
     tangents = 2 if len(found) and found[0].lambda_t.ndim == 2 else 1
     lines = [f"{'':>8} {node_heading(width, tangents)}"]
     for k, root in enumerate(found):
@@ -47,7 +48,8 @@ def _family_rows(k: int, family: RootFamily, node_ids: tuple[Any, ...], width: i
     yield f"family {k}, vertices"
     for j, vertex in enumerate(family.vertices):
         for i, (label, (normal, tangential)) in enumerate(zip(node_ids, vertex, strict=True)):
-            yield f"{j if i == 0 else '':>8} {label!s:>{width}} {'':<7} {normal + 0.0:>12.6g} {tangential + 0.0:>12.6g}"
+            numbers = f"{normal + 0.0:>12.6g} {tangential + 0.0:>12.6g}"
+            yield f"{j if i == 0 else '':>8} {visible(label):>{width}} {'':<7} {numbers}"
 
 
 def uniqueness(found: RootSet) -> str:

@@ -17,6 +17,7 @@ from functools import cached_property
 from typing import Any, TextIO, cast
 
 from enumsol.errors import OutputError
+from enumsol.support.messages import visible
 
 
 class _Guarded:
@@ -97,6 +98,24 @@ def guarded_streams() -> Iterator[None]:
             yield
         finally:
             sys.stdout, sys.stderr = before
+
+
+def say(text: str, *, err: bool = False) -> None:
+    """Print a text, and the end of a line where it has none: the one place where text leaves for the terminal.
+
+    What a terminal would obey, in names from files and arguments, is printed as an escape.
+    """
+    pour(visible(text, keep="\n\t"), err=err)
+
+
+def pour(text: str, *, err: bool = False) -> None:
+    """Write data as they are, for another program to read; on a terminal they are text, as in `say`."""
+    stream = sys.stderr if err else sys.stdout
+    if stream.isatty():
+        text = visible(text, keep="\n\t")
+    coding = getattr(stream, "encoding", None) or "utf-8"
+    stream.write(text.encode(coding, "backslashreplace").decode(coding) + ("" if text.endswith("\n") else "\n"))
+    stream.flush()
 
 
 _QUIET = ContextVar("enumsol_quiet", default=False)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -16,7 +15,7 @@ from enumsol.io import read_problem
 from enumsol.model.statuses import ContactStatus
 from enumsol.proof.proof_file import Proof
 from enumsol.support.arguments import entry_named, file_path, shown
-from enumsol.support.files import writing
+from enumsol.support.files import write_files, writing
 from enumsol.support.immutable import Sealed
 from enumsol.support.messages import counted
 
@@ -194,14 +193,13 @@ def export(folder: str | os.PathLike[str], names: Sequence[str] | None = None) -
     chosen = tuple(COLLECTION.values()) if names is None else tuple(get(name) for name in names)
     with writing(place, "folder"):
         place.mkdir(exist_ok=True)
-        for part, endings in _ENDINGS.items():
+        for part in _ENDINGS:
             (place / part).mkdir(exist_ok=True)
-            for entry in chosen:
-                for ending in endings:
-                    file = f"{entry.name}.{ending}"
-                    shutil.copyfile(DATA / part / file, place / part / file)
+        for entry in chosen:
+            parts = [f"{part}/{entry.name}.{ending}" for part, endings in _ENDINGS.items() for ending in endings]
+            write_files({place / file: (DATA / file).read_bytes() for file in parts})
         lines = [line for line in _index_lines() if json.loads(line)["name"] in {entry.name for entry in chosen}]
-        (place / INDEX).write_text("[\n" + ",\n".join(lines) + "\n]\n", encoding="utf-8")
+        write_files({place / INDEX: "[\n" + ",\n".join(lines) + "\n]\n"})
     return chosen
 
 

@@ -5,7 +5,6 @@ A file belongs to the problem that its name begins with, up to the first dot. do
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,9 +14,12 @@ import numpy as np
 
 from enumsol.collection.entries import INDEX, CollectionEntry, get
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
+from enumsol.io.fclib import child, numbers
 from enumsol.support.array_arguments import real_array
 from enumsol.support.array_types import Floats
 from enumsol.support.files import reading, unreadable
+from enumsol.support.messages import shortened
+from enumsol.support.saved import archive_arrays, json_from, table_text
 
 #: Arrays that give solutions, the first ones that are there count: forces, those in the order of fclib, displacements.
 _GIVEN = (("lambda_n", "lambda_t"), ("r",), ("u",))
@@ -133,13 +135,13 @@ def _submission(entry: CollectionEntry, file: str, content: Mapping[str, Any]) -
 
 
 def _npz(file: Path) -> dict[str, Any]:
-    with np.load(file, allow_pickle=False) as archive:
-        return {name: archive[name] if name in sum(_GIVEN, ()) else None for name in archive.files}
+    with file.open("rb") as stream:
+        return archive_arrays(stream)
 
 
 def _json(file: Path) -> dict[str, Any]:
     """One object with arrays, a list of objects, or what ``enumsol roots --json`` writes."""
-    content = json.loads(file.read_text(encoding="utf-8"))
+    content = json_from(file.read_bytes())
     if isinstance(content, dict) and isinstance(content.get("roots"), list):
         content = [*content["roots"], *_vertices(content.get("families", []))]
     if isinstance(content, dict):
@@ -162,11 +164,11 @@ def _csv(file: Path) -> dict[str, Any]:
     """Rows with a solution, a node and its forces; ``enumsol roots --csv`` writes such a file."""
     import pandas as pd  # for tables only
 
-    frame = pd.read_csv(file).rename(columns={"root": "solution"})
+    frame = pd.read_csv(table_text(file)).rename(columns={"root": "solution"})
     normal, tangential = "lambda_n", [name for name in frame.columns if name.startswith("lambda_t")]
     missing = [name for name in ("node", normal) if name not in frame] + ([] if tangential else ["lambda_t"])
     if missing:
-        found = ", ".join(map(str, frame.columns))
+        found = shortened(", ".join(map(str, frame.columns)))
         raise InvalidArgumentError(
             f"{file}: the column {missing[0]} is missing (found {found}); expected solution, node, lambda_n and "
             "lambda_t, in 3D lambda_t1 and lambda_t2"
@@ -198,8 +200,8 @@ def _h5(file: Path) -> dict[str, Any]:
     with h5py.File(file, "r") as content:
         if "solution" not in content:
             return dict.fromkeys(content)
-        group = content["solution"]
-        return {"r": np.asarray(group["r"])} if "r" in group else dict.fromkeys(group)
+        group = child(content, "solution")
+        return {"r": numbers(group, "r")} if "r" in group else dict.fromkeys(group)
 
 
 _READERS = {".npz": _npz, ".json": _json, ".csv": _csv, ".h5": _h5, ".hdf5": _h5}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from enumsol.roots.local_branch import LocalBranchTest
 from enumsol.support.arguments import file_path, one_of, row_number
 from enumsol.support.files import read_arrays, reading, write_arrays
 from enumsol.support.plotting import axes_or_none, figure_of, new_figure
+from enumsol.support.saved import Array, Maybe, check_kind, is_label, is_number
 
 if TYPE_CHECKING:
     import os
@@ -51,7 +53,31 @@ def save_path(followed: PathData, path: str | os.PathLike[str]) -> None:
     write_arrays(file_path(path, "path"), _FORMAT, report, {name: getattr(followed, name) for name in ARRAYS})
 
 
+def _check(report: Any, arrays: dict[str, Any]) -> None:
+    """Refuse a report and arrays of other kinds than those of a path."""
+    m, p = arrays["lambda_n"].shape
+    statuses = ({status.value for status in ContactStatus},) * p
+    test = {"exists": bool, "premise": bool, "signs": [(statuses, int)]}
+    transition = {
+        **{"point": range(m), "alpha": float, "before": statuses, "after": statuses, "nodes": [range(p)]},
+        **{"dalpha": (is_number, is_number), "local_test": Maybe(test)},
+    }
+    named = {
+        **{"kinds": ({kind.value for kind in PointKind},) * m, "names": (statuses,) * m, "transitions": [transition]},
+        **{"status": {status.value for status in PathStatus}, "message": str, "orientation": range(-1, 2)},
+        **{"interval": (is_number, is_number), "next_step": float, "node_ids": (is_label,) * p, "options": {}},
+        "stats": dict.fromkeys((f"{item.name}?" for item in fields(PathStats)), is_number),
+        f"{RIGID}?": Array(m, None),
+    }
+    check_kind(report, named, "report")
+    pair = Array(m, p, 2) if arrays["lambda_t"].ndim == 3 else Array(m, p)
+    shapes = {"lambda_n": Array(m, p), "u_n": Array(m, p), "codes": Array(m, p), "lambda_t": pair, "u_t": pair}
+    for name in ARRAYS:
+        check_kind(arrays[name], shapes.get(name, Array(m)), name)
+
+
 def _unpacked(report: dict[str, Any], arrays: dict[str, Any]) -> Path:
+    _check(report, arrays)
     low, high = report["interval"]
     return Path(
         **arrays,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import inspect
-import tomllib
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
@@ -12,6 +11,7 @@ from enumsol.fem.scenes import Scene, refuse_old_friction
 from enumsol.support.arguments import file_path, shown
 from enumsol.support.files import unreadable
 from enumsol.support.messages import shortened
+from enumsol.support.saved import LARGEST_TOML, toml_from
 
 if TYPE_CHECKING:
     import os
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     Plane = Literal["strain", "stress"]
 
 T = TypeVar("T")
-#: Largest TOML file that is read; one that describes a problem has a thousandth of that [bytes].
-LARGEST_FILE = 1_000_000
 #: What ``pairs`` may be called in TOML files.
 _PAIRS = "contact_pair"
 
@@ -262,12 +260,10 @@ def _toml(place: Path) -> dict[str, Any]:
     if (found := unreadable(place)) is not None:
         raise InvalidArgumentError(f"{found}; expected a TOML file of options")
     with place.open("rb") as file:
-        content = file.read(LARGEST_FILE + 1)
-    if len(content) > LARGEST_FILE:
-        raise InvalidArgumentError(f"it has more than {LARGEST_FILE} bytes; expected a TOML file of options")
+        content = file.read(LARGEST_TOML + 1)
     try:
-        options = tomllib.loads(content.decode("utf-8"))
-    except (ValueError, RecursionError) as error:  # UnicodeDecodeError and TOMLDecodeError, too
+        options = toml_from(content)
+    except ValueError as error:
         reason = shortened(str(error))
         raise InvalidArgumentError(
             f"it is not a TOML file ({reason}); expected lines such as contact = 'floor'"

@@ -10,11 +10,14 @@ r_N >= 0 presses, and friction acts against u_T, so that its (u_N, u_T) are our 
   [Bn; Bt] = W and load -q: nothing is inverted, forces and contact displacements are those of the file, while the
   problem's u means nothing. W must be positive definite.
 
-mu is isotropic and depends neither on alpha nor on the slip. Equality constraints (G, b; V, R, s) are refused.
+mu is isotropic and depends neither on alpha nor on the slip. Equality constraints (G, b; V, R, s) are refused, and
+so is what leads to another file: external storage, links, virtual datasets.
 """
 
 from __future__ import annotations
 
+import math
+from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -23,6 +26,8 @@ import scipy.sparse as sp
 from enumsol.errors import InvalidProblemError, MissingDependencyError
 from enumsol.io.arrays import refusing
 from enumsol.model.problem import ContactProblem
+from enumsol.support.files import write_file
+from enumsol.support.saved import check_shape, check_size
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -47,12 +52,12 @@ def read(path: Path) -> Problem:
     except OSError as error:
         raise InvalidProblemError("it is not a readable HDF5 file; expected an fclib problem, complete") from error
     # h5py reports damage by any of these
-    damage = (OSError, KeyError, ValueError, RuntimeError, TypeError)
+    damage = (OSError, KeyError, ValueError, RuntimeError, TypeError, MemoryError)
     with file, refusing(damage, "its HDF5 data cannot be read", "a complete fclib problem"):
         if "fclib_global" in file:
-            return _global(file["fclib_global"])
+            return _global(child(file, "fclib_global"))
         if "fclib_local" in file:
-            return _local(file["fclib_local"])
+            return _local(child(file, "fclib_local"))
         raise InvalidProblemError(
             f"it holds {', '.join(file) or 'nothing'}; expected a group named fclib_global or fclib_local"
         )
@@ -76,7 +81,8 @@ def write(problem: Problem, path: Path) -> None:
     interleaved = np.arange(dimension * problem.p).reshape(dimension, -1).T.ravel()
     H = sp.csc_array(-problem.contact_rows[interleaved].T)
     mu = _isotropic(problem)
-    with h5py.File(path, "w") as file:
+    written = BytesIO()
+    with h5py.File(written, "w") as file:
         group = file.create_group("fclib_global")
         group["spacedim"] = np.array([dimension], dtype=np.int32)
         _write_matrix(group.create_group("M"), problem.A)
@@ -86,6 +92,7 @@ def write(problem: Problem, path: Path) -> None:
         vectors["w"] = offsets.ravel()
         vectors["mu"] = mu
         group.create_group("info")["title"] = np.bytes_(f"contact problem with {problem.p} nodes, written by enumsol")
+    write_file(path, written.getvalue(), "path")
 
 
 def _isotropic(problem: Problem) -> Floats:
@@ -107,12 +114,13 @@ def _global(group: Any) -> Problem:
     dimension = _dimension(group)
     if "G" in group:
         raise InvalidProblemError("it has equality constraints (G, b); expected a problem without them")
-    M, H = _matrix(group, "M", symmetric=True), _matrix(group, "H")
+    vectors = child(group, "vectors")
+    f, w = (numbers(vectors, name) for name in ("f", "w"))
+    M, H = _matrix(group, "M", f.size, symmetric=True), _matrix(group, "H", f.size + w.size)
     if H.shape[0] != M.shape[0] or H.shape[1] % dimension or not H.shape[1]:
         raise InvalidProblemError(
             f"H has shape {H.shape}; expected {M.shape[0]} rows and {_NUMBERS[dimension]} columns a contact"
         )
-    vectors = _child(group, "vectors")
     w, mu = _vector(vectors, "w", H.shape[1]), _vector(vectors, "mu", H.shape[1] // dimension)
     return _problem(M, sp.csr_array(-H.T), _vector(vectors, "f", M.shape[0]), w, mu, dimension)
 
@@ -121,12 +129,12 @@ def _local(group: Any) -> Problem:
     dimension = _dimension(group)
     if "V" in group or "R" in group:
         raise InvalidProblemError("it has equality constraints (V, R, s); expected a problem without them")
-    W = _matrix(group, "W", symmetric=True)
+    vectors = child(group, "vectors")
+    W = _matrix(group, "W", numbers(vectors, "q").size, symmetric=True)
     if W.shape[0] != W.shape[1] or W.shape[0] % dimension:
         raise InvalidProblemError(
             f"W has shape {W.shape}; expected a square matrix with {_NUMBERS[dimension]} rows a contact"
         )
-    vectors = _child(group, "vectors")
     q, mu = _vector(vectors, "q", W.shape[0]), _vector(vectors, "mu", W.shape[0] // dimension)
     try:
         return _problem(W, sp.csr_array(W), -q, np.zeros(len(q)), mu, dimension)
@@ -155,11 +163,12 @@ def _dimension(group: Any) -> int:
     return spacedim
 
 
-def _matrix(group: Any, name: str, *, symmetric: bool = False) -> sp.csc_array:
-    parts = _child(group, name)
+def _matrix(group: Any, name: str, room: int, *, symmetric: bool = False) -> sp.csc_array:
+    parts = child(group, name)
     m, n, nz = (_integer(parts, key) for key in ("m", "n", "nz"))
-    p, i, x = (np.asarray(_child(parts, key)[()]).ravel() for key in ("p", "i", "x"))
+    p, i, x = (numbers(parts, key).ravel() for key in ("p", "i", "x"))
     with refusing((ValueError, TypeError), f"{name} is not a sparse matrix", "consistent m, n, nz, p, i, x"):
+        check_shape("it", (m, n), room + p.size + x.size)
         if nz >= 0:
             row, column = _triplets(name, p[:nz], i[:nz], (m, n), symmetric=symmetric)
             return sp.csc_array(sp.coo_array((x[:nz], (row, column)), shape=(m, n)))
@@ -195,22 +204,57 @@ def _write_matrix(group: Any, matrix: sp.csc_array) -> None:
     group["x"] = matrix.data
 
 
-def _child(group: Any, name: str) -> Any:
-    if name not in group:
+def child(group: Any, name: str) -> Any:
+    """A group or dataset of an HDF5 file that stands in the file itself.
+
+    Raises
+    ------
+    InvalidProblemError
+        It is missing, or the file only leads to it by a link.
+    """
+    if name not in group and group.get(name, getlink=True, default=None) is None:
         found = ", ".join(group) or "nothing"
         raise InvalidProblemError(f"{group.name}/{name} is missing (found {found}); expected an fclib problem")
+    link = type(group.get(name, getlink=True)).__name__
+    if link != "HardLink":
+        raise InvalidProblemError(
+            f"{group.name}/{name} is a link ({link}), which is never followed; expected the data in the file itself"
+        )
     return group[name]
 
 
+def numbers(group: Any, name: str) -> NDArray[Any]:
+    """The numbers of a dataset that stand in the file itself, of a size that its bytes can have.
+
+    Raises
+    ------
+    InvalidProblemError
+        They are in another file, or no numbers; or there is no such dataset.
+    ValueError
+        It claims to be larger than it can be.
+    """
+    data = child(group, name)
+    if not hasattr(data, "dtype") or data.dtype.kind not in "iuf":
+        raise InvalidProblemError(f"{group.name}/{name} holds no numbers; expected a dataset of them")
+    if data.external or data.is_virtual:
+        raise InvalidProblemError(
+            f"{group.name}/{name} has its numbers in another file, which is never read; expected them in this one"
+        )
+    stored, item = data.id.get_storage_size(), data.dtype.itemsize
+    for shape in (data.shape or (), data.chunks or ()):
+        check_size(f"{group.name}/{name}", item * math.prod(shape), stored)
+    return np.asarray(data[()])
+
+
 def _integer(group: Any, name: str) -> int:
-    value = np.asarray(_child(group, name)[()])
+    value = numbers(group, name)
     if value.size != 1 or value.dtype.kind not in "iu":
         raise InvalidProblemError(f"{group.name}/{name} is {value.tolist()}; expected one whole number")
     return int(value.ravel()[0])
 
 
 def _vector(group: Any, name: str, size: int) -> NDArray[Any]:
-    value = np.asarray(_child(group, name)[()])
+    value = numbers(group, name)
     if value.shape != (size,):
         raise InvalidProblemError(f"{group.name}/{name} has shape {value.shape}; expected ({size},)")
     return value

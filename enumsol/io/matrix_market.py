@@ -12,6 +12,8 @@ import scipy.sparse as sp
 
 from enumsol.errors import InvalidProblemError
 from enumsol.io.arrays import LAYOUT_2D, LAYOUT_3D, arrays_of, check_names, layout_of, problem_from_arrays, refusing
+from enumsol.support.files import Content, write_files
+from enumsol.support.saved import check_shape, is_label, json_from
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -20,8 +22,8 @@ if TYPE_CHECKING:
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import NDArray
 
-#: Most entries of a vector, or of a table that is stored densely.
-_LARGEST_VECTOR = 50_000_000
+#: Most entries of a table that is stored densely, for every byte of the directory: most of them may be left out.
+_OF_TABLE = 16
 #: Numbers to the end of a file; without backtracking.
 _NUMBERS = re.compile(
     rb"\s*+(?:[+-]?(?:\d++(?:\.\d*+)?+(?:e[+-]?\d++)?+|\.\d++(?:e[+-]?\d++)?+|nan|inf(?:inity)?+)(?:\s++|\Z))*+\Z",
@@ -39,7 +41,9 @@ def read(path: Path) -> AnyProblem:
         raise InvalidProblemError("the directory has no MatrixMarket files; expected A.mtx, Bn.mtx, Bt.mtx and f.mtx")
     layout = layout_of(files)
     check_names(files, layout, ".mtx")
-    arrays: dict[str, Any] = {name: _values(name, file, layout) for name, file in files.items()}
+    with refusing((OSError,), "a file in it cannot be read", "readable files"):
+        room = sum(file.stat().st_size for file in files.values())
+    arrays: dict[str, Any] = {name: _values(name, file, layout, room) for name, file in files.items()}
     if (path / _LABELS).exists():
         arrays["node_ids"] = _labels(path / _LABELS)
     return problem_from_arrays(arrays, layout)
@@ -57,28 +61,28 @@ def write(problem: AnyProblem, path: Path) -> None:
         kept = False
     if not kept:
         raise InvalidProblemError("node_ids cannot be kept in node_ids.json; expected integers, floats or strings")
-    path.mkdir(exist_ok=True)
-    stale = [file for file in path.glob("*.mtx") if file.stem not in columns]
-    if stale:
-        _remove(stale)
+    stale = [file for file in path.glob("*.mtx") if file.stem not in columns and not file.name.startswith("_")]
+    names = [file.stem for file in stale]
+    layout = LAYOUT_2D if all(name in LAYOUT_2D.known for name in names) else LAYOUT_3D
+    check_names([*layout.required, *names], layout, ".mtx")
+    files: dict[Path, Content] = {path / _LABELS: labels + "\n"}
     for name, matrix in columns.items():
         text = BytesIO()  # scipy's writer ignores errors of the disk
         mmwrite(text, matrix, field="real", precision=_DIGITS)
-        (path / f"{name}.mtx").write_bytes(text.getvalue())
-    (path / _LABELS).write_text(labels + "\n", encoding="utf-8")
+        files[path / f"{name}.mtx"] = text.getvalue()
+    is_new = not path.exists()
+    path.mkdir(exist_ok=True)
+    try:
+        write_files(files)
+    except OSError:
+        if is_new:
+            path.rmdir()
+        raise
+    for file in stale:  # of an earlier problem
+        file.unlink()
 
 
-def _remove(files: list[Path]) -> None:
-    """Delete files of an earlier problem that this one lacks, unless there are foreign files."""
-    names = [file.stem for file in files if not file.name.startswith("_")]
-    layout = LAYOUT_2D if all(name in LAYOUT_2D.known for name in names) else LAYOUT_3D
-    check_names([*layout.required, *names], layout, ".mtx")
-    for file in files:
-        if not file.name.startswith("_"):
-            file.unlink()
-
-
-def _values(name: str, file: Path, layout: Layout) -> sp.coo_array | NDArray[Any]:
+def _values(name: str, file: Path, layout: Layout, room: int) -> sp.coo_array | NDArray[Any]:
     from scipy.io import mminfo, mmread  # slow to import
 
     with refusing(
@@ -86,7 +90,8 @@ def _values(name: str, file: Path, layout: Layout) -> sp.coo_array | NDArray[Any
     ):
         content = file.read_bytes()
         rows, columns, entries = mminfo(BytesIO(content))[:3]
-        _check(content, rows, columns, entries, dense=name not in layout.matrices)
+        _check(content, rows, columns, entries, None if name in layout.matrices else _OF_TABLE * room)
+        check_shape("it", (rows, columns), room)
         if name not in layout.matrices and name not in layout.tables and 1 not in (rows, columns):
             raise InvalidProblemError(f"{file.name} holds a {rows} x {columns} matrix; expected a vector in one column")
         values: Any = mmread(BytesIO(content), spmatrix=False)
@@ -98,20 +103,20 @@ def _values(name: str, file: Path, layout: Layout) -> sp.coo_array | NDArray[Any
     return dense.reshape(()) if name in layout.broadcast and dense.size == 1 else dense.ravel()
 
 
-def _check(content: bytes, rows: int, columns: int, entries: int, *, dense: bool) -> None:
+def _check(content: bytes, rows: int, columns: int, entries: int, largest: int | None) -> None:
     """Refuse what scipy's reader crashes on or takes memory for: words that are no numbers, and counts out of range."""
     start = 0
     while content[start : start + 1] in (b"%", b"\n", b"\r"):
         start = content.find(b"\n", start) + 1 or len(content)
     if _NUMBERS.match(content, start) is None:
         raise ValueError("a word in it is not a number")
-    if entries > len(content) or (dense and rows * columns > _LARGEST_VECTOR):
+    if entries > len(content) or (largest is not None and rows * columns > largest):
         raise ValueError(f"it cannot hold {rows} x {columns} entries")
 
 
 def _labels(file: Path) -> list[Any]:
-    with refusing((ValueError,), f"{file.name} is not JSON", "a list of labels"):
-        labels = json.loads(file.read_text(encoding="utf-8"))
-    if not isinstance(labels, list) or not all(isinstance(label, (int, float, str)) for label in labels):
+    with refusing((ValueError, OSError), f"{file.name} is not JSON", "a list of labels"):
+        labels = json_from(file.read_bytes())
+    if not isinstance(labels, list) or not all(map(is_label, labels)):
         raise InvalidProblemError(f"{file.name} holds something else; expected a list of integers, floats or strings")
     return labels

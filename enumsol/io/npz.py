@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zipfile
 import zlib
+from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,6 +12,8 @@ import scipy.sparse as sp
 
 from enumsol.errors import InvalidProblemError
 from enumsol.io.arrays import FORMAT_VERSION, arrays_of, check_names, layout_of, problem_from_arrays, refusing
+from enumsol.support.files import write_file
+from enumsol.support.saved import archive_arrays, check_shape
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -28,6 +31,7 @@ _DAMAGE = (
     NotImplementedError,
     RuntimeError,
     SyntaxError,
+    MemoryError,
     zipfile.BadZipFile,
     zlib.error,
 )
@@ -43,12 +47,13 @@ def read(path: Path) -> AnyProblem:
         )
     named: dict[str, Any] = dict(arrays)
     layout = layout_of(named)
+    room = sum(array.size for array in arrays.values())
     for name in layout.matrices:
         parts = {part: named.pop(f"{name}_{part}") for part in _PARTS if f"{name}_{part}" in named}
         if parts and name in named:
             raise InvalidProblemError(f"{name} is given as a matrix and in sparse parts; expected only one of them")
         if parts:
-            named[name] = _matrix(name, parts)
+            named[name] = _matrix(name, parts, room)
     check_names(named, layout)
     if "node_ids" in named:
         named["node_ids"] = _labels(named["node_ids"])
@@ -69,8 +74,9 @@ def write(problem: AnyProblem, path: Path) -> None:
             "node_ids cannot be kept in a .npz file; expected labels that are all integers, all floats or all strings"
         )
     arrays["node_ids"] = labels
-    with path.open("wb") as file:
-        np.savez_compressed(file, allow_pickle=False, **arrays)
+    packed = BytesIO()
+    np.savez_compressed(packed, allow_pickle=False, **arrays)
+    write_file(path, packed.getvalue(), "path")
 
 
 def _load(path: Path) -> dict[str, NDArray[Any]]:
@@ -79,27 +85,19 @@ def _load(path: Path) -> dict[str, NDArray[Any]]:
         if file.read(2) != b"PK":
             raise InvalidProblemError("it is not a .npz archive despite its name; expected what numpy.savez writes")
         file.seek(0)
-        archive = np.load(file, allow_pickle=False)
-        with archive:
-            return {name: _member(archive, name) for name in archive.files if not name.startswith("_")}
+        arrays = archive_arrays(file)
+    for name, array in arrays.items():
+        if array is None:
+            raise InvalidProblemError(
+                f"{name} is a pickled Python object, which is never loaded; expected an array of numbers, or for a "
+                f"sparse matrix its parts {', '.join(f'{name}_{part}' for part in _PARTS)}"
+            )
+        if not isinstance(array, np.ndarray):
+            raise InvalidProblemError(f"its member {name} is not a NumPy array; expected arrays only")
+    return arrays
 
 
-def _member(archive: Any, name: str) -> NDArray[Any]:
-    try:
-        array = archive[name]
-    except ValueError as error:
-        if "allow_pickle" not in str(error):
-            raise
-        raise InvalidProblemError(
-            f"{name} is a pickled Python object, which is never loaded; expected an array of numbers, or for a sparse "
-            f"matrix its parts {', '.join(f'{name}_{part}' for part in _PARTS)}"
-        ) from error
-    if not isinstance(array, np.ndarray):
-        raise InvalidProblemError(f"its member {name} is not a NumPy array; expected arrays only")
-    return array
-
-
-def _matrix(name: str, parts: dict[str, NDArray[Any]]) -> sp.csc_array | sp.csr_array:
+def _matrix(name: str, parts: dict[str, NDArray[Any]], room: int) -> sp.csc_array | sp.csr_array:
     missing = [f"{name}_{part}" for part in _PARTS if part not in parts]
     if missing:
         raise InvalidProblemError(
@@ -117,6 +115,8 @@ def _matrix(name: str, parts: dict[str, NDArray[Any]]) -> sp.csc_array | sp.csr_
     if parts["data"].ndim != 1 or parts["data"].dtype.kind not in "iufb":
         raise InvalidProblemError(f"{name}_data is not a list of real numbers; expected those of scipy.sparse")
     build = sp.csc_array if kind == "csc" else sp.csr_array
+    with refusing((ValueError,), f"{name} cannot be made", "a matrix of this problem"):
+        check_shape(f"{name}_shape", map(int, shape), room)
     with refusing((ValueError,), f"the sparse parts of {name} do not fit together", f"those of one {kind} matrix"):
         matrix = build((parts["data"], parts["indices"], parts["indptr"]), shape=(int(shape[0]), int(shape[1])))
         matrix.check_format(full_check=True)

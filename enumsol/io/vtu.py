@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
 from xml.etree import ElementTree
 
@@ -16,7 +17,7 @@ from enumsol.model.shapes import body_shape, row_frames
 from enumsol.model.statuses import STATUSES
 from enumsol.support.arguments import file_path
 from enumsol.support.array_arguments import real_array
-from enumsol.support.files import writing
+from enumsol.support.files import Content, write_files, writing
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
@@ -132,11 +133,11 @@ def write_vtu(problem: AnyProblem, state: State | Sequence[State], path: str | o
         states = {place.with_stem(f"{place.stem}-{k}"): one for k, one in enumerate(state)}
     meshio = MissingDependencyError.imported("meshio", "VTU files", "meshes")
     pictures = {file: _picture(meshio, problem, one) for file, one in states.items()}
-    for file, picture in pictures.items():
-        with writing(file, "path"):
-            picture.write(file, file_format="vtu")
+    files: dict[Path, Content] = {file: partial(picture.write, file_format="vtu") for file, picture in pictures.items()}
     if isinstance(state, Sequence):
-        _write_collection(place.with_suffix(".pvd"), [file.name for file in pictures])
+        files[place.with_suffix(".pvd")] = _collection([file.name for file in pictures])
+    with writing(place, "path"):
+        write_files(files)
 
 
 def _empty(states: Sequence[State]) -> str:
@@ -150,14 +151,13 @@ def _picture(meshio: Any, problem: AnyProblem, state: State) -> Any:
     return _plane(meshio, problem, state) if isinstance(problem, ContactProblem) else _space(meshio, problem, state)
 
 
-def _write_collection(place: Path, names: list[str]) -> None:
-    """The file by which ParaView shows files one after the other."""
+def _collection(names: list[str]) -> bytes:
+    """Content of the file by which ParaView shows files one after the other."""
     root = ElementTree.Element("VTKFile", type="Collection", version="0.1")
     collection = ElementTree.SubElement(root, "Collection")
     for k, name in enumerate(names):
         ElementTree.SubElement(collection, "DataSet", timestep=str(k), file=name)
-    with writing(place, "path"):
-        ElementTree.ElementTree(root).write(place, encoding="utf-8", xml_declaration=True)
+    return bytes(ElementTree.tostring(root, encoding="utf-8", xml_declaration=True))
 
 
 def _stresses(problem: AnyProblem, u: Floats) -> dict[str, Floats]:

@@ -23,9 +23,10 @@ from enumsol.proof.proof_file import Proof
 from enumsol.roots.root import Enclosure, Polytope, Root, RootFamily, summary
 from enumsol.roots.root_set import RootSet, SearchStats, Undecided
 from enumsol.support.arguments import file_path, positive_integer, shown
-from enumsol.support.files import reading, writing
+from enumsol.support.files import reading, write_file
 from enumsol.support.immutable import Immutable
 from enumsol.support.plotting import kept
+from enumsol.support.saved import Array, Maybe, check_kind, is_fraction, is_number, json_from
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -56,10 +57,7 @@ def save_history(data: history_data.HistoryData, file: str | Path) -> None:
         "seconds": data.seconds,
         "refinement": None if data.refinement is None else asdict(data.refinement),
     }
-    place = file_path(file, "file")
-    text = json.dumps(record)
-    with writing(place, "file"):
-        place.write_text(text, encoding="utf-8")
+    write_file(file_path(file, "file"), json.dumps(record), "file")
 
 
 def load_history(file: str | Path, problem: Any) -> history_data.HistoryData:
@@ -72,11 +70,13 @@ def load_history(file: str | Path, problem: Any) -> history_data.HistoryData:
     """
     place = file_path(file, "file")
     with reading(place, "a history", "History.save"):
-        record = json.loads(place.read_text(encoding="utf-8"))
+        record = json_from(place.read_bytes())
         if record["format"] != FORMAT or record["version"] != VERSION:
             raise InvalidArgumentError(f"{place} has another format; expected {FORMAT}, version {VERSION}")
         if record["problem"] != problem.fingerprint:
             raise InvalidArgumentError(f"{place} holds a history of another problem (its fingerprint is different)")
+        check_kind(record, _kind(problem, record["steps"]), "history")
+        _check_nodes(record)
         steps = tuple(_read_step(step, problem) for step in record["steps"])
         stages = tuple(_read_stage(k, item, problem, steps, record) for k, item in enumerate(record["stages"]))
         refinement = record["refinement"]
@@ -93,6 +93,56 @@ def load_history(file: str | Path, problem: Any) -> history_data.HistoryData:
             record["seconds"],
             refinement,
         )
+
+
+def _kind(problem: AnyProblem, steps: Any) -> dict[str, Any]:
+    """Kinds of what a file holds."""
+    p, shape = problem.p, problem.slip_offset.shape
+    known = {status.value for status in ContactStatus}
+    statuses, slips = (known,) * p, Array(*shape)
+    vectors = dict(zip(_ARRAYS, (Array(p), slips) * 2, strict=True))
+    bounds = dict(zip(_ARRAYS, (Array(p, 2), Array(*shape, 2)) * 2, strict=True))
+    root = {
+        **{"statuses": statuses, "active": ([known],) * p, **vectors},
+        **{"index": Maybe(int), "regular": bool, "margin": is_number, "bounds": Maybe(bounds)},
+        **{"slips": Maybe([is_fraction]), "angles": Maybe(((str, str),) * p)},
+    }
+    part = (statuses, Array(None, p, 2), range(3 * p + 7))
+    stage = {
+        **{"step": range(1, 1 + len(steps)), "offset": slips, "radius": Maybe(slips), "exact": Maybe([is_fraction])},
+        **{"reasons": [str], "alpha": is_fraction, "as_float": bool, "roots": [root]},
+        "families": [{"polytopes": [part], "index": Maybe(int), "proven": bool}],
+        "undecided": [((Maybe(str),) * p, str, str, int)],
+        **{"stopped": Maybe(str), "at_least": int, "certified_data": {"problem", "condensed"}},
+        **{"stats": {"nodes": int, "closed": int, "seconds": float}, "proof": Maybe(str)},
+    }
+    node = (int, int)
+    refinement = {"halvings": int, "settled": bool, "changed_at": [int], "reason": Maybe(str)}
+    return {
+        "arithmetic": {"verified", "exact", "fast"},
+        "steps": [{"alpha": Maybe(is_fraction), "friction": Maybe(_is_list), "load": Maybe(Array(problem.n))}],
+        **{"stages": [stage], "parents": [[node]], "followed": [node], "reasons": [str]},
+        **{"seconds": is_number, "refinement": Maybe(refinement)},
+    }
+
+
+def _is_list(value: Any) -> bool:
+    return isinstance(value, list)
+
+
+def _check_nodes(record: dict[str, Any]) -> None:
+    """Refuse a file that names roots which are not in it, or are of another step than the one before."""
+    roots = [0] * (len(record["steps"]) + 1)
+    for stage in record["stages"]:
+        roots[stage["step"]] += len(stage["roots"])
+    parents = [
+        (stage["step"] - 1, *node)
+        for stage, nodes in zip(record["stages"], record["parents"], strict=True)
+        for node in nodes
+    ]
+    for before, step, root in [*parents, *((step, step, root) for step, root in record["followed"])]:
+        if before != step or not 0 < step < len(roots) or root not in range(roots[step]):
+            raise ValueError(f"there is no root {step, root} before one that follows it")
 
 
 def _step(step: LoadStep) -> dict[str, Any]:

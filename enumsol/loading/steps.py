@@ -14,6 +14,8 @@ from enumsol.model.problem import ContactProblem
 from enumsol.support.arguments import alpha_value, exact_number, shown
 from enumsol.support.array_arguments import plain_array, real_array
 from enumsol.support.immutable import Sealed, sealed
+from enumsol.support.messages import shortened
+from enumsol.support.saved import table_text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -165,13 +167,12 @@ def read_steps(file: str | Path) -> pd.DataFrame:
     import pandas as pd
 
     try:
-        return pd.read_csv(file, skipinitialspace=True, dtype=str, keep_default_na=False, comment="#")
+        return pd.read_csv(table_text(file), skipinitialspace=True, dtype=str, keep_default_na=False, comment="#")
     except OSError as error:
         raise InvalidArgumentError(f"steps {file} cannot be read ({error.strerror}); expected a CSV file") from error
     except ValueError as error:
-        raise InvalidArgumentError(
-            f"steps {file} is not a table ({error}); expected a CSV file with a header"
-        ) from error
+        why = shortened(str(error).removeprefix("Error tokenizing data. C error: "))
+        raise InvalidArgumentError(f"steps {file} is not a table ({why}); expected a CSV file with a header") from error
 
 
 def _step(item: Any, number: int, expected: str) -> LoadStep:
@@ -195,7 +196,7 @@ def _from_table(problem: Problem, table: Any, expected: str) -> list[LoadStep]:
     loads = [name for name in names if name not in ("alpha", "friction")]
     unknown = [name for name in loads if name not in set(components)]
     if unknown or not names or len(set(names)) < len(names):
-        raise InvalidArgumentError(f"steps has the columns {', '.join(names)}; {expected}")
+        raise InvalidArgumentError(f"steps has the columns {shortened(', '.join(names))}; {expected}")
     found = []
     for k in range(len(table)):
         row = dict(zip(names, table.iloc[k].tolist(), strict=True))

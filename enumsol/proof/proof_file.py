@@ -30,7 +30,7 @@ import numpy as np
 from enumsol.errors import EnumsolError, InvalidArgumentError
 from enumsol.support.arguments import file_path
 from enumsol.support.array_types import Floats, Indices
-from enumsol.support.files import writing
+from enumsol.support.files import check_replaceable, write_file
 from enumsol.support.messages import html_lines
 
 MAGIC = b"enumsol-proof 1\n"
@@ -121,14 +121,13 @@ class Proof:
         Raises
         ------
         InvalidArgumentError
-            The file cannot be written.
+            The file cannot be written, or there is one that is not a proof.
         ProofFormatError
             The proof's own file cannot be read any more.
         """
         place = file_path(path, "path")
-        data = self.content()
-        with writing(place, "path"):
-            place.write_bytes(data)
+        check_replaceable(place, "path", MAGIC[:14], "a proof")
+        write_file(place, self.content(), "path")
 
     def content(self) -> bytes:
         """The bytes of the proof file.

@@ -21,7 +21,7 @@ import numpy as np
 
 from enumsol.proof.proof_file import MAGIC, Proof
 from enumsol.proof.reading import rational_text
-from enumsol.support.files import writing
+from enumsol.support.files import check_replaceable, writing
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -131,8 +131,8 @@ class KeptRecords:
 
 #: Records after which a file is readable to its end: what a killed program loses.
 FLUSH_EVERY = 64
-#: Ending of the file that is to replace another one.
-BESIDE = ".resumed"
+#: Endings of the file that is to replace another one, and of the one that is replaced.
+BESIDE, BEFORE = ".resumed", ".before"
 
 
 class ProofWriter:
@@ -146,7 +146,8 @@ class ProofWriter:
     path : path or None
         Where the proof is streamed to; None keeps the compressed proof in memory.
     beside : bool
-        There is a file at ``path`` that must not be lost: a file beside it is written, until `replace`.
+        There is a file at ``path`` that must not be lost: a file beside it is written, until `replace`. Otherwise a
+        proof that is there is kept beside the new one, and comes back if that cannot be written to the end.
 
     Attributes
     ----------
@@ -156,19 +157,21 @@ class ProofWriter:
     Raises
     ------
     InvalidArgumentError
-        The file cannot be written.
+        The file cannot be written, or there is one that is not a proof.
     """
 
     def __init__(self, path: str | Path | None = None, *, beside: bool = False) -> None:
         self._path = None if path is None else Path(path)
         self._beside: Path | None = None
+        self._before: Path | None = None
         if beside and self._path is not None:
             self._path = Path(os.path.realpath(self._path))
             self._beside = self._path.with_name(self._path.name + BESIDE)
         self._may_replace = False
-        with contextlib.nullcontext() if self._path is None else writing(self._path, "proof_path"):
-            place = self._beside or self._path
-            self._file: BinaryIO = io.BytesIO() if place is None else place.open("wb")
+        self._file: BinaryIO = io.BytesIO()
+        if self._path is not None:
+            with writing(self._path, "proof_path"):
+                self._file = self._opened(self._path)
         self.failure: str | None = None
         self._digest = hashlib.sha256()
         self._checksum = Checksum()
@@ -216,6 +219,8 @@ class ProofWriter:
             return Proof(self._file.getvalue())  # type: ignore[attr-defined]
         if self.failure is None:
             self._attempt(self._file.close)
+            if self._before is not None:
+                self._before.unlink(missing_ok=True)
         if self._beside is not None:
             beside, path = self._beside, self._path
             if self._may_replace and self.failure is None:
@@ -224,6 +229,30 @@ class ProofWriter:
                 beside.unlink(missing_ok=True)
             self._beside = None
         return Proof(self._path)
+
+    def _opened(self, path: Path) -> BinaryIO:
+        if self._beside is not None:
+            return self._beside.open("wb")
+        check_replaceable(path, "proof_path", MAGIC[:14], "a proof")
+        if not path.is_file() or not path.stat().st_size or not os.access(path, os.W_OK):
+            return path.open("wb")
+        target = Path(os.path.realpath(path))
+        with contextlib.suppress(OSError):  # a folder that takes no new names
+            self._before = target.rename(target.with_name(target.name + BEFORE))
+        try:
+            file = target.open("wb")
+            if self._before is not None:
+                target.chmod(self._before.stat().st_mode & 0o7777)
+        except OSError:
+            self._restore()
+            raise
+        return file
+
+    def _restore(self) -> None:
+        """Put back the proof that was there before."""
+        if self._before is not None and self._path is not None:
+            self._before.replace(os.path.realpath(self._path))
+            self._before = None
 
     def _flush(self) -> None:
         if self._pending:
@@ -252,6 +281,7 @@ class ProofWriter:
             )
             with contextlib.suppress(OSError):  # the same once more, for what is still in its buffer
                 self._file.close()
+            self._restore()
 
 
 def point_header(

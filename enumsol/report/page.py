@@ -29,7 +29,7 @@ from enumsol.report.parts import (
 from enumsol.report.roots_page import roots_page
 from enumsol.roots.root_set import RootSet
 from enumsol.support.arguments import file_path, instance_of
-from enumsol.support.files import writing
+from enumsol.support.files import write_file
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
@@ -121,8 +121,7 @@ def write_report(
         page = roots_page(solutions, *words)
     else:
         page = history_page(solutions, *words)
-    with writing(place, "file"):
-        place.write_text(page, encoding="utf-8")
+    write_file(place, page, "file")
 
 
 def _checked_scene(scene: Any) -> Scene | None:

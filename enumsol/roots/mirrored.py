@@ -15,7 +15,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.model.mirrors import Mirror
 from enumsol.support.arguments import instance_of
 from enumsol.support.immutable import Sealed
-from enumsol.support.messages import counted
+from enumsol.support.messages import counted, visible
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -148,7 +148,7 @@ def problem_asymmetry(problem: Any, alpha: Alpha, mirror: Mirror, tolerance: flo
         worst = float(np.max(most))
         if not worst <= tolerance:
             where = np.unravel_index(int(np.argmax(most)), most.shape)
-            nodes = " and ".join(dict.fromkeys(str(problem.node_ids[int(k) % problem.p]) for k in where))
+            nodes = " and ".join(dict.fromkeys(visible(problem.node_ids[int(k) % problem.p]) for k in where))
             changes_by = (
                 "changes by" if np.abs(middle[where]) > tolerance else "is known too coarsely, and may change by"
             )

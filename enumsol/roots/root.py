@@ -12,7 +12,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.model.statuses import ContactStatus, sign_array
 from enumsol.roots.local_branch import LocalBranchTest, branch_test
 from enumsol.support.immutable import Sealed, sealed
-from enumsol.support.messages import html_lines, html_table
+from enumsol.support.messages import html_lines, html_table, visible
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -421,7 +421,7 @@ def root_html(root: Root, labels: tuple[Any, ...]) -> str:
 def node_table(state: ContactState, labels: tuple[Any, ...]) -> list[str]:
     """Lines of a table over the contact nodes; of many the first."""
     shown = min(len(labels), _PRINTED_NODES)
-    width = max(4, *(len(str(label)) for label in labels[:shown]))
+    width = max(4, *(len(visible(label)) for label in labels[:shown]))
     lines = [
         node_heading(width, 1 if state.lambda_t.ndim == 1 else 2),
         *(node_line(state, i, labels[i], width) for i in range(shown)),
@@ -444,7 +444,7 @@ def _node_heads(tangents: int) -> list[str]:
 def node_line(state: ContactState, i: int, label: object, width: int) -> str:
     """Status, forces and displacements of a contact node, below `node_heading`."""
     text = " ".join(f"{number:>12.6g}" for number in _node_numbers(state, i))
-    return f"{label!s:>{width}} {state.statuses[i].value:<7} {text}"
+    return f"{visible(label):>{width}} {state.statuses[i].value:<7} {text}"
 
 
 def _node_numbers(state: ContactState, i: int) -> list[float]:

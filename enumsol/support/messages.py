@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import enum
+import unicodedata
 from collections.abc import Iterable
 from html import escape
+
+#: Categories of characters that control a terminal (also the direction of writing), or that have no picture.
+_UNSEEN = frozenset(("Cc", "Cf", "Cn", "Co", "Cs", "Zl", "Zp"))
 
 
 class TextEnum(enum.StrEnum):
@@ -12,6 +16,15 @@ class TextEnum(enum.StrEnum):
 
     def __repr__(self) -> str:
         return repr(self.value)
+
+
+def visible(text: object, keep: str = "") -> str:
+    r"""A text without what a terminal obeys or does not show, as escapes such as ``\x1b``; ``keep`` may stay."""
+    said = str(text)
+    if said.isprintable():
+        return said
+    shown = (c if c in keep or unicodedata.category(c) not in _UNSEEN else ascii(c)[1:-1] for c in said)
+    return "".join(shown)
 
 
 def counted(number: int, singular: str, plural: str | None = None) -> str:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from functools import cache
+from io import BytesIO
 from typing import Any
 
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.support.arguments import file_path
-from enumsol.support.files import writing
+from enumsol.support.files import write_file
 
 
 def new_figure(**options: Any) -> Any:
@@ -29,8 +30,6 @@ def new_figure(**options: Any) -> Any:
 
 @cache
 def _figure_class() -> Any:
-    from io import BytesIO
-
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -62,8 +61,16 @@ def kept(figure: Any, file: Any) -> Any:
     """
     if file is not None:
         place = file_path(file, "file")
-        with writing(place, "file"):
-            figure.savefig(place, dpi=150)
+        place = place if place.suffix else place.with_name(f"{place.name}.png")  # as matplotlib does
+        kind = place.suffix.removeprefix(".").lower()
+        drawn = BytesIO()  # not all of matplotlib's formats survive a file that cannot be written
+        try:
+            figure.savefig(drawn, dpi=150, format=kind)
+        except ValueError as error:
+            if kind in figure.canvas.get_supported_filetypes():
+                raise
+            raise InvalidArgumentError(f"file is {place}; expected a name that ends in .png, .pdf or .svg") from error
+        write_file(place, drawn.getvalue(), "file")
     return figure
 
 

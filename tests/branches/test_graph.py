@@ -154,7 +154,7 @@ def test_files_that_are_no_graphs_are_refused(tmp_path):
     file = tmp_path / "graph.json"
     bad_argument("cannot be read", BranchGraph.load, file)
     old = '{"format": "enumsol-branch-graph", "version": 1}'
-    for text, message in (("{", "JSON"), ("[]", "format"), (old, "damaged")):
+    for text, message in (("{", "JSON"), ("[]", "format"), (old, "'reasons' is missing")):
         file.write_text(text)
         bad_argument(message, BranchGraph.load, file)
 
@@ -198,7 +198,7 @@ def test_kinds_of_vertices_are_texts_too(square, tmp_path):
     assert [item["kind"] for item in json.loads(file.read_text())["vertices"]] == [v.kind for v in square.vertices]
     assert all(type(v.kind) is VertexKind for v in BranchGraph.load(file).vertices)
     file.write_text(file.read_text().replace('"kind": "fold"', '"kind": "cusp"', 1))
-    bad_argument(r"damaged .*'cusp'", BranchGraph.load, file)
+    bad_argument(r"does not hold a graph \(.*'cusp'", BranchGraph.load, file)
 
 
 def test_the_first_number_is_that_at_the_first_alpha_also_if_this_is_no_float():

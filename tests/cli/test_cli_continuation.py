@@ -211,7 +211,7 @@ def test_ctrl_c_audits_what_was_found(capsys, points, monkeypatch):
         (("--node", "7"), "there is no contact node 7"),
         (("--plot", "p.xyz"), "--plot is p.xyz; expected a file name that ends in"),
         (("--csv", "-", "--json", "-"), "--json and --csv are both -"),
-        (("--graph", "graph.json", "--plot", "p.png"), "graph graph.json cannot be read"),
+        (("--graph", "graph.json", "--plot", "p.png"), "graph.json cannot be read"),
     ],
 )
 def test_bad_follow_calls_get_one_sentence(capsys, tmp_path, monkeypatch, options, part):
@@ -245,7 +245,7 @@ def test_bad_points_get_one_sentence(capsys, tmp_path, points, graph):
     assert_refused(*run(capsys, *AUDIT, points, "--graph", graph, "--to", 3), "a graph has its own interval")
     other = ("audit", "gallery:one-node-6.2", points, "--graph", graph)
     assert_refused(*run(capsys, *other), "a graph of another problem")
-    assert_refused(*run(capsys, *AUDIT, points, "--graph", points), "is not a JSON file")
+    assert_refused(*run(capsys, *AUDIT, points, "--graph", points), "it is not JSON")
 
 
 def test_two_node_branches_end_to_end(capsys, tmp_path):

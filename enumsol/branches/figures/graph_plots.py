@@ -31,7 +31,7 @@ from enumsol.branches.roots_at import roots_at
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.arguments import alpha_interval, positive_number, shown
 from enumsol.support.messages import counted
-from enumsol.support.plotting import axes_or_none, figure_of, new_figure
+from enumsol.support.plotting import axes_or_none, figure_of, kept, new_figure
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -135,9 +135,7 @@ def plot_graph(
     _mark_windows(axes, windows)
     _words(figure, axes[0][0], graph, chosen, title, others, alone=ax is not None)
     draw_numbers(figure, panels, None if ax is None else ax)
-    if file is not None:
-        figure.savefig(file, dpi=150)
-    return figure
+    return kept(figure, file)
 
 
 def checked_units(units: Any) -> tuple[str, str] | None:

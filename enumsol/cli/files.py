@@ -1,0 +1,146 @@
+"""The files that a command names: no output takes the place of an input, or of another output of the same call."""
+
+from __future__ import annotations
+
+import os
+import re
+from glob import escape
+from itertools import combinations
+from os.path import exists, isdir, isfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from typer.core import TyperCommand
+
+from enumsol.cli.common import TOML
+from enumsol.errors import InvalidArgumentError
+from enumsol.support.files import check_replaceable
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+#: Metavariables of what a command writes, and of what it reads.
+_WRITTEN, _READ = ("FILE",), ("PROBLEM", "MESH", "POINTS", "PROOF", "SOLUTIONS", "GRAPH", "STEPS")
+#: How the files begin that some options write, and what these are.
+_BEGINNINGS = {
+    "--proof": (b"enumsol-proof ", "a proof"),
+    "--save": (b'{"format": "enumsol-', "a saved graph or history"),
+    "--report": (b"<!DOCTYPE html>", "an HTML page"),
+    "--graphml": (b"<?xml", "a GraphML file"),
+}
+#: How meshes name files that belong to them: XDMF the heavy data, Abaqus what it includes.
+_REFERENCES = {".xdmf": rb"([^\s<>]+):/", ".inp": rb"(?i)input\s*=\s*([^,\r\n]+)"}
+#: Files of a problem in a directory.
+_MATRICES = ("*.mtx", "node_ids.json")
+
+
+class FileCommand(TyperCommand):
+    """A command that refuses, before it does anything, outputs that would take the place of other files.
+
+    Raises
+    ------
+    InvalidArgumentError
+        An output is an input, by whatever name, or another output, or an existing file of another kind than the option
+        writes.
+    """
+
+    def invoke(self, ctx: Any) -> Any:
+        """Check the files, then run the command."""
+        named = [(option.metavar, option.opts[0], option, ctx.params.get(option.name)) for option in self.params]
+        given = [(metavar, name, value) for metavar, name, _, value in named if isinstance(value, str) and value != "-"]
+        outputs = [(_called(name), value) for metavar, name, value in given if metavar in _WRITTEN]
+        check_files([(str(metavar), value) for metavar, _, value in given if metavar in _READ], outputs)
+        for name, value in outputs:
+            kind = "--report" if (ctx.info_name, name) == ("report", "--output") else name
+            if kind in _BEGINNINGS:
+                check_replaceable(Path(value), name, *_BEGINNINGS[kind])
+        return super().invoke(ctx)
+
+
+def _called(name: str) -> str:
+    """What a message calls an option, or an argument."""
+    return name if name.startswith("-") else name.upper()
+
+
+def check_files(inputs: list[tuple[str, str]], outputs: list[tuple[str, str]]) -> None:
+    """Refuse outputs that are inputs or one another; each has the name of its option and its own.
+
+    Raises
+    ------
+    InvalidArgumentError
+        Two are one file: by the same path, a link, or letters of another case where these make no difference.
+    """
+    for (name, value), (other, again) in combinations(outputs, 2):
+        if any(_same(a, b) for a in _all_written(name, value) for b in _all_written(other, again)):
+            raise InvalidArgumentError(f"{name} is {value}, and {other} is {again}, the same file; expected two files")
+    existing = [(name, value, file) for name, value in outputs for file in _all_written(name, value) if exists(file)]
+    if not existing:
+        return
+    for kind, given in inputs:
+        for read in _all_read(kind, Path(given)):
+            for name, value, file in existing:
+                if _same(file, read):
+                    what = kind if str(read) == given else f"a file of {kind} {given}"
+                    raise InvalidArgumentError(
+                        f"{name} is {value}, which would replace {read} ({what}), an input; expected another file"
+                    )
+
+
+def _all_written(name: str, value: str) -> Iterator[Path]:
+    """The files that an output may become."""
+    place = Path(value)
+    if isdir(place):
+        for pattern in _MATRICES:
+            yield from place.glob(pattern)
+        return
+    yield place
+    if name == "--vtu":
+        yield place.with_suffix(".pvd")
+        yield from place.parent.glob(f"{escape(place.stem)}-*.vtu")
+
+
+def _all_read(kind: str, place: Path) -> Iterator[Path]:
+    """The files that an input consists of, those among them that are named in others."""
+    if isdir(place):
+        for pattern in ("*",) if kind == "SOLUTIONS" else _MATRICES:
+            yield from (file for file in place.glob(pattern) if isfile(file))
+    waiting, seen = [place], set[Path]()
+    while waiting:
+        file = waiting.pop()
+        if isfile(file) and file not in seen:
+            yield file
+            seen.add(file)
+            waiting += [file.parent / name for name in _references(file)]
+
+
+def _references(place: Path) -> list[str]:
+    """Names of other files in a file of a problem or a mesh; what is wrong with it is said where it is read."""
+    try:
+        if place.suffix == TOML:
+            from enumsol.support.saved import toml_from  # numpy: not for --help
+
+            told = toml_from(place.read_bytes())
+            return [name for key in ("mesh", "steps") if isinstance(name := told.get(key), str) and name]
+        pattern = _REFERENCES.get(place.suffix.lower())
+        found = [] if pattern is None else re.findall(pattern, place.read_bytes())
+        return [os.fsdecode(name.strip().strip(b"\"'")) for name in found if b"\0" not in name]
+    except (OSError, ValueError):
+        return []
+
+
+def _same(a: Path, b: Path) -> bool:
+    """Whether two names are those of one regular file, which may not be there yet."""
+    try:
+        return a.samefile(b) and a.is_file()
+    except (OSError, ValueError):
+        pass
+    one, other = (Path(os.path.realpath(place)) for place in (a, b))
+    if one == other:
+        return True
+    return one.parent == other.parent and one.name.casefold() == other.name.casefold() and _folds(one.parent)
+
+
+def _folds(folder: Path) -> bool:
+    """Whether upper and lower case are the same in the names of a folder."""
+    other = folder.with_name(folder.name.swapcase())
+    return other != folder and other.exists() and other.samefile(folder)
