@@ -175,7 +175,7 @@ def _basins(
         (plot_file, lambda path: output.write_figure(path, plot_basins(table))),
         json_file=json_file,
         csv_file=csv_file,
-        text=lambda: _basin_text(table, len(roots), roots.completeness()),
+        text=lambda: _basin_text(table, len(roots), roots.closing_line),
         content=lambda: {"problem": name, "alpha": float(alpha), **_basin_content(table, len(roots))},
         frame=lambda: table,
     )
@@ -192,7 +192,7 @@ def _basin_text(table: pd.DataFrame, roots: int, completeness: str) -> str:
     for root in range(roots):
         rows = table[table["root"] == root]
         most = f", up to {counted(rows['iterations'].max(), 'iteration')}" if len(rows) else ""
-        lines.append(f"root {root}: reached from {len(rows)} of {len(table)} starts{most}")
+        lines.append(f"root {root}: reached from {len(rows)} of {counted(len(table), 'start')}{most}")
     lost = table[table["root"].isna()]
-    lines += [f"no root ({outcome}): {len(rows)} starts" for outcome, rows in lost.groupby("outcome")]
+    lines += [f"no root ({outcome}): {counted(len(rows), 'start')}" for outcome, rows in lost.groupby("outcome")]
     return "\n".join([*lines, f"the list of roots is {completeness}"])

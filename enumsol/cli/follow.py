@@ -152,7 +152,7 @@ def _starts(
     count = len(found)
     if not count:
         raise InvalidArgumentError(
-            f"there is no isolated root at alpha = {float(alpha):g} ({found.completeness()}); expected another --start"
+            f"there is no isolated root at alpha = {float(alpha):g} ({found.closing_line}); expected another --start"
         )
     if root is None:
         return list(enumerate(found))

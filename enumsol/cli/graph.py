@@ -199,7 +199,7 @@ def as_content(found: BranchGraph) -> dict[str, Any]:
     arcs, vertices = found.to_frame(), found.vertices_frame()
     return {
         **found.summary(),
-        "completeness": found.completeness(),
+        "completeness": found.closing_line,
         "branch_list": branches,
         "arc_list": arcs.to_dict("records"),
         "vertex_list": vertices.to_dict("records"),

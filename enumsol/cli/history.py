@@ -26,6 +26,7 @@ from enumsol.cli.options import (
 from enumsol.cli.output import as_json, check_outputs, check_plot, check_writable, deliver, write_figure
 from enumsol.cli.progress import Display
 from enumsol.errors import InvalidArgumentError
+from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from enumsol.loading.growing import HistoryProgress
@@ -144,7 +145,10 @@ class _HistoryDisplay(Display):
         """Show where the history is."""
         of_step = state.stages / (state.stages + state.waiting)
         share = (state.step - 1 + of_step) / state.steps
-        self.show(share, f"step {state.step} of {state.steps}, {state.waiting} starts left, {state.roots:,} roots")
+        self.show(
+            share,
+            f"step {state.step} of {state.steps}, {counted(state.waiting, 'start')} left, {counted(state.roots, 'root')}",
+        )
 
 
 def _steps(problem: str, steps: str | None) -> Any:

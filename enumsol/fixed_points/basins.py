@@ -177,7 +177,7 @@ def basin_table(
     table = pd.DataFrame(rows, columns=names).astype({"root": "Int64"})
     table.attrs["never"] = sorted(set(range(len(roots))) - set(table["root"].dropna().astype(int)))
     if stopped is not None:
-        raise Interrupted(f"interrupted after {len(rows)} of {len(bounds)} starts", table) from None
+        raise Interrupted(f"interrupted after {len(rows)} of {counted(len(bounds), 'start')}", table) from None
     return table
 
 
@@ -190,7 +190,7 @@ def _common_alpha(roots: Sequence[Any]) -> Alpha:
         ) from None
     if len(set(alphas)) != 1:
         raise InvalidArgumentError(
-            f"roots has {len(alphas)} roots at {len(set(alphas))} alphas; expected at least one, all at the same alpha"
+            f"roots has {counted(len(alphas), 'root')} at {counted(len(set(alphas)), 'alpha')}; expected at least one, all at the same alpha"
         )
     return alphas[0]
 

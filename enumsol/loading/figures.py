@@ -59,7 +59,7 @@ def draw_history(data: HistoryData, x: Any, y: Any, ax: Any) -> Any:
     _name_ends(data, across, up, ax)
     ax.set_xlabel(_label(x))
     ax.set_ylabel(_label(y))
-    ax.set_title(data.completeness(), fontsize=9)
+    ax.set_title(data.closing_line, fontsize=9)
     ax.margins(0.07)
     return figure_of(ax)
 

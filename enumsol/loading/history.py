@@ -24,7 +24,7 @@ from enumsol.roots.root import Enclosure, Polytope, Root, RootFamily, summary
 from enumsol.roots.root_set import RootSet, SearchStats, Undecided
 from enumsol.support.arguments import file_path, positive_integer, shown
 from enumsol.support.files import reading, writing
-from enumsol.support.immutable import Immutable
+from enumsol.support.immutable import Immutable, Listed
 from enumsol.support.plotting import kept
 
 if TYPE_CHECKING:
@@ -283,21 +283,22 @@ class History(Immutable):
             There is no such step.
         """
         number = positive_integer(step, "step", most=len(self.steps))
-        return tuple(self.graph.nodes[node]["root"] for node in self.nodes_of(number))
+        return Listed((self.graph.nodes[node]["root"] for node in self.nodes_of(number)), "root")
 
     @property
     def branchings(self) -> tuple[history_data.Node, ...]:
         """Nodes that more than one root may follow; (0, 0) if the first step has several."""
-        return tuple(node for node, degree in self.graph.out_degree() if degree > 1)
+        return Listed((node for node, degree in self.graph.out_degree() if degree > 1), "branching")
 
     @property
     def ends(self) -> tuple[history_data.Node, ...]:
         """Nodes that nothing follows: those of the last step, and those after which nothing was searched or found."""
-        return tuple(node for node, degree in self.graph.out_degree() if degree == 0 and node != history_data.START)
+        ends = (node for node, degree in self.graph.out_degree() if degree == 0 and node != history_data.START)
+        return Listed(ends, "end")
 
     def stages(self, step: int) -> tuple[history_data.Stage, ...]:
         """The searches of one step, from 1, one for each start."""
-        return self.data.stages_of(step)
+        return Listed(self.data.stages_of(step), "stage")
 
     def nodes_of(self, step: int) -> tuple[history_data.Node, ...]:
         """The nodes of one step."""
@@ -412,9 +413,10 @@ class History(Immutable):
         check_is_problem(given)
         return cls(load_history(file, problem))
 
-    def completeness(self) -> str:
+    @property
+    def closing_line(self) -> str:
         """The closing line of the printed history."""
-        return self.data.completeness()
+        return self.data.closing_line
 
     def __repr__(self) -> str:
         return history_data.history_text(self.data)

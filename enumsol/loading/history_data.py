@@ -289,7 +289,8 @@ class HistoryData:
             number += 1
         return number
 
-    def completeness(self) -> str:
+    @property
+    def closing_line(self) -> str:
         """The closing line of the printed history."""
         if self.arithmetic == "fast":
             return "complete: no" if self.reasons else "complete: not proven (fast arithmetic)"
@@ -449,4 +450,4 @@ def _notes(history: HistoryData) -> list[str]:
         lines.append(f"   ... {len(history.reasons) - _REASONS} more reasons")
     if history.refinement is not None:
         lines.append(f"increments: {history.refinement}")
-    return [*lines, history.completeness()]
+    return [*lines, history.closing_line]

@@ -18,7 +18,7 @@ from enumsol.loading.strips import MapFold, MapRow, MapStrip, map_strip, ranges_
 from enumsol.model.problem import ContactProblem
 from enumsol.support import arguments
 from enumsol.support.array_arguments import vector_of
-from enumsol.support.immutable import Immutable
+from enumsol.support.immutable import Immutable, Listed
 from enumsol.support.messages import counted
 from enumsol.support.plotting import kept
 from enumsol.support.workers import spread
@@ -243,7 +243,8 @@ class MultiplicityMap(Immutable):
         strips: tuple[MapStrip, ...],
         missing: str | None,
     ) -> None:
-        self.name, self.interval, self.rows, self.strips, self.missing = name, interval, rows, strips, missing
+        self.name, self.interval, self.missing = name, interval, missing
+        self.rows, self.strips = Listed(rows, "row"), Listed(strips, "strip")
         self._freeze()
 
     @property
@@ -349,7 +350,7 @@ class MultiplicityMap(Immutable):
         """
         from enumsol.loading.figures import draw_map  # matplotlib comes with the first picture
 
-        return kept(draw_map(self.name, self.rows, self.strips, self.curves, self.completeness(), ax), file)
+        return kept(draw_map(self.name, self.rows, self.strips, self.curves, self.closing_line, ax), file)
 
     @property
     def unique_between(self) -> float:
@@ -357,7 +358,8 @@ class MultiplicityMap(Immutable):
         shares = [strip.share(*self.interval) for strip in self.strips]
         return sum(shares) / len(shares) if shares else 0.0
 
-    def completeness(self) -> str:
+    @property
+    def closing_line(self) -> str:
         """The closing line of the printed map."""
         if self.missing is not None:
             return f"complete: no ({self.missing})"
@@ -367,7 +369,7 @@ class MultiplicityMap(Immutable):
                 between += f", but for one solution over {_percent(self.unique_between)} of alpha"
             return f"complete: yes (proven at these values{self._within()}; {between})"
         number = sum(not row.complete for row in self.rows)
-        return f"complete: no (not proven at {number} of {len(self.rows)} values{self._within()})"
+        return f"complete: no (not proven at {number} of {counted(len(self.rows), 'value')}{self._within()})"
 
     def _within(self) -> str:
         """Of bodies that nothing holds, within which rigid displacements the map is about solutions."""
@@ -389,7 +391,7 @@ class MultiplicityMap(Immutable):
         for row in self.rows:
             text = f"{row.value:>8.5g}  {_counts(row):<{width}}  {_limit(row):>12}"
             lines.append(text + (f"{shares[row.value]:>19}" if row.value in shares else ""))
-        return "\n".join([*lines, self.completeness()])
+        return "\n".join([*lines, self.closing_line])
 
 
 def _share(strip: MapStrip | None, first: float, last: float) -> float:

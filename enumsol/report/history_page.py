@@ -34,7 +34,7 @@ def history_page(
         "title": escape(title),
         "plotly": "",
         "badge": "yes" if history.complete else "no",
-        "completeness": escape(history.completeness()),
+        "completeness": escape(history.closing_line),
         "reasons": _reasons(history),
         "answers": "",
         "facts": _facts(history),
@@ -112,7 +112,7 @@ def _image(figure: Any, words: str) -> str:
 
 
 def _certified(history: History, commands: Sequence[str]) -> str:
-    lines = [f"<p>{escape(history.completeness())}.</p>"]
+    lines = [f"<p>{escape(history.closing_line)}.</p>"]
     if history.complete:
         lines.append(
             "<p>It is proven that these are all histories of the steps as they are given: every step has no other "

@@ -142,7 +142,7 @@ def report_page(
         "title": escape(title),
         "plotly": packed_plotly(),
         "badge": "yes" if graph.complete else "no",
-        "completeness": escape(graph.completeness()),
+        "completeness": escape(graph.closing_line),
         "reasons": _reasons(graph),
         "facts": _facts(graph, units),
         "given": given_section(scene, units),
@@ -205,8 +205,8 @@ def _branches(graph: BranchGraph) -> str:
         if branch.sheet:
             return "sheet (a continuum over an interval)"
         if branch.closed:
-            return "closed"
-        return "unfinished" if any(v.kind.value == "unsettled" for v in branch.vertices) else "open"
+            return "loop"
+        return "unfinished" if any(v.kind.value == "unsettled" for v in branch.vertices) else "path"
 
     rows = []
     for branch in graph.branches:
@@ -259,7 +259,7 @@ def _certified(graph: BranchGraph, commands: Sequence[str]) -> str:
         "problem": "the matrices A, the contact rows and f as they were given",
         "condensed": "the condensed problem, S and g as computed",
     }[graph.certified_data]
-    lines = [f"<p>{escape(graph.completeness())}.</p>"]
+    lines = [f"<p>{escape(graph.closing_line)}.</p>"]
     if graph.complete:
         lines.append(
             f"<p>It is proven that every solution for every alpha of the interval lies on the arcs shown here. This is "

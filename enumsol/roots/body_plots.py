@@ -8,7 +8,15 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.cells import KINDS, boundary_facets, facet_outlines, outline_edges
-from enumsol.model.shapes import SLIP_ARROW, BodyShape, arrow_scale, body_shape, own_scales, slip_directions
+from enumsol.model.shapes import (
+    SLIP_ARROW,
+    BodyShape,
+    arrow_scale,
+    body_shape,
+    largest_length,
+    own_scales,
+    slip_directions,
+)
 from enumsol.model.statuses import ContactStatus
 from enumsol.support.arguments import positive_number
 from enumsol.support.plotting import axes_or_none, figure_of, new_figure
@@ -89,15 +97,11 @@ def _factors(
 ) -> tuple[tuple[float, ...], float]:
     """By what the displacements of each root are multiplied, and the forces of all."""
     arrows = arrow_scale(
-        max(_largest(shape.contact_forces(problem, root.lambda_n, root.lambda_t)) for root in roots), shape.size
+        max(largest_length(shape.contact_forces(problem, root.lambda_n, root.lambda_t)) for root in roots), shape.size
     )
     if scale is not None:
         return (positive_number(scale, "scale"),) * len(roots), arrows
-    return own_scales([_largest(shape.displacements(root.u)) for root in roots], shape.size), arrows
-
-
-def _largest(vectors: Floats) -> float:
-    return float(np.max(np.linalg.norm(vectors, axis=1), initial=0.0))
+    return own_scales([largest_length(shape.moves(root)) for root in roots], shape.size), arrows
 
 
 def _axes(figure: Any, place: Any, shape: BodyShape) -> Any:
@@ -106,7 +110,7 @@ def _axes(figure: Any, place: Any, shape: BodyShape) -> Any:
 
 
 def _draw(ax: Any, root: Any, problem: Any, shape: BodyShape, scale: float, arrows: float) -> None:
-    moves = scale * shape.displacements(root.u)
+    moves = scale * shape.moves(root)
     points = shape.points + moves
     places = shape.at_rows(points)
     forces = arrows * shape.contact_forces(problem, root.lambda_n, root.lambda_t)

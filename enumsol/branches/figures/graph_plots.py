@@ -313,7 +313,7 @@ def _words(
     """The title and the legend."""
     problem, (a, b) = graph.problem, graph.interval
     name = counted(problem.p, "contact node") if title is None else title
-    words = f"{name}, alpha in [{a:g}, {b:g}]; {graph.completeness()}"
+    words = f"{name}, alpha in [{a:g}, {b:g}]; {graph.closing_line}"
     if not alone:
         # no wider than the panel below, beside which others have titles of their own
         widths = first.get_gridspec().get_width_ratios()
