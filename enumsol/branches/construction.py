@@ -62,8 +62,8 @@ def branch_graph(
         degrees of freedom. "exact": everything in rationals, for the problem's own matrices of up to 250 degrees of
         freedom, and slow beyond some ten contact nodes.
         In 3D there is only "verified": solutions lie on curves in boxes, followed in balls (theory, sections 12.8 to
-        12.10), which takes seconds to minutes for one or two contact nodes. What stays open is named in
-        ``graph.reasons``.
+        12.10). Where there is one solution at every alpha, that takes seconds for some thirty contact nodes; with
+        several solutions, seconds to half a minute for up to eight. What stays open is named in ``graph.reasons``.
     progress : callable, optional
         Called with the name of the stage ("search", "arcs") and the share of it that is done.
     max_nodes : int, optional

@@ -14,6 +14,7 @@ from refusals import bad_argument
 
 from enumsol import enumerate_roots, gallery
 from enumsol.branches import branch_graph, link_samples, multiplicity_table, samples
+from enumsol.errors import InvalidArgumentError
 from enumsol.support.arguments import even_alphas
 
 ALPHAS = [0.5, 2.0, 3.5, 5.0, 7.5]
