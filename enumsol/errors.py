@@ -41,7 +41,7 @@ class NoSuchItemError(EnumsolError, IndexError):
     >>> enumsol.enumerate_roots(enumsol.gallery.one_node_triangle(), 5)[9]
     Traceback (most recent call last):
         ...
-    enumsol.errors.NoSuchItemError: there is no root 9: there are 3 roots; expected a number from 0 to 2, or from -3 to -1
+    enumsol.errors.NoSuchItemError: there is no root 9: there are 3 roots; expected a number from 0 to 2, ...
     """
 
 

@@ -1,4 +1,4 @@
-"""Every page of the documents is followed, and what it says comes out; README, with whose first screen the front page begins, and the pages on meshes elsewhere."""
+"""Every page of the documents is followed, and what it says comes out; README and the pages on meshes elsewhere."""
 
 import re
 

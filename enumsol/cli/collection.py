@@ -49,7 +49,8 @@ def export(
     deliver(
         json_file=json_file,
         text=lambda: (
-            f"wrote {counted(len(written), 'problem')} to {folder}/problems, and their solutions and proofs to {folder}/certified"
+            f"wrote {counted(len(written), 'problem')} to {folder}/problems, and their solutions and proofs to "
+            f"{folder}/certified"
         ),
         content=lambda: {"folder": folder, "names": [entry.name for entry in written]},
     )

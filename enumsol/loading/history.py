@@ -25,7 +25,7 @@ from enumsol.roots.root_set import RootSet, SearchStats, Undecided
 from enumsol.support.arguments import file_path, positive_integer, shown
 from enumsol.support.files import reading, writing
 from enumsol.support.immutable import Immutable, Listed
-from enumsol.support.plotting import kept
+from enumsol.support.plotting import checked_units, kept
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -358,7 +358,15 @@ class History(Immutable):
             )
         return pd.DataFrame(rows).astype({"index": "Int64"}) if rows else pd.DataFrame(rows)
 
-    def plot(self, x: Any = "displacement", y: Any = "alpha", *, ax: Any = None, file: str | Path | None = None) -> Any:
+    def plot(
+        self,
+        x: Any = "displacement",
+        y: Any = "alpha",
+        *,
+        units: tuple[str, str] | None = None,
+        ax: Any = None,
+        file: str | Path | None = None,
+    ) -> Any:
         """A figure of one quantity of the roots against another, a line for every history.
 
         Points that several histories share are grey; a point is open where the history was not followed, and a rhombus
@@ -370,6 +378,8 @@ class History(Immutable):
             "step", "alpha", "displacement" (of the loaded degrees of freedom in the direction in which the load
             changes), "lambda_n" or "lambda_t" (sums over the contact nodes; in 3D along the first axis), "dissipated"
             (work of friction since the start), or a function of a `Root`.
+        units : (str, str), optional
+            Of forces and of lengths, for the axes.
         ax : matplotlib Axes or None
             Draw there; None: in a new figure.
         file : path, optional
@@ -388,7 +398,7 @@ class History(Immutable):
         """
         from enumsol.loading.figures import draw_history  # matplotlib comes with the first picture
 
-        return kept(draw_history(self.data, x, y, ax), file)
+        return kept(draw_history(self.data, x, y, ax, checked_units(units)), file)
 
     def save(self, file: str | Path) -> None:
         """Write the history, with the proofs of its searches, as JSON; the problem is not part of the file.
@@ -418,8 +428,12 @@ class History(Immutable):
         """The closing line of the printed history."""
         return self.data.closing_line
 
+    def text(self, units: tuple[str, str] | None = None) -> str:
+        """What is printed, with units of forces and lengths if they are given."""
+        return history_data.history_text(self.data, checked_units(units))
+
     def __repr__(self) -> str:
-        return history_data.history_text(self.data)
+        return self.text()
 
     def _repr_html_(self) -> str:
         return history_data.history_html(self.data)

@@ -20,7 +20,7 @@ from enumsol.support import arguments
 from enumsol.support.array_arguments import vector_of
 from enumsol.support.immutable import Immutable, Listed
 from enumsol.support.messages import counted
-from enumsol.support.plotting import kept
+from enumsol.support.plotting import checked_units, in_units, kept
 from enumsol.support.workers import spread
 
 if TYPE_CHECKING:
@@ -325,7 +325,7 @@ class MultiplicityMap(Immutable):
             columns=["value", "first", "last", "solutions", "exact", "complete", "to_next"],
         )
 
-    def plot(self, *, ax: Any = None, file: str | Path | None = None) -> Any:
+    def plot(self, *, units: tuple[str, str] | None = None, ax: Any = None, file: str | Path | None = None) -> Any:
         """A figure: alpha across, the second parameter upwards, numbers of solutions by colour, folds as curves.
 
         What is proven is drawn in full colour: lines at the values, and between them green rectangles, in which the
@@ -334,6 +334,8 @@ class MultiplicityMap(Immutable):
 
         Parameters
         ----------
+        units : (str, str), optional
+            Of forces and of lengths, for the axis of a gap.
         ax : matplotlib Axes or None
         file : path, optional
 
@@ -350,7 +352,8 @@ class MultiplicityMap(Immutable):
         """
         from enumsol.loading.figures import draw_map  # matplotlib comes with the first picture
 
-        return kept(draw_map(self.name, self.rows, self.strips, self.curves, self.closing_line, ax), file)
+        name = in_units(self.name, "length" if self.name == "gap" else None, checked_units(units))
+        return kept(draw_map(name, self.rows, self.strips, self.curves, self.closing_line, ax), file)
 
     @property
     def unique_between(self) -> float:

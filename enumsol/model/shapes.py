@@ -59,7 +59,7 @@ class BodyShape:
         return np.asarray(self.motion @ u).reshape(self.points.shape) + self.offset
 
     def moves(self, root: Any) -> Floats:
-        """Displacements of all nodes at a root, (N, d) [length]: zero for a body at rest, of which only rounding is left.
+        """Displacements of all nodes at a root, (N, d) [length]: zero for a body at rest, where only rounding is left.
 
         What rounding is is measured by the displacements without contact forces, or, if nothing holds the body, by its
         size.

@@ -9,7 +9,6 @@ import numpy as np
 
 from enumsol.branches import BranchGraph
 from enumsol.branches.claims import ranges_text
-from enumsol.branches.figures.graph_plots import checked_units
 from enumsol.errors import InvalidArgumentError
 from enumsol.loading.history import History
 from enumsol.model.problem import ContactProblem
@@ -31,6 +30,7 @@ from enumsol.roots.root_set import RootSet
 from enumsol.support.arguments import file_path, instance_of
 from enumsol.support.files import writing
 from enumsol.support.messages import counted
+from enumsol.support.plotting import checked_units
 
 if TYPE_CHECKING:
     import os

@@ -14,6 +14,7 @@ from enumsol.roots.root import Enclosure, Root, RootFamily, summary
 from enumsol.support.arguments import positive_number, shown
 from enumsol.support.immutable import Immutable, Listed, Sealed
 from enumsol.support.messages import counted, html_lines, html_table
+from enumsol.support.plotting import checked_units, kept
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -381,7 +382,7 @@ class RootSet(Sequence[Root], Immutable):
             return {}
         return {"mirror_image": np.repeat(np.array(self.mirror_images.images, dtype=object), p)}
 
-    def plot_bodies(self, *, scale: float | None = None) -> Any:
+    def plot_bodies(self, *, scale: float | None = None, units: tuple[str, str] | None = None, file: Any = None) -> Any:
         """A matplotlib figure of the deformed bodies of the isolated roots, up to 12 of them, side by side.
 
         Forces are drawn in one scale, and displacements too unless their sizes differ by more than a factor of 8, as
@@ -391,6 +392,10 @@ class RootSet(Sequence[Root], Immutable):
         ----------
         scale : float, optional
             The displacements of all roots are multiplied by it.
+        units : (str, str), optional
+            Of forces and of lengths, for the axes and the largest contact force.
+        file : path, optional
+            Save the figure there.
 
         Raises
         ------
@@ -401,7 +406,7 @@ class RootSet(Sequence[Root], Immutable):
         """
         from enumsol.roots.body_plots import draw_bodies  # matplotlib comes with the first picture
 
-        return draw_bodies(self._roots, scale)
+        return kept(draw_bodies(self._roots, scale, checked_units(units)), file)
 
     @property
     def closing_line(self) -> str:

@@ -183,6 +183,19 @@ def _from_text(text: str, name: str) -> float | Fraction | None:
     return number
 
 
+def text_of(value: Any, name: str) -> str:
+    """A text.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is something else.
+    """
+    if not isinstance(value, str):
+        raise InvalidArgumentError(f"{name} is {shown(value)}; expected a text in quotes")
+    return value
+
+
 def alpha_list(values: Any, name: str = "alphas") -> list[Alpha]:
     """The exact values of several alphas, in their order.
 
