@@ -16,6 +16,7 @@ from enumsol.cli.progress import Display
 from enumsol.cli.streams import is_quiet
 from enumsol.errors import EnumsolError, Interrupted, InvalidArgumentError, OutputError
 from enumsol.support.arguments import text_of
+from enumsol.support.files import unreadable
 from enumsol.support.plotting import checked_units
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ class ExitStatus(enum.IntEnum):
 
 def described(problem: str) -> dict[str, Any]:
     """What a TOML file says besides the problem: steps, units and title; what is wrong with it is said elsewhere."""
-    if not problem.endswith(TOML):
+    if not problem.endswith(TOML) or unreadable(Path(problem)) is not None:
         return {}
     try:
         return tomllib.loads(Path(problem).read_text(encoding="utf-8"))
