@@ -49,6 +49,7 @@ from .errors import (
     InvalidArgumentError as InvalidArgumentError,
     InvalidProblemError as InvalidProblemError,
     MissingDependencyError as MissingDependencyError,
+    NoSuchItemError as NoSuchItemError,
     NotHeldError as NotHeldError,
     OutOfMemoryError as OutOfMemoryError,
     OutputError as OutputError,

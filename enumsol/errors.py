@@ -32,6 +32,19 @@ class TooLargeError(EnumsolError, ValueError):
     """The work asked for is beyond a stated limit; the message gives an estimate of its cost."""
 
 
+class NoSuchItemError(EnumsolError, IndexError):
+    """A list of results was asked for an item beyond its end.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> enumsol.enumerate_roots(enumsol.gallery.one_node_triangle(), 5)[9]
+    Traceback (most recent call last):
+        ...
+    enumsol.errors.NoSuchItemError: there is no root 9: there are 3 roots; expected a number from 0 to 2, ...
+    """
+
+
 class NotHeldError(EnumsolError, ValueError):
     """What was asked is not available for a body that nothing holds (one with ``rigid_modes``).
 

@@ -1,6 +1,7 @@
 """What README shows runs as it stands, and what its comments say comes out."""
 
 import re
+import tomllib
 
 import pytest
 from documents import ROOT, blocks, follow, write_wedge
@@ -62,3 +63,24 @@ def test_the_two_commands_are_there():
     install = "    python3 -m venv .venv && .venv/bin/pip install"
     lines = [line for line in README.read_text(encoding="utf-8").splitlines() if line.startswith(install)]
     assert lines == [f"{install} . && .venv/bin/{job}", f'{install} -e ".[test]" && .venv/bin/pytest']
+
+
+def test_the_front_page_says_what_the_first_screen_says():
+    """The site begins as README does: what it finds, for whom, with the command and what it prints."""
+    first = (
+        README.read_text(encoding="utf-8")
+        .partition("Each of the 8 contact nodes")[0]
+        .replace("(studies/", "(../studies/")
+    )
+    assert ".venv/bin/enumsol roots" in first
+    assert (ROOT / "docs" / "index.md").read_text(encoding="utf-8").startswith(first)
+
+
+def test_all_pages_count_the_compiled_modules_alike():
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    count = ["no", "one", "two", "three", "four"][len(settings["tool"]["setuptools"]["ext-modules"])]
+    for page, words in (
+        (README, f"compiles {count} small C modules"),
+        (ROOT / "CONTRIBUTING.md", f"the {count} compiled modules"),
+    ):
+        assert words in " ".join(page.read_text(encoding="utf-8").split()), page

@@ -17,6 +17,7 @@ from enumsol.continuation.path_data import PathStats, PathStatus
 from enumsol.errors import InvalidArgumentError, TooLargeError
 from enumsol.model.problem import check_is_problem
 from enumsol.support.arguments import alpha_interval, optional_callable, positive_integer, shown
+from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -66,8 +67,8 @@ class FollowAllResult:
     def __repr__(self) -> str:
         stats = self.stats
         lines = [
-            f"{len(self.paths)} paths ({self.reseeded} reseeded), {stats.accepted} steps, "
-            f"{stats.corrections} corrections",
+            f"{counted(len(self.paths), 'path')} ({self.reseeded} reseeded), {counted(stats.accepted, 'step')}, "
+            f"{counted(stats.corrections, 'correction')}",
             *(f"  failed at alpha = {alpha:.8g}: {reason}" for alpha, reason in self.failures),
             repr(self.report),
         ]

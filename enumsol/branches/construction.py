@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 #: Of the time that is left when arcs are begun: for working them out, and for joining them too, where there is a limit.
 #: To join them takes a fifth as long as to work them out by exact algebra, to make a graph of them another tenth.
 _WORKED_OUT, _JOINED = 0.55, 0.75
+#: What takes bodies that nothing holds where there is no graph of them, in messages.
+_AT_SINGLE_ALPHAS = " (weak ones will do), or multiplicity_table, which counts the solutions at single alphas"
 
 
 def branch_graph(
@@ -67,8 +69,8 @@ def branch_graph(
         degrees of freedom. "exact": everything in rationals, for the problem's own matrices of up to 250 degrees of
         freedom, and slow beyond some ten contact nodes.
         In 3D there is only "verified": solutions lie on curves in boxes, followed in balls (theory, sections 12.8 to
-        12.10), which takes seconds to minutes for one or two contact nodes. What stays open is named in
-        ``graph.reasons``.
+        12.10). Where there is one solution at every alpha, that takes seconds for some thirty contact nodes; with
+        several solutions, seconds to half a minute for up to eight. What stays open is named in ``graph.reasons``.
     progress : callable, optional
         Called with the name of the stage ("search", "arcs") and the share of it that is done.
     max_nodes : int, optional
@@ -214,7 +216,7 @@ def _in_space(
     """The graph of a problem in 3D."""
     from enumsol.branches.space.space_graph import space_graph  # continuation, and what only 3D needs
 
-    problem.check_held("branch_graph in 3D")
+    problem.check_held("branch_graph in 3D", instead=_AT_SINGLE_ALPHAS)
     if arithmetic != "verified":
         raise InvalidArgumentError(f'arithmetic is "{arithmetic}" for a problem in 3D; expected "verified"')
     for end in interval:
@@ -229,8 +231,8 @@ def _check_floating(problem: ContactProblem, arithmetic: Arithmetic) -> None:
     if problem.n > EXACT_DOF_LIMIT:
         raise TooLargeError(
             f"branch_graph follows a body that nothing holds in rationals, up to n = {EXACT_DOF_LIMIT} degrees of "
-            f"freedom, and the problem has n = {problem.n}; use "
-            "multiplicity_table"
+            f"freedom, and the problem has n = {problem.n}; expected fewer, or a body held by supports or "
+            f"springs{_AT_SINGLE_ALPHAS}"
         )
 
 

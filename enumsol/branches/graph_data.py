@@ -16,7 +16,7 @@ from enumsol.branches.elements import VertexKind, make_branches, make_components
 from enumsol.errors import InvalidArgumentError
 from enumsol.roots.root_set import by_axis
 from enumsol.support.arguments import alpha_value
-from enumsol.support.immutable import Immutable
+from enumsol.support.immutable import Immutable, Listed
 from enumsol.support.messages import counted, html_lines, html_table
 
 if TYPE_CHECKING:
@@ -96,6 +96,8 @@ class GraphData(Immutable):
     left_open: tuple[tuple[Fraction, Fraction], ...] | None = None
 
     def __post_init__(self) -> None:
+        self.vertices = Listed(self.vertices, "vertex", "vertices")
+        self.arcs = Listed(self.arcs, "arc")
         self._freeze()
 
     @cached_property
@@ -147,7 +149,8 @@ class GraphData(Immutable):
         """
         return self.claims.open_ranges
 
-    def completeness(self) -> str:
+    @property
+    def closing_line(self) -> str:
         """The closing line of the printed summary: whether the graph is complete, and of what, or why not."""
         if self.reasons:
             more = f"; {counted(len(self.reasons) - 1, 'more reason')}" if len(self.reasons) > 1 else ""
@@ -169,12 +172,12 @@ class GraphData(Immutable):
     @cached_property
     def components(self) -> tuple[Component, ...]:
         """Connected components of what was found, in the order of their smallest alpha."""
-        return make_components(self.graph, self.vertices, self.arcs)
+        return Listed(make_components(self.graph, self.vertices, self.arcs), "component")
 
     @cached_property
     def branches(self) -> tuple[Branch, ...]:
         """Components cut at bifurcations, families and sheets: paths and closed loops of arcs, and sheets."""
-        return make_branches(self.components, self.vertices)
+        return Listed(make_branches(self.components, self.vertices), "branch", "branches")
 
     @cached_property
     def branch_of(self) -> Mapping[int, int]:
@@ -241,7 +244,7 @@ def graph_text(data: GraphData) -> str:
     if len(data.branches) > _PRINTED_BRANCHES:
         lines.append(f"  ... {len(data.branches) - _PRINTED_BRANCHES} more branches")
     lines += _left_open(data)
-    return "\n".join([*lines, data.completeness()])
+    return "\n".join([*lines, data.closing_line])
 
 
 def graph_html(data: GraphData) -> str:
@@ -258,7 +261,7 @@ def graph_html(data: GraphData) -> str:
     ]
     more = len(data.branches) - _PRINTED_BRANCHES
     table = html_table(("branch", "shape", "arcs", "alpha from", "to", "folds at"), rows) if rows else ""
-    closing = [*([f"... {more} more branches"] if more > 0 else []), *_left_open(data), data.completeness()]
+    closing = [*([f"... {more} more branches"] if more > 0 else []), *_left_open(data), data.closing_line]
     return html_lines(_heading(data)) + table + html_lines(closing)
 
 
@@ -292,8 +295,8 @@ def _shape(branch: Branch) -> str:
     if branch.sheet:
         return "sheet"
     if branch.closed:
-        return "closed"
-    return "unfinished" if any(v.kind is VertexKind.UNSETTLED for v in branch.vertices) else "open"
+        return "loop"
+    return "unfinished" if any(v.kind is VertexKind.UNSETTLED for v in branch.vertices) else "path"
 
 
 def arcs_frame(data: GraphData) -> pd.DataFrame:

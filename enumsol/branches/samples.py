@@ -18,7 +18,7 @@ from enumsol.model.problem import ContactProblem, check_is_problem
 from enumsol.model.statuses import STATUSES, ContactStatus
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.roots.slips import ratios
-from enumsol.support.arguments import alpha_list, optional_callable, optional_executor
+from enumsol.support.arguments import alpha_list, even_alphas, optional_callable, optional_executor
 from enumsol.support.keeping import keeping
 from enumsol.support.messages import counted
 from enumsol.support.workers import spread
@@ -284,6 +284,7 @@ def multiplicity_table(
     problem: AnyProblem,
     alphas: Iterable[AlphaLike],
     *,
+    samples: int | None = None,
     arithmetic: str = "verified",
     executor: Executor | None = None,
     progress: Callable[[int, int], object] | None = None,
@@ -295,6 +296,9 @@ def multiplicity_table(
     ----------
     problem : ContactProblem or ContactProblem3D
     alphas : iterable of float, Fraction or whatever enumerate_roots accepts as alpha
+    samples : int, optional
+        The number of evenly spaced alphas, if ``alphas`` has their first and last one only. They are the floats nearest
+        to the decimals, where numpy.linspace(-1, 0.2, 7) has -1.1e-16 for 0.
     arithmetic : str
         Of ``enumerate_roots``.
     executor : concurrent.futures.Executor, optional
@@ -332,7 +336,7 @@ def multiplicity_table(
     check_is_problem(given)
     optional_executor(executor)
     optional_callable(progress, "progress")
-    chosen = alpha_list(alphas)
+    chosen = alpha_list(alphas) if samples is None else even_alphas(alphas, samples)
     for alpha in chosen:
         problem.friction_at(alpha)
     row = partial(table_row, problem, {"arithmetic": arithmetic, **options})
@@ -350,7 +354,7 @@ def multiplicity_table(
         "multiplicity_table",
         work,
         lambda _: _frame(problem, done),
-        lambda _: f" after {len(done)} of {len(chosen)} alphas",
+        lambda _: f" after {len(done)} of {counted(len(chosen), 'alpha')}",
     )
 
 

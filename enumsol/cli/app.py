@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 import sys
 import warnings
 from collections.abc import Sequence
@@ -122,8 +123,22 @@ def _in_a_sentence(error: Any) -> str:
     )
 
 
+#: What messages of the library call by its name in Python, and what it is called here.
+_CALLED = (
+    (r"\bbranch_graph\b", "enumsol graph"),
+    (r"\bhistories(?= cannot)", "enumsol history"),
+    (r"\bmultiplicity_table\b", "enumsol table"),
+    (r"\benumerate_roots\b", "enumsol roots"),
+    (r" \(rigid_modes is given\)", ""),
+    (r'\barithmetic(?:=| )"(\w+)"', r"--arithmetic \1"),
+    (r'\barithmetic is "(\w+)"', r"--arithmetic is \1"),
+)
+
+
 def _refuse(message: str, status: ExitStatus = ExitStatus.BAD_INPUT) -> ExitStatus:
     sentence = " ".join(message.split()).rstrip(".")
+    for name, here in _CALLED:
+        sentence = re.sub(name, here, sentence)
     # quotes, names and capitals of our own messages stay as they are
     if sentence.startswith(("Missing ", "No such ", "Invalid ", "Got ", "Option ")):
         sentence = sentence[0].lower() + sentence[1:]

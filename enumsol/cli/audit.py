@@ -118,7 +118,7 @@ def _read_runs(points: str, problem: AnyProblem, columns: Columns) -> Sequence[P
 
 def _as_text(report: AuditReport, found: BranchGraph) -> str:
     low, high = found.interval
-    about = f"graph for alpha in [{low:g}, {high:g}], {counted(len(found.arcs), 'arc')}; {found.completeness()}"
+    about = f"graph for alpha in [{low:g}, {high:g}], {counted(len(found.arcs), 'arc')}; {found.closing_line}"
     return f"{report!r}\n{about}"
 
 

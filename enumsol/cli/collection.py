@@ -10,6 +10,7 @@ from enumsol.cli.common import ExitStatus
 from enumsol.cli.files import FileCommand
 from enumsol.cli.options import JsonFile, Quiet, csv
 from enumsol.cli.output import check_outputs, deliver, list_entries, named_group
+from enumsol.support.messages import counted
 
 app = named_group("Problems with certified solutions, and a check of what other solvers find.")
 
@@ -49,7 +50,8 @@ def export(
     deliver(
         json_file=json_file,
         text=lambda: (
-            f"wrote {len(written)} problems to {folder}/problems, and their solutions and proofs to {folder}/certified"
+            f"wrote {counted(len(written), 'problem')} to {folder}/problems, and their solutions and proofs to "
+            f"{folder}/certified"
         ),
         content=lambda: {"folder": folder, "names": [entry.name for entry in written]},
     )

@@ -14,7 +14,10 @@ import typer
 from enumsol.cli.progress import Display
 from enumsol.cli.streams import is_quiet, say
 from enumsol.errors import EnumsolError, Interrupted, InvalidArgumentError, OutOfMemoryError, OutputError
+from enumsol.support.arguments import text_of
+from enumsol.support.files import unreadable
 from enumsol.support.messages import visible
+from enumsol.support.plotting import checked_units
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -49,20 +52,40 @@ class ExitStatus(enum.IntEnum):
     BROKEN_PIPE = 141
 
 
-def parse_units(text: str | None) -> tuple[str, str] | None:
-    """Units of forces and lengths, those of --units.
+def described(problem: str) -> dict[str, Any]:
+    """What a TOML file says besides the problem: steps, units and title; what is wrong with it is said elsewhere."""
+    if not problem.endswith(TOML) or unreadable(Path(problem)) is not None:
+        return {}
+    from enumsol.support.saved import toml_from  # numpy: not for --help
+
+    try:
+        return toml_from(Path(problem).read_bytes())
+    except (OSError, ValueError):
+        return {}
+
+
+def units_of(problem: str, text: str | None) -> tuple[str, str] | None:
+    """Units of forces and lengths: those of --units, or those that a TOML file names.
 
     Raises
     ------
     InvalidArgumentError
-        It is not two texts with a comma between them.
+        They are not two texts.
     """
-    if text is None:
-        return None
-    force, comma, length = text.partition(",")
-    if not (force and comma and length):
-        raise InvalidArgumentError(f"--units is {text}; expected units of force and length, such as N,mm")
-    return force.strip(), length.strip()
+    if text is not None:
+        return checked_units(text, "--units")
+    return checked_units(described(problem).get("units"))
+
+
+def in_units(text: str, units: tuple[str, str] | None) -> str:
+    """What is printed about forces and displacements, below a line that names their units if they are known."""
+    return text if units is None else f"forces in {units[0]}, displacements in {units[1]}\n\n{text}"
+
+
+def title_of(problem: str, text: str | None = None) -> str:
+    """The heading of a page or a figure: what is asked for, the title in a TOML file, or the name of the problem."""
+    found = described(problem).get("title", problem) if text is None else text
+    return text_of(found, "title")
 
 
 def scene_of(name: str) -> Scene | None:

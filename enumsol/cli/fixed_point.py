@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from enumsol.cli import output
-from enumsol.cli.common import ExitStatus, finish, load_problem, parse_alpha, so_far
-from enumsol.cli.options import JsonFile, PlotFile, ProblemArgument, Quiet, VtuFile, count, csv, file, number
+from enumsol.cli.common import ExitStatus, finish, in_units, load_problem, parse_alpha, so_far, units_of
+from enumsol.cli.options import JsonFile, PlotFile, ProblemArgument, Quiet, Units, VtuFile, count, csv, file, number
 from enumsol.cli.progress import Display
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.messages import counted
@@ -52,6 +52,7 @@ def fixed_point(
     npz_file: Annotated[str | None, file("--npz", "Write all arrays, for FixedPoint.load.")] = None,
     vtu_file: VtuFile = None,
     plot_file: PlotFile = None,
+    units: Units = None,
     quiet: Quiet = False,
 ) -> None:
     """Find one solution of PROBLEM at one ALPHA, as the limit of contact problems with given slip bounds.
@@ -68,11 +69,11 @@ def fixed_point(
     output.check_vtu(vtu_file)
     output.check_plot(plot_file)
     _check_combination(starts, npz_file, vtu_file, plot_file)
-    body = load_problem(problem)
+    body, names = load_problem(problem), units_of(problem, units)
     value = _alpha(alpha, problem, body)
     options: dict[str, Any] = {"tolerance": tolerance, "max_iterations": max_iterations, "anderson": anderson}
     if starts is not None:
-        _basins(_in_2d(body, problem), problem, value, starts, options, json_file, csv_file, plot_file)
+        _basins(_in_2d(body, problem), problem, value, starts, options, json_file, csv_file, plot_file, names)
     output.check_places(vtu_file, body, problem)
     found, ended = so_far(lambda: _approximate(body, value, start, options))
 
@@ -86,7 +87,7 @@ def fixed_point(
         (vtu_file, show),
         json_file=json_file,
         csv_file=csv_file,
-        text=lambda: repr(found),
+        text=lambda: in_units(repr(found), names),
         content=lambda: _content(found, problem),
         frame=found.to_frame,
     )
@@ -160,6 +161,7 @@ def _basins(
     json_file: str | None,
     csv_file: str | None,
     plot_file: str | None,
+    units: tuple[str, str] | None,
 ) -> None:
     from enumsol.fixed_points import basin_table, plot_basins  # as above
     from enumsol.roots.enumerate import enumerate_roots
@@ -172,10 +174,10 @@ def _basins(
         )
     table, ended = so_far(lambda: basin_table(body, roots, starts, **options))
     output.deliver(
-        (plot_file, lambda path: output.write_figure(path, plot_basins(table))),
+        (plot_file, lambda path: output.write_figure(path, plot_basins(table, units=units))),
         json_file=json_file,
         csv_file=csv_file,
-        text=lambda: _basin_text(table, len(roots), roots.completeness()),
+        text=lambda: _basin_text(table, len(roots), roots.closing_line),
         content=lambda: {"problem": name, "alpha": float(alpha), **_basin_content(table, len(roots))},
         frame=lambda: table,
     )
@@ -192,7 +194,7 @@ def _basin_text(table: pd.DataFrame, roots: int, completeness: str) -> str:
     for root in range(roots):
         rows = table[table["root"] == root]
         most = f", up to {counted(rows['iterations'].max(), 'iteration')}" if len(rows) else ""
-        lines.append(f"root {root}: reached from {len(rows)} of {len(table)} starts{most}")
+        lines.append(f"root {root}: reached from {len(rows)} of {counted(len(table), 'start')}{most}")
     lost = table[table["root"].isna()]
-    lines += [f"no root ({outcome}): {len(rows)} starts" for outcome, rows in lost.groupby("outcome")]
+    lines += [f"no root ({outcome}): {counted(len(rows), 'start')}" for outcome, rows in lost.groupby("outcome")]
     return "\n".join([*lines, f"the list of roots is {completeness}"])

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from enumsol.cli import options
-from enumsol.cli.common import ExitStatus, finish, load_problem, node_row, parse_alpha, parse_interval
+from enumsol.cli.common import ExitStatus, finish, load_problem, node_row, parse_alpha, parse_interval, units_of
 from enumsol.cli.graph import read_graph
 from enumsol.cli.output import check_outputs, check_plot, deliver, write_figure
 from enumsol.cli.progress import Display, SearchDisplay
@@ -76,6 +76,7 @@ def follow(
     ] = None,
     quantity: options.DrawnQuantity = "lambda_n",
     label: Annotated[str | None, options.node("--node", "LABEL", "Contact node to draw; default: the first.")] = None,
+    units: options.Units = None,
     quiet: options.Quiet = False,
 ) -> None:
     """Follow branches of solutions of PROBLEM, in 2D or 3D, from its roots at one alpha.
@@ -95,7 +96,7 @@ def follow(
         raise InvalidArgumentError("--tangent is given without --root or --direction; expected one root and direction")
     steps = _steps(h_max, h_min, h_init, eps, max_steps, check_steps)
     interval, alpha, signs = parse_interval(first, last), parse_alpha(start, "--start"), _directions(direction)
-    body = load_problem(problem)
+    names, body = units_of(problem, units), load_problem(problem)
     row = node_row(body, label)
     over = None if graph_file is None else read_graph(graph_file, body)
     followed = _Followed(body, (float(interval[0]), float(interval[1])), steps, tangent)
@@ -109,7 +110,10 @@ def follow(
         ended = OutOfMemoryError("out of memory", followed)
     about = {"problem": problem, "start": alpha, "interval": interval}
     deliver(
-        (plot_file if followed.paths else None, lambda path: write_figure(path, followed.draw(over, row, quantity))),
+        (
+            plot_file if followed.paths else None,
+            lambda path: write_figure(path, followed.draw(over, row, quantity, names)),
+        ),
         json_file=json_file,
         csv_file=csv_file,
         text=lambda: followed.as_text() + (f" ({ended})" if ended else ""),
@@ -156,7 +160,7 @@ def _starts(
     count = len(found)
     if not count:
         raise InvalidArgumentError(
-            f"there is no isolated root at alpha = {float(alpha):g} ({found.completeness()}); expected another --start"
+            f"there is no isolated root at alpha = {float(alpha):g} ({found.closing_line}); expected another --start"
         )
     if root is None:
         return list(enumerate(found))
@@ -252,9 +256,9 @@ class _Followed:
             "failures": [{"root": number, "direction": sign, "reason": why} for number, sign, why in self.failures],
         }
 
-    def draw(self, over: BranchGraph | None, node: int, quantity: str) -> Any:
+    def draw(self, over: BranchGraph | None, node: int, quantity: str, units: tuple[str, str] | None) -> Any:
         """A figure of all paths."""
-        figure = self.paths[0].plot(over, node=node, quantity=quantity)
+        figure = self.paths[0].plot(over, node=node, quantity=quantity, units=units)
         for path in self.paths[1:]:
             path.plot(ax=figure.axes[0], node=node, quantity=quantity)
         return figure

@@ -14,8 +14,9 @@ from enumsol.cli.common import (
     node_row,
     note,
     parse_interval,
-    parse_units,
     so_far,
+    title_of,
+    units_of,
     workers,
 )
 from enumsol.cli.output import check_named_files, check_outputs, check_plot, deliver, write_figure
@@ -64,7 +65,7 @@ def graph(
     nodes: Annotated[
         str | None, options.node("--nodes", "LABELS", "Contact nodes to draw, such as 0,3; default: up to three.")
     ] = None,
-    units: Annotated[str | None, options.node("--units", "FORCE,LENGTH", "Units for the figure, such as N,mm.")] = None,
+    units: options.Units = None,
     quiet: options.Quiet = False,
 ) -> None:
     """Find all solutions of PROBLEM for every alpha of an interval, as branches of arcs.
@@ -81,7 +82,12 @@ def graph(
     check_plot(plot_file)
     interval, body = parse_interval(first, last), load_problem(problem)
     chosen = None if nodes is None else [body.node_ids[node_row(body, label.strip())] for label in nodes.split(",")]
-    drawn: dict[str, Any] = {"quantity": quantity, "nodes": chosen, "title": problem, "units": parse_units(units)}
+    drawn: dict[str, Any] = {
+        "quantity": quantity,
+        "nodes": chosen,
+        "title": title_of(problem),
+        "units": units_of(problem, units),
+    }
     if chosen is not None and quantity in ("norm", "sum_n", "sum_t"):
         raise InvalidArgumentError(f"--nodes is given with --quantity {quantity}; expected a quantity of nodes")
     limits = {"max_nodes": max_nodes, "time_limit": time_limit}
@@ -197,7 +203,7 @@ def as_content(found: BranchGraph) -> dict[str, Any]:
     arcs, vertices = found.to_frame(), found.vertices_frame()
     return {
         **found.summary(),
-        "completeness": found.completeness(),
+        "completeness": found.closing_line,
         "branch_list": branches,
         "arc_list": arcs.to_dict("records"),
         "vertex_list": vertices.to_dict("records"),

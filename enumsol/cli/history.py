@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from enumsol.cli.common import TOML, ExitStatus, finish, load_problem, scene_of, so_far, workers
+from enumsol.cli.common import (
+    ExitStatus,
+    described,
+    finish,
+    load_problem,
+    scene_of,
+    so_far,
+    title_of,
+    units_of,
+    workers,
+)
 from enumsol.cli.options import (
     OUTPUT,
     PLOT,
@@ -17,6 +27,7 @@ from enumsol.cli.options import (
     PlotFile,
     ProblemArgument,
     Quiet,
+    Units,
     count,
     csv,
     file,
@@ -25,6 +36,7 @@ from enumsol.cli.options import (
 from enumsol.cli.output import as_json, check_outputs, check_plot, check_writable, deliver, write_figure
 from enumsol.cli.progress import Display
 from enumsol.errors import InvalidArgumentError
+from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
     from enumsol.loading.growing import HistoryProgress
@@ -79,6 +91,7 @@ def history(
         Drawn, typer.Option("--x", help="Quantity on the horizontal axis.", rich_help_panel=PLOT)
     ] = "displacement",
     y: Annotated[Drawn, typer.Option("--y", help="Quantity on the vertical axis.", rich_help_panel=PLOT)] = "alpha",
+    units: Units = None,
     title: Annotated[
         str | None, typer.Option(metavar="TEXT", help="Heading of the page; default: PROBLEM.", rich_help_panel=OUTPUT)
     ] = None,
@@ -102,7 +115,7 @@ def history(
         check_writable(path, option)
     if proof_file is not None and arithmetic != "verified":
         raise InvalidArgumentError(f"--proof is given with {arithmetic} arithmetic; expected verified")
-    given, body = _steps(problem, steps), load_problem(problem)
+    given, names, body = _steps(problem, steps), units_of(problem, units), load_problem(problem)
     limits = {"max_branches": max_branches, "max_nodes": max_nodes, "time_limit": time_limit}
     options = {"arithmetic": arithmetic, "follow": follow, "merge": merge, "refine": refine, **limits}
     found, ended = so_far(lambda: _search(body, given, jobs, options))
@@ -110,16 +123,16 @@ def history(
     def write_page(path: str) -> None:
         from enumsol.report import write_report  # numpy: not for --help
 
-        write_report(found, path, title=problem if title is None else title, scene=scene_of(problem))
+        write_report(found, path, title=title_of(problem, title), units=names, scene=scene_of(problem))
 
     deliver(
         (proof_file, lambda path: _write_proof(found, path)),
         (save, found.save),
         (report, write_page),
-        (plot, lambda path: write_figure(path, found.plot(x, y))),
+        (plot, lambda path: write_figure(path, found.plot(x, y, units=names))),
         json_file=json_file,
         csv_file=csv_file,
-        text=lambda: repr(found),
+        text=lambda: found.text(names),
         content=lambda: as_json({"problem": problem, **_content(found)}),
         frame=found.to_frame,
     )
@@ -143,7 +156,8 @@ class _HistoryDisplay(Display):
         """Show where the history is."""
         of_step = state.stages / (state.stages + state.waiting)
         share = (state.step - 1 + of_step) / state.steps
-        self.show(share, f"step {state.step} of {state.steps}, {state.waiting} starts left, {state.roots:,} roots")
+        left, roots = counted(state.waiting, "start"), counted(state.roots, "root")
+        self.show(share, f"step {state.step} of {state.steps}, {left} left, {roots}")
 
 
 def _steps(problem: str, steps: str | None) -> Any:
@@ -160,7 +174,7 @@ def _steps(problem: str, steps: str | None) -> Any:
         if Path(steps).suffix.lower() == ".csv" or Path(steps).is_file():
             return read_steps(steps)
         return [part.strip() for part in steps.split(",")]
-    said = _told(Path(problem)) if problem.endswith(TOML) else None
+    said = described(problem).get("steps")
     if said is None:
         raise InvalidArgumentError(
             "--steps is missing; expected a CSV file, a list of alphas, or steps in a .toml file"
@@ -170,16 +184,6 @@ def _steps(problem: str, steps: str | None) -> Any:
     if isinstance(said, list) and said and all(isinstance(item, dict) for item in said):
         return [_of_table(k, item) for k, item in enumerate(said, 1)]
     return said
-
-
-def _told(place: Path) -> Any:
-    """What a TOML file says of steps; what is wrong with the file is said where the problem is read."""
-    from enumsol.support.saved import toml_from  # numpy: not for --help
-
-    try:
-        return toml_from(place.read_bytes()).get("steps")
-    except (OSError, ValueError):
-        return None
 
 
 def _of_table(number: int, item: dict[str, Any]) -> Any:

@@ -114,7 +114,10 @@ VtuFile = Annotated[
 ]
 ReportFile = Annotated[str | None, file("--report", "Write an HTML page about the roots, with their deformed bodies.")]
 Units = Annotated[
-    str | None, typer.Option(metavar="FORCE,LENGTH", help="Units of the page, such as N,mm.", rich_help_panel=OUTPUT)
+    str | None,
+    typer.Option(
+        metavar="FORCE,LENGTH", help="Units of what is printed and drawn, such as N,mm.", rich_help_panel=OUTPUT
+    ),
 ]
 PlotFile = Annotated[str | None, file("--plot", "Draw a figure: .png, .pdf, .svg.", PLOT)]
 Overview = Literal["norm", "sum_n", "sum_t", "lambda_n", "lambda_t", "u_n", "u_t"]

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from enumsol.cli import options
-from enumsol.cli.common import ExitStatus, finish, load_problem, parse_interval, parse_units, scene_of, so_far
+from enumsol.cli.common import ExitStatus, finish, load_problem, parse_interval, scene_of, so_far, title_of, units_of
 from enumsol.cli.graph import HowExact, as_content, build, graph_as_text, write_proof
 from enumsol.cli.output import check_named_files, check_outputs, checking_commands, deliver
 from enumsol.errors import MissingDependencyError
@@ -50,7 +50,7 @@ def report(
     check_named_files(output=output, proof=proof_file)
     if find_spec("plotly") is None:
         raise MissingDependencyError.of("reports", "plotly", "report")
-    interval, body, names = parse_interval(first, last), load_problem(problem), parse_units(units)
+    interval, body, names = parse_interval(first, last), load_problem(problem), units_of(problem, units)
     limits = {"max_nodes": max_nodes, "time_limit": time_limit}
     found, ended = so_far(lambda: build(body, interval, arithmetic, jobs, **limits))
 
@@ -60,8 +60,8 @@ def report(
         # -1 would be read as an option
         place = f"--from={shlex.quote(first)} --to={shlex.quote(last)}"
         commands = checking_commands(found.proof is not None, problem, "graph", place, proof_file)
-        heading, scene = problem if title is None else title, scene_of(problem)
-        write_report(found, path, title=heading, units=names, commands=commands, scene=scene)
+        heading = title_of(problem, title)
+        write_report(found, path, title=heading, units=names, commands=commands, scene=scene_of(problem))
 
     deliver(
         (proof_file, lambda path: write_proof(found, path)),

@@ -55,7 +55,7 @@ def _family_rows(k: int, family: RootFamily, node_ids: tuple[Any, ...], width: i
 def uniqueness(found: RootSet) -> str:
     """Whether there is one solution, in a line."""
     if found.unique is None:
-        why = "fast arithmetic proves nothing" if found.arithmetic == "fast" else found.completeness()
+        why = "fast arithmetic proves nothing" if found.arithmetic == "fast" else found.closing_line
         return f"unique: not known ({why})"
     if found.unique:
         bound = found.rigid_bound
@@ -78,7 +78,7 @@ def roots_as_json(found: RootSet, problem: str) -> str:
         "method": found.method,
         "complete": found.complete,
         "certified_data": found.certified_data if found.complete else None,
-        "completeness": found.completeness(),
+        "completeness": found.closing_line,
         "unique": found.unique,
         "by_one_certificate": found.by_one_certificate,
         "stopped": found.stopped,

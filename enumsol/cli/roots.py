@@ -13,6 +13,7 @@ from enumsol.cli import common, options, output, root_report
 from enumsol.cli.progress import SearchDisplay
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.messages import counted
+from enumsol.support.plotting import checked_units
 
 if TYPE_CHECKING:
     from enumsol.fem import Scene
@@ -117,7 +118,7 @@ class Search:
             raise InvalidArgumentError(
                 "--resume is given without --proof; expected the file of the proof to resume from"
             )
-        common.parse_units(self.units)
+        checked_units(self.units, "--units")
         if self.unique and self.stop_after is not None:
             raise InvalidArgumentError(
                 f"--stop-after is {self.stop_after} with --unique, which stops at the second root"
@@ -134,6 +135,7 @@ class Search:
         output.check_places(self.vtu_file, problem, name)
         output.check_scripts(self.report_file, problem)
         check_mirror(problem, alpha, self.mirror)
+        units = common.units_of(name, self.units)
         found, ended = common.so_far(lambda: self._found(problem, alpha))
         if self.mirror is not None and len(found):
             found = found.mirrored(self.mirror)
@@ -142,7 +144,11 @@ class Search:
             (self.report_file, lambda path: self._write_page(found, path, name, source, scene)),
             json_file=self.json_file,
             csv_file=self.csv_file,
-            text=lambda: root_report.uniqueness(found) if self.unique else root_report.roots_as_text(found),
+            text=lambda: (
+                root_report.uniqueness(found)
+                if self.unique
+                else common.in_units(root_report.roots_as_text(found), units)
+            ),
             content=lambda: root_report.roots_as_json(found, name),
             frame=found.to_frame,
         )
@@ -160,7 +166,8 @@ class Search:
         place = f"--alpha={shlex.quote(str(found.alpha))}"
         commands = output.checking_commands(found.proof is not None, source, "roots", place, self.proof_file)
         about = common.scene_of(name) if scene is None else scene
-        write_report(found, path, title=name, units=common.parse_units(self.units), commands=commands, scene=about)
+        title, units = common.title_of(name), common.units_of(name, self.units)
+        write_report(found, path, title=title, units=units, commands=commands, scene=about)
 
     def _found(self, problem: AnyProblem, alpha: Alpha) -> RootSet:
         from enumsol.roots.enumerate import enumerate_roots  # numpy and scipy: not for --help

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from enumsol.cli.common import GALLERY, TOML, note, parse_alpha, refuse_misspelt
+from enumsol.cli.common import GALLERY, TOML, note, parse_alpha, refuse_misspelt, units_of
 from enumsol.cli.options import LIMITS, OUTPUT, Quiet, file, with_options
 from enumsol.cli.output import check_plot, deliver, write_figure
 from enumsol.cli.progress import Display
@@ -283,17 +283,18 @@ def solve(
     search.check()
     value = None if alpha is None else parse_alpha(alpha)
     check_plot(plot)
+    units = units_of(mesh, search.units)
     with Display("reading the mesh"):
         scene = _scene(mesh, given)
     if dry_run:
         deliver(
-            (plot, lambda path: write_figure(path, scene.plot())),
+            (plot, lambda path: write_figure(path, scene.plot(units=units))),
             json_file=search.json_file,
             text=lambda: str(scene),
             content=lambda: {"scene": str(scene).splitlines(), "notes": scene.notes},
         )
     elif plot is not None:
-        write_figure(plot, scene.plot())
+        write_figure(plot, scene.plot(units=units))
     with Display("assembling"):
         problem = _problem(mesh, scene)
     if output is not None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -12,6 +11,7 @@ from enumsol.cli.options import Arithmetic, JsonFile, ProblemArgument, Quiet, co
 from enumsol.cli.output import check_outputs, deliver
 from enumsol.cli.progress import Display
 from enumsol.errors import EnumsolError, InvalidArgumentError
+from enumsol.support.arguments import even_alphas
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -88,13 +88,7 @@ def _alphas(first: str | None, last: str | None, samples: int, listed: str | Non
         return [parse_alpha(text, f"--alphas[{k}]") for k, text in enumerate(listed.split(","))]
     if first is None or last is None:
         raise InvalidArgumentError("expected --from and --to, or --alphas")
-    low, high = parse_interval(first, last)
-    if isinstance(low, Fraction) or isinstance(high, Fraction):
-        start, width = Fraction(low), Fraction(high) - Fraction(low)
-        return [start + width * k / (samples - 1) for k in range(samples)]
-    import numpy as np  # not for --help
-
-    return [float(alpha) for alpha in np.linspace(low, high, samples)]
+    return even_alphas(parse_interval(first, last), samples)
 
 
 def _search(

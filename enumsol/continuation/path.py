@@ -18,7 +18,7 @@ from enumsol.model.statuses import ContactStatus
 from enumsol.roots.local_branch import LocalBranchTest
 from enumsol.support.arguments import file_path, one_of, row_number
 from enumsol.support.files import read_arrays, reading, write_arrays
-from enumsol.support.plotting import axes_or_none, figure_of, new_figure
+from enumsol.support.plotting import axes_or_none, checked_units, figure_of, in_units, kept, new_figure
 from enumsol.support.saved import Array, Maybe, check_kind, is_label, is_number
 
 if TYPE_CHECKING:
@@ -130,7 +130,15 @@ _QUANTITIES = ("lambda_n", "lambda_t", "u_n", "u_t")
 
 
 def draw_path(
-    path: PathData, graph: Any = None, *, node: int = 0, quantity: str = "lambda_n", ax: Any = None, **of_graph: Any
+    path: PathData,
+    graph: Any = None,
+    *,
+    node: int = 0,
+    quantity: str = "lambda_n",
+    units: tuple[str, str] | None = None,
+    ax: Any = None,
+    file: Any = None,
+    **of_graph: Any,
 ) -> Any:
     """A figure of the accepted steps as dots, transition points as circles, folds as squares, the start as a star.
 
@@ -144,8 +152,12 @@ def draw_path(
         Contact node (row number).
     quantity : {"lambda_n", "lambda_t", "u_n", "u_t"}
         In 3D the tangential ones are drawn as their lengths.
+    units : (str, str), optional
+        Of forces and of lengths, for the axis.
     ax : matplotlib Axes or None
         Draw there, for example in ``figure.axes[0]`` of an earlier plot to add a path to it.
+    file : path, optional
+        Save the figure there.
 
     Returns
     -------
@@ -160,12 +172,12 @@ def draw_path(
         An argument is not one of those above.
     """
     one_of(quantity, "quantity", _QUANTITIES)
-    node = row_number(node, "node", path.lambda_n.shape[1])
+    node, named_units = row_number(node, "node", path.lambda_n.shape[1]), checked_units(units)
     if graph is not None and ax is not None:
         raise InvalidArgumentError("graph and ax are both given; draw further paths with path.plot(ax=...) alone")
     if graph is not None:
         # the graph draws a figure of its own; its first panel is this node's, and no zoom shows the path
-        ax = graph.plot(quantity, [path.node_ids[node]], **{"zoom": False, **of_graph}).axes[0]
+        ax = graph.plot(quantity, [path.node_ids[node]], **{"zoom": False, "units": units, **of_graph}).axes[0]
     elif axes_or_none(ax) is None:
         ax = new_figure().subplots()
     values = getattr(path, quantity)[:, node]
@@ -186,11 +198,12 @@ def draw_path(
     ax.plot(path.alpha[:1], values[:1], "*", color="tab:red", markersize=10, label="start", zorder=5)
     if not ax.get_ylabel():
         ax.set_xlabel("alpha")
-        ax.set_ylabel(f"{name} of node {path.node_ids[node]}")
+        dimension = "force" if quantity.startswith("lambda") else "length"
+        ax.set_ylabel(in_units(f"{name} of node {path.node_ids[node]}", dimension, named_units))
         ax.set_title(f"path for alpha in [{path.alpha.min():g}, {path.alpha.max():g}]: {path.status.value}", fontsize=9)
     named = dict(zip(*reversed(ax.get_legend_handles_labels()), strict=True))  # of several paths once
     ax.legend(handles=list(named.values()), labels=list(named), fontsize=7, frameon=False)
-    return figure_of(ax)
+    return kept(figure_of(ax), file)
 
 
 class Path(PathData):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Self
 import numpy as np
 
 from enumsol.roots.root import summary
-from enumsol.support.immutable import Sealed
+from enumsol.support.immutable import Listed, Sealed, no_such_item
 from enumsol.support.messages import TextEnum, counted
 
 if TYPE_CHECKING:
@@ -193,7 +193,10 @@ class PathData(Sequence[PathPoint], Sealed):
     def __getitem__(self, item: Any) -> Any:
         if isinstance(item, slice):
             return tuple(self[k] for k in range(*item.indices(len(self))))
-        k = range(len(self))[item]
+        try:
+            k = range(len(self))[item]
+        except IndexError:
+            raise no_such_item(item, len(self), "point") from None
         return PathPoint(
             alpha=float(self.alpha[k]),
             lambda_n=self.lambda_n[k],
@@ -208,7 +211,7 @@ class PathData(Sequence[PathPoint], Sealed):
     @property
     def points(self) -> tuple[PathPoint, ...]:
         """All points."""
-        return tuple(self[:])
+        return Listed(self[:], "point")
 
     @property
     def selections(self) -> tuple[tuple[ContactStatus, ...], ...]:

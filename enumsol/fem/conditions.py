@@ -117,9 +117,10 @@ class Held:
         extent = float(np.max(np.ptp(points, axis=0)))
         flat = np.flatnonzero(np.ptp(points[nodes], axis=0) <= _SAME * extent)
         if len(flat) != 1:
+            where = "no plane" if len(flat) == 0 else f"{len(flat)} planes"
             raise InvalidArgumentError(
-                f"symmetry {part} lies in {len(flat)} planes perpendicular to an axis; expected a part of the boundary "
-                "in one such plane"
+                f"symmetry {part} lies in {where} perpendicular to an axis; expected a part of the boundary in one "
+                "such plane"
             )
         self._fix(part, nodes, int(flat[0]), 0.0)
         self.mirrored[nodes, flat[0]] = True

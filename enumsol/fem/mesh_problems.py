@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.fem.scenes import Scene, refuse_old_friction
-from enumsol.support.arguments import file_path, shown
+from enumsol.support.arguments import file_path, shown, text_of
 from enumsol.support.files import unreadable
 from enumsol.support.messages import shortened
+from enumsol.support.plotting import checked_units
 from enumsol.support.saved import LARGEST_TOML, toml_from
 
 if TYPE_CHECKING:
@@ -200,7 +201,8 @@ def read_mesh_problem(path: str | os.PathLike[str]) -> AnyProblem:
 
     In the file, ``pairs`` may also be called ``contact_pair``.
 
-    The file may also have the ``steps`` of a history, which the command ``enumsol history`` reads.
+    The file may also have a ``title`` and ``units`` of forces and lengths such as "N,mm", for what commands print,
+    and the ``steps`` of a history, which the command ``enumsol history`` reads.
 
     Parameters
     ----------
@@ -249,6 +251,8 @@ def _of_file(path: Any, made: Callable[[Scene], T]) -> T:
         options = _toml(place)
         name = file_path(options.pop("mesh", None), "mesh", "the name of a mesh file in quotes")
         options.pop("steps", None)  # of enumsol history
+        checked_units(options.pop("units", None))
+        text_of(options.pop("title", ""), "title")
         check_keys(options, also=(_PAIRS,))
         refuse_old_friction(options, lambda name, part, number: f"{name}{part and f'.{part}'} = {number}")
         return made(mesh_scene(place.parent / name, **options))

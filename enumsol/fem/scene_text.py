@@ -12,7 +12,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines
 from enumsol.support.array_types import Floats, Integers
 from enumsol.support.messages import counted
-from enumsol.support.plotting import new_figure
+from enumsol.support.plotting import in_units, new_figure
 
 #: Width of the column of titles.
 _TITLES = 10
@@ -132,7 +132,7 @@ _FORCE, _NORMAL = 0.16, 0.06
 _BODY, _EDGE, _LOAD, _SLOPE, _CONTACT = "#dfe6ee", "#aab6c3", "#b3202c", "#d9730d", "#1f5fa8"
 
 
-def draw_scene(scene: Any) -> Any:
+def draw_scene(scene: Any, units: tuple[str, str] | None = None) -> Any:
     """A figure of a `Scene`."""
     from matplotlib.collections import LineCollection, PolyCollection  # with the first figure
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
@@ -171,6 +171,8 @@ def draw_scene(scene: Any) -> Any:
     else:
         ax.auto_scale_xyz(*mesh.points.T)
         ax.set_aspect("equal")
+    for direction in "xyz"[: d if units is not None else 0]:
+        getattr(ax, f"set_{direction}label")(in_units(direction, "length", units))
     figure.legend(loc="outside right upper", fontsize=7)
     return figure
 

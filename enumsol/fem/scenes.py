@@ -28,6 +28,7 @@ from enumsol.model.mesh import BodyMesh
 from enumsol.model.problem import given_friction, old_friction
 from enumsol.support.arguments import finite_number, one_of, positive_number, shown
 from enumsol.support.array_arguments import short_vector
+from enumsol.support.plotting import checked_units, kept
 
 if TYPE_CHECKING:
     from enumsol.model.problem3d import AnyProblem
@@ -181,15 +182,24 @@ class Scene:
             more.pop("max_rigid_displacement", None)
         return modes
 
-    def plot(self) -> Any:
+    def plot(self, *, units: tuple[str, str] | None = None, file: Any = None) -> Any:
         """A figure of the bodies, the parts of their boundaries, forces and contact nodes with their normals.
+
+        Parameters
+        ----------
+        units : (str, str), optional
+            Of forces and of lengths, for the axes.
+        file : path, optional
+            Save the figure there.
 
         Raises
         ------
+        InvalidArgumentError
+            The file cannot be written, or ``units`` are none.
         MissingDependencyError
             matplotlib is not installed.
         """
-        return draw_scene(self)
+        return kept(draw_scene(self, checked_units(units)), file)
 
     def uses(self, part: str) -> list[str]:
         """What the options say of a part of the boundary."""

@@ -17,7 +17,7 @@ from enumsol.support.arguments import alpha_value, positive_integer, positive_nu
 from enumsol.support.array_arguments import plain_array, real_array
 from enumsol.support.keeping import keeping
 from enumsol.support.messages import counted
-from enumsol.support.plotting import axes_or_none, figure_of, new_figure
+from enumsol.support.plotting import axes_or_none, checked_units, figure_of, in_units, kept, new_figure
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -191,7 +191,8 @@ def _common_alpha(roots: Sequence[Any]) -> Alpha:
         ) from None
     if len(set(alphas)) != 1:
         raise InvalidArgumentError(
-            f"roots has {len(alphas)} roots at {len(set(alphas))} alphas; expected at least one, all at the same alpha"
+            f"roots has {counted(len(alphas), 'root')} at {counted(len(set(alphas)), 'alpha')}; expected at least one, "
+            "all at the same alpha"
         )
     return alphas[0]
 
@@ -218,7 +219,7 @@ _MARKERS = "osD^v<>P*h"
 _LINEAR = 20
 
 
-def plot_basins(table: pd.DataFrame, ax: Any = None) -> Any:
+def plot_basins(table: pd.DataFrame, ax: Any = None, *, units: tuple[str, str] | None = None, file: Any = None) -> Any:
     """Every start of a `basin_table`: iterations against the mean slip bound, marked by the root that is reached.
 
     Parameters
@@ -227,6 +228,10 @@ def plot_basins(table: pd.DataFrame, ax: Any = None) -> Any:
         Of `basin_table`.
     ax : matplotlib Axes or None
         Draw there; None: in a new figure.
+    units : (str, str), optional
+        Of forces and of lengths, for the axis.
+    file : path, optional
+        Save the figure there.
 
     Returns
     -------
@@ -263,10 +268,10 @@ def plot_basins(table: pd.DataFrame, ax: Any = None) -> Any:
         ax.set_yscale("log")
     else:
         ax.yaxis.set_major_locator(MaxNLocator(integer=True))
-    ax.set_xlabel("mean slip bound of the start [force]")
+    ax.set_xlabel(in_units("mean slip bound of the start", "force", checked_units(units) or ("force", "length")))
     ax.set_ylabel("iterations")
     never = table.attrs.get("never", [])
     names = ", ".join(map(str, never))
     ax.set_title(f"never reached: {'roots' if len(never) > 1 else 'root'} {names}" if names else "never reached: none")
     ax.legend()
-    return figure_of(ax)
+    return kept(figure_of(ax), file)

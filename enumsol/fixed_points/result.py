@@ -203,7 +203,7 @@ class FixedPoint(TrescaState):
             case Outcome.CYCLE:
                 return (
                     f"not converged: from iteration {self.iterations} on it repeats {self.period} iterates ({last}); "
-                    "another start or anderson=5 may reach a solution, enumerate_roots reaches all in 2D"
+                    "another start or anderson=5 may reach a solution, and enumerate_roots reaches all of them"
                 )
             case Outcome.ITERATION_LIMIT:
                 return f"not converged within {solved} ({last})"

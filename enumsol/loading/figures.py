@@ -11,7 +11,7 @@ import numpy as np
 from enumsol.errors import InvalidArgumentError
 from enumsol.loading.history_data import START, HistoryData, Node
 from enumsol.support.arguments import shown
-from enumsol.support.plotting import axes_or_none, figure_of, new_figure
+from enumsol.support.plotting import axes_or_none, figure_of, in_units, new_figure
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -29,12 +29,13 @@ LABELS = {
     "lambda_t": "sum of lambda_t",
     "dissipated": "work of friction since the start",
 }
+_DIMENSIONS = {"displacement": "length", "lambda_n": "force", "lambda_t": "force", "dissipated": "work"}
 #: Histories that have a colour of their own; ends that are labelled.
 _COLOURED, _NAMED = 10, 24
 _SHARED = "#555555"
 
 
-def draw_history(data: HistoryData, x: Any, y: Any, ax: Any) -> Any:
+def draw_history(data: HistoryData, x: Any, y: Any, ax: Any, units: tuple[str, str] | None = None) -> Any:
     """A figure; see History.plot."""
     axes_or_none(ax)
     across, up = _values(data, x, "x"), _values(data, y, "y")
@@ -57,15 +58,17 @@ def draw_history(data: HistoryData, x: Any, y: Any, ax: Any) -> Any:
         face = "white" if dropped else colour
         ax.plot(across[node], up[node], marker, markersize=4, color=colour, markerfacecolor=face, zorder=3)
     _name_ends(data, across, up, ax)
-    ax.set_xlabel(_label(x))
-    ax.set_ylabel(_label(y))
-    ax.set_title(data.completeness(), fontsize=9)
+    ax.set_xlabel(_label(x, units))
+    ax.set_ylabel(_label(y, units))
+    ax.set_title(data.closing_line, fontsize=9)
     ax.margins(0.07)
     return figure_of(ax)
 
 
-def _label(quantity: Any) -> str:
-    return LABELS[quantity] if isinstance(quantity, str) else getattr(quantity, "__name__", "")
+def _label(quantity: Any, units: tuple[str, str] | None) -> str:
+    if not isinstance(quantity, str):
+        return getattr(quantity, "__name__", "")
+    return in_units(LABELS[quantity], _DIMENSIONS.get(quantity), units)
 
 
 def _colours(data: HistoryData) -> dict[tuple[Node, Node], str]:

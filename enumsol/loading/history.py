@@ -24,8 +24,8 @@ from enumsol.roots.root import Enclosure, Polytope, Root, RootFamily, summary
 from enumsol.roots.root_set import RootSet, SearchStats, Undecided
 from enumsol.support.arguments import file_path, positive_integer, shown
 from enumsol.support.files import reading, write_file
-from enumsol.support.immutable import Immutable
-from enumsol.support.plotting import kept
+from enumsol.support.immutable import Immutable, Listed
+from enumsol.support.plotting import checked_units, kept
 from enumsol.support.saved import Array, Maybe, check_kind, is_fraction, is_number, json_from
 
 if TYPE_CHECKING:
@@ -333,21 +333,22 @@ class History(Immutable):
             There is no such step.
         """
         number = positive_integer(step, "step", most=len(self.steps))
-        return tuple(self.graph.nodes[node]["root"] for node in self.nodes_of(number))
+        return Listed((self.graph.nodes[node]["root"] for node in self.nodes_of(number)), "root")
 
     @property
     def branchings(self) -> tuple[history_data.Node, ...]:
         """Nodes that more than one root may follow; (0, 0) if the first step has several."""
-        return tuple(node for node, degree in self.graph.out_degree() if degree > 1)
+        return Listed((node for node, degree in self.graph.out_degree() if degree > 1), "branching")
 
     @property
     def ends(self) -> tuple[history_data.Node, ...]:
         """Nodes that nothing follows: those of the last step, and those after which nothing was searched or found."""
-        return tuple(node for node, degree in self.graph.out_degree() if degree == 0 and node != history_data.START)
+        ends = (node for node, degree in self.graph.out_degree() if degree == 0 and node != history_data.START)
+        return Listed(ends, "end")
 
     def stages(self, step: int) -> tuple[history_data.Stage, ...]:
         """The searches of one step, from 1, one for each start."""
-        return self.data.stages_of(step)
+        return Listed(self.data.stages_of(step), "stage")
 
     def nodes_of(self, step: int) -> tuple[history_data.Node, ...]:
         """The nodes of one step."""
@@ -407,7 +408,15 @@ class History(Immutable):
             )
         return pd.DataFrame(rows).astype({"index": "Int64"}) if rows else pd.DataFrame(rows)
 
-    def plot(self, x: Any = "displacement", y: Any = "alpha", *, ax: Any = None, file: str | Path | None = None) -> Any:
+    def plot(
+        self,
+        x: Any = "displacement",
+        y: Any = "alpha",
+        *,
+        units: tuple[str, str] | None = None,
+        ax: Any = None,
+        file: str | Path | None = None,
+    ) -> Any:
         """A figure of one quantity of the roots against another, a line for every history.
 
         Points that several histories share are grey; a point is open where the history was not followed, and a rhombus
@@ -419,6 +428,8 @@ class History(Immutable):
             "step", "alpha", "displacement" (of the loaded degrees of freedom in the direction in which the load
             changes), "lambda_n" or "lambda_t" (sums over the contact nodes; in 3D along the first axis), "dissipated"
             (work of friction since the start), or a function of a `Root`.
+        units : (str, str), optional
+            Of forces and of lengths, for the axes.
         ax : matplotlib Axes or None
             Draw there; None: in a new figure.
         file : path, optional
@@ -437,7 +448,7 @@ class History(Immutable):
         """
         from enumsol.loading.figures import draw_history  # matplotlib comes with the first picture
 
-        return kept(draw_history(self.data, x, y, ax), file)
+        return kept(draw_history(self.data, x, y, ax, checked_units(units)), file)
 
     def save(self, file: str | Path) -> None:
         """Write the history, with the proofs of its searches, as JSON; the problem is not part of the file.
@@ -462,12 +473,17 @@ class History(Immutable):
         check_is_problem(given)
         return cls(load_history(file, problem))
 
-    def completeness(self) -> str:
+    @property
+    def closing_line(self) -> str:
         """The closing line of the printed history."""
-        return self.data.completeness()
+        return self.data.closing_line
+
+    def text(self, units: tuple[str, str] | None = None) -> str:
+        """What is printed, with units of forces and lengths if they are given."""
+        return history_data.history_text(self.data, checked_units(units))
 
     def __repr__(self) -> str:
-        return history_data.history_text(self.data)
+        return self.text()
 
     def _repr_html_(self) -> str:
         return history_data.history_html(self.data)

@@ -23,6 +23,7 @@ from enumsol.proof.reading import rational_text
 from enumsol.proof.writer import ProofWriter
 from enumsol.roots.root import Root, summary
 from enumsol.support.messages import counted, html_lines, html_table
+from enumsol.support.plotting import in_units
 from enumsol.trusted.positions import certain_statuses, tangential_positions
 
 if TYPE_CHECKING:
@@ -308,7 +309,8 @@ class HistoryData:
             number += 1
         return number
 
-    def completeness(self) -> str:
+    @property
+    def closing_line(self) -> str:
         """The closing line of the printed history."""
         if self.arithmetic == "fast":
             return "complete: no" if self.reasons else "complete: not proven (fast arithmetic)"
@@ -381,10 +383,11 @@ _BRANCH = {True: ("└─ ", "   "), False: ("├─ ", "│  ")}
 _HEADS = ("step", "alpha", "roots", "from", "histories", "dissipated")
 
 
-def history_text(history: HistoryData) -> str:
-    """What print shows."""
-    rows = [_HEADS, *_rows(history)]
-    widths = (4, 10, 6, 5, 10, 11)
+def history_text(history: HistoryData, units: tuple[str, str] | None = None) -> str:
+    """What print shows, with units of forces and lengths if they are given."""
+    heads, body = steps_table(history, units)
+    rows = [heads, *body]
+    widths = (4, 10, 6, 5, 10, max(11, len(heads[-1])))
     table = [" ".join(f"{cell:>{width}}" for cell, width in zip(row, widths, strict=True)) for row in rows]
     left = len(history.steps) - _STEPS
     more = [f"   ... {counted(left, 'more step')}"] if left > 0 else []
@@ -397,9 +400,11 @@ def history_html(history: HistoryData) -> str:
     return html_lines([_heading(history)]) + html_table(_HEADS, _rows(history)) + tree + html_lines(_notes(history))
 
 
-def steps_table(history: HistoryData) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def steps_table(
+    history: HistoryData, units: tuple[str, str] | None = None
+) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Heads and rows of the table of the steps."""
-    return _HEADS, _rows(history)
+    return (*_HEADS[:-1], in_units(_HEADS[-1], "work", units)), _rows(history)
 
 
 def tree_lines(history: HistoryData, most: int = _TREE) -> Iterator[str]:
@@ -468,4 +473,4 @@ def _notes(history: HistoryData) -> list[str]:
         lines.append(f"   ... {len(history.reasons) - _REASONS} more reasons")
     if history.refinement is not None:
         lines.append(f"increments: {history.refinement}")
-    return [*lines, history.completeness()]
+    return [*lines, history.closing_line]

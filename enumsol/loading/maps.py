@@ -19,10 +19,10 @@ from enumsol.model.problem import ContactProblem
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.support import arguments
 from enumsol.support.array_arguments import vector_of
-from enumsol.support.immutable import Immutable
+from enumsol.support.immutable import Immutable, Listed
 from enumsol.support.keeping import keeping
 from enumsol.support.messages import counted
-from enumsol.support.plotting import kept
+from enumsol.support.plotting import checked_units, in_units, kept
 from enumsol.support.workers import spread
 
 if TYPE_CHECKING:
@@ -244,7 +244,8 @@ class MultiplicityMap(Immutable):
         strips: tuple[MapStrip, ...],
         missing: str | None,
     ) -> None:
-        self.name, self.interval, self.rows, self.strips, self.missing = name, interval, rows, strips, missing
+        self.name, self.interval, self.missing = name, interval, missing
+        self.rows, self.strips = Listed(rows, "row"), Listed(strips, "strip")
         self._freeze()
 
     @property
@@ -325,7 +326,7 @@ class MultiplicityMap(Immutable):
             columns=["value", "first", "last", "solutions", "exact", "complete", "to_next"],
         )
 
-    def plot(self, *, ax: Any = None, file: str | Path | None = None) -> Any:
+    def plot(self, *, units: tuple[str, str] | None = None, ax: Any = None, file: str | Path | None = None) -> Any:
         """A figure: alpha across, the second parameter upwards, numbers of solutions by colour, folds as curves.
 
         What is proven is drawn in full colour: lines at the values, and between them green rectangles, in which the
@@ -334,6 +335,8 @@ class MultiplicityMap(Immutable):
 
         Parameters
         ----------
+        units : (str, str), optional
+            Of forces and of lengths, for the axis of a gap.
         ax : matplotlib Axes or None
         file : path, optional
 
@@ -350,7 +353,8 @@ class MultiplicityMap(Immutable):
         """
         from enumsol.loading.figures import draw_map  # matplotlib comes with the first picture
 
-        return kept(draw_map(self.name, self.rows, self.strips, self.curves, self.completeness(), ax), file)
+        name = in_units(self.name, "length" if self.name == "gap" else None, checked_units(units))
+        return kept(draw_map(name, self.rows, self.strips, self.curves, self.closing_line, ax), file)
 
     @property
     def unique_between(self) -> float:
@@ -358,7 +362,8 @@ class MultiplicityMap(Immutable):
         shares = [strip.share(*self.interval) for strip in self.strips]
         return sum(shares) / len(shares) if shares else 0.0
 
-    def completeness(self) -> str:
+    @property
+    def closing_line(self) -> str:
         """The closing line of the printed map."""
         if self.missing is not None:
             return f"complete: no ({self.missing})"
@@ -368,7 +373,7 @@ class MultiplicityMap(Immutable):
                 between += f", but for one solution over {_percent(self.unique_between)} of alpha"
             return f"complete: yes (proven at these values{self._within()}; {between})"
         number = sum(not row.complete for row in self.rows)
-        return f"complete: no (not proven at {number} of {len(self.rows)} values{self._within()})"
+        return f"complete: no (not proven at {number} of {counted(len(self.rows), 'value')}{self._within()})"
 
     def _within(self) -> str:
         """Of bodies that nothing holds, within which rigid displacements the map is about solutions."""
@@ -390,7 +395,7 @@ class MultiplicityMap(Immutable):
         for row in self.rows:
             text = f"{row.value:>8.5g}  {_counts(row):<{width}}  {_limit(row):>12}"
             lines.append(text + (f"{shares[row.value]:>19}" if row.value in shares else ""))
-        return "\n".join([*lines, self.completeness()])
+        return "\n".join([*lines, self.closing_line])
 
 
 def _share(strip: MapStrip | None, first: float, last: float) -> float:

@@ -190,8 +190,10 @@ class ContactBody(Immutable):
         """The problem condensed to its contact forces (theory, section 4.1)."""
         raise NotImplementedError
 
-    def check_held(self, what: str, why: str = "") -> None:
-        """Nothing for a body that supports or springs hold; ``what`` was asked of it, for the message, as is ``why``.
+    def check_held(self, what: str, why: str = "", instead: str = "") -> None:
+        """Nothing for a body that supports or springs hold; the arguments are words of the message.
+
+        ``what`` was asked of it, ``why`` that needs supports, and ``instead`` is what else will do.
 
         Raises
         ------
@@ -201,7 +203,7 @@ class ContactBody(Immutable):
         if self.modes is not None:
             raise NotHeldError(
                 f"{what} cannot take a body that nothing holds (rigid_modes is given){why and f', {why}'}; "
-                "expected a body held by supports or springs"
+                f"expected a body held by supports or springs{instead}"
             )
 
     @cached_property

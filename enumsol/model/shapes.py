@@ -21,6 +21,9 @@ SLIP_ARROW = 0.12
 _ALIKE = 8.0
 #: Nodal forces below this part of the largest are rounding.
 _LEAST_FORCE = 1e-9
+#: Displacements below this part of those without contact forces are what rounding leaves where forces cancel the load;
+#: larger, it would hide how a stiff body on very weak springs is deformed.
+_LEAST_MOVED = 1e-12
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,18 @@ class BodyShape:
         """Of all nodes, (N, d) [length]."""
         return np.asarray(self.motion @ u).reshape(self.points.shape) + self.offset
 
+    def moves(self, root: Any) -> Floats:
+        """Displacements of all nodes at a root, (N, d) [length]: zero for a body at rest, where only rounding is left.
+
+        What rounding is is measured by the displacements without contact forces, or, if nothing holds the body, by its
+        size.
+        """
+        problem, found, free = root.problem, self.displacements(root.u), self.size
+        if problem.modes is None:
+            none = np.zeros(problem.contact_rows.shape[0])
+            free = largest_length(self.displacements(problem.condensed.displacement(root.alpha, none)))
+        return found if largest_length(found) > _LEAST_MOVED * free else np.zeros_like(found)
+
     def contact_forces(self, problem: Any, lambda_n: Floats, lambda_t: Floats) -> Floats:
         """Contact forces on all nodes of the body in global axes, (N, d) [force]."""
         rows = np.concatenate([lambda_n, lambda_t.ravel(order="F")])
@@ -65,6 +80,11 @@ class BodyShape:
     def at_rows(self, values: Floats) -> Floats:
         """Values of nodes (N, d) at the contact rows, (p, d)."""
         return np.asarray(self.weights @ values)
+
+
+def largest_length(vectors: Floats) -> float:
+    """The length of the longest of some vectors."""
+    return float(np.max(np.linalg.norm(vectors, axis=1), initial=0.0))
 
 
 def body_shape(problem: Any) -> BodyShape:

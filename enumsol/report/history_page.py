@@ -34,15 +34,15 @@ def history_page(
         "title": escape(title),
         "plotly": "",
         "badge": "yes" if history.complete else "no",
-        "completeness": escape(history.completeness()),
+        "completeness": escape(history.closing_line),
         "reasons": _reasons(history),
         "answers": "",
         "facts": _facts(history),
         "given": given_section(scene, units),
-        "steps": scrolling("Steps", html_table(*steps_table(history.data))),
+        "steps": scrolling("Steps", html_table(*steps_table(history.data, units))),
         "tree": escape("\n".join(tree_lines(history.data, _TREE))),
-        "figures": _figures(history),
-        "bodies": _bodies(history),
+        "figures": _figures(history, units),
+        "bodies": _bodies(history, units),
         "certified": _certified(history, commands),
     }
     return filled_page("history", ("page.theme.js", "page.history.js"), {}, words)
@@ -73,20 +73,23 @@ def _facts(history: History) -> str:
     return fact_list(facts)
 
 
-def _figures(history: History) -> str:
+def _figures(history: History, units: tuple[str, str] | None) -> str:
     pairs = (("displacement", "alpha"), ("step", "dissipated"), ("step", "lambda_n"), ("displacement", "lambda_t"))
     moves = any(step.alpha is not None for step in history.steps)
-    return "".join(_image(history.plot(x, y), f"{y} against {x}") for x, y in pairs if moves or y != "alpha")
+    return "".join(
+        _image(history.plot(x, y, units=units), f"{y} against {x}") for x, y in pairs if moves or y != "alpha"
+    )
 
 
-def _bodies(history: History) -> str:
+def _bodies(history: History, units: tuple[str, str] | None) -> str:
     from enumsol.roots.body_plots import draw_bodies  # matplotlib comes with the first picture
 
     shown = [number for number in range(1, len(history.steps) + 1) if history.nodes_of(number)][-_BODIES:]
     pictures = {}
     for number in shown:
         try:
-            pictures[number] = _image(draw_bodies(history.roots(number)), f"deformed bodies of step {number}")
+            drawn = draw_bodies(history.roots(number), units=units)
+            pictures[number] = _image(drawn, f"deformed bodies of step {number}")
         except InvalidArgumentError as error:
             return f"<p>They are not drawn: {escape(str(error))}.</p>"
     if not pictures:
@@ -112,7 +115,7 @@ def _image(figure: Any, words: str) -> str:
 
 
 def _certified(history: History, commands: Sequence[str]) -> str:
-    lines = [f"<p>{escape(history.completeness())}.</p>"]
+    lines = [f"<p>{escape(history.closing_line)}.</p>"]
     if history.complete:
         lines.append(
             "<p>It is proven that these are all histories of the steps as they are given: every step has no other "

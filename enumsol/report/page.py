@@ -9,7 +9,6 @@ import numpy as np
 
 from enumsol.branches import BranchGraph
 from enumsol.branches.claims import ranges_text
-from enumsol.branches.figures.graph_plots import checked_units
 from enumsol.errors import InvalidArgumentError
 from enumsol.loading.history import History
 from enumsol.model.problem import ContactProblem
@@ -31,6 +30,7 @@ from enumsol.roots.root_set import RootSet
 from enumsol.support.arguments import file_path, instance_of
 from enumsol.support.files import write_file
 from enumsol.support.messages import counted
+from enumsol.support.plotting import checked_units
 
 if TYPE_CHECKING:
     import os
@@ -141,7 +141,7 @@ def report_page(
         "title": escape(title),
         "plotly": packed_plotly(),
         "badge": "yes" if graph.complete else "no",
-        "completeness": escape(graph.completeness()),
+        "completeness": escape(graph.closing_line),
         "reasons": _reasons(graph),
         "facts": _facts(graph, units),
         "given": given_section(scene, units),
@@ -203,8 +203,8 @@ def _branches(graph: BranchGraph) -> str:
         if branch.sheet:
             return "sheet (a continuum over an interval)"
         if branch.closed:
-            return "closed"
-        return "unfinished" if any(v.kind.value == "unsettled" for v in branch.vertices) else "open"
+            return "loop"
+        return "unfinished" if any(v.kind.value == "unsettled" for v in branch.vertices) else "path"
 
     rows = []
     for branch in graph.branches:
@@ -257,7 +257,7 @@ def _certified(graph: BranchGraph, commands: Sequence[str]) -> str:
         "problem": "the matrices A, the contact rows and f as they were given",
         "condensed": "the condensed problem, S and g as computed",
     }[graph.certified_data]
-    lines = [f"<p>{escape(graph.completeness())}.</p>"]
+    lines = [f"<p>{escape(graph.closing_line)}.</p>"]
     if graph.complete:
         lines.append(
             f"<p>It is proven that every solution for every alpha of the interval lies on the arcs shown here. This is "

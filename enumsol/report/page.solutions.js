@@ -57,9 +57,11 @@ function drawCards() {
 // -- deformed bodies ----------------------------------------------------------------------------------------------
 
 function moves(f) {
-  const body = data.body, u = body.u0.map((x, i) => x + state.alpha * body.u1[i]);
+  const body = data.body, free = body.u0.map((x, i) => x + state.alpha * body.u1[i]), u = [...free];
   f.forEach((force, k) => { if (force !== 0) body.c[k].forEach((x, i) => { u[i] -= force * x; }); });
-  return u;
+  // of a body at rest, the seven digits of these numbers leave rounding
+  const largest = (values) => values.reduce((most, x) => Math.max(most, Math.abs(x)), 0);
+  return largest(u) > 5e-7 * largest(free) ? u : u.map(() => 0);
 }
 
 function nodalForces(f) {

@@ -71,7 +71,7 @@ def _pictures(roots: Sequence[Root], scene: Scene | None) -> tuple[dict[str, Any
         return _picture(None, f"The mesh is too large to draw: its boundary alone has {len(nodes):,} nodes"), []
     bodies = [
         {
-            "u": short_list(shape.displacements(root.u)[nodes].ravel()),
+            "u": short_list(shape.moves(root)[nodes].ravel()),
             "forces": vectors(shape.contact_forces(problem, root.lambda_n, root.lambda_t), nodes),
         }
         for root in roots[:count]

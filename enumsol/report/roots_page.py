@@ -43,7 +43,7 @@ def roots_page(
         "title": escape(title),
         "plotly": packed_plotly() if turned else "",
         "badge": "yes" if found.complete else "no",
-        "completeness": escape(found.completeness()),
+        "completeness": escape(found.closing_line),
         "reasons": _open_parts(found),
         "facts": _root_facts(found, units),
         "given": given_section(scene, units),
@@ -176,7 +176,7 @@ def _what_is_certified(found: RootSet, commands: Sequence[str]) -> str:
         "problem": "the matrices A, the contact rows and f as they were given",
         "condensed": "the condensed problem, S and g as computed",
     }[found.certified_data]
-    lines = [f"<p>{escape(found.completeness())}.</p>"]
+    lines = [f"<p>{escape(found.closing_line)}.</p>"]
     if found.complete:
         lines.append(
             f"<p>It is proven that the problem has the listed solutions at this alpha, and no others. This is about "

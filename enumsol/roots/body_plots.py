@@ -8,10 +8,18 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.cells import KINDS, boundary_facets, facet_outlines, outline_edges
-from enumsol.model.shapes import SLIP_ARROW, BodyShape, arrow_scale, body_shape, own_scales, slip_directions
+from enumsol.model.shapes import (
+    SLIP_ARROW,
+    BodyShape,
+    arrow_scale,
+    body_shape,
+    largest_length,
+    own_scales,
+    slip_directions,
+)
 from enumsol.model.statuses import ContactStatus
 from enumsol.support.arguments import positive_number
-from enumsol.support.plotting import axes_or_none, figure_of, new_figure
+from enumsol.support.plotting import axes_or_none, figure_of, in_units, new_figure
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,7 +42,9 @@ _BEFORE_IN_SPACE, _BEFORE_LINE = "#5b6672", {"linewidths": 0.8, "linestyles": "d
 _ACROSS, MOST_BODIES = 3, 12
 
 
-def draw_body(root: Any, problem: Any, ax: Any = None, scale: float | None = None) -> Any:
+def draw_body(
+    root: Any, problem: Any, ax: Any = None, scale: float | None = None, units: tuple[str, str] | None = None
+) -> Any:
     """A figure of one deformed body; see Root.plot_body."""
     axes_or_none(ax)
     shape = body_shape(problem)
@@ -46,11 +56,12 @@ def draw_body(root: Any, problem: Any, ax: Any = None, scale: float | None = Non
         raise InvalidArgumentError("ax is plane and the body is not; expected Axes with projection '3d', or None")
     _draw(ax, root, problem, shape, factor, arrows)
     ax.set_title(f"alpha = {float(root.alpha):g}, {_index(root)}; {_scale_words(factor)}", fontsize=9)
-    _legend(ax, [root])
+    _name_axes(ax, shape.points.shape[1], units)
+    _legend(ax, [root], _strongest([root], problem, shape), units)
     return figure_of(ax)
 
 
-def draw_bodies(roots: Sequence[Any], scale: float | None = None) -> Any:
+def draw_bodies(roots: Sequence[Any], scale: float | None = None, units: tuple[str, str] | None = None) -> Any:
     """A figure of the deformed bodies of several roots side by side; see RootSet.plot_bodies."""
     if not roots:
         raise InvalidArgumentError("there are no isolated roots to draw; expected at least one")
@@ -67,12 +78,13 @@ def draw_bodies(roots: Sequence[Any], scale: float | None = None) -> Any:
         _draw(ax, root, problem, shape, factor, arrows)
         own = "" if one_scale else f"; {_scale_words(factor)}"
         ax.set_title(f"root {k}: {_index(root)}{own}", fontsize=9)
+        _name_axes(ax, shape.points.shape[1], units)
     if shape.points.shape[1] == 3:
         _same_view(figure.axes)
     shown = f", the first {len(drawn)} of {len(roots)} roots" if len(drawn) < len(roots) else ""
     words = _scale_words(factors[0]) if one_scale else "every body with an enlargement of its own"
     figure.suptitle(f"alpha = {float(drawn[0].alpha):g}, {words}{shown}", fontsize=10)
-    _legend(figure, drawn)
+    _legend(figure, drawn, _strongest(drawn, problem, shape), units)
     return figure
 
 
@@ -84,20 +96,19 @@ def _scale_words(scale: float) -> str:
     return f"displacements times {scale:g}"
 
 
+def _strongest(roots: Sequence[Any], problem: Any, shape: BodyShape) -> float:
+    """The largest nodal contact force of several roots [force]."""
+    return max(largest_length(shape.contact_forces(problem, root.lambda_n, root.lambda_t)) for root in roots)
+
+
 def _factors(
     roots: Sequence[Any], problem: Any, shape: BodyShape, scale: float | None
 ) -> tuple[tuple[float, ...], float]:
     """By what the displacements of each root are multiplied, and the forces of all."""
-    arrows = arrow_scale(
-        max(_largest(shape.contact_forces(problem, root.lambda_n, root.lambda_t)) for root in roots), shape.size
-    )
+    arrows = arrow_scale(_strongest(roots, problem, shape), shape.size)
     if scale is not None:
         return (positive_number(scale, "scale"),) * len(roots), arrows
-    return own_scales([_largest(shape.displacements(root.u)) for root in roots], shape.size), arrows
-
-
-def _largest(vectors: Floats) -> float:
-    return float(np.max(np.linalg.norm(vectors, axis=1), initial=0.0))
+    return own_scales([largest_length(shape.moves(root)) for root in roots], shape.size), arrows
 
 
 def _axes(figure: Any, place: Any, shape: BodyShape) -> Any:
@@ -106,7 +117,7 @@ def _axes(figure: Any, place: Any, shape: BodyShape) -> Any:
 
 
 def _draw(ax: Any, root: Any, problem: Any, shape: BodyShape, scale: float, arrows: float) -> None:
-    moves = scale * shape.displacements(root.u)
+    moves = scale * shape.moves(root)
     points = shape.points + moves
     places = shape.at_rows(points)
     forces = arrows * shape.contact_forces(problem, root.lambda_n, root.lambda_t)
@@ -171,7 +182,13 @@ def _solid(ax: Any, shape: BodyShape, points: Floats) -> None:
     ax.add_collection3d(Line3DCollection(list(edges), colors=_BEFORE_IN_SPACE, **_BEFORE_LINE, zorder=3))
 
 
-def _legend(place: Any, roots: Sequence[Any]) -> None:
+def _name_axes(ax: Any, dimension: int, units: tuple[str, str] | None) -> None:
+    """Directions with the unit of lengths; without units a picture needs no names of axes."""
+    for direction in "xyz"[: dimension if units is not None else 0]:
+        getattr(ax, f"set_{direction}label")(in_units(direction, "length", units), fontsize=8)
+
+
+def _legend(place: Any, roots: Sequence[Any], strongest: float, units: tuple[str, str] | None) -> None:
     from matplotlib.lines import Line2D
 
     found = {status for root in roots for status in root.statuses}
@@ -180,8 +197,9 @@ def _legend(place: Any, roots: Sequence[Any]) -> None:
         for status, (marker, face) in MARKS.items()
         if status in found
     ]
-    if any(np.any(root.lambda_n) for root in roots):
-        handles.append(Line2D([], [], color=_FORCE, label="contact force on the body"))
+    if strongest > 0:
+        most = "" if units is None else f", up to {strongest:.4g} {units[0]}"
+        handles.append(Line2D([], [], color=_FORCE, label=f"contact force on the body{most}"))
     if ContactStatus.SLIP in found:
         handles.append(Line2D([], [], color=_SLIP, linewidth=1.8, label="direction of slip"))
     if roots[0].lambda_t.ndim == 2:
@@ -201,17 +219,17 @@ _MARKS = {
 }
 
 
-def draw_root(root: Any, problem: ContactProblem3D, ax: Any) -> Any:
+def draw_root(root: Any, problem: ContactProblem3D, ax: Any, units: tuple[str, str] | None = None) -> Any:
     """See Root.plot."""
     if axes_or_none(ax) is not None or problem.mesh is None:
-        return draw_slips(root, problem, ax)
+        return draw_slips(root, problem, ax, units)
     figure = new_figure(figsize=(11.0, 5.0))
-    draw_body(root, problem, figure.add_subplot(121, projection="3d"))
-    draw_slips(root, problem, figure.add_subplot(122))
+    draw_body(root, problem, figure.add_subplot(121, projection="3d"), units=units)
+    draw_slips(root, problem, figure.add_subplot(122), units)
     return figure
 
 
-def draw_slips(root: Any, problem: ContactProblem3D, ax: Any) -> Any:
+def draw_slips(root: Any, problem: ContactProblem3D, ax: Any, units: tuple[str, str] | None = None) -> Any:
     """Statuses and directions of slip on the contact surface."""
     if problem.coordinates is None:
         raise InvalidArgumentError("the problem has no coordinates; expected a problem made with coordinates=")
@@ -233,8 +251,8 @@ def draw_slips(root: Any, problem: ContactProblem3D, ax: Any) -> Any:
         ax.quiver(*places[slides][:, shown].T, *d.T, size[slides], angles="xy", width=0.005, **colours)
     ax.set_aspect("equal", adjustable="box")
     ax.margins(0.15)
-    ax.set_xlabel("xyz"[shown[0]])
-    ax.set_ylabel("xyz"[shown[1]])
+    ax.set_xlabel(in_units("xyz"[shown[0]], "length", units))
+    ax.set_ylabel(in_units("xyz"[shown[1]], "length", units))
     ax.set_title(f"directions of slip at alpha = {float(root.alpha):g}, index {root.index:+d}")
     ax.legend()
     return figure_of(ax)

@@ -13,6 +13,7 @@ from enumsol.model.statuses import ContactStatus, sign_array
 from enumsol.roots.local_branch import LocalBranchTest, branch_test
 from enumsol.support.immutable import Sealed, sealed
 from enumsol.support.messages import html_lines, html_table, visible
+from enumsol.support.plotting import checked_units, kept
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -209,13 +210,17 @@ class Root(ContactState):
         """The problem that it solves."""
         return self._condensed.problem
 
-    def plot(self, ax: Any = None) -> Any:
+    def plot(self, ax: Any = None, *, units: tuple[str, str] | None = None, file: Any = None) -> Any:
         """The deformed body; in 3D also statuses and directions of slip on the contact surface.
 
         Parameters
         ----------
         ax : matplotlib Axes or None
             In 3D plane ones: the contact surface alone is drawn there. None: all in a new figure.
+        units : (str, str), optional
+            Of forces and of lengths, for the axes and the largest contact force.
+        file : path, optional
+            Save the figure there.
 
         Returns
         -------
@@ -230,12 +235,19 @@ class Root(ContactState):
             matplotlib is not installed.
         """
         if self.lambda_t.ndim == 1:
-            return self.plot_body(ax)
+            return self.plot_body(ax, units=units, file=file)
         from enumsol.roots.body_plots import draw_root  # matplotlib comes with the first picture
 
-        return draw_root(self, self.problem, ax)
+        return kept(draw_root(self, self.problem, ax, checked_units(units)), file)
 
-    def plot_body(self, ax: Any = None, *, scale: float | None = None) -> Any:
+    def plot_body(
+        self,
+        ax: Any = None,
+        *,
+        scale: float | None = None,
+        units: tuple[str, str] | None = None,
+        file: Any = None,
+    ) -> Any:
         """The deformed body with contact forces as arrows and contact nodes by status; in 3D also directions of slip.
 
         Parameters
@@ -244,6 +256,10 @@ class Root(ContactState):
             Draw there, in 3D with ``projection="3d"``; None: in a new figure.
         scale : float, optional
             Displacements are multiplied by it; default so that they can be seen. The title tells it.
+        units : (str, str), optional
+            Of forces and of lengths, for the axes and the largest contact force.
+        file : path, optional
+            Save the figure there.
 
         Returns
         -------
@@ -259,7 +275,7 @@ class Root(ContactState):
         """
         from enumsol.roots.body_plots import draw_body  # matplotlib comes with the first picture
 
-        return draw_body(self, self.problem, ax, scale)
+        return kept(draw_body(self, self.problem, ax, scale, checked_units(units)), file)
 
     def _in_2d(self, name: str) -> None:
         """Refuse what roots in 3D do not have."""

@@ -11,9 +11,10 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.roots.root import Enclosure, Root, RootFamily, summary
-from enumsol.support.arguments import positive_number
-from enumsol.support.immutable import Immutable, Sealed
+from enumsol.support.arguments import positive_number, shown
+from enumsol.support.immutable import Immutable, Listed, Sealed
 from enumsol.support.messages import counted, html_lines, html_table
+from enumsol.support.plotting import checked_units, kept
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -211,9 +212,9 @@ class RootSet(Sequence[Root], Immutable):
         rigid_bound: RigidBound | None = None,
     ) -> None:
         self.alpha = alpha
-        self._roots = tuple(roots)
-        self.families = tuple(families)
-        self.undecided = tuple(undecided)
+        self._roots = Listed(roots, "root")
+        self.families = Listed(families, "family", "families")
+        self.undecided = Listed(undecided, "undecided part")
         self.arithmetic = arithmetic
         self.method = method
         self.stopped = stopped
@@ -277,6 +278,22 @@ class RootSet(Sequence[Root], Immutable):
     def __getitem__(self, item: slice) -> tuple[Root, ...]: ...
     def __getitem__(self, item: int | slice) -> Root | tuple[Root, ...]:
         return self._roots[item]
+
+    def index(self, root: Any = None, start: int = 0, stop: int | None = None) -> int:
+        """Position of a root, as that of an item of a list; the topological index is ``index`` of a root.
+
+        Raises
+        ------
+        InvalidArgumentError
+            It is none of these roots.
+        """
+        for k in range(len(self))[slice(start, stop)]:
+            if self._roots[k] is root:
+                return k
+        raise InvalidArgumentError(
+            f"index, the position of a root, is asked of {shown(root)}; expected one of these "
+            f"{counted(len(self), 'root')} (for topological indices, roots[0].index or roots.index_sum)"
+        )
 
     def mirrored(self, mirror: Any, *, tolerance: float = 1e-6) -> RootSet:
         """The same roots with ``mirror_images``, which tells which are mirror images of one another.
@@ -365,7 +382,7 @@ class RootSet(Sequence[Root], Immutable):
             return {}
         return {"mirror_image": np.repeat(np.array(self.mirror_images.images, dtype=object), p)}
 
-    def plot_bodies(self, *, scale: float | None = None) -> Any:
+    def plot_bodies(self, *, scale: float | None = None, units: tuple[str, str] | None = None, file: Any = None) -> Any:
         """A matplotlib figure of the deformed bodies of the isolated roots, up to 12 of them, side by side.
 
         Forces are drawn in one scale, and displacements too unless their sizes differ by more than a factor of 8, as
@@ -375,6 +392,10 @@ class RootSet(Sequence[Root], Immutable):
         ----------
         scale : float, optional
             The displacements of all roots are multiplied by it.
+        units : (str, str), optional
+            Of forces and of lengths, for the axes and the largest contact force.
+        file : path, optional
+            Save the figure there.
 
         Raises
         ------
@@ -385,9 +406,10 @@ class RootSet(Sequence[Root], Immutable):
         """
         from enumsol.roots.body_plots import draw_bodies  # matplotlib comes with the first picture
 
-        return draw_bodies(self._roots, scale)
+        return kept(draw_bodies(self._roots, scale, checked_units(units)), file)
 
-    def completeness(self) -> str:
+    @property
+    def closing_line(self) -> str:
         """The closing line of the printed table."""
         count = len(self.undecided)
         if self.stopped is not None:
@@ -440,7 +462,10 @@ class RootSet(Sequence[Root], Immutable):
             )
         # a search that was cut short leaves many alike
         alike = Counter((item.reason, item.hint) for item in self.undecided)
-        lines += [f"undecided, {count} times: {reason} ({hint})" for (reason, hint), count in alike.most_common(5)]
+        lines += [
+            f"undecided{f', {count} times' if count > 1 else ''}: {reason} ({hint})"
+            for (reason, hint), count in alike.most_common(5)
+        ]
         regions = [item for item in self.undecided if item.slip_angle is not None]
         lines += [f"undecided region {k}: {_region(item)}" for k, item in enumerate(regions[:_PRINTED_REGIONS])]
         if len(regions) > _PRINTED_REGIONS:
@@ -455,10 +480,10 @@ class RootSet(Sequence[Root], Immutable):
         total = self.index_sum
         if self.rigid_bound is not None:
             # nothing that holds the body makes the sum +1
-            return [*lines, f"index sum: {'unknown' if total is None else f'{total:+d}'}", self.completeness()]
+            return [*lines, f"index sum: {'unknown' if total is None else f'{total:+d}'}", self.closing_line]
         # a sum other than +1 proves that something is missing or wrong
         note = "unknown" if total is None else f"{total:+d}" if total == 1 else f"{total:+d} (not +1!)"
-        return [*lines, f"index sum: {note}", self.completeness()]
+        return [*lines, f"index sum: {note}", self.closing_line]
 
     def __repr__(self) -> str:
         rows = [_HEADS, *self._rows()] if len(self) else []

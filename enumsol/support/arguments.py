@@ -183,6 +183,19 @@ def _from_text(text: str, name: str) -> float | Fraction | None:
     return number
 
 
+def text_of(value: Any, name: str) -> str:
+    """A text.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is something else.
+    """
+    if not isinstance(value, str):
+        raise InvalidArgumentError(f"{name} is {shown(value)}; expected a text in quotes")
+    return value
+
+
 def alpha_list(values: Any, name: str = "alphas") -> list[Alpha]:
     """The exact values of several alphas, in their order.
 
@@ -198,6 +211,24 @@ def alpha_list(values: Any, name: str = "alphas") -> list[Alpha]:
     if several is None:
         raise InvalidArgumentError(f"{name} is {shown(values)}; expected several numbers, such as [1.0, 2.5]")
     return [alpha_value(value, f"{name}[{k}]") for k, value in enumerate(several)]
+
+
+def even_alphas(ends: Any, samples: Any, name: str = "alphas") -> list[Alpha]:
+    """Evenly spaced alphas, both ends included: exact ones between fractions, else the floats nearest to the decimals.
+
+    Between -1 and 0.2 the sixth of seven is 0, and not what is left of -1 + 5 * 0.2 in floats.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The ends are no pair of alphas in increasing order, or there are fewer than two samples.
+    """
+    low, high = alpha_interval(ends, name)
+    last = positive_integer(samples, "samples", least=2) - 1
+    start, end = (Fraction(repr(value)) if isinstance(value, float) else value for value in (low, high))
+    inside = [start + (end - start) * k / last for k in range(1, last)]
+    rounded = isinstance(low, float) and isinstance(high, float)
+    return [low, *(map(float, inside) if rounded else inside), high]
 
 
 def alpha_interval(value: Any, name: str = "interval") -> tuple[Alpha, Alpha]:

@@ -6,14 +6,18 @@ holds is copied when it is made, and made immutable: writing to it raises, and i
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self, SupportsIndex, TypeVar, overload
 
 import numpy as np
 import scipy.sparse as sp
 
+from enumsol.errors import NoSuchItemError
 from enumsol.support.array_types import Floats, NDArray
+from enumsol.support.messages import counted
+
+Item = TypeVar("Item")
 
 
 def sealed(array: NDArray[Any]) -> NDArray[Any]:
@@ -54,6 +58,42 @@ class Sealed:
     def __setstate__(self, state: Mapping[str, Any]) -> None:
         # a frozen dataclass refuses setattr; arrays come out of a pickle writable
         self.__dict__.update({name: _sealed_within(value) for name, value in state.items()})
+
+
+class Listed(tuple[Item, ...]):
+    """A tuple of results, which says what there is when it is asked for an item beyond its end.
+
+    Parameters
+    ----------
+    items : iterable
+    name, plural : str
+        What an item is called in the message.
+    """
+
+    def __new__(cls, items: Iterable[Item] = (), name: str = "item", plural: str | None = None) -> Self:
+        """The tuple of these items."""
+        made = super().__new__(cls, items)
+        made.__dict__.update(name=name, plural=plural)
+        return made
+
+    @overload
+    def __getitem__(self, item: SupportsIndex) -> Item: ...
+    @overload
+    def __getitem__(self, item: slice) -> tuple[Item, ...]: ...
+    def __getitem__(self, item: Any) -> Any:
+        try:
+            return super().__getitem__(item)
+        except IndexError:
+            given: dict[str, Any] = self.__dict__
+            raise no_such_item(item, len(self), given["name"], given["plural"]) from None
+
+
+def no_such_item(item: object, count: int, name: str, plural: str | None = None) -> NoSuchItemError:
+    """The error that a list of results has no item of a number."""
+    there = "is" if count == 1 else "are"
+    numbers = "0" if count == 1 else f"a number from 0 to {count - 1}, or from -{count} to -1"
+    expected = f"; expected {numbers}" if count else ""
+    return NoSuchItemError(f"there is no {name} {item}: there {there} {counted(count, name, plural)}{expected}")
 
 
 class Immutable:

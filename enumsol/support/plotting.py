@@ -7,7 +7,7 @@ from io import BytesIO
 from typing import Any
 
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
-from enumsol.support.arguments import file_path
+from enumsol.support.arguments import file_path, shown
 from enumsol.support.files import write_file
 
 
@@ -44,6 +44,30 @@ def _figure_class() -> Any:
             return drawn.getvalue()
 
     return NotebookFigure
+
+
+def checked_units(units: Any, name: str = "units") -> tuple[str, str] | None:
+    """Units of forces and lengths, of a pair or a text such as "N,mm"; None for None.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It is something else.
+    """
+    if units is None:
+        return None
+    pair = units.split(",") if isinstance(units, str) else units
+    if not isinstance(pair, (tuple, list)) or len(pair) != 2 or not all(isinstance(x, str) and x.strip() for x in pair):
+        raise InvalidArgumentError(f"{name} is {shown(units)}; expected units of force and length, such as N,mm")
+    return pair[0].strip(), pair[1].strip()
+
+
+def in_units(name: str, dimension: str | None, units: tuple[str, str] | None) -> str:
+    """A heading or the label of an axis, with the unit of "force", "length" or "work" if units are given."""
+    if units is None or dimension is None:
+        return name
+    force, length = units
+    return f"{name} [{ {'force': force, 'length': length, 'work': f'{force} {length}'}[dimension] }]"
 
 
 def figure_of(ax: Any) -> Any:

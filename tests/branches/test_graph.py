@@ -55,7 +55,7 @@ def test_a_closed_branch_of_any_length():
             lo, hi = (v.exact.enclosure()[0] for v in sorted(closed.folds, key=lambda v: v.alpha))
             assert float(hi - lo) == pytest.approx(2 * half, rel=1e-9)
             assert graph.multiplicity_at(2.0) == 3
-            assert f"  branch {closed.number}: closed, 2 arcs, alpha in [" in repr(graph)
+            assert f"  branch {closed.number}: loop, 2 arcs, alpha in [" in repr(graph)
 
 
 def test_a_branch_on_an_alpha_interval_of_length_1e_6_is_missed_by_samples():

@@ -52,7 +52,7 @@ def test_a_large_body_is_decided_at_its_contact_nodes():
     (reason,) = graph.reasons
     assert "conditions of contact nodes left and right vanish there" in reason or "several contact nodes" in reason
     assert "problem.at_contact_nodes()" in reason
-    assert graph.completeness() == f"complete: no ({reason})"
+    assert graph.closing_line == f"complete: no ({reason})"
     refusal(IncompleteGraphError, re.escape(reason), graph.multiplicity_at, 3.25)
     small = whole_graph(problem.at_contact_nodes(), (2.5, 3.5))
     assert {small.multiplicity_at(alpha) for alpha in (2.75, 3.25)} == {3, 5}

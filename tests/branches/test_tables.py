@@ -1,6 +1,7 @@
 """multiplicity_table and link_samples."""
 
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from fractions import Fraction
 
 import networkx as nx
 import numpy as np
@@ -13,6 +14,8 @@ from refusals import bad_argument
 
 from enumsol import enumerate_roots, gallery
 from enumsol.branches import branch_graph, link_samples, multiplicity_table, samples
+from enumsol.errors import InvalidArgumentError
+from enumsol.support.arguments import even_alphas
 
 ALPHAS = [0.5, 2.0, 3.5, 5.0, 7.5]
 
@@ -26,6 +29,18 @@ def assert_as_alone(table, problem):
     """A table is that of a run in this process, but for the seconds that it took."""
     tables = [one.drop(columns="seconds") for one in (table, multiplicity_table(problem, ALPHAS))]
     pd.testing.assert_frame_equal(*tables)
+
+
+def test_evenly_spaced_alphas_are_those_that_their_decimals_say():
+    """-1 + 5 * 0.2 is 0, where numpy.linspace gives -1.1e-16; the ends are those that are given."""
+    problem = gallery.get("clamped-block-8").build().replace(friction=0.3)
+    table = multiplicity_table(problem, (-1, 0.2), samples=7)
+    assert table["alpha"].tolist() == [-1, -0.8, -0.6, -0.4, -0.2, 0, 0.2]
+    assert even_alphas(("1/3", 0.1 + 1), 3) == [Fraction(1, 3), Fraction(43, 60), 1.1]
+    with pytest.raises(InvalidArgumentError, match="samples is 1"):
+        multiplicity_table(problem, (0, 1), samples=1)
+    with pytest.raises(InvalidArgumentError, match="alphas is"):
+        multiplicity_table(problem, [0, 0.5, 1], samples=3)
 
 
 def test_the_table_counts_roots_families_and_kinds(square):

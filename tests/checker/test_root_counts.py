@@ -124,7 +124,7 @@ def test_without_rationals_the_count_is_right_or_open(p, count, monkeypatch):
             assert outline(roots)[1] == outline(exact)[1]
         else:
             left_open += 1
-            assert "undecided" in roots.completeness()
+            assert "undecided" in roots.closing_line
             for item in roots.undecided:
                 assert "singular" in item.reason or "is zero to" in item.reason
                 assert "perturb the load" in item.hint

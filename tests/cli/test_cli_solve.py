@@ -51,6 +51,40 @@ def test_from_a_mesh_to_the_roots(here, capsys):
     assert json.loads((here / "r.json").read_text())["roots"][0]["lambda_n"] == pytest.approx(root.lambda_n.tolist())
 
 
+UNITS = "forces in kN, displacements in mm"
+
+
+@pytest.mark.parametrize("given", ["--units kN,mm", 'units = "kN,mm"', 'units = ["kN", "mm"]'])
+@pytest.mark.parametrize(
+    ("command", "said"),
+    [
+        ("solve body.toml --alpha 0.5 --report page.html", UNITS),
+        ("roots body.toml --alpha 0.5 --report page.html", UNITS),
+        ("fixed-point body.toml --alpha 0.5", UNITS),
+        ("history body.toml --steps 0,0.5 --report page.html", "dissipated [kN mm]"),
+    ],
+)
+def test_units_stand_where_forces_and_displacements_do(here, capsys, command, said, given):
+    """Of an option, or of a TOML file, which may have a title, too."""
+    option = shlex.split(given) if given.startswith("--") else []
+    (here / "body.toml").write_text('title = "My <body>"\n' + ("" if option else f"{given}\n") + TOML)
+    assert said in printed(capsys, *shlex.split(command), *option)
+    if "--report" in command:
+        page = (here / "page.html").read_text(encoding="utf-8")
+        assert "<title>My &lt;body&gt;" in page
+        assert "kN" in page
+    assert said not in printed(capsys, *shlex.split(command), "--units", "N,m")
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [("units = 5", "units is 5; expected units of force and length"), ("title = 5", "title is 5; expected a text")],
+)
+def test_units_and_titles_that_are_none(here, capsys, line, said):
+    (here / "body.toml").write_text(f"{line}\n{TOML}")
+    assert_refused(*run(capsys, "roots", "body.toml", "--alpha", 0), said)
+
+
 @pytest.mark.parametrize(
     "command",
     [

@@ -370,7 +370,7 @@ def test_bad_arguments_get_one_sentence(changes, message):
 
 def test_a_symmetry_that_is_inclined_is_refused():
     mesh = moved(grid(2, 2, 3), lambda p: p + np.c_[0.3 * p[:, 1], 0 * p[:, 1]])
-    message = "symmetry left lies in 0 planes perpendicular to an axis"
+    message = "symmetry left lies in no plane perpendicular to an axis"
     bad_argument(message, fem.mesh_problem, mesh, **GOOD, symmetry="left")
 
 

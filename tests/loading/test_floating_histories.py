@@ -54,7 +54,7 @@ def test_sliding_for_good_is_a_family_that_is_not_followed():
     history = compared(pushed_block(1, max_rigid_displacement=4.0), [0.5, 1.0, 0.0])
     assert len(history.stages(3)) == 0
     assert "family of solutions, which are not followed" in history.reasons[0]
-    assert "within rigid displacements of 4" in history.completeness()
+    assert "within rigid displacements of 4" in history.closing_line
 
 
 def test_weak_springs_tend_to_it():

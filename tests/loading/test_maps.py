@@ -231,4 +231,4 @@ def test_a_map_of_a_body_that_nothing_holds_against_rationals():
     assert "within rigid displacements of 4; says nothing about those between" in repr(found)
     reaches = [problem, problem.replace(max_rigid_displacement=8.0)]
     several = enumsol.multiplicity_map(None, (0, 0.5), (lambda value: reaches[int(value)], [0, 1]))
-    assert "within rigid displacements of 4 to 8" in several.completeness()
+    assert "within rigid displacements of 4 to 8" in several.closing_line

@@ -203,7 +203,7 @@ def test_a_graph_cut_short_says_so(tmp_path, nodes):
     page = page_of(graph, tmp_path)
     text = text_of(page)
     assert not re.search("complete: yes|It is proven", text)
-    for said in ("This graph is not complete", graph.completeness(), "numbers of solutions are lower bounds"):
+    for said in ("This graph is not complete", graph.closing_line, "numbers of solutions are lower bounds"):
         assert said in text
     data = data_of(page)
     assert (data["complete"], data["exact_counts"]) == (False, False)
@@ -386,7 +386,7 @@ def test_an_incomplete_history_says_so(tmp_path, monkeypatch):
     assert not history.complete
     assert "This history is not complete." in text
     assert "these are all histories" not in text
-    for said in (history.completeness(), *history.reasons, problem.fingerprint, "enumsol verify PROBLEM FILE"):
+    for said in (history.closing_line, *history.reasons, problem.fingerprint, "enumsol verify PROBLEM FILE"):
         assert said in text
     for drawn in ("alpha against displacement", "lambda_n against step", "deformed bodies of step 2"):
         assert f"Picture of {drawn}." in text

@@ -1,7 +1,10 @@
 """Deformed bodies: displacements and forces in global axes against those of the rows, marks by status; 2D and 3D."""
 
+import re
+
 import numpy as np
 import pytest
+from matplotlib.text import Text
 from parted_meshes import grid
 from parted_solids import solid
 from problems3d import from_compliance
@@ -190,6 +193,30 @@ def test_the_outline_of_a_box_is_its_edges(kind):
     # both ends lie in the same two of the six sides, and the lengths add up to those of the twelve edges
     assert np.all(np.sum(np.all((along == 0) | (along == size), axis=1), axis=1) == 2)
     assert np.sum(np.linalg.norm(along[:, 1] - along[:, 0], axis=1)) == pytest.approx(4 * np.sum(size))
+
+
+def solid_at_rest():
+    """A tetrahedron three of whose corners are held, pressed on the ground by the fourth, which sticks."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=float)
+    mesh = BodyMesh(points, [[0, 1, 2, 3]], np.eye(12)[:, :3])
+    stiffness, normal, (along, across) = np.diag([3.0, 5.0, 7.0]), [[0, 0, -1.0]], np.eye(3)[:2]
+    load = np.array([0.1, 0.2, -1.1]) / 3
+    return enumsol.ContactProblem3D(stiffness, normal, along[None], across[None], load, friction=2.0, mesh=mesh)
+
+
+@pytest.mark.parametrize("problem", [enumsol.gallery.two_node_square(), solid_at_rest()], ids=["2D", "3D"])
+def test_rounding_is_not_enlarged(problem):
+    """What stays of a load that contact forces cancel is drawn as no displacement, beside moving bodies and alone."""
+    roots = enumsol.enumerate_roots(problem, 3.5)
+    for root in roots:
+        moves = body_shape(problem).moves(root)
+        assert np.array_equal(moves, np.zeros_like(moves)) == (np.max(np.abs(root.u)) < 1e-15), root
+    still = [root for root in roots if np.max(np.abs(root.u)) < 1e-15]
+    assert still
+    for figure in (roots.plot_bodies(), *(root.plot_body() for root in still)):
+        scales = re.findall(r"displacements times (\S+)", " ".join(text.get_text() for text in figure.findobj(Text)))
+        assert scales
+        assert all(float(scale) < 1e3 for scale in scales)
 
 
 def test_scales_are_round():

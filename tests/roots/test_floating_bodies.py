@@ -22,7 +22,7 @@ def difference_from_oracle(problem, alpha, arithmetic, oracle=None):
     oracle = Oracle(problem, alpha) if oracle is None else oracle
     roots = enumsol.enumerate_roots(problem, alpha, arithmetic=arithmetic)
     if not roots.complete:
-        return f"not complete: {roots.completeness()}"
+        return f"not complete: {roots.closing_line}"
     if (len(roots), len(roots.families)) != (len(oracle.points), oracle.families):
         return f"{len(roots)} roots and {len(roots.families)} families, not {len(oracle.points)} and {oracle.families}"
     forces, u = oracle.forces

@@ -35,7 +35,7 @@ def disagreement(seed):
     problem = known.problem
     roots = checked(problem)
     if not roots.complete:
-        return f"not complete: {roots.completeness()}"
+        return f"not complete: {roots.closing_line}"
     root = nearest(roots, known.u)
     if np.max(np.abs(root.u - known.u)) > 1e-9 or np.max(np.abs(root.lambda_t - known.lambda_t)) > 1e-9:
         return "the known solution is missing"

@@ -1,5 +1,7 @@
 """RootSet and Root as the user sees them."""
 
+import pickle
+import re
 from fractions import Fraction
 from html.parser import HTMLParser
 
@@ -173,6 +175,62 @@ def test_sequence():
     assert next(reversed(roots)) is roots[4]
     with pytest.raises(IndexError):
         roots[5]
+    assert [roots.index(root) for root in roots] == [0, 1, 2, 3, 4]
+    assert roots[4] in roots
+
+
+def test_an_item_beyond_the_end_is_refused_in_a_sentence():
+    problem = gallery.one_node_triangle()
+    roots, graph = enumerate_roots(problem, 5), branch_graph(problem, (0, 5))
+    history = enumsol.histories(problem, [5, 4])
+    path = enumsol.follow(problem, roots[0], interval=(4, 5), direction=-1)
+    three = "there are 3 roots; expected a number from 0 to 2, or from -3 to -1"
+    for items, at, said in (
+        (roots, 9, f"there is no root 9: {three}"),
+        (roots, -4, f"there is no root -4: {three}"),
+        (roots.families, 0, "there is no family 0: there are 0 families"),
+        (graph.arcs, 99, "there is no arc 99: there are"),
+        (graph.branches, 99, "there is no branch 99: there are 2 branches"),
+        (history.roots(1), 3, f"there is no root 3: {three}"),
+        (history.stages(1), 1, "there is no stage 1: there is 1 stage; expected 0"),
+        (path, len(path), f"there is no point {len(path)}: there are"),
+        (pickle.loads(pickle.dumps(roots)), 9, f"there is no root 9: {three}"),
+    ):
+        with pytest.raises(enumsol.NoSuchItemError, match=re.escape(said)) as refused:
+            items[at]
+        assert isinstance(refused.value, IndexError)
+        assert isinstance(refused.value, enumsol.EnumsolError)
+    assert type(graph.arcs[:1]) is tuple
+
+
+@pytest.mark.parametrize("asked", [(), (1,), ("root",)])
+def test_a_position_is_asked_of_a_root(asked):
+    """The index of a root set is that of any sequence; who expects the topological one is told where that is."""
+    roots = enumerate_roots(gallery.one_node_triangle(), 5)
+    with pytest.raises(enumsol.InvalidArgumentError, match=r"expected one of these 3 roots .*roots\[0\]\.index"):
+        roots.index(*asked)
+
+
+def test_a_result_that_is_not_complete_is_never_taken_for_one():
+    """A text is true whatever it says: no result has one that is called completeness."""
+    problem = gallery.one_node_triangle()
+    graph = branch_graph(problem, (0, 5), max_nodes=1)
+    history = enumsol.histories(problem, [5, 4], max_nodes=1)
+    over = enumsol.multiplicity_map(problem, (0, 1), {"friction": [0.1]}, max_nodes=1)
+    for result in (enumerate_roots(problem, 5, max_nodes=1), graph, history, over):
+        assert result.complete is False
+        assert result.closing_line.startswith("complete: no")
+        assert repr(result).endswith(result.closing_line)
+        assert not hasattr(result, "completeness")
+
+
+def test_one_undecided_part_is_not_counted():
+    found = enumerate_roots(gallery.one_node_triangle(), 5, max_nodes=1)
+    names = ("alpha", "families", "arithmetic", "method", "stopped", "stats", "node_ids")
+    kept = {name: getattr(found, name) for name in names}
+    texts = [repr(enumsol.RootSet(roots=(), undecided=found.undecided[:1] * n, **kept)) for n in (1, 2)]
+    assert "\nundecided: " in texts[0]
+    assert "\nundecided, 2 times: " in texts[1]
 
 
 @pytest.mark.parametrize("arithmetic", ["fast", "exact"])
@@ -336,7 +394,7 @@ def test_graphs_and_proofs(nodes):
     problem = gallery.two_node_square()
     graph = branch_graph(problem, (0, 10), max_nodes=nodes)
     cells = Cells(graph._repr_html_())
-    assert cells.cells[-1] == graph.completeness()
+    assert cells.cells[-1] == graph.closing_line
     assert cells.tags.count("tr") == (1 + len(graph.branches) if graph.branches else 0)
     proofs = [enumerate_roots(problem, 3.5, max_nodes=nodes).proof]
     if nodes is None:

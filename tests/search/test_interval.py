@@ -112,9 +112,9 @@ def test_a_stopped_search_is_not_complete():
     problem = gallery.get("wedge-8-3").build()
     graph = branch_graph(problem, (0.0, 5.0), max_nodes=50)
     assert (graph.complete, graph.roots_at(1.0).complete) == (False, False)
-    assert "max_nodes = 50" in graph.completeness()
+    assert "max_nodes = 50" in graph.closing_line
     graph = branch_graph(problem, (0.0, 5.0), time_limit=1e-9)
-    assert "time limit" in graph.completeness()
+    assert "time limit" in graph.closing_line
 
 
 def test_bad_arguments_are_refused_by_name():

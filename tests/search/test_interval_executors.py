@@ -87,7 +87,7 @@ def test_a_limit_on_nodes_leaves_the_same_graph(most, executors, wedge):
 
 def test_a_limit_on_time(executors, wedge):
     graph = branch_graph(wedge[0], (0, 5), time_limit=1e-9, executor=executors[1])
-    assert "time limit" in graph.completeness()
+    assert "time limit" in graph.closing_line
     assert not graph.complete
 
 

@@ -118,7 +118,7 @@ def test_a_number_and_its_noun(number, words, text):
 def test_printed_results_count_one_of_a_kind():
     problem = enumsol.gallery.one_node_triangle()
     graph = enumsol.branch_graph(problem, (0, 10))
-    assert "open, 1 arc, alpha" in repr(graph)
+    assert "path, 1 arc, alpha" in repr(graph)
     path = enumsol.follow(problem, graph.starting_points()[1], -1, interval=(0, 10))
     assert [line for line in repr(path).splitlines() if line.endswith("of them 1 fold")]
     assert "1 arcs" not in repr(graph)

@@ -96,5 +96,5 @@ def test_a_root_beyond_the_bound_is_not_listed():
     near = dataclasses.replace(lifted, max_rigid_displacement=0.25)
     roots = all_roots(near, 0)
     assert (len(roots), roots.rigid_bound.needed) == (0, True)
-    assert "within rigid displacements of 0.25" in roots.completeness()
+    assert "within rigid displacements of 0.25" in roots.closing_line
     assert enumsol.verify(near, roots.proof).within == 0.25

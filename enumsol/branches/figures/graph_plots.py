@@ -31,7 +31,7 @@ from enumsol.branches.roots_at import roots_at
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.arguments import alpha_interval, positive_number, shown
 from enumsol.support.messages import counted
-from enumsol.support.plotting import axes_or_none, figure_of, kept, new_figure
+from enumsol.support.plotting import axes_or_none, checked_units, figure_of, in_units, kept, new_figure
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -136,21 +136,6 @@ def plot_graph(
     _words(figure, axes[0][0], graph, chosen, title, others, alone=ax is not None)
     draw_numbers(figure, panels, None if ax is None else ax)
     return kept(figure, file)
-
-
-def checked_units(units: Any) -> tuple[str, str] | None:
-    """Units of forces and lengths, or None.
-
-    Raises
-    ------
-    InvalidArgumentError
-        It is something else.
-    """
-    if units is None:
-        return None
-    if not isinstance(units, (tuple, list)) or len(units) != 2 or not all(isinstance(unit, str) for unit in units):
-        raise InvalidArgumentError(f"units is {shown(units)}; expected two texts, of forces and of lengths")
-    return units[0], units[1]
 
 
 def _rows(graph: GraphData, quantity: Quantity, nodes: Sequence[Any] | None, *, one: bool) -> list[int]:
@@ -275,9 +260,7 @@ def _ending(
 def _dress(axis: Any, graph: GraphData, style: _Style, row: int, window: tuple[float, float]) -> None:
     quantity = style.quantity
     name = f"{quantity.name} of node {graph.problem.node_ids[row]}" if quantity.by_node else quantity.words
-    if style.units is not None:
-        name += f" [{style.units[0 if quantity.dimension == 'force' else 1]}]"
-    axis.set_ylabel(name)
+    axis.set_ylabel(in_units(name, quantity.dimension, style.units))
     axis.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4))
     axis.grid(visible=True, color="#e4e4e4", linewidth=0.6)
     axis.set_axisbelow(True)
@@ -311,7 +294,7 @@ def _words(
     """The title and the legend."""
     problem, (a, b) = graph.problem, graph.interval
     name = counted(problem.p, "contact node") if title is None else title
-    words = f"{name}, alpha in [{a:g}, {b:g}]; {graph.completeness()}"
+    words = f"{name}, alpha in [{a:g}, {b:g}]; {graph.closing_line}"
     if not alone:
         # no wider than the panel below, beside which others have titles of their own
         widths = first.get_gridspec().get_width_ratios()
