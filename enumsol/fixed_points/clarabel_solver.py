@@ -14,7 +14,7 @@ import scipy.sparse as sp
 from enumsol.errors import MissingDependencyError
 from enumsol.fixed_points.system import checked_problem
 from enumsol.fixed_points.tresca_newton import TrescaData, TrescaNotSolved
-from enumsol.relaxation.conic import conic_answer
+from enumsol.support.conic import conic_answer
 
 if TYPE_CHECKING:
     from enumsol.fixed_points.system import Problem

@@ -8,9 +8,9 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import solve_triangular
 
-from enumsol.relaxation.conic import conic_answer
 from enumsol.relaxation.engine import PRUNE_MARGIN, Relaxation, largest_violation
 from enumsol.relaxation.imposed_rows import EQUALITY, row_terms
+from enumsol.support.conic import conic_answer
 
 if TYPE_CHECKING:
     from enumsol.condensation.condensed import ScaledSystem

@@ -21,12 +21,12 @@ from enumsol.branches.exact import gluing
 from enumsol.branches.exact.known_selections import KnownSelections
 from enumsol.condensation import products
 from enumsol.condensation.factorization import Factorization
-from enumsol.relaxation.conic import conic_answer
 from enumsol.relaxation.convex_forms import FormAscent
 from enumsol.search import form_policy as forms
 from enumsol.search.interval.subintervals import IntervalSearch
 from enumsol.search.solvers import Solvers
 from enumsol.selections.rational_selections import ExactSelections
+from enumsol.support.conic import conic_answer
 from enumsol.support.deadlines import Deadline, TimeOverError, attended, current, look, over, within
 
 

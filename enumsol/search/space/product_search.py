@@ -14,7 +14,7 @@ import scipy.sparse
 
 from enumsol.model.sectors import DEEPEST, SECTORS, cut, level_of, width_of
 from enumsol.model.statuses import CONTACT, UNDECIDED
-from enumsol.relaxation.conic import conic_answer
+from enumsol.support.conic import conic_answer
 from enumsol.support.deadlines import look, remaining
 from enumsol.trusted.space.boxed_solution import BoxedSolution, proposed_rho, solution_in_box
 from enumsol.trusted.space.product_forms import CONE, SIGNED, Ellipsoid, Frame
