@@ -6,7 +6,7 @@ import json
 import re
 from dataclasses import asdict, fields
 from fractions import Fraction
-from functools import partial
+from functools import cache, partial
 from io import BytesIO
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -169,7 +169,10 @@ def _values(
         from enumsol.branches.space.make_curved import CurvedArcValues  # for graphs in 3D only
         from enumsol.trusted.space.solution_curve import AlphaProblem
 
-        given = AlphaProblem.of(problem.enclosure)
+        @cache
+        def given() -> AlphaProblem:
+            """Made for the first arc: a graph without any may be one of a problem that has no such form."""
+            return AlphaProblem.of(problem.enclosure)
 
         def along(item: dict[str, Any]) -> ArcValues:
             codes, knots = tuple(item["selections"][0]), np.array(item["knots"], dtype=np.float64)
@@ -177,7 +180,7 @@ def _values(
             size = 3 * problem.p + 1
             if knots.shape != (len(borders) + 1, size) or borders.shape[1:] != (size,):
                 raise ValueError("knots of an arc")
-            return CurvedArcValues(given, problem, codes, knots, borders)
+            return CurvedArcValues(given(), problem, codes, knots, borders)
 
         return None, along
 
@@ -185,8 +188,8 @@ def _values(
         return make(tuple(item["selections"][0]), Fraction(item["sample"]))
 
     if record.get("arcs_by", "exact") == "balls":
-        traced = TracedProblem(problem, interval, vanishing_alpha(problem, "problem"))
-        return None, partial(of_selection, partial(TracedArcValues, traced))
+        traced = cache(lambda: TracedProblem(problem, interval, vanishing_alpha(problem, "problem")))
+        return None, partial(of_selection, lambda codes, sample: TracedArcValues(traced(), codes, sample))
     exactly = record["condensed_exactly"]
     exact = exact_condensed(problem) if exactly else ExactCondensed.from_condensed(problem)
     return exact, partial(of_selection, partial(ExactArcValues, exact))

@@ -34,7 +34,8 @@ What checker and search share
       ``trusted.precise_at_alpha``, the same solve with many digits, loaded where double arithmetic does not decide;
     - ``trusted.uniqueness``, the test by which a subtree is closed by its only possible solution, and which of these
       solutions are the same, and the test that a root is alone below an assignment;
-      ``trusted.uniqueness_weights``, the form of both;
+      ``trusted.uniqueness_weights``, the form of both; ``trusted.same_roots``, the list of roots without those that
+      several leaves hold;
     - for the arcs of branch graphs: ``trusted.selection``, the numbers of unknowns and conditions;
       ``trusted.arcs.selection_balls``, ``trusted.arcs.series`` and ``trusted.arcs.over_parts``, a selection over an
       interval as a series with bounds of its error; ``trusted.arcs.precise``, ``trusted.arcs.bordered``,
@@ -100,6 +101,9 @@ What counts as one root
     if their forces differ for certain. Where neither is proven, one more part counts as undecided. Roots that are the
     only ones in boxes are one if the box of one surely holds the other; so with roots of leaves. A root that
     closes the whole tree is the only solution, whatever statuses hold there.
+
+    Of a root that several leaves hold, every leaf encloses the end; a history has to go on from one of these enclosures
+    (theory, section 13.3).
 
 Cross-checks
     They use nothing of the proof and are printed with the result. The indices of all roots and families add up to +1,

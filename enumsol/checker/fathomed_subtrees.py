@@ -9,6 +9,7 @@ import numpy as np
 from enumsol.arithmetic.balls import SAFE
 from enumsol.arithmetic.rationals import to_fraction
 from enumsol.proof.reading import same
+from enumsol.trusted.same_roots import told_apart
 from enumsol.trusted.status_rows import BACKWARD, CONTACT, FORWARD, OPEN
 from enumsol.trusted.uniqueness import ClosedSolution, closed_solution, only_solution, same_solution
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.proof.records import Closed, ClosedInRationals
     from enumsol.support.array_types import Codes, Floats
+    from enumsol.trusted.same_roots import Apart
 
     #: The core of a solution, and per node the codes that may hold there.
     Known = tuple[Codes, Sequence[frozenset[int]]]
@@ -74,15 +76,8 @@ def closed_in_rationals(
     return None, [tuple(to_fraction(x) for x in point)] if holds else []
 
 
-def count_apart(closed: dict[Codes, ClosedSolution], others: list[Codes]) -> tuple[int, int]:
-    """Closed roots that are not among those of complete selections, each once, and how many of them are in doubt."""
-    known: list[Known] = [(codes, tuple(frozenset((code,)) for code in codes)) for codes in others if closed]
-    kept = doubtful = 0
-    for core, ball in sorted(closed.items()):
-        answers = [same_solution(core, ball.possible, *other) for other in known]
-        if True in answers:
-            continue
-        doubtful += None in answers
-        kept += 1
-        known.append((core, ball.possible))
-    return kept, doubtful
+def closed_apart(closed: dict[Codes, ClosedSolution], others: list[Codes]) -> Apart[Known]:
+    """Closed roots, each once, without those that are roots of complete selections."""
+    known: list[Known] = [(codes, tuple(frozenset((code,)) for code in codes)) for codes in others]
+    found: list[Known] = [(core, ball.possible) for core, ball in sorted(closed.items())]
+    return told_apart(found, lambda other, one: same_solution(*one, *other), known)

@@ -44,7 +44,8 @@ class _Stage:
     following: list[int]
     roots: int = 0
     complete: bool = False
-    ends: list[Ball] = field(default_factory=list)
+    #: Of every root, where each of the leaves that hold it shows it to leave the nodes.
+    ends: list[list[Ball]] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -147,7 +148,7 @@ class HistoryChecker:
         problem = restarted(self._base(stage.step), stage.start)
         enclosure = self.enclosure.restarted(problem, problem.products)
         checker = self.checker(problem, self.progress)
-        checker.enclosure, checker.located = enclosure, []
+        checker.enclosure, checker.located = enclosure, {}
         tell("searches", number, count)
         with heard_by(tell_part(f"of search {number + 1}")):
             report = checker.run(_Part(_search(records)))
@@ -164,9 +165,13 @@ class HistoryChecker:
         checker.locate_rational_roots()
         stage.roots, stage.complete = report.roots, report.complete and not report.families
         before = stage.start.ball
-        for forces, still, codes in checker.located:
-            end = tangential_positions(enclosure, step.alpha, forces, still, before, codes, share=0.5)
-            stage.ends.append(end)
+        stage.ends = [
+            [
+                tangential_positions(enclosure, step.alpha, leaf.forces, leaf.still, before, leaf.codes, share=0.5)
+                for leaf in leaves
+            ]
+            for leaves in checker.located_roots()
+        ]
 
     def _said(self, number: int, count: int, record: Any) -> _Stage:
         """What the record of a stage says."""
@@ -225,9 +230,14 @@ class HistoryChecker:
                 yield self.stages[number]
 
     def _all_followed(self, stage: _Stage) -> bool:
-        """Whether every root of a stage leaves the nodes in the ball of a start that follows."""
+        """Whether every root of a stage leaves the nodes in the ball of a start that follows.
+
+        All leaves that hold a root have its end in their balls, so that any of these balls shows it.
+        """
         starts = [self.stages[k].start for k in stage.following]
-        return bool(stage.ends) and all(any(start.holds(end) for start in starts) for end in stage.ends)
+        return bool(stage.ends) and all(
+            any(start.holds(ball) for start in starts for ball in balls) for balls in stage.ends
+        )
 
 
 def _search(records: Iterator[Any]) -> list[Any]:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
-from enumsol.checker.walk import TreeChecker
+from enumsol.checker.walk import Located, TreeChecker
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.proof import records
 from enumsol.proof.proof_file import fraction_text
@@ -255,7 +255,7 @@ class Checker(TreeChecker):
         """Count a regular root, and look at what is said of it."""
         self.regular += 1
         self.strict.append(codes)
-        self._locate(ball)
+        self._locate(codes, ball)
         centre, radius = said.numbers(2 * self.problem.p)
         with np.errstate(over="ignore", invalid="ignore"):
             reach = np.abs(centre - ball.force.mid * self.force) + ball.force.rad * self.force
@@ -267,26 +267,26 @@ class Checker(TreeChecker):
 
         reason, ball = closed_by_balls(self.system, said, self.force)
         if ball is not None:
-            self._locate(ball)
+            self._locate(ball.core, ball)
             self.closed[ball.core] = ball
         return reason
 
-    def _locate(self, ball: VerifiedSelection | ClosedSolution) -> None:
+    def _locate(self, name: Codes, ball: VerifiedSelection | ClosedSolution) -> None:
         if self.located is not None:
             p = self.problem.p
             mid, rad = ball.force.mid, ball.force.rad
             rad = np.where((mid == 0) & (rad == 0), 0.0, rad * self.force + TINY)
-            self._locate_by(Ball(mid * self.force, rad), ball.w[p:])
+            self._locate_by(name, Ball(mid * self.force, rad), ball.w[p:])
 
-    def _locate_by(self, forces: Ball, slips: Ball) -> None:
+    def _locate_by(self, name: Codes, forces: Ball, slips: Ball) -> None:
         """Take note of a root by its forces in the problem's units, and by its slips in any unit."""
         still = (slips.mid == 0) & (slips.rad == 0)
-        self.locate(forces, still, certain_statuses(forces, slips))
+        self.locate(name, Located(forces, still, certain_statuses(forces, slips)))
 
     def locate_rational_roots(self) -> None:
         """Add the isolated roots that rationals have found to ``located``."""
         p = self.problem.p
-        for _, points, dimension in self.polytopes:
+        for codes, points, dimension in self.polytopes:
             if dimension:
                 continue
             exact = [Fraction(x) for x in points[0]]
@@ -294,7 +294,7 @@ class Checker(TreeChecker):
             w = [Fraction(0)] * p if not any(exact) and self.problem.is_unloaded(self.alpha) else self._slips(exact)
             signs = np.array([float(x > 0) - float(x < 0) for x in w])
             rad = np.where([x == 0 for x in exact], 0.0, np.abs(forces) * 2 * UNIT + TINY)
-            self._locate_by(Ball(forces, rad), Ball(signs, np.zeros(p)))
+            self._locate_by(codes, Ball(forces, rad), Ball(signs, np.zeros(p)))
 
     def _slips(self, point: list[Fraction]) -> list[Any]:
         """w_t at a point, exactly."""
@@ -376,9 +376,11 @@ class Checker(TreeChecker):
         families = {group_of(k) for k, polytope in enumerate(self.polytopes) if polytope[2] > 0}
         apart = 0
         if self.closed:
-            from enumsol.checker.fathomed_subtrees import count_apart
+            from enumsol.checker.fathomed_subtrees import closed_apart
 
-            apart, self.doubtful = count_apart(self.closed, self.strict + [codes for codes, _, _ in self.polytopes])
+            others = closed_apart(self.closed, self.strict + [codes for codes, _, _ in self.polytopes])
+            apart, self.doubtful = len(others.kept), len(others.doubtful)
+            self.same = {core: other for (core, _), (other, _) in others.same}
         return len(found) - len(families) + apart, len(families)
 
     def _meet(self, k: int, m: int) -> bool:

@@ -13,7 +13,7 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, Ball
 from enumsol.checker.floating import WithinReach
-from enumsol.checker.walk import TreeChecker
+from enumsol.checker.walk import Located, TreeChecker
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.space_condensed import EnclosedSpace, FloatingSpace
 from enumsol.proof import records, space_records
@@ -23,17 +23,15 @@ from enumsol.trusted.space.boxed_solution import Box, BoxedSolution, apart_in_bo
 from enumsol.trusted.space.leaves import Open, SpaceRoot, distinct_roots, settle
 from enumsol.trusted.space.product_forms import Ellipsoid, refines
 from enumsol.trusted.space.resultants import floating_margin, is_unbalanced_in_space, unbounded
-from enumsol.trusted.space.sector_rows import STICK, UNDECIDED, is_sector_covering, sector_margin
+from enumsol.trusted.space.sector_rows import OPEN, STICK, UNDECIDED, is_sector_covering, sector_margin
 from enumsol.trusted.space.slip_forms import SlipForm
-from enumsol.trusted.space.space_uniqueness import lone_root, only_root, only_solution_in_space
+from enumsol.trusted.space.space_uniqueness import LooseSolution, lone_root, only_root, only_solution_in_space
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from enumsol.checker.walk import Test
     from enumsol.support.array_types import Codes, Floats
-    from enumsol.trusted.space.space_uniqueness import LooseSolution
-
 
 _OPEN = "what it holds is not proven"
 _NO_FORM = "no form that is convex was declared over it"
@@ -101,7 +99,8 @@ class SpaceChecker(TreeChecker):
 
     def _at_rest(self) -> None:
         self.regular += 1
-        self.locate(Ball.exact(np.zeros(3 * self.problem.p)), np.ones(2 * self.problem.p, dtype=bool))
+        still = np.ones(2 * self.problem.p, dtype=bool)
+        self.locate(None, Located(Ball.exact(np.zeros(3 * self.problem.p)), still))
 
     def _excluded(self, codes: Codes, said: space_records.ExcludedInSpace) -> str | None:
         positive = sector_margin(self.system, codes, said.rows, said.values) > 0
@@ -225,32 +224,36 @@ class SpaceChecker(TreeChecker):
 
     def _count(self) -> tuple[int, int]:
         """Roots that two leaves share count once; what cannot be told apart leaves the count open."""
-        distinct, doubtful = distinct_roots(self.roots)
-        boxed, uncertain = apart_in_boxes([root for _, root in distinct], self.boxed)
-        self.doubtful = len(doubtful) + len(uncertain)
-        return len(distinct) + len(boxed), 0
+        regular = distinct_roots(self.roots)
+        boxed = apart_in_boxes(regular.kept, self.boxed)
+        self.doubtful = len(regular.doubtful) + len(boxed.doubtful)
+        self.same = {id(root): id(other) for (_, root), (_, other) in (*regular.same, *boxed.same)}
+        return len(regular.kept) + len(boxed.kept), 0
 
     def locate_rational_roots(self) -> None:
         """Nothing: in 3D there are none."""
 
-    def _locate(self, found: SpaceRoot | LooseSolution, leaf: Codes = ()) -> None:
-        """Take note of a root's forces in the problem's units, and of its statuses."""
+    def _locate(self, found: SpaceRoot | LooseSolution, codes: Codes = ()) -> None:
+        """Take note of a root: its forces in the problem's units, its statuses; ``codes`` are those of its leaf, if known."""
         if self.located is None:
             return
         p, system, y = self.problem.p, self.system, found.y
-        forces = Ball(np.zeros(3 * p), np.zeros(3 * p))
-        forces[:p] = Ball(y.mid[:p] * self.force, y.rad[:p] * self.force + TINY)
+        forces, unit = Ball(np.zeros(3 * p), np.zeros(3 * p)), np.tile(self.force, 3)
+        pressed = np.array([code != OPEN for code in codes or (STICK,) * p])
+        forces[:p] = Ball(np.where(pressed, y.mid[:p], 0.0), np.where(pressed, y.rad[:p], 0.0))
         for k in (0, 1):
-            nodes = np.flatnonzero(system.tau[:, k] >= 0)
-            part = y[system.tau[nodes, k]] * Ball(system.F[nodes, k], system.F_rad[nodes, k])
-            forces[(1 + k) * p + nodes] = Ball(part.mid * self.force[nodes], part.rad * self.force[nodes] + TINY)
-        certain: tuple[int, ...] | None = tuple(leaf)
-        if isinstance(found, SpaceRoot):
-            still = np.array(leaf) == STICK
-        else:
+            nodes = np.flatnonzero((system.tau[:, k] >= 0) & pressed)
+            forces[(1 + k) * p + nodes] = y[system.tau[nodes, k]] * Ball(system.F[nodes, k], system.F_rad[nodes, k])
+        zero = (forces.mid == 0) & (forces.rad == 0)
+        forces = Ball(forces.mid * unit, np.where(zero, 0.0, forces.rad * unit + TINY))
+        certain: Codes | None = tuple(codes)
+        if isinstance(found, LooseSolution):
             certain, still = found.certain(np.any(system.tau >= 0, axis=1)), ~(found.slip | found.open)
+        else:
+            still = np.array(codes) == STICK
         # where a coefficient is 0 a sticking node may move all the same
-        self.locate(forces, np.concatenate([still & (system.tau[:, k] >= 0) for k in (0, 1)]), certain)
+        still = np.concatenate([still & (system.tau[:, k] >= 0) for k in (0, 1)])
+        self.locate(id(found), Located(forces, still, certain))
 
     def _claim(self, isolated: int, families: int) -> dict[str, int]:
         return {"roots": self.regular + isolated, "undecided": self.undecided, "leaves": self.leaves}

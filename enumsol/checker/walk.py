@@ -16,7 +16,7 @@ from enumsol.support.deadlines import tell
 from enumsol.trusted.status_rows import UNDECIDED
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Hashable, Iterator
     from fractions import Fraction
 
     from enumsol.arithmetic.balls import Ball
@@ -30,6 +30,25 @@ if TYPE_CHECKING:
 
 _REPORT_EVERY = 256
 _END = object()
+
+
+@dataclass(frozen=True, eq=False)
+class Located:
+    """What a leaf shows of a root.
+
+    Attributes
+    ----------
+    forces : Ball
+        In the problem's units: all normal components first.
+    still : bool array
+        Tangential components with u_t = 0 for certain.
+    codes : p status codes, or None
+        Where they are certain; in 3D any one but open and stick means slip.
+    """
+
+    forces: Ball
+    still: Mask
+    codes: tuple[int, ...] | None = None
 
 
 @dataclass
@@ -50,9 +69,10 @@ class TreeChecker(ABC):
     leaves: int = 0
     _all: int = 0
     data: Data = "problem"
-    #: What was found of the roots, if someone wants to know where they leave the contact nodes: forces in the
-    #: problem's units, and tangential components with u_t = 0 for certain.
-    located: list[tuple[Ball, Mask, tuple[int, ...] | None]] | None = None
+    #: What leaves show of their roots, by the roots' names, if someone wants to know where these leave the nodes.
+    located: dict[Hashable, list[Located]] | None = None
+    #: Names of roots that are those of other names.
+    same: dict[Hashable, Hashable] = field(default_factory=dict)
     #: The problem's balls, where whoever asks for the check has made them already.
     enclosure: CondensedEnclosure | None = None
 
@@ -224,10 +244,17 @@ class TreeChecker(ABC):
         self._at_rest()
         return None if unloaded else "the problem is not unloaded"
 
-    def locate(self, forces: Ball, still: Mask, codes: tuple[int, ...] | None = None) -> None:
-        """Take note of where a root is, and of its statuses if they are certain, if anybody wants to know."""
+    def locate(self, name: Hashable, found: Located) -> None:
+        """Take note of where a root is, if anybody wants to know."""
         if self.located is not None:
-            self.located.append((forces, still, codes))
+            self.located.setdefault(name, []).append(found)
+
+    def located_roots(self) -> list[list[Located]]:
+        """What the leaves that hold it show of every root, one by one."""
+        roots: dict[Hashable, list[Located]] = {}
+        for name, found in (self.located or {}).items():
+            roots.setdefault(self.same.get(name, name), []).extend(found)
+        return list(roots.values())
 
     def fail(self, message: str) -> None:
         """Take note of a failure.

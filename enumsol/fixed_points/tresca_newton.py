@@ -25,8 +25,8 @@ MOST_PROXIMAL, _FIRST_RHO, _LEAST_RHO = 60, 1e-3, 1e-14
 _NEGLIGIBLE = 1e-100
 #: Where normals and sticking forces resist a rigid displacement less, relative to all forces, they do not at all.
 _FREE = 1e-10
-#: Forces, displacements and what is left of slip bounds [as above] that count as zero where it is asked how a body may
-#: move on.
+#: Forces, displacements, slip bounds and what is left of these [as above] that count as zero where it is asked how a
+#: body may move on: above what is left of forces at an accepted point (``ACCEPTED``).
 _TIGHT = 1e-8
 #: A load that is in balance but for less than this is; slip bounds above the second number [as above] are seldom
 #: reached; and directions that are this close to a plane may be meant to be in it.
@@ -160,9 +160,11 @@ class TrescaData:
         normal, _ = system.split(x)
         w_n, v, tau = self._in_tau(x, system.moves(x))
         along_n = system.G[:, :p].T
-        along_t = np.where(self.occurs, self.F, 0.0)[:, :, None] * system.G[:, p:].reshape(modes, d, p).T
+        # bounds come from computed normal forces, of which those that count as zero resist no slip
+        rubs = self.F * self.bound[:, None] > _TIGHT
+        along_t = np.where(rubs, self.F, 0.0)[:, :, None] * system.G[:, p:].reshape(modes, d, p).T
         size = np.linalg.norm(tau, axis=1)
-        slides = np.any(self.occurs, axis=1) & (size >= (1.0 - _TIGHT) * self.bound)
+        slides = np.any(rubs, axis=1) & (size >= (1.0 - _TIGHT) * self.bound)
         way = np.divide(tau, size[:, None], out=np.zeros_like(tau), where=slides[:, None])
         forward = np.einsum("pd,pdr->pr", way, along_t)
         turning = (along_t - way[:, :, None] * forward[:, None, :]).reshape(-1, modes)

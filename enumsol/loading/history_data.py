@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import networkx as nx
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, UNIT, Ball
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.model.restart import SlipStart
 from enumsol.model.statuses import ContactStatus
@@ -160,9 +160,10 @@ def _forces(root: Root) -> Ball:
 
 
 def _middle(low: Floats, high: Floats) -> Ball:
-    """Balls that hold what lies between bounds."""
+    """Balls that hold what lies between bounds, with the checker's room for underflow."""
     mid = 0.5 * low + 0.5 * high
-    return Ball(mid, np.maximum(high - mid, mid - low) * SAFE)
+    zero = (low == 0) & (high == 0)
+    return Ball(mid, np.where(zero, 0.0, np.maximum(high - mid, mid - low) * SAFE + TINY))
 
 
 def dissipated(root: Root) -> float:

@@ -48,9 +48,9 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         if only:
             return only, []
         boxed = [(codes, root) for codes, root in verified.items() if isinstance(root, BoxedSolution)]
-        regular, doubtful = distinct_roots(leaf for leaf in verified.items() if not isinstance(leaf[1], BoxedSolution))
-        kept, uncertain = apart_in_boxes([root for _, root in regular], boxed)
-        return [*regular, *kept], [*doubtful, *uncertain]
+        regular = distinct_roots(leaf for leaf in verified.items() if not isinstance(leaf[1], BoxedSolution))
+        others = apart_in_boxes(regular.kept, boxed)
+        return [*regular.kept, *others.kept], [codes for codes, _ in (*regular.doubtful, *others.doubtful)]
 
     def _enough(self, stop_after: int) -> Callable[[list[Any]], bool]:
         return lambda solutions: len(solutions) >= stop_after and len(self._distinct()[0]) >= stop_after

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.balls import Ball, smaller
+from enumsol.arithmetic.balls import SAFE, Ball, smaller
 from enumsol.trusted.status_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def tangential_positions(
         Of the step's problem.
     alpha : Fraction
     forces : Ball of shape (2p,) or (3p,)
-        lambda: normal components first [force].
+        lambda: normal components first, of which those that are not negative count [force].
     still : (p,) or (2p,) bool array
         Tangential components for which u_t = 0 at the root, whatever the data in their balls are.
     before : Ball of the same shape
@@ -81,6 +81,7 @@ def tangential_positions(
     """
     p = len(enclosure.problem.gap)
     S = Ball(enclosure.S, enclosure.S_rad)
+    forces = _pressing(forces, p)
     with np.errstate(over="ignore", invalid="ignore"):
         moved = (enclosure.moved_freely(alpha) - (S @ forces[:, None])[:, 0])[p:]
     if codes is not None and not np.max(moved.rad) <= share * _WELL_KNOWN * np.max(np.abs(moved.mid)):
@@ -89,6 +90,13 @@ def tangential_positions(
         elif (found := _by_leaf(enclosure, alpha, forces, codes)) is not None:
             moved = smaller(found, moved)
     return Ball(np.where(still, before.mid, moved.mid), np.where(still, before.rad, moved.rad))
+
+
+def _pressing(forces: Ball, p: int) -> Ball:
+    """The forces of a ball whose normal components are not negative, as those of a root are."""
+    half = 0.5 * (forces.mid + forces.rad)
+    cut = (np.arange(len(half)) < p) & (forces.mid < forces.rad) & (half > 0)
+    return Ball(np.where(cut, half, forces.mid), np.where(cut, half * SAFE, forces.rad))
 
 
 def _by_leaf(enclosure: CondensedEnclosure, alpha: Fraction, forces: Ball, codes: Sequence[int]) -> Ball | None:

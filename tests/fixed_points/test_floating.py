@@ -241,3 +241,19 @@ def test_saved_and_loaded(tmp_path, push):
     wrong = Known(found.alpha, found.lambda_n, found.lambda_t, found.u_t)
     wrong.rigid_coordinates = np.zeros(2)
     bad_argument("rigid_coordinates of shape", enumsol.successive_approximations, problem, 0, wrong)
+
+
+def test_a_computed_force_that_is_zero_but_for_rounding_holds_nothing():
+    """All load is on one of two nodes, about which the body may turn; the other one just touches."""
+    A = [[24, 16, -8, -12, -16, -4], [16, 19, -12, -18, -4, -1], [-8, -12, 16, 4, -8, 8]]
+    A += [[-12, -18, 4, 26, 8, -8], [-16, -4, -8, 8, 24, -4], [-4, -1, 8, -8, -4, 9]]
+    N, e = np.array([[1, 0, 2], [0, 1, -2], [1, 0, -1], [0, 1, 0], [1, 0, 1], [0, 1, 2.0]]), np.eye(6)
+    data = {"friction": 0.75, "rigid_modes": N, "max_rigid_displacement": 1000.0}
+    problem = enumsol.ContactProblem(A, [-e[1], -e[3]], [e[0], e[2]], [0, -2, 0, 0, 0, 0], **data)
+    assert Oracle(problem).families == 1
+    found = limit_of(problem, 0)
+    checked(problem, 0, found)
+    # along a motion that leaves the pressed node where it is
+    moved = N @ found.free_motion
+    assert np.max(np.abs(moved[:2])) < 1e-9 < np.max(np.abs(moved))
+    assert "may move on" in repr(found)

@@ -143,6 +143,100 @@ def test_a_changed_proof_is_not_complete(change, out_again, pulled_wedge):
     assert report.unique_until <= 2
 
 
+def held_at_its_limit():
+    """The load of step 3 is held in step 4: two leaves hold its root, whose balls differ."""
+    A = np.diag([80.5, 80.5, 4, 4, 4, 4])
+    A[2:, :2] = [[-12, 4], [12, 4], [-4, -12], [4, -12]]
+    A[:2, 2:] = A[2:, :2].T
+    e = np.eye(6)
+    problem = enumsol.ContactProblem(A, e[2:4], e[4:6], [1, -3, -2, 2, -1, -2], friction=0.75)
+    first, held = [1, -2, -4, 3, -3, -4], [3, -2, 0, 3, -3, -1]
+    steps = [enumsol.LoadStep(load=load) for load in (first, first, held, held)]
+    return problem, [*steps, enumsol.LoadStep(load=held, friction=0.375)]
+
+
+def test_a_root_that_two_leaves_hold_is_followed_by_one_of_their_balls():
+    problem, steps = held_at_its_limit()
+    history = histories(problem, steps)
+    assert history.complete
+    assert complete_report(problem, history.proof).unique_until == history.unique_until == 5
+    records = records_of(history.proof)
+    starts = of_kind(records, "s")
+    # two leaves of step 4 hold its one root, and only that of one leaf is in the start of step 5
+    assert len(of_kind(records[starts[3] : starts[4]], "m")) == 2
+    narrow_start(records, starts[4:])
+    report = verify(problem, proof_of(records))
+    assert not report.complete
+    assert report.unique_until <= 4
+
+
+def degenerate_history(seed, tangents):
+    """Loads that are repeated, taken away, halved or at the limit of friction, in whole numbers and their quarters."""
+    rng = np.random.default_rng(seed)
+    p, d = int(rng.integers(1, 3)), 1 + tangents
+    n = d * p + int(rng.integers(0, 2)) * d
+    X = rng.integers(-2, 3, (n, n))
+    A, e, F = (X @ X.T + np.diag(rng.integers(1, 9, n))) / 4, np.eye(n), float(rng.choice([0.25, 0.5, 0.75, 1, 2]))
+    rows, load = [e[k * p : (k + 1) * p] for k in range(d)], rng.integers(-3, 4, n).astype(float)
+    gap = rng.choice([0.0, 0.0, 0.0, 0.5, -0.5], p)
+    kind = enumsol.ContactProblem if tangents == 1 else enumsol.ContactProblem3D
+    problem = kind(A, *rows, load, gap=gap, friction=F)
+    steps = []
+    for _ in range(int(rng.integers(3, 6))):
+        what = rng.choice(["same", "same", "new", "none", "back", "half", "limit"])
+        if what == "new":
+            load = rng.integers(-3, 4, n).astype(float)
+        elif what == "none":
+            load = np.zeros(n)
+        elif what == "back" and steps:
+            load = steps[int(rng.integers(len(steps)))].load
+        elif what == "half":
+            load = load / 2
+        elif what == "limit":
+            pressed = rng.integers(0, 4, p)
+            load = pressed @ rows[0] + sum(F * pressed * rng.integers(-1, 2, p) @ row for row in rows[1:])
+        friction = rng.choice([F, F, F, F / 2, 2 * F, 0.0])
+        steps.append(enumsol.LoadStep(load=load, friction=None if rng.random() < 0.3 else float(friction)))
+    return problem, steps
+
+
+def says_what_its_proof_says(problem, steps):
+    """The history, after this was compared."""
+    history = histories(problem, steps)
+    report = accepted_report(problem, history.proof)
+    assert (report.complete, report.unique_until) == (history.complete, history.unique_until), history
+    return history
+
+
+def has_degenerate_root(history):
+    return any(not root.regular for step in range(1, len(history.steps) + 1) for root in history.roots(step))
+
+
+@pytest.mark.few(6, 12)
+@pytest.mark.parametrize("seed", range(2000, 2150))
+def test_a_history_says_what_its_proof_says(seed):
+    says_what_its_proof_says(*degenerate_history(seed, 1))
+
+
+@pytest.mark.parametrize("seed", [2002, 2016])
+def test_the_checker_knows_which_forces_are_zero_or_press(seed):
+    assert says_what_its_proof_says(*degenerate_history(seed, 2)).complete
+
+
+@pytest.mark.few(2, 6)
+@pytest.mark.parametrize("seed", range(2000, 2060))
+def test_a_history_in_space_says_what_its_proof_says(seed):
+    says_what_its_proof_says(*degenerate_history(seed, 2))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tangents", [1, 2])
+def test_such_histories_are_complete_and_degenerate(tangents):
+    found = [says_what_its_proof_says(*degenerate_history(seed, tangents)) for seed in range(2000, 2012)]
+    assert sum(history.complete for history in found) > 6
+    assert sum(map(has_degenerate_root, found)) > 3
+
+
 @pytest.fixture(scope="module")
 def pressed():
     """A problem of one node and the records of a history of two steps, in each of which it has one root."""

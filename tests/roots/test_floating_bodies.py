@@ -279,3 +279,46 @@ SLOW, LONG = pytest.param(range(14, 30), marks=pytest.mark.slow), pytest.param(r
 @pytest.mark.parametrize("seeds", [range(8, 14), SLOW, LONG])
 def test_derivatives_and_local_branches_of_regular_roots(seeds):
     assert sum(branches_of(seed) for seed in seeds) > len(seeds) // 10
+
+
+def padded(problem, n=264):
+    """The same body with further degrees of freedom that nothing moves, too many for rationals."""
+    more = n - problem.n
+    A, *rows = (sp.csc_array(M) for M in (problem.A, problem.Bn, problem.Bt))
+    wide = [sp.hstack([M, sp.csc_array((problem.p, more))]) for M in rows]
+    data = {name: getattr(problem, name) for name in ("gap", "friction", "slip_offset", "max_rigid_displacement")}
+    modes, load = np.vstack([problem.rigid_modes, np.zeros((more, problem.modes.r))]), np.r_[problem.f, np.zeros(more)]
+    return enumsol.ContactProblem(sp.block_diag([A, sp.eye_array(more)]), *wide, load, rigid_modes=modes, **data)
+
+
+def large_body(seed):
+    """What is found of a padded random body within a tight bound, after it was compared with all of the small one."""
+    small = random_body(seed).replace(load_slope=None, max_rigid_displacement=(0.5, 1.0, 2.0, 4.0)[seed % 4])
+    oracle, problem = Oracle(small, 0), padded(small)
+    roots = enumsol.enumerate_roots(problem, 0)
+    report = enumsol.verify(problem, roots.proof)
+    assert report.ok, report
+    assert (report.roots, report.complete) == (len(roots), roots.complete)
+    assert len(roots) <= len(oracle.points)
+    if roots.complete:
+        assert (len(roots), len(roots.families)) == (len(oracle.points), oracle.families)
+    return roots
+
+
+@pytest.mark.few(5, 30)
+@pytest.mark.parametrize("seed", range(300))
+def test_large_bodies_within_tight_bounds(seed):
+    large_body(seed)
+
+
+def test_a_bound_that_is_reached_is_named():
+    A = np.array([[16.5, 3.5, -12.5, -25.5], [3.5, 12.5, -19.5, -10.5], [-12.5, -19.5, 48.5, 41.5], [0, 0, 0, 56.5]])
+    A[3, :3], e = A[:3, 3], np.eye(4)
+    data = {"gap": -1.0, "slip_offset": 2.0, "friction": 1.0, "rigid_modes": np.array([[-1.0], [1], [1], [-1]])}
+    rows = [e[1], -e[3]], [-e[0], e[2]]
+    small = enumsol.ContactProblem(A, *rows, [-87, -69, 186, 198], max_rigid_displacement=2.0, **data)
+    roots = enumsol.enumerate_roots(padded(small), 0)
+    said = [(part.reason, part.hint) for part in roots.undecided]
+    assert any("left of max_rigid_displacement along mode 0 is zero" in reason for reason, _ in said)
+    assert "take another max_rigid_displacement" in {hint for _, hint in said}
+    assert not roots.complete

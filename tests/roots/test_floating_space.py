@@ -178,3 +178,70 @@ def test_a_table_of_roots_over_a_push_that_grows():
     table = enumsol.multiplicity_table(still.replace(load_slope=pushed.f - still.f), [0.25, 0.75, 1.25])
     assert table["roots"].tolist() == [1, 1, 0]
     assert table["complete"].all()
+
+
+def small_body(seed):
+    """One or two bodies of two points each, which move in a plane in which nothing holds them, in whole numbers."""
+    rng = np.random.default_rng(seed)
+    blocks, p = int(rng.integers(1, 3)), int(rng.integers(1, 3))
+    still = 4 * blocks
+    n = still + p
+    A, N, e = np.eye(n), np.zeros((n, 2 * blocks)), np.eye(n)
+    for k in range(0, still, 4):
+        B = rng.integers(-1, 2, (2, 2))
+        B = B @ B.T + np.eye(2)
+        A[k : k + 4, k : k + 4] = np.block([[B, -B], [-B, B]])
+        N[[k, k + 2], k // 2] = N[[k + 1, k + 3], k // 2 + 1] = 1
+    rows, at = np.zeros((2, p, n)), 2 * rng.permutation(2 * blocks)[:p]
+    for i, a in enumerate(at):
+        sign, facing = rng.choice([-1, 1]), (a + 4) % still
+        rows[:, i] = sign * e[a + 1], e[a]
+        if blocks > 1 and facing not in at and rng.random() < 0.7:
+            rows[:, i] -= sign * e[facing + 1], e[facing]
+    f = np.zeros(n)
+    if rng.random() < 0.6:
+        f[:still] = rng.integers(-2, 3, still)
+    if rng.random() < 0.5:
+        # in balance with forces at the contact
+        f = rng.integers(0, 3, p) @ rows[0] + rng.integers(-1, 2, p) @ rows[1]
+    data = {"gap": rng.choice([0, 0, 0.5, -0.5], p), "friction": (float(rng.choice([0.5, 1])), rng.choice([0, 0, 0.5]))}
+    data |= {"rigid_modes": N, "max_rigid_displacement": float(rng.choice([0.5, 1, 2]))}
+    return enumsol.ContactProblem3D(A, *rows, e[still:], f, **data)
+
+
+def in_the_plane(problem):
+    """The same in 2D, where there is no friction along the second tangent."""
+    data = {name: getattr(problem, name) for name in ("gap", "rigid_modes", "max_rigid_displacement")}
+    matrices = problem.A, problem.Bn, problem.Bt1, problem.f
+    return enumsol.ContactProblem(*matrices, friction=float(problem.friction[0][0]), **data)
+
+
+def settled(seed):
+    """Whether the roots of a small body are all known; those of one with friction along one tangent are compared."""
+    problem = small_body(seed)
+    roots = checked(problem, max_nodes=60)
+    if not problem.friction[1].any():
+        exact = enumsol.enumerate_roots(in_the_plane(problem), 0, arithmetic="exact")
+        assert exact.complete
+        assert len(roots) <= len(exact)
+        assert not roots.complete or (len(exact), len(exact.families)) == (len(roots), 0)
+    return roots.complete
+
+
+@pytest.mark.few(4, 20)
+@pytest.mark.parametrize("seed", range(200))
+def test_small_bodies_within_tight_bounds(seed):
+    settled(seed)
+
+
+def test_two_free_bodies_with_friction_along_one_tangent_are_left_open():
+    a = np.array([[2, 1, -2, -1], [1, 3, -1, -3], [-2, -1, 2, 1], [-1, -3, 1, 3]])
+    A, e, N = np.eye(10), np.eye(10), np.zeros((10, 4))
+    A[:4, :4] = A[4:8, 4:8] = a
+    N[[0, 2], 0] = N[[1, 3], 1] = N[[4, 6], 2] = N[[5, 7], 3] = 1
+    rows = [-e[1], e[4] - e[2]], [e[0], e[5] - e[3]], e[8:]
+    data = {"gap": [0.5, -0.5], "friction": (1.0, 0.0), "rigid_modes": N, "max_rigid_displacement": 1.0}
+    problem = enumsol.ContactProblem3D(A, *rows, np.zeros(10), **data)
+    roots = checked(problem)
+    assert not roots.complete
+    assert any("leave the body free to move as a whole" in part.reason for part in roots.undecided)

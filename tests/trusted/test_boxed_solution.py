@@ -196,12 +196,13 @@ def test_which_solutions_are_the_same():
     one = solution_in_box(solvers.enclosed, box_around(solvers.enclosed, y))
     half = solution_in_box(solvers.enclosed, replace(one.box, radius=0.5 * one.box.radius))
     elsewhere = Box.of(solvers.enclosed, one.box.centre + 1.0, one.box.radius * 0.1, one.box.rho)
-    kept, doubtful = apart_in_boxes([], [((1, 1), one), ((0, 1), half)])
+    kept, doubtful, same = apart_in_boxes([], [((1, 1), one), ((0, 1), half)])
     assert ([codes for codes, _ in kept], doubtful) == ([(0, 1)], [])
+    assert same == [(((1, 1), one), ((0, 1), half))]
     moved = Ball(one.y.mid + 1.0, one.y.rad)
     other = BoxedSolution(moved, one.w, one.open, one.stick, one.slip, 1, elsewhere)
     assert len(apart_in_boxes([], [((1, 1), one), ((0, 1), other)])[0]) == 2
     wide = Ball(one.y.mid, np.full_like(one.y.rad, 9.0))
     unknown = BoxedSolution(wide, one.w, one.open, one.stick, one.slip, 1, elsewhere)
     # the one is not known to lie in the box of the other, nor the other in that of the one
-    assert apart_in_boxes([], [((0, 1), one), ((1, 1), unknown)])[1] == [(1, 1)]
+    assert apart_in_boxes([], [((0, 1), one), ((1, 1), unknown)]).doubtful == [((1, 1), unknown)]

@@ -347,12 +347,13 @@ def test_roots_of_two_leaves_are_told_apart():
     roots = [((SECTORS + n,), settle(enclosed, (SECTORS + n,))) for n in (16, 31, 63, 32)]
     assert all(isinstance(root, SpaceRoot) for _, root in roots)
     assert all(same_root(one, other) for _, one in roots for _, other in roots)
-    distinct, doubtful = distinct_roots(roots)
-    assert (len(distinct), doubtful) == (1, [])
+    distinct, doubtful, same = distinct_roots(roots)
+    assert (len(distinct), doubtful, len(same)) == (1, [], 3)
+    assert all(other is distinct[0] for _, other in same)
     far = roots[0][1]
     wide = SpaceRoot(far.y, far.w, far.centre, far.angle, far.angle_rad + 1.0, far.reach, 1, far.slack)
     assert same_root(wide, far) is None
-    assert distinct_roots([roots[0], (roots[0][0], wide)])[1] == [roots[0][0]]
+    assert distinct_roots([roots[0], (roots[0][0], wide)]).doubtful == [(roots[0][0], wide)]
 
 
 def test_cut_boxes_hold_what_both_hold():

@@ -55,7 +55,7 @@ def roots_on_arcs(
             undecided.append(Undecided(arc.statuses, _NOT_PROVEN, "another alpha, or enumerate_roots there"))
         else:
             leaves.append(found)
-    distinct, doubtful = distinct_roots(leaves)
+    distinct, doubtful, _ = distinct_roots(leaves)
     # every arc has a root of its own
     lost = len(leaves) - len(distinct)
     undecided += [Undecided((None,) * data.problem.p, _NOT_PROVEN, "enumerate_roots there")] * lost

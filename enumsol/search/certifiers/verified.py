@@ -347,4 +347,9 @@ def _reason(codes: Codes, ball: VerifiedSelection | None, node_ids: Sequence[Any
     ]
     slack = np.abs(ball.slack.mid)
     k = int(np.argmin(np.where(slack <= ball.slack.rad, slack, np.inf)))
+    if k >= len(names):
+        # of a body that nothing holds both bounds of every coordinate of its rigid displacement follow
+        mode = (k - len(names)) % ((len(slack) - len(names)) // 2)
+        names += [f"what is left of max_rigid_displacement along mode {mode}"] * (len(slack) - len(names))
+        hint = "take another max_rigid_displacement"
     return f"{names[k]} is zero to {slack[k] + ball.slack.rad[k]:.0e} (scaled)", hint

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, Ball, determinant_sign, smaller, solution, upper_sum
+from enumsol.trusted.same_roots import told_apart
 from enumsol.trusted.space.natural_map import MARGIN, Discs, Step, middle_inverse
 from enumsol.trusted.space.space_uniqueness import LARGEST_UNIT, LooseSolution
 
@@ -21,7 +22,10 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.space_condensed import EnclosedSpace
     from enumsol.support.array_types import Floats, Indices
+    from enumsol.trusted.same_roots import Apart
     from enumsol.trusted.space.leaves import SpaceRoot
+
+    _AnyLeaf = tuple[tuple[int, ...], "SpaceRoot | BoxedSolution"]
 
 
 #: Steps towards the zero of a box, and halvings of a box that may hold too much.
@@ -128,32 +132,21 @@ def proposed_rho(system: EnclosedSpace) -> list[Floats]:
     return found
 
 
-def apart_in_boxes(
-    regular: Sequence[SpaceRoot], boxed: Iterable[tuple[tuple[int, ...], BoxedSolution]]
-) -> tuple[list[tuple[tuple[int, ...], BoxedSolution]], list[tuple[int, ...]]]:
-    """Solutions of boxes, each once, that are not among regular ones; and leaves of those that may be all the same.
+def apart_in_boxes(regular: Sequence[_AnyLeaf], boxed: Iterable[_AnyLeaf]) -> Apart[_AnyLeaf]:
+    """Leaves by their solutions in boxes, without those whose solutions are among regular ones.
 
     A solution that lies in the box of another one is that one; where bounds of forces do not meet there are two. The
     result does not depend on the order in which the leaves are given.
     """
-    kept: list[tuple[tuple[int, ...], BoxedSolution]] = []
-    doubtful = []
-    for codes, one in sorted(boxed, key=lambda leaf: leaf[0]):
-        answers = [_same(other, one) for other in regular] + [_same(one, other) for _, other in kept]
-        if True in answers:
-            continue
-        if None in answers:
-            doubtful.append(codes)
-        kept.append((codes, one))
-    return kept, doubtful
+    return told_apart(sorted(boxed, key=lambda leaf: leaf[0]), lambda a, b: _same(a[1], b[1]), regular)
 
 
-def _same(one: SpaceRoot | BoxedSolution, other: BoxedSolution) -> bool | None:
+def _same(one: SpaceRoot | BoxedSolution, other: SpaceRoot | BoxedSolution) -> bool | None:
     """Whether two solutions are the same; None where that is open."""
     if np.any(np.abs(one.y.mid - other.y.mid) > (one.y.rad + other.y.rad) * SAFE):
         return False
-    inside = is_inside(one.y, one.w, other.box)
-    inside = inside or (isinstance(one, BoxedSolution) and is_inside(other.y, other.w, one.box))
+    pairs = ((one, other), (other, one))
+    inside = any(isinstance(b, BoxedSolution) and is_inside(a.y, a.w, b.box) for a, b in pairs)
     return True if inside else None
 
 

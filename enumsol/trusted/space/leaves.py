@@ -27,6 +27,7 @@ from enumsol.arithmetic.balls import (
     upper_sum,
 )
 from enumsol.model.sectors import SECTORS, direction, end_number
+from enumsol.trusted.same_roots import Apart, told_apart
 from enumsol.trusted.space.sector_rows import OPEN, SLIP_PLUS, STICK
 from enumsol.trusted.space.turning import LIBRARY, Box, Combined, Turning, turned_by
 
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.space_condensed import EnclosedSpace
     from enumsol.support.array_types import Floats, Mask
+
+    _RootLeaf = tuple[tuple[int, ...], "SpaceRoot"]
 
 
 #: A sector's box of directions is this share of its width wider on both sides: a root on an end lies inside two boxes.
@@ -610,7 +613,7 @@ class Leaf:
             return self.free[int(np.argmax(np.abs(along)))] - len(self.system.g)
         E, k = self.E.copy(), len(self.system.reach)
         E[self.t, np.array(self.column, dtype=np.intp)[:, None]] = (
-            turned_by(self.centre, angle)[0] / self.system.unit[self.t]
+            turned_by(self.centre, angle[:q])[0] / self.system.unit[self.t]
         )
         _, _, rows = np.linalg.svd((self.system.balls[0].mid @ E)[self.rows])
         return int(np.argmax(np.abs(rows[-1][-k:])))
@@ -843,22 +846,11 @@ def _apart(one: Ball, other: Ball) -> bool:
     return bool(np.any(np.abs(one.mid - other.mid) > (one.rad + other.rad) * SAFE))
 
 
-def distinct_roots(
-    found: Iterable[tuple[tuple[int, ...], SpaceRoot]],
-) -> tuple[list[tuple[tuple[int, ...], SpaceRoot]], list[tuple[int, ...]]]:
-    """Roots of leaves without those that two leaves share, and the leaves whose roots could not be told apart.
+def distinct_roots(found: Iterable[_RootLeaf]) -> Apart[_RootLeaf]:
+    """Leaves by the roots that they hold, whatever the order in which they are given."""
 
-    Neither depends on the order in which the leaves are given.
-    """
-    distinct: list[tuple[tuple[int, ...], SpaceRoot]] = []
-    doubtful = []
-    for codes, root in sorted(found, key=lambda leaf: leaf[0]):
-        pattern = [min(code, SECTORS) for code in codes]
-        alike = [other for known, other in distinct if [min(code, SECTORS) for code in known] == pattern]
-        answers = [same_root(root, other) for other in alike]
-        if True in answers:
-            continue
-        if None in answers:
-            doubtful.append(codes)
-        distinct.append((codes, root))
-    return distinct, doubtful
+    def same(other: _RootLeaf, one: _RootLeaf) -> bool | None:
+        patterns = [[min(code, SECTORS) for code in codes] for codes, _ in (other, one)]
+        return same_root(one[1], other[1]) if patterns[0] == patterns[1] else False
+
+    return told_apart(sorted(found, key=lambda leaf: leaf[0]), same)
