@@ -15,6 +15,7 @@ from enumsol.model.problem import ContactProblem, check_is_problem
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.support import arguments
 from enumsol.support.deadlines import Deadline, TimeOverError, within
+from enumsol.support.workers import workers_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -39,6 +40,7 @@ def branch_graph(
     max_nodes: int | None = None,
     time_limit: float | None = None,
     executor: Executor | None = None,
+    jobs: int | None = None,
 ) -> BranchGraph:
     """All solutions over an interval of alpha, as arcs glued at vertices (theory, section 7).
 
@@ -78,6 +80,9 @@ def branch_graph(
         found without it. In 3D workers search parts of the tree; its proof may have other leaves than without them, but
         does not depend on their number and timing, and the calling process follows the curves.
 
+    jobs : int, optional
+        Number of processes that work, instead of an ``executor``; a script then needs ``if __name__ == "__main__":``.
+
     Returns
     -------
     BranchGraph
@@ -108,12 +113,13 @@ def branch_graph(
     a, b = (Fraction(end) for end in arguments.alpha_interval(interval))
     arguments.one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
     arguments.optional_callable(progress, "progress")
-    arguments.optional_executor(executor)
+    arguments.optional_executor(executor, jobs)
     max_nodes, time_limit = arguments.optional_count(max_nodes, "max_nodes"), arguments.optional_seconds(time_limit)
     started = time.perf_counter()
     limits = Deadline.after(started, time_limit)
     if not isinstance(problem, ContactProblem):
-        return _in_space(problem, (a, b), arithmetic, progress, max_nodes, limits, executor)
+        with workers_of(executor, jobs) as pool:
+            return _in_space(problem, (a, b), arithmetic, progress, max_nodes, limits, pool)
     if problem.modes is not None:
         _check_floating(problem, arithmetic)
     _check_friction(problem, a, b)
@@ -125,7 +131,8 @@ def branch_graph(
         late = f"{Stop(StopReason.TIME_LIMIT)} before the body was condensed to its contact nodes"
         stats = GraphStats(seconds=time.perf_counter() - started)
         return BranchGraph(problem, None, (a, b), arithmetic, vertices=(), arcs=(), undecided=(late,), stats=stats)
-    candidates = way.candidates(search, executor)
+    with workers_of(executor, jobs) as pool:
+        candidates = way.candidates(search, pool)
     searched = time.perf_counter()
     limits = limits.extended(started)
     stops = [] if search.stopped is None else [search.stopped]

@@ -20,7 +20,7 @@ from enumsol.roots.enumerate import enumerate_roots
 from enumsol.roots.slips import affine_friction, ratios
 from enumsol.support.arguments import alpha_list, even_alphas, optional_callable, optional_executor
 from enumsol.support.messages import counted
-from enumsol.support.workers import spread
+from enumsol.support.workers import spread, workers_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -286,6 +286,7 @@ def multiplicity_table(
     samples: int | None = None,
     arithmetic: str = "verified",
     executor: Executor | None = None,
+    jobs: int | None = None,
     progress: Callable[[int, int], object] | None = None,
     **options: Any,
 ) -> pd.DataFrame:
@@ -301,7 +302,9 @@ def multiplicity_table(
     arithmetic : str
         Of ``enumerate_roots``.
     executor : concurrent.futures.Executor, optional
-        Enumerates at several alphas at a time: a process pool, or a dask Client's ``get_executor()``.
+        Enumerates at several alphas at a time: a process pool, or the Client of a dask cluster.
+    jobs : int, optional
+        Number of processes that work, instead of an ``executor``; a script then needs ``if __name__ == "__main__":``.
     progress : callable, optional
         Called with the numbers of alphas done and of all.
     **options
@@ -333,7 +336,7 @@ def multiplicity_table(
     """
     given: Any = problem
     check_is_problem(given)
-    optional_executor(executor)
+    optional_executor(executor, jobs)
     optional_callable(progress, "progress")
     chosen = alpha_list(alphas) if samples is None else even_alphas(alphas, samples)
     for alpha in chosen:
@@ -341,7 +344,10 @@ def multiplicity_table(
     row = partial(table_row, problem, {"arithmetic": arithmetic, **options})
     done: dict[int, dict[str, Any]] = {}
     try:
-        with closing(spread(executor, ((k, row, (alpha,)) for k, alpha in enumerate(chosen)))) as rows:
+        with (
+            workers_of(executor, jobs) as pool,
+            closing(spread(pool, ((k, row, (alpha,)) for k, alpha in enumerate(chosen)))) as rows,
+        ):
             for k, found in rows:
                 done[k] = found
                 if progress is not None:

@@ -6,7 +6,6 @@ import enum
 import os
 import sys
 import tomllib
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
@@ -15,13 +14,11 @@ import typer
 from enumsol.cli.progress import Display
 from enumsol.cli.streams import is_quiet
 from enumsol.errors import EnumsolError, Interrupted, InvalidArgumentError, OutputError
-from enumsol.support.arguments import text_of
-from enumsol.support.files import unreadable
-from enumsol.support.plotting import checked_units
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
     from concurrent.futures import Executor
+    from contextlib import AbstractContextManager
 
     from enumsol.fem import Scene
     from enumsol.model.problem3d import AnyProblem
@@ -35,6 +32,8 @@ GALLERY, COLLECTION = "gallery:", "collection:"
 TOML = ".toml"
 #: Usual endings of files that meshio reads and that are no problems.
 MESHES = (".msh", ".vtu", ".vtk", ".inp", ".xdmf", ".med", ".bdf", ".mesh", ".e", ".exo")
+#: Bytes of a TOML file that is read here, as in `enumsol.fem`, which refuses larger ones.
+_LARGEST = 1_000_000
 #: As many processes as Windows lets one wait for.
 _MOST_ON_WINDOWS = 61
 
@@ -53,7 +52,11 @@ class ExitStatus(enum.IntEnum):
 
 def described(problem: str) -> dict[str, Any]:
     """What a TOML file says besides the problem: steps, units and title; what is wrong with it is said elsewhere."""
-    if not problem.endswith(TOML) or unreadable(Path(problem)) is not None:
+    if not problem.endswith(TOML):
+        return {}
+    from enumsol.support.files import unreadable  # numpy: not for --help
+
+    if unreadable(Path(problem)) is not None or Path(problem).stat().st_size > _LARGEST:
         return {}
     try:
         return tomllib.loads(Path(problem).read_text(encoding="utf-8"))
@@ -69,6 +72,8 @@ def units_of(problem: str, text: str | None) -> tuple[str, str] | None:
     InvalidArgumentError
         They are not two texts.
     """
+    from enumsol.support.plotting import checked_units  # numpy: not for --help
+
     if text is not None:
         return checked_units(text, "--units")
     return checked_units(described(problem).get("units"))
@@ -81,6 +86,8 @@ def in_units(text: str, units: tuple[str, str] | None) -> str:
 
 def title_of(problem: str, text: str | None = None) -> str:
     """The heading of a page or a figure: what is asked for, the title in a TOML file, or the name of the problem."""
+    from enumsol.support.arguments import text_of  # numpy: not for --help
+
     found = described(problem).get("title", problem) if text is None else text
     return text_of(found, "title")
 
@@ -254,25 +261,8 @@ def capped(jobs: int) -> int:
     return min(jobs, most)
 
 
-@contextmanager
-def workers(jobs: int) -> Iterator[Executor | None]:
-    """An executor of that many processes at most, stopped at once on the way out; None for one.
+def workers(jobs: int) -> AbstractContextManager[Executor | None]:
+    """An executor of that many processes at most, for --jobs; None for one."""
+    from enumsol.support.workers import workers_of  # not for --help
 
-    Raises
-    ------
-    InvalidArgumentError
-        The system starts no more processes.
-    """
-    if jobs == 1:
-        yield None
-        return
-    from enumsol.cli.pool import RenewedPool  # loky: only for several processes
-
-    with RenewedPool(capped(jobs)) as pool:
-        try:
-            pool.renew()
-        except OSError as error:
-            raise InvalidArgumentError(
-                f"--jobs is {jobs}, and the system starts no more processes ({error.strerror}); expected fewer"
-            ) from error
-        yield pool
+    return workers_of(None, jobs if jobs == 1 else capped(jobs), "--jobs")

@@ -21,7 +21,7 @@ from enumsol.support.array_arguments import vector_of
 from enumsol.support.immutable import Immutable, Listed
 from enumsol.support.messages import counted
 from enumsol.support.plotting import checked_units, in_units, kept
-from enumsol.support.workers import spread
+from enumsol.support.workers import spread, workers_of
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -44,6 +44,7 @@ def multiplicity_map(
     over: Any,
     *,
     executor: Executor | None = None,
+    jobs: int | None = None,
     progress: Callable[[int, int], object] | None = None,
     time_limit: float | None = None,
     max_boxes: int = 200,
@@ -67,6 +68,8 @@ def multiplicity_map(
         for example with another mesh.
     executor : concurrent.futures.Executor, optional
         Makes several graphs at a time. A function ``make`` must be one that other processes can import.
+    jobs : int, optional
+        Number of processes that work, instead of an ``executor``; a script then needs ``if __name__ == "__main__":``.
     progress : callable, optional
         Called with the numbers of values done and of all.
     time_limit : float, optional
@@ -102,7 +105,7 @@ def multiplicity_map(
     """
     interval = arguments.alpha_interval(alphas, "alphas")
     name, make, values = _parameter(problem, over)
-    arguments.optional_executor(executor)
+    arguments.optional_executor(executor, jobs)
     arguments.optional_callable(progress, "progress")
     if "interval" in options or "progress" in options:
         raise InvalidArgumentError("interval and progress are not options here; expected those of branch_graph")
@@ -111,7 +114,8 @@ def multiplicity_map(
         most = 0
     work = _Rows(name, interval, values, make, options, arguments.optional_seconds(time_limit), most)
     try:
-        work.run(executor, progress)
+        with workers_of(executor, jobs) as pool:
+            work.run(pool, progress)
     except (KeyboardInterrupt, Interrupted) as interruption:
         done = f"{len(work.done)} of {counted(len(values), 'value')}"
         raise Interrupted(
