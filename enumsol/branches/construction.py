@@ -18,6 +18,7 @@ from enumsol.search.outcome import Stop, StopReason
 from enumsol.support import arguments
 from enumsol.support.deadlines import Deadline, TimeOverError, within
 from enumsol.support.keeping import keeping
+from enumsol.support.workers import workers_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -44,6 +45,7 @@ def branch_graph(
     max_nodes: int | None = None,
     time_limit: float | None = None,
     executor: Executor | None = None,
+    jobs: int | None = None,
 ) -> BranchGraph:
     """All solutions over an interval of alpha, as arcs glued at vertices (theory, section 7).
 
@@ -83,6 +85,9 @@ def branch_graph(
         found without it. In 3D workers search parts of the tree; its proof may have other leaves than without them, but
         does not depend on their number and timing, and the calling process follows the curves.
 
+    jobs : int, optional
+        Number of processes that work, instead of an ``executor``; a script then needs ``if __name__ == "__main__":``.
+
     Returns
     -------
     BranchGraph
@@ -113,18 +118,20 @@ def branch_graph(
     a, b = (Fraction(end) for end in arguments.alpha_interval(interval))
     arguments.one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
     arguments.optional_callable(progress, "progress")
-    arguments.optional_executor(executor)
+    arguments.optional_executor(executor, jobs)
     max_nodes, time_limit = arguments.optional_count(max_nodes, "max_nodes"), arguments.optional_seconds(time_limit)
     started = time.perf_counter()
     limits = Deadline.after(started, time_limit)
     if not isinstance(problem, ContactProblem):
-        return _in_space(problem, (a, b), arithmetic, progress, max_nodes, limits, executor)
+        with workers_of(executor, jobs) as pool:
+            return _in_space(problem, (a, b), arithmetic, progress, max_nodes, limits, pool)
     if problem.modes is not None:
         _check_floating(problem, arithmetic)
     _check_friction(problem, a, b)
     call = _Construction(problem, (a, b), arithmetic, started)
-    work = partial(call.run, progress, max_nodes, limits, executor)
-    return keeping("branch_graph", work, call.cut_short, lambda _: "; the arcs found so far are kept")
+    with workers_of(executor, jobs) as pool:
+        work = partial(call.run, progress, max_nodes, limits, pool)
+        return keeping("branch_graph", work, call.cut_short, lambda _: "; the arcs found so far are kept")
 
 
 @dataclass

@@ -21,7 +21,7 @@ from enumsol.roots.slips import ratios
 from enumsol.support.arguments import alpha_list, even_alphas, optional_callable, optional_executor
 from enumsol.support.keeping import keeping
 from enumsol.support.messages import counted
-from enumsol.support.workers import spread
+from enumsol.support.workers import spread, workers_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -287,6 +287,7 @@ def multiplicity_table(
     samples: int | None = None,
     arithmetic: str = "verified",
     executor: Executor | None = None,
+    jobs: int | None = None,
     progress: Callable[[int, int], object] | None = None,
     **options: Any,
 ) -> pd.DataFrame:
@@ -302,7 +303,9 @@ def multiplicity_table(
     arithmetic : str
         Of ``enumerate_roots``.
     executor : concurrent.futures.Executor, optional
-        Enumerates at several alphas at a time: a process pool, or a dask Client's ``get_executor()``.
+        Enumerates at several alphas at a time: a process pool, or the Client of a dask cluster.
+    jobs : int, optional
+        Number of processes that work, instead of an ``executor``; a script then needs ``if __name__ == "__main__":``.
     progress : callable, optional
         Called with the numbers of alphas done and of all.
     **options
@@ -334,7 +337,7 @@ def multiplicity_table(
     """
     given: Any = problem
     check_is_problem(given)
-    optional_executor(executor)
+    optional_executor(executor, jobs)
     optional_callable(progress, "progress")
     chosen = alpha_list(alphas) if samples is None else even_alphas(alphas, samples)
     for alpha in chosen:
@@ -343,7 +346,10 @@ def multiplicity_table(
     done: dict[int, dict[str, Any]] = {}
 
     def work() -> pd.DataFrame:
-        with closing(spread(executor, ((k, row, (alpha,)) for k, alpha in enumerate(chosen)))) as rows:
+        with (
+            workers_of(executor, jobs) as pool,
+            closing(spread(pool, ((k, row, (alpha,)) for k, alpha in enumerate(chosen)))) as rows,
+        ):
             for k, found in rows:
                 done[k] = found
                 if progress is not None:

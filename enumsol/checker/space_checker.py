@@ -234,7 +234,7 @@ class SpaceChecker(TreeChecker):
         """Nothing: in 3D there are none."""
 
     def _locate(self, found: SpaceRoot | LooseSolution, codes: Codes = ()) -> None:
-        """Take note of a root: its forces in the problem's units, its statuses; ``codes`` are those of its leaf, if known."""
+        """Take note of a root: forces in the problem's units, and statuses, by its leaf's ``codes`` if there is one."""
         if self.located is None:
             return
         p, system, y = self.problem.p, self.system, found.y

@@ -5,7 +5,6 @@ from __future__ import annotations
 import enum
 import os
 import sys
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
@@ -20,8 +19,9 @@ from enumsol.support.messages import visible
 from enumsol.support.plotting import checked_units
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable
     from concurrent.futures import Executor
+    from contextlib import AbstractContextManager
 
     from enumsol.fem import Scene
     from enumsol.model.problem3d import AnyProblem
@@ -35,6 +35,8 @@ GALLERY, COLLECTION = "gallery:", "collection:"
 TOML = ".toml"
 #: Usual endings of files that meshio reads and that are no problems.
 MESHES = (".msh", ".vtu", ".vtk", ".inp", ".xdmf", ".med", ".bdf", ".mesh", ".e", ".exo")
+#: Bytes of a TOML file that is read here, as in `enumsol.fem`, which refuses larger ones.
+_LARGEST = 1_000_000
 #: As many processes as Windows lets one wait for.
 _MOST_ON_WINDOWS = 61
 
@@ -54,7 +56,10 @@ class ExitStatus(enum.IntEnum):
 
 def described(problem: str) -> dict[str, Any]:
     """What a TOML file says besides the problem: steps, units and title; what is wrong with it is said elsewhere."""
-    if not problem.endswith(TOML) or unreadable(Path(problem)) is not None:
+    if not problem.endswith(TOML):
+        return {}
+
+    if unreadable(Path(problem)) is not None or Path(problem).stat().st_size > _LARGEST:
         return {}
     from enumsol.support.saved import toml_from  # numpy: not for --help
 
@@ -257,25 +262,8 @@ def capped(jobs: int) -> int:
     return min(jobs, most)
 
 
-@contextmanager
-def workers(jobs: int) -> Iterator[Executor | None]:
-    """An executor of that many processes at most, stopped at once on the way out; None for one.
+def workers(jobs: int) -> AbstractContextManager[Executor | None]:
+    """An executor of that many processes at most, for --jobs; None for one."""
+    from enumsol.support.workers import workers_of  # not for --help
 
-    Raises
-    ------
-    InvalidArgumentError
-        The system starts no more processes.
-    """
-    if jobs == 1:
-        yield None
-        return
-    from enumsol.cli.pool import RenewedPool  # loky: only for several processes
-
-    with RenewedPool(capped(jobs)) as pool:
-        try:
-            pool.renew()
-        except OSError as error:
-            raise InvalidArgumentError(
-                f"--jobs is {jobs}, and the system starts no more processes ({error.strerror}); expected fewer"
-            ) from error
-        yield pool
+    return workers_of(None, jobs if jobs == 1 else capped(jobs), "--jobs")

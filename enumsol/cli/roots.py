@@ -13,7 +13,6 @@ from enumsol.cli import common, options, output, root_report
 from enumsol.cli.progress import SearchDisplay
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.messages import counted
-from enumsol.support.plotting import checked_units
 
 if TYPE_CHECKING:
     from enumsol.fem import Scene
@@ -118,7 +117,7 @@ class Search:
             raise InvalidArgumentError(
                 "--resume is given without --proof; expected the file of the proof to resume from"
             )
-        checked_units(self.units, "--units")
+        common.units_of("", self.units)
         if self.unique and self.stop_after is not None:
             raise InvalidArgumentError(
                 f"--stop-after is {self.stop_after} with --unique, which stops at the second root"

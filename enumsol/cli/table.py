@@ -11,7 +11,6 @@ from enumsol.cli.options import Arithmetic, JsonFile, ProblemArgument, Quiet, co
 from enumsol.cli.output import check_outputs, deliver
 from enumsol.cli.progress import Display
 from enumsol.errors import EnumsolError, InvalidArgumentError
-from enumsol.support.arguments import even_alphas
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -88,6 +87,8 @@ def _alphas(first: str | None, last: str | None, samples: int, listed: str | Non
         return [parse_alpha(text, f"--alphas[{k}]") for k, text in enumerate(listed.split(","))]
     if first is None or last is None:
         raise InvalidArgumentError("expected --from and --to, or --alphas")
+    from enumsol.support.arguments import even_alphas  # numpy: not for --help
+
     return even_alphas(parse_interval(first, last), samples)
 
 

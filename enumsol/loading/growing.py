@@ -37,6 +37,7 @@ from enumsol.search.outcome import Stop, StopReason
 from enumsol.support import arguments
 from enumsol.support.keeping import keeping
 from enumsol.support.messages import counted
+from enumsol.support.workers import workers_of
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -160,6 +161,7 @@ def histories(
     max_nodes: int | None = None,
     time_limit: float | None = None,
     executor: Executor | None = None,
+    jobs: int | None = None,
     progress: Callable[[HistoryProgress], object] | None = None,
     **options: Any,
 ) -> History:
@@ -201,6 +203,8 @@ def histories(
     executor : concurrent.futures.Executor, optional
         Of `enumerate_roots`: its workers share each search. The starts of a step are searched one after the other, so
         that limits and ends are counted in one order.
+    jobs : int, optional
+        Number of processes that work, instead of an ``executor``; a script then needs ``if __name__ == "__main__":``.
     progress : callable, optional
         Called with a HistoryProgress after every search.
     **options
@@ -256,7 +260,7 @@ def histories(
         if name in options:
             raise InvalidArgumentError(f"{name} is an option of enumerate_roots that histories does not take")
     arguments.instance_of(refine, bool, "refine")
-    arguments.optional_executor(executor)
+    arguments.optional_executor(executor, jobs)
     arguments.optional_callable(progress, "progress")
     limits = _Limits(
         arguments.optional_count(max_branches, "max_branches"),
@@ -264,24 +268,25 @@ def histories(
         arguments.optional_seconds(time_limit),
     )
     fitted = steps_of(problem, steps)
-    search = {"arithmetic": arithmetic, "executor": executor, **options}
+    with workers_of(executor, jobs) as pool:
+        search = {"arithmetic": arithmetic, "executor": pool, **options}
 
-    begun = [_Growing(problem, fitted, follow, tolerance, limits, search, progress)]
-    halvings = arguments.optional_count(max_halvings, "max_halvings") or 0
+        begun = [_Growing(problem, fitted, follow, tolerance, limits, search, progress)]
+        halvings = arguments.optional_count(max_halvings, "max_halvings") or 0
 
-    def grown(several: Sequence[LoadStep]) -> HistoryData:
-        begun.append(_Growing(problem, several, follow, tolerance, limits, search, progress))
-        return begun[-1].run()
+        def grown(several: Sequence[LoadStep]) -> HistoryData:
+            begun.append(_Growing(problem, several, follow, tolerance, limits, search, progress))
+            return begun[-1].run()
 
-    def work() -> History:
-        if not refine:
-            return History(grown(fitted))
-        return History(refined(grown, fitted, way_to(problem, fitted[0]), halvings))
+        def work() -> History:
+            if not refine:
+                return History(grown(fitted))
+            return History(refined(grown, fitted, way_to(problem, fitted[0]), halvings))
 
-    def rest(ending: Ending) -> History:
-        return History(begun[-1].history(str(Stop(StopReason.of(ending)))))
+        def rest(ending: Ending) -> History:
+            return History(begun[-1].history(str(Stop(StopReason.of(ending)))))
 
-    return keeping("histories", work, rest, lambda _: begun[-1].so_far)
+        return keeping("histories", work, rest, lambda _: begun[-1].so_far)
 
 
 @dataclass

@@ -23,7 +23,7 @@ from enumsol.support.immutable import Immutable, Listed
 from enumsol.support.keeping import keeping
 from enumsol.support.messages import counted
 from enumsol.support.plotting import checked_units, in_units, kept
-from enumsol.support.workers import spread
+from enumsol.support.workers import spread, workers_of
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
@@ -46,6 +46,7 @@ def multiplicity_map(
     over: Any,
     *,
     executor: Executor | None = None,
+    jobs: int | None = None,
     progress: Callable[[int, int], object] | None = None,
     time_limit: float | None = None,
     max_boxes: int = 200,
@@ -69,6 +70,8 @@ def multiplicity_map(
         for example with another mesh.
     executor : concurrent.futures.Executor, optional
         Makes several graphs at a time. A function ``make`` must be one that other processes can import.
+    jobs : int, optional
+        Number of processes that work, instead of an ``executor``; a script then needs ``if __name__ == "__main__":``.
     progress : callable, optional
         Called with the numbers of values done and of all.
     time_limit : float, optional
@@ -104,7 +107,7 @@ def multiplicity_map(
     """
     interval = arguments.alpha_interval(alphas, "alphas")
     name, make, values = _parameter(problem, over)
-    arguments.optional_executor(executor)
+    arguments.optional_executor(executor, jobs)
     arguments.optional_callable(progress, "progress")
     if "interval" in options or "progress" in options:
         raise InvalidArgumentError("interval and progress are not options here; expected those of branch_graph")
@@ -112,12 +115,13 @@ def multiplicity_map(
     if not isinstance(make, _Replaced) or make.problem.modes is not None or options.get("arithmetic") == "fast":
         most = 0
     rows = _Rows(name, interval, values, make, options, arguments.optional_seconds(time_limit), most)
-    return keeping(
-        "multiplicity_map",
-        partial(rows.run, executor, progress),
-        lambda ending: rows.result(str(Stop(StopReason.of(ending)))),
-        lambda found: f" after {len(found.rows)} of {counted(len(values), 'value')}",
-    )
+    with workers_of(executor, jobs) as pool:
+        return keeping(
+            "multiplicity_map",
+            partial(rows.run, pool, progress),
+            lambda ending: rows.result(str(Stop(StopReason.of(ending)))),
+            lambda found: f" after {len(found.rows)} of {counted(len(values), 'value')}",
+        )
 
 
 @dataclass

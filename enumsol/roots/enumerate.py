@@ -29,6 +29,7 @@ from enumsol.support import arguments
 from enumsol.support.deadlines import Deadline, TimeOverError, within
 from enumsol.support.keeping import keeping
 from enumsol.support.messages import counted
+from enumsol.support.workers import workers_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -99,6 +100,7 @@ def enumerate_roots(
     arithmetic: Arithmetic = "verified",
     method: Method = "tree",
     executor: Executor | None = None,
+    jobs: int | None = None,
     progress: Callable[[SearchProgress], object] | None = None,
     stop_after: int | None = None,
     max_nodes: int | None = None,
@@ -128,6 +130,8 @@ def enumerate_roots(
     executor : concurrent.futures.Executor, optional
         Runs parts of the tree in parallel (method "tree"): roots and proof do not depend on the number of workers. What
         a worker that died had to do is done again, by others or in this process, with a RuntimeWarning.
+    jobs : int, optional
+        Number of processes that work, instead of an ``executor``; a script then needs ``if __name__ == "__main__":``.
     progress : callable, optional
         Called regularly with a SearchProgress.
     stop_after : int, optional
@@ -181,7 +185,7 @@ def enumerate_roots(
     arguments.one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
     arguments.one_of(method, "method", ("tree", "exhaustive"))
     arguments.one_of(engine, "engine", (None, "active-set", "clarabel"))
-    arguments.optional_executor(executor)
+    arguments.optional_executor(executor, jobs)
     arguments.optional_callable(progress, "progress")
     counts = arguments.optional_count(stop_after, "stop_after"), arguments.optional_count(max_nodes, "max_nodes")
     seconds, tolerance = arguments.optional_seconds(time_limit), arguments.share(tolerance)
@@ -211,7 +215,8 @@ def enumerate_roots(
                     search = _Enumeration(solvers, progress, proof_path, method=method, resumed=resume, started=started)
         except TimeOverError:
             return nothing(StopReason.TIME_LIMIT)
-        return search.run(executor, *counts, seconds)
+        with workers_of(executor, jobs) as pool:
+            return search.run(pool, *counts, seconds)
 
     def rest(ending: Ending) -> RootSet:
         return nothing(StopReason.of(ending)) if search is None else search.cut_short(ending)

@@ -411,11 +411,14 @@ def optional_callable(value: Any, name: str) -> Any:
     return value
 
 
-def optional_executor(value: Any, name: str = "executor") -> Any:
-    """Value, which is like a concurrent.futures.Executor, or None."""
+def optional_executor(value: Any, jobs: Any = None) -> None:
+    """Refuse what is not like a concurrent.futures.Executor nor None, a number of jobs that is none, and both."""
     if value is not None and not callable(getattr(value, "submit", None)):
-        raise _refusal(value, name, "a concurrent.futures.Executor or None")
-    return value
+        raise _refusal(value, "executor", "a concurrent.futures.Executor or None")
+    if jobs is not None:
+        positive_integer(jobs, "jobs")
+        if value is not None:
+            raise InvalidArgumentError("executor and jobs are both given; expected one of them, or neither")
 
 
 def file_path(value: Any, name: str, expected: str = "the name of a file") -> Path:

@@ -9,9 +9,12 @@ from __future__ import annotations
 import warnings
 from collections import deque
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
+from contextlib import contextmanager
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING, Any, TypeVar
+
+from enumsol.errors import InvalidArgumentError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator
@@ -244,3 +247,27 @@ def _one_line(error: BaseException) -> str:
     if not text:
         return type(error).__name__
     return text if len(text) <= _LONGEST else f"{type(error).__name__}, {text[:_LONGEST]} ..."
+
+
+@contextmanager
+def workers_of(executor: Executor | None, jobs: int | None, name: str = "jobs") -> Iterator[Executor | None]:
+    """The executor that is given, or one of that many processes, ended at once on the way out; None for one job.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The system starts no more processes.
+    """
+    if jobs is None or jobs == 1:
+        yield executor
+        return
+    from enumsol.support.pool import RenewedPool  # loky: only for several processes
+
+    with RenewedPool(jobs) as pool:
+        try:
+            pool.renew()
+        except OSError as error:
+            raise InvalidArgumentError(
+                f"{name} is {jobs}, and the system starts no more processes ({error.strerror}); expected fewer"
+            ) from error
+        yield pool

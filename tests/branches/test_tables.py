@@ -88,7 +88,7 @@ def test_two_dask_workers_give_the_same_table(square):
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster,
         distributed.Client(cluster) as client,
     ):
-        table = multiplicity_table(square, ALPHAS, executor=client.get_executor())
+        table = multiplicity_table(square, ALPHAS, executor=client)
     assert_as_alone(table, square)
 
 

@@ -1,20 +1,25 @@
 """Processes of ``--jobs`` that are ended in the middle of a result or a task."""
 
 import errno
+import inspect
 import multiprocessing.popen_spawn_posix
 import subprocess
 import sys
 import threading
 from concurrent.futures import BrokenExecutor, ThreadPoolExecutor
+from typing import ClassVar
 
 import pytest
 from command_line import assert_refused, run
 from effort import some
 from loky import ProcessPoolExecutor
+from refusals import bad_argument
 
-from enumsol.cli import common, pool
-from enumsol.cli.pool import RenewedPool
+import enumsol
+from enumsol.cli import common
+from enumsol.support import pool
 from enumsol.support.deadlines import heard_by, tell
+from enumsol.support.pool import RenewedPool
 
 SCRIPT = """
 import time
@@ -201,3 +206,60 @@ def test_a_command_on_a_system_that_starts_no_more_processes(capsys, monkeypatch
     monkeypatch.setattr("loky.ProcessPoolExecutor", Refusing)
     found = run(capsys, *ROOTS, "--jobs", 2)
     assert_refused(*found, "--jobs is 2", "starts no more processes (Resource temporarily unavailable)")
+
+
+# -- jobs= in Python ---------------------------------------------------------------------------------------------------
+
+SQUARE = enumsol.gallery.two_node_square()
+#: Whatever takes an executor, and what is compared of its result.
+WITH_JOBS = {
+    "enumerate_roots": (lambda **o: enumsol.enumerate_roots(SQUARE, 3.5, **o), len),
+    "branch_graph": (lambda **o: enumsol.branch_graph(SQUARE, (3, 4), **o), repr),
+    "multiplicity_table": (lambda **o: enumsol.multiplicity_table(SQUARE, [1, 3.5], **o)["roots"].tolist(), repr),
+    "histories": (lambda **o: enumsol.histories(SQUARE, [1, 3.5], **o), repr),
+    "multiplicity_map": (lambda **o: enumsol.multiplicity_map(SQUARE, (3, 4), {"gap": [0, 0.1]}, **o), repr),
+}  # fmt: skip
+
+
+class Renewed(ThreadPoolExecutor):
+    """Renewed in the place of processes, which take a second to start."""
+
+    made: ClassVar[list] = []
+
+    def __init__(self, jobs):
+        super().__init__(jobs)
+        self.made.append(jobs)
+
+    def renew(self):
+        """Nothing dies."""
+
+
+@pytest.mark.parametrize("name", WITH_JOBS)
+def test_jobs_in_python_are_those_of_the_command_line(name, monkeypatch):
+    call, of = WITH_JOBS[name]
+    monkeypatch.setattr(pool, "RenewedPool", Renewed)
+    monkeypatch.setattr(Renewed, "made", [])
+    assert of(call(jobs=3)) == of(call())
+    assert of(call(jobs=1)) == of(call())
+    assert Renewed.made == [3]
+    bad_argument("jobs is 0; expected an integer of at least 1", call, jobs=0)
+    with ThreadPoolExecutor(1) as other:
+        bad_argument("executor and jobs are both given", call, jobs=2, executor=other)
+
+
+def test_nothing_takes_an_executor_without_jobs():
+    public = {name: getattr(enumsol, name) for name in enumsol.__all__}
+    takes = {n for n, f in public.items() if inspect.isfunction(f) and "executor" in inspect.signature(f).parameters}
+    assert takes == WITH_JOBS.keys()
+
+
+@pytest.mark.slow
+def test_jobs_are_processes(tmp_path):
+    program = """
+import enumsol
+
+if __name__ == "__main__":
+    roots = enumsol.enumerate_roots(enumsol.gallery.get("wedge-8-5").build(), 3, jobs=2)
+    print(len(roots), roots.complete)
+"""
+    assert output_of(tmp_path / "script.py", program) == "5 True\n"

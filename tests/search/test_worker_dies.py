@@ -18,9 +18,9 @@ from proof_tools import bytes_of
 
 import enumsol
 from enumsol import Proof, enumerate_roots, gallery, multiplicity_table, verify, write_problem
-from enumsol.cli.pool import RenewedPool
 from enumsol.search import parallel
 from enumsol.support import workers
+from enumsol.support.pool import RenewedPool
 from enumsol.support.workers import Crew
 
 #: What takes a process down.

@@ -1,4 +1,4 @@
-"""Worker processes of ``--jobs``: a pool of loky that is made anew when one of them dies."""
+"""Worker processes of ``jobs=`` and ``--jobs``: a pool of loky that is made anew when one of them dies."""
 
 from __future__ import annotations
 
@@ -140,6 +140,9 @@ def _wait_and_end(sentinel: int) -> None:
 @contextmanager
 def _ignoring_interrupts() -> Iterator[None]:
     """A terminal sends Ctrl-C to the workers too: processes born while it is ignored go on ignoring it."""
+    if threading.current_thread() is not threading.main_thread():
+        yield  # no other thread may change what a signal does
+        return
     handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         yield
