@@ -91,7 +91,7 @@ def outcomes(file, count, read, *arguments):
 
 
 def mesh_problem(path):
-    fem.mesh_problem(path, **OPTIONS)
+    fem.mesh_problem(path, **OPTIONS, plane="strain")
 
 
 def _meshes():

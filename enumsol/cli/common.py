@@ -109,7 +109,7 @@ def scene_of(name: str) -> Scene | None:
 
 
 def load_problem(name: str) -> AnyProblem:
-    """The problem in a file or made of a mesh, or that of ``gallery:NAME`` or ``collection:NAME``.
+    """The problem in a file or made of a mesh, or that of ``gallery:NAME`` or ``collection:NAME``; its notes are said.
 
     Raises
     ------
@@ -117,7 +117,10 @@ def load_problem(name: str) -> AnyProblem:
         It cannot be read, or there is none of that name; the message gives names that are close.
     """
     with Display("reading the problem"):
-        return _any_problem(name)
+        problem = _any_problem(name)
+    for text in problem.notes:
+        note(text)
+    return problem
 
 
 def _any_problem(name: str) -> AnyProblem:

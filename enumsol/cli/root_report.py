@@ -82,6 +82,7 @@ def roots_as_json(found: RootSet, problem: str) -> str:
         "unique": found.unique,
         "by_one_certificate": found.by_one_certificate,
         "stopped": found.stopped,
+        "notes": list(found.notes),
         "index_sum": found.index_sum,
         **_rigid_bound(found),
         "node_ids": list(found.node_ids),

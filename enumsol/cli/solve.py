@@ -139,7 +139,11 @@ MESH_OPTIONS = {
     ),
     "poisson": Given(_BODY, "[NAME=]NU", "Poisson's ratio, by parts of the body.", _each(_number), True),
     "plane": Given(
-        _BODY, "[NAME=]strain|stress", "In 2D, plane strain or plane stress; default: strain.", _each(_plane), True
+        _BODY,
+        "[NAME=]strain|stress",
+        "In 2D, plane strain or plane stress; default: strain, but for files of elements of plane stress.",
+        _each(_plane),
+        True,
     ),
     "thickness": Given(
         _BODY, "[NAME=]LENGTH", "In 2D, thickness; by default all forces are per unit thickness.", _each(_number), True

@@ -10,14 +10,15 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.mesh_checks import check_every_node_is_used
+from enumsol.fem.mesh_checks import cell_name, check_every_node_is_used
+from enumsol.fem.tangles import refuse_wrong_sides
 from enumsol.model.cells import KINDS, by_kind
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from enumsol.model.problem3d import AnyProblem
-    from enumsol.support.array_types import ArrayLike, Floats, Integers
+    from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
 
 
 #: An area or volume below this share of the squared or cubed extent of its cell is rounding.
@@ -220,22 +221,25 @@ class NodalBasis:
         return total
 
 
-def nodal_basis(nodes: Floats, cells: Integers, degree: int = 0) -> NodalBasis:
+def nodal_basis(nodes: Floats, cells: Integers, degree: int = 0, labels: Integers | None = None) -> NodalBasis:
     """Basis of displacements, whose quadrature is that of stiffness matrices, or of a higher degree.
+
+    ``labels`` (M,) are the numbers by which messages name cells; by default their rows.
 
     Raises
     ------
     InvalidArgumentError
-        A node belongs to no cell, or a cell is flat, folded or inside out at a corner.
+        A node belongs to no cell, a cell is flat, folded or inside out at a corner, or two overlap that share a facet.
     """
     kinds = by_kind(nodes.shape[1], cells)
     used = np.unique(np.concatenate([nodes_of.ravel() for _, nodes_of in kinds]))
     check_every_node_is_used(used, len(nodes), "cells", "cell")
-    blocks = tuple(_block(nodes, rows, nodes_of, degree) for rows, nodes_of in kinds)
+    blocks = tuple(_block(nodes, rows, nodes_of, degree, labels) for rows, nodes_of in kinds)
+    refuse_wrong_sides(nodes, cells, labels)
     return NodalBasis(blocks, (nodes.shape[0], nodes.shape[1]))
 
 
-def _block(points: Floats, rows: Integers, cells: Integers, degree: int) -> Block:
+def _block(points: Floats, rows: Integers, cells: Integers, degree: int, labels: Integers | None) -> Block:
     # scikit-fem takes a while to import and is needed for meshes only
     import skfem
     from skfem.quadrature import get_quadrature
@@ -251,7 +255,12 @@ def _block(points: Floats, rows: Integers, cells: Integers, degree: int) -> Bloc
         places = kind.places
         ordered = ordered[:, [int(np.argmin(np.linalg.norm(places - place, axis=1))) for place in element.doflocs]]
     order = max(kind.degree, degree)
-    _check_jacobians(points[nodes][ordered], element, get_quadrature(element, order)[0], rows)
+    wrong = _folded(points[nodes][ordered], element, get_quadrature(element, order)[0])
+    if np.any(wrong):
+        raise InvalidArgumentError(
+            f"{cell_name(int(rows[np.argmax(wrong)]), labels)} is flat, folded or inside out at a corner; expected "
+            "proper cells with their nodes in the order of VTK"
+        )
     mesh_class = _serendipity() if kind.mesh == "MeshQuadS2" else getattr(skfem, kind.mesh)
     mesh = mesh_class(np.ascontiguousarray(points[nodes].T), np.ascontiguousarray(ordered.T))
     basis = skfem.Basis(mesh, skfem.ElementVector(element), intorder=order)
@@ -304,20 +313,15 @@ def _serendipity() -> Any:
     return dataclass(repr=False)(type("MeshQuadS2", (skfem.MeshQuad2,), names))
 
 
-def _check_jacobians(corners: Floats, element: Any, quadrature: Floats, rows: Integers) -> None:
-    """Refuse cells whose area or volume vanishes or changes its sign at a corner or a quadrature point."""
+def _folded(corners: Floats, element: Any, quadrature: Floats) -> Mask:
+    """Cells whose area or volume vanishes or changes its sign at a corner or a quadrature point."""
     places = np.concatenate([element.refdom.init_refdom()[0], quadrature], axis=1)
     slopes = [np.broadcast_to(element.lbasis(places, i)[1], places.shape) for i in range(corners.shape[1])]
-    with np.errstate(all="ignore"):  # what over- or underflows is refused below
+    with np.errstate(all="ignore"):  # what over- or underflows is among them
         values = np.linalg.det(np.einsum("mai,akq->mqik", corners, np.stack(slopes)))
     extents = np.max(np.ptp(corners, axis=1), axis=1) ** corners.shape[2]
-    wrong = np.min(np.abs(values), axis=1) <= FLAT * extents
-    wrong |= np.abs(np.sum(np.sign(values), axis=1)) < values.shape[1]
-    if np.any(wrong):
-        raise InvalidArgumentError(
-            f"cells row {rows[np.argmax(wrong)]} is flat, folded or inside out at a corner; expected proper cells with "
-            "their nodes in the order of VTK"
-        )
+    flat = np.min(np.abs(values), axis=1) <= FLAT * extents
+    return np.asarray(flat | (np.abs(np.sum(np.sign(values), axis=1)) < values.shape[1]))
 
 
 def cell_stresses(problem: AnyProblem, u: ArrayLike) -> Floats:

@@ -101,9 +101,16 @@ class Held:
             raise InvalidArgumentError(
                 f"{name} is {shown(value)}; expected {dimension} components, each a number or {FREE!r}"
             )
-        for component, entry in enumerate(value):
-            if entry is not None and not (isinstance(entry, str) and entry == FREE):
-                self._fix(part, nodes, component, finite_number(entry, name))
+        given = {
+            component: finite_number(entry, name)
+            for component, entry in enumerate(value)
+            if entry is not None and not (isinstance(entry, str) and entry == FREE)
+        }
+        for component, entry in given.items():
+            self._fix(part, nodes, component, entry)
+        # rollers in a plane are a plane of symmetry, however they are given
+        if len(given) == 1 and 0.0 in given.values() and self._flat(nodes) == [*given]:
+            self.mirrored[nodes, next(iter(given))] = True
 
     def mirror(self, part: str) -> None:
         """Hold the nodes of a part in the direction of the axis that it is perpendicular to.
@@ -113,17 +120,22 @@ class Held:
         InvalidArgumentError
             There is no such axis, or several.
         """
-        points, nodes = self._mesh.points, self._mesh.nodes(part)
-        extent = float(np.max(np.ptp(points, axis=0)))
-        flat = np.flatnonzero(np.ptp(points[nodes], axis=0) <= _SAME * extent)
+        nodes = self._mesh.nodes(part)
+        flat = self._flat(nodes)
         if len(flat) != 1:
             where = "no plane" if len(flat) == 0 else f"{len(flat)} planes"
             raise InvalidArgumentError(
                 f"symmetry {part} lies in {where} perpendicular to an axis; expected a part of the boundary in one "
                 "such plane"
             )
-        self._fix(part, nodes, int(flat[0]), 0.0)
+        self._fix(part, nodes, flat[0], 0.0)
         self.mirrored[nodes, flat[0]] = True
+
+    def _flat(self, nodes: Integers) -> list[int]:
+        """Axes to which a plane through all of these nodes is perpendicular."""
+        points = self._mesh.points
+        extent = float(np.max(np.ptp(points, axis=0)))
+        return np.flatnonzero(np.ptp(points[nodes], axis=0) <= _SAME * extent).tolist()
 
     def _fix(self, part: str, nodes: Integers, component: int, value: float) -> None:
         differ = self._fixed[nodes, component] & (self._values[nodes, component] != value)

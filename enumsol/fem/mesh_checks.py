@@ -58,6 +58,11 @@ def node_numbers(value: ArrayLike, name: str, count: int, *, distinct: bool = Tr
     return array.astype(np.int64)
 
 
+def cell_name(row: int, labels: Integers | None = None) -> str:
+    """What messages call a cell: by its number in the file, if that is known, or by its row."""
+    return f"cells row {row}" if labels is None else f"element {labels[row]}"
+
+
 def check_every_node_is_used(cells: Integers, count: int, name: str, kind: str) -> None:
     """Raise InvalidArgumentError if a node belongs to no cell: it would have no stiffness."""
     used = np.unique(cells)

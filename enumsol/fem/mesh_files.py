@@ -12,12 +12,14 @@ import struct
 import warnings
 import zlib
 from collections.abc import Sequence
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, cast
 
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
+from enumsol.fem.file_counts import Deck, deck_of, refuse_partial
 from enumsol.fem.mesh_checks import positions
 from enumsol.fem.meshes import ALL, PartedMesh, SolidMesh
 from enumsol.model.cells import KINDS, TRIANGLES, as_quadrilaterals, boundary_facets, facet_rows, numbers_of_nodes
@@ -32,6 +34,8 @@ _PHYSICAL = "gmsh:physical"
 #: What meshio calls the families of a MED file, of cells and of points; numbers of groups in formats without names.
 _FAMILIES = ("cell_tags", "point_tags")
 _NUMBERS = ("medit:ref", "su2:tag", "CellEntityIds")
+#: How the names of decks end.
+_DECK = ".inp"
 #: What meshio raises on damaged files or files of another kind; it may also exit.
 _DAMAGE = (
     ArithmeticError,
@@ -123,37 +127,59 @@ def read_solid(source: str | os.PathLike[str] | Any, groups: str | None = None) 
 def _read(source: Any, groups: str | None, dimension: int | None) -> PartedMesh:
     meshio = MissingDependencyError.imported("meshio", "Meshes in files", "meshes")
     if isinstance(source, meshio.Mesh):
-        return _checked(source, groups, dimension)
+        return _checked(source, groups, dimension, None, "")
     place = file_path(source, "source", "the name of a file or a meshio.Mesh")
     if (found := unreadable(place)) is not None:
         raise InvalidArgumentError(f"{place}: {found}; expected a mesh that meshio reads")
+    try:
+        mesh, said = _by_meshio(meshio, place)
+        return _checked(mesh, groups, dimension, place, said)
+    except InvalidArgumentError as error:
+        raise InvalidArgumentError(f"{place}: {error}") from error
+
+
+def _by_meshio(meshio: Any, place: Path) -> tuple[Any, str]:
+    """What meshio reads, and what it says of it."""
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of numpy, about files that end too early
-            mesh = meshio.read(place)
+            return meshio.read(place), said.getvalue()
     except ImportError as error:  # netCDF4 for Exodus, h5py for MED and XDMF
         package = error.name or "another package"
         raise MissingDependencyError(
             f"{place}: meshio needs {package} for this format, which is not installed; expected it, or another format"
         ) from error
     except (*_DAMAGE, meshio.ReadError) as error:
+        if place.suffix.lower() == _DECK:
+            _refuse_torn(place)
         reason = "" if isinstance(error, SystemExit) else str(error)
         if isinstance(error, LookupError):  # its text is the key alone
             reason = f"{type(error).__name__}: {reason}"
         reason = (reason or said.getvalue()).strip().split("\n")[0].rstrip(" .") or type(error).__name__
         raise InvalidArgumentError(
-            f"{place}: meshio cannot read it ({shortened(reason)}); expected a complete file of a format that it knows"
+            f"meshio cannot read it ({shortened(reason)}); expected a complete file of a format that it knows"
         ) from error
-    try:
-        return _checked(mesh, groups, dimension)
-    except InvalidArgumentError as error:
-        raise InvalidArgumentError(f"{place}: {error}") from error
 
 
-def _checked(mesh: Any, groups: str | None, dimension: int | None) -> PartedMesh:
+def _refuse_torn(place: Path) -> None:
+    """Refuse a deck that meshio cannot read for what it lost of it."""
     try:
-        return _parted(mesh, groups, dimension)
+        deck_of(place, None)
+    except InvalidArgumentError:
+        raise
+    except (OSError, ValueError):
+        return  # damaged: meshio has said how
+
+
+def _checked(mesh: Any, groups: str | None, dimension: int | None, place: Path | None, said: str) -> PartedMesh:
+    deck = None
+    try:
+        if place is not None and place.suffix.lower() == _DECK:
+            deck = deck_of(place, mesh)
+        elif place is not None:
+            refuse_partial(place, mesh, said)
+        return _parted(mesh, groups, dimension, deck)
     except InvalidArgumentError:
         raise
     except (IndexError, KeyError, OverflowError, TypeError, ValueError) as error:  # what meshio does not check
@@ -161,12 +187,14 @@ def _checked(mesh: Any, groups: str | None, dimension: int | None) -> PartedMesh
         raise InvalidArgumentError(f"the arrays of the mesh do not fit together ({reason})") from error
 
 
-def _parted(mesh: Any, groups: str | None, dimension: int | None) -> PartedMesh:
+def _parted(mesh: Any, groups: str | None, dimension: int | None, deck: Deck | None) -> PartedMesh:
     kinds = list(dict.fromkeys(block.type for block in mesh.cells))
     if dimension is None:
         spatial = any(kind.startswith(("tetra", "hexa", "wedge", "pyramid", "polyhedron")) for kind in kinds)
         dimension = 3 if spatial else 2
     bodies, facet = body_kinds(kinds, dimension)
+    types = () if deck is None else deck.types(bodies, mesh)
+    labels = None if deck is None else deck.labels(bodies, mesh)
     cells = body_cells(mesh, bodies)
     used = np.unique(cells)
     if len(used) and not 0 <= used[0] <= used[-1] < len(mesh.points):
@@ -179,7 +207,7 @@ def _parted(mesh: Any, groups: str | None, dimension: int | None) -> PartedMesh:
     number[used] = np.arange(len(used))
     inside = number[cells]
     if dimension == 3:
-        nodes, inside = solid_cells(nodes, inside)
+        nodes, inside = solid_cells(nodes, inside, labels)
     sets = {name: kept for name, rows in _node_sets(mesh).items() if len(kept := _inside(number, rows, name))}
     facets = {name: _inside(number, rows, name) for name, rows in _named(mesh, facet, groups, dimension).items()}
     lost = [name for name, rows in facets.items() if np.any(rows < 0)]
@@ -197,7 +225,8 @@ def _parted(mesh: Any, groups: str | None, dimension: int | None) -> PartedMesh:
     sets = {name: rows[rows >= 0] for name, rows in sets.items() if np.any(rows >= 0)}
     made = PartedMesh if dimension == 2 else SolidMesh
     named = _grouped(mesh, bodies, groups, dimension)
-    return made(nodes, inside, MappingProxyType(facets), MappingProxyType(sets), MappingProxyType(named))
+    parts, others, bodies_of = (MappingProxyType(each) for each in (facets, sets, named))
+    return made(nodes, inside, parts, others, bodies_of, labels, types)
 
 
 def _plane(points: NDArray[Any]) -> Floats:
@@ -367,7 +396,7 @@ def body_cells(mesh: Any, bodies: list[str]) -> Integers:
     return np.concatenate(parts)
 
 
-def solid_cells(points: Floats, cells: Integers) -> tuple[Floats, Integers]:
+def solid_cells(points: Floats, cells: Integers, labels: Integers | None = None) -> tuple[Floats, Integers]:
     """Points and cells of a body in 3D, tetrahedra turned and hexahedra of 20 nodes completed to 27.
 
     Raises
@@ -379,7 +408,7 @@ def solid_cells(points: Floats, cells: Integers) -> tuple[Floats, Integers]:
 
     if cells.shape[1] == 20:
         points, cells = completed(points, cells)
-    return solid_mesh(points, cells, numbers_of_nodes(3))
+    return solid_mesh(points, cells, numbers_of_nodes(3), labels)
 
 
 def completed(points: Floats, cells: Integers) -> tuple[Floats, Integers]:

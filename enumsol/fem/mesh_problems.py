@@ -39,7 +39,7 @@ def mesh_problem(
     poisson: float | Mapping[str, float],
     contact: Names = (),
     pairs: Sequence[Sequence[Any]] = (),
-    plane: Plane | Mapping[str, Plane] = "strain",
+    plane: Plane | Mapping[str, Plane] | None = None,
     thickness: float | Mapping[str, float] = 1.0,
     friction: float | Mapping[str, float] | None = None,
     friction_slope: float | Mapping[str, float] | None = None,
@@ -87,8 +87,9 @@ def mesh_problem(
         Parts of two bodies that may touch each other. The nodes of the first part are the contact nodes; each is in
         contact with the point of a facet of the second part on the line along its normal (theory, section 11.8). Nodes
         that face no facet have no contact. The gap is the distance along the normal, or the one that is given [length].
-    plane : {"strain", "stress"}, or mapping of names to them
-        In 2D, whether strain or stress is plane, for the whole body or for every part of it.
+    plane : {"strain", "stress"}, or mapping of names to them, optional
+        In 2D, whether strain or stress is plane, for the whole body or for every part of it; by default strain. It has
+        to be given for a file whose elements are of plane stress (CPS4 and the like).
     thickness : float, or mapping of names to float
         In 2D, of the whole body or of every part of it; all forces and stiffnesses are multiplied by it. By default
         they are per unit thickness [length].

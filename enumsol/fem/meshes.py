@@ -51,6 +51,10 @@ class PartedMesh:
         Nodes of parts that are given by nodes.
     bodies : mapping of names to (k,) int arrays
         Rows of the cells of named parts of the body: materials, or several bodies.
+    labels : (M,) int array or None
+        Numbers of the cells in the file that they are from, where it gives such.
+    types : tuple of str
+        What the file calls the elements that the cells are, as in Abaqus; they stand for a formulation.
     """
 
     points: Floats
@@ -58,6 +62,8 @@ class PartedMesh:
     facets: Mapping[str, Integers]
     node_sets: Mapping[str, Integers] = field(default_factory=lambda: MappingProxyType({}))
     bodies: Mapping[str, Integers] = field(default_factory=lambda: MappingProxyType({}))
+    labels: Integers | None = None
+    types: tuple[str, ...] = ()
 
     def body(self, name: str) -> Integers:
         """Rows of the cells of this name.
@@ -142,7 +148,7 @@ class SolidMesh(PartedMesh):
         Nodes of each tetrahedron (k = 4 or 10) or hexahedron (k = 8 or 27), in the order of VTK.
     facets : mapping of names to (k, m) int arrays
         Nodes of the triangles (m = 3 or 6) or quadrilaterals (m = 4 or 9) of parts of the boundary.
-    node_sets, bodies : mappings of names to (k,) int arrays
+    node_sets, bodies, labels, types
         As in `PartedMesh`.
     """
 

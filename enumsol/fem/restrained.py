@@ -107,7 +107,7 @@ def movable(nodes: Integers, normals: Floats, supports: Supports, means: sp.csr_
         raise InvalidArgumentError(
             f"contact node {nodes[np.argmax(wrong)]} is held or displaced in some components only, which makes its "
             "rows dependent; expected contact nodes that are free, held entirely, or held at zero across their normal "
-            "(as on a plane of symmetry)"
+            "(by symmetry of a part of the boundary in the plane of symmetry)"
         )
     touched = np.any(fixed, axis=1)
     normals = np.where(fixed, 0.0, normals)

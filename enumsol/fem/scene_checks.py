@@ -6,29 +6,56 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.basis_problems import outward_normal
+from enumsol.fem.conditions import holding
+from enumsol.fem.contacts import Group
+from enumsol.fem.file_counts import taken_as
+from enumsol.fem.mesh_checks import unit_vectors
+from enumsol.fem.meshes import PartedMesh
 from enumsol.fem.pairs import faced
+from enumsol.fem.tangles import SAME, refuse_tangles, unjoined
 from enumsol.model.cells import boundary_facets
+from enumsol.support.array_types import Floats, Integers, Mask
 from enumsol.support.messages import counted
 
 #: Share of the contact nodes of a part that may touch another body before that is refused as a wall between both.
 _WALL = 0.5
-#: Nodes nearer to each other than this share of the extent of the mesh are at the same place.
-_SAME = 1e-9
 #: Press fits, and given displacements, above these parts of the extent of the largest body are not small.
 _FIT, _SMALL = 0.05, 0.25
 #: A node that is deeper in what it faces than this share of a facet faces it through the body.
 _DEEP = 0.5
-#: Strains by loads above this come from wrong units: ten times the length of the body.
-_ABSURD = 10.0
-#: Loads that strain the body by less than this are below what its own rounding does.
-_NOTHING = 1e-13
+#: Strains by loads above this come from wrong units: the length of the body.
+_ABSURD = 1.0
+#: Loads that strain the body by less than this hardly mean to.
+_NOTHING = 1e-12
+#: Where normals of a pair turn away by more than this from those that they face, they make a pocket [degrees].
+_TURN = 10.0
+#: Loads and press fits that strain the body so differently are hardly in the same units.
+_UNEVEN = 1e5
 #: Coefficients of friction above this are rare.
 _STEEP = 5.0
 #: A ratio of moduli above this is often a wrong unit.
 _UNLIKE = 1e8
+
+
+def _bodies(scene: Any) -> Integers:
+    """Number of the connected body of each node, (N,)."""
+    return np.asarray(np.argmax([piece.nodes for piece in scene.pieces], axis=0))
+
+
+def refuse_overlaps(scene: Any) -> None:
+    """Refuse meshes whose cells overlap, but for parts of bodies that are a pair.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It names cells.
+    """
+    pairs = [_nodes_of(scene.mesh, group) for group in scene.contacts.groups if group.pair is not None]
+    refuse_tangles(scene.mesh, _bodies(scene), np.any([np.zeros(len(scene.mesh.points), dtype=bool), *pairs], axis=0))
 
 
 def refuse_walls(scene: Any) -> None:
@@ -79,9 +106,7 @@ def refuse_pairs(scene: Any) -> None:
     """
     mesh, rows = scene.mesh, scene.contacts.rows
     places = rows.means @ mesh.points
-    body = np.zeros(len(mesh.points), dtype=np.int64)
-    for number, piece in enumerate(scene.pieces):
-        body[piece.nodes] = number
+    body = _bodies(scene)
     first = 0
     for group in scene.contacts.groups:
         own, first = np.arange(first, first + group.count), first + group.count
@@ -104,11 +129,9 @@ def _refuse_cracks(scene: Any, nodes: Any, parts: list[str]) -> None:
     from scipy.spatial import cKDTree  # not needed for paths that read no mesh
 
     mesh, boundary = scene.mesh, np.unique(boundary_facets(scene.dimension, scene.mesh.cells))
-    near = _SAME * float(np.max(np.ptp(mesh.points, axis=0)))
+    near = SAME * float(np.max(np.ptp(mesh.points, axis=0)))
     pairs = cKDTree(mesh.points[nodes]).query_ball_tree(cKDTree(mesh.points[boundary]), near)
-    body = np.zeros(len(mesh.points), dtype=np.int64)
-    for number, piece in enumerate(scene.pieces):
-        body[piece.nodes] = number
+    body = _bodies(scene)
     twins = [
         [k for k in boundary[found] if k != node and body[k] == body[node]]
         for node, found in zip(nodes, pairs, strict=True)
@@ -128,9 +151,53 @@ def _refuse_cracks(scene: Any, nodes: Any, parts: list[str]) -> None:
 
 def scene_notes(scene: Any) -> list[str]:
     """What may not have been intended."""
-    checks = (_unfaced, _shared, _alone, _rest, _loaded_contact, _reach, _units, _friction, _held)
+    checks = (
+        *(_formulations, _unjoined, _unfaced, _shared, _alone, _rest, _loaded_contact),
+        *(_turning, _reach, _units, _proportions, _friction, _held),
+    )
     with np.errstate(over="ignore"):  # what overflows is out of proportion, and told as such
         return [note for check in checks for note in check(scene)]
+
+
+def _formulations(scene: Any) -> list[str]:
+    """Elements of the file that others take the place of."""
+    return taken_as(scene.mesh.types)
+
+
+def _unjoined(scene: Any) -> list[str]:
+    """Nodes that coincide, but for those of contacts."""
+    joined = [_nodes_of(scene.mesh, group) for group in scene.contacts.groups]
+    return unjoined(scene.mesh, _bodies(scene), [piece.name for piece in scene.pieces], joined)
+
+
+def _nodes_of(mesh: PartedMesh, group: Group) -> Mask:
+    """Nodes of the parts of contacts, (N,)."""
+    parts = group.parts if group.pair is None else [group.pair.slave, group.pair.master]
+    mask = np.zeros(len(mesh.points), dtype=bool)
+    for part in parts:
+        mask[mesh.nodes(part)] = True
+    return mask
+
+
+def _turning(scene: Any) -> list[str]:
+    """Pairs of a body that could roll, whose normals turn along the contact more than what they face does."""
+    mesh, notes, first = scene.mesh, [], 0
+    hold = holding(scene.held.supports, sp.csc_array(scene.springs.shape))
+    loose = np.any([piece.nodes for piece in scene.pieces if piece.free_motions(mesh.points, hold)], axis=0)
+    for group in scene.contacts.groups:
+        rows, first = scene.contacts.rows.means[first : first + group.count], first + group.count
+        if group.pair is None or not np.any(loose & _nodes_of(mesh, group)):
+            continue
+        outward = scene.body.on_part(mesh.part(group.pair.master), group.pair.master, outward_normal)
+        facing = unit_vectors(np.asarray(sp.csr_array(-rows).maximum(0) @ outward), "normals of the other side")
+        apart = float(np.degrees(np.max(np.arccos(np.clip(-np.sum(facing * group.normals, axis=1), -1.0, 1.0)))))
+        if apart > _TURN:
+            notes.append(
+                f"the normals of the pair {group.pair} turn along the contact, up to {apart:.0f} degrees away from the "
+                "normals of what they face: as they stay so, a body that could roll or slide along is caught as in a "
+                "pocket"
+            )
+    return notes
 
 
 def _unfaced(scene: Any) -> list[str]:
@@ -203,19 +270,45 @@ def _reach(scene: Any) -> list[str]:
     return notes
 
 
+def _strains(scene: Any) -> dict[str, float]:
+    """About how much the loads strain the body, and how much their slopes do."""
+    thickness = 1.0 if scene.body.thickness is None else float(np.min(scene.body.thickness))
+    force = float(np.min(_stiffness(scene))) * _extent(scene) ** (scene.dimension - 1) * thickness
+    return {
+        name: float(np.sum(np.abs(own))) / force
+        for name, own in (("loads", scene.forces), ("load slopes", scene.slope))
+    }
+
+
+def _stiffness(scene: Any) -> Floats:
+    """Moduli lambda + 2 mu of the cells."""
+    return np.asarray(np.atleast_2d(scene.lame) @ (1.0, 2.0))
+
+
+def _proportions(scene: Any) -> list[str]:
+    """Loads and press fits, or gaps that only strain can close, that are out of proportion."""
+    strain, extent, notes = max(_strains(scene).values()), _extent(scene), []
+    held = not scene.options["spring"] and not any(p.free_motions(scene.mesh.points, scene.hold) for p in scene.pieces)
+    for group, gaps in scene.gaps_of_groups:
+        length = float(gaps.min())
+        ratio = abs(length) / extent / strain if strain > 0 else 1.0
+        if (ratio > _UNEVEN and (length < 0 or held)) or 0 < ratio < 1.0 / _UNEVEN:
+            notes.append(
+                f"the {'press fit' if length < 0 else 'gap'} of {group} is {abs(length):.3g}, while the loads strain "
+                f"the body of extent {extent:.3g} by about {strain:.2g}; are young, loads and lengths in units that "
+                "fit together?"
+            )
+    return notes
+
+
 def _units(scene: Any) -> list[str]:
     """Loads, displacements and moduli of absurd size."""
-    notes, dimension = [], scene.dimension
-    extent = _extent(scene)
-    stiffness = np.atleast_2d(scene.lame) @ (1.0, 2.0)
-    thickness = 1.0 if scene.body.thickness is None else float(np.min(scene.body.thickness))
-    area = extent ** (dimension - 1) * thickness
-    for forces, name in ((scene.forces, "loads"), (scene.slope, "load slopes")):
-        strain = float(np.sum(np.abs(forces))) / (float(np.min(stiffness)) * area)
+    notes, extent, stiffness = [], _extent(scene), _stiffness(scene)
+    for name, strain in _strains(scene).items():
         if strain > _ABSURD:
             notes.append(
-                f"the {name} would strain the body by about {strain:.2g}, which is absurd; are young and the "
-                f"{name} in the same units?"
+                f"the {name} would strain the body by about {strain:.2g}, which is far from small; are young and "
+                f"the {name} in the same units?"
             )
         elif 0 < strain < _NOTHING:
             notes.append(

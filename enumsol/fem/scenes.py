@@ -22,7 +22,7 @@ from enumsol.fem.mesh_files import read_mesh
 from enumsol.fem.meshes import PartedMesh
 from enumsol.fem.pairs import Pair
 from enumsol.fem.restrained import ContactNodes, axes_of, plain_dofs, problem_of
-from enumsol.fem.scene_checks import refuse_pairs, refuse_walls, scene_notes
+from enumsol.fem.scene_checks import refuse_overlaps, refuse_pairs, refuse_walls, scene_notes
 from enumsol.fem.scene_text import described, draw_scene, sections_of
 from enumsol.model.mesh import BodyMesh
 from enumsol.model.problem import given_friction, old_friction
@@ -81,9 +81,10 @@ class Scene:
         if options["friction"] is options["friction_slope"] is None:
             options = {**options, **dict(zip(("friction", "friction_slope"), given_friction(None, None), strict=True))}
         mesh = source if isinstance(source, PartedMesh) else read_mesh(source, options["groups"])
+        options = {**options, "plane": _plane(mesh) if options["plane"] is None else options["plane"]}
         coefficients = lame_of(mesh, options["young"], options["poisson"], options["plane"])
         thickness = thickness_of(mesh, options["thickness"])
-        body = replace(nodal_basis(mesh.points, mesh.cells), thickness=thickness)
+        body = replace(nodal_basis(mesh.points, mesh.cells, labels=mesh.labels), thickness=thickness)
         held = _held(mesh, options["clamp"], options["symmetry"], options["displacement"])
         parts, pairs = conditions.names_of(options["contact"], "contact"), Pair.all_of(options["pairs"])
         contacts = contacts_of(body, mesh, parts, pairs, held, options["obstacle"])
@@ -93,6 +94,7 @@ class Scene:
         slope = conditions.part_forces(body, mesh, options["load_slope"], options["pressure_slope"], "_slope")
         springs, pieces = conditions.part_springs(body, mesh, options["spring"]), conditions.pieces_of(mesh)
         scene = cls(mesh, options, body, held, contacts, forces, slope, springs, coefficients, pieces)
+        refuse_overlaps(scene)
         refuse_walls(scene)
         refuse_pairs(scene)
         scene.coefficients  # noqa: B018 (refuses those that cannot be used)
@@ -210,6 +212,17 @@ class Scene:
 
     def __str__(self) -> str:
         return described(self)
+
+
+def _plane(mesh: PartedMesh) -> str:
+    """What is plane where no option says it: strain, unless the file has elements of plane stress."""
+    stressed = [name for name in mesh.types if name.startswith("CPS")]
+    if stressed:
+        raise InvalidArgumentError(
+            f"plane is not given, and the cells are elements of type {stressed[0]}, which are of plane stress; "
+            "expected plane = 'stress', or 'strain' if the type only carries the mesh, as in files of gmsh"
+        )
+    return "strain"
 
 
 def _names(value: Any) -> Sequence[str]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.bases import FLAT
-from enumsol.fem.mesh_checks import check_every_node_is_used, elements, positions
+from enumsol.fem.mesh_checks import cell_name, check_every_node_is_used, elements, positions
 from enumsol.model.cells import HEXAHEDRON, KINDS, boundary_facets, facet_rows
 from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
 
@@ -17,10 +17,13 @@ _GAUSS_2 = (0.5 - np.sqrt(1 / 12), 0.5 + np.sqrt(1 / 12)), (0.5, 0.5)
 _GAUSS_3 = (0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15)), (5 / 18, 8 / 18, 5 / 18)
 
 
-def solid_mesh(points: ArrayLike, cells: ArrayLike, kinds: tuple[int, ...] = (4, 8)) -> tuple[Floats, Integers]:
+def solid_mesh(
+    points: ArrayLike, cells: ArrayLike, kinds: tuple[int, ...] = (4, 8), labels: Integers | None = None
+) -> tuple[Floats, Integers]:
     """Points (N, 3) and cells (M, k) of positive volume, k among ``kinds``; they may come in any orientation.
 
-    What the nodes of second order (10 or 27 in all) do to a cell is checked by `nodal_basis`.
+    ``labels`` (M,) are the numbers by which messages name cells; by default their rows. What the nodes of second order
+    (10 or 27 in all) do to a cell is checked by `nodal_basis`.
 
     Raises
     ------
@@ -33,21 +36,29 @@ def solid_mesh(points: ArrayLike, cells: ArrayLike, kinds: tuple[int, ...] = (4,
     corners = nodes[bodies[:, : kind.corners]]
     size = np.max(np.ptp(corners, axis=1), axis=1) ** 3
     volumes = _tetrahedron_volumes(corners)[:, None] if kind.corners == 4 else _corner_volumes(corners)
+    ordered = np.sort(bodies, axis=1)
+    _refuse(
+        np.any(ordered[:, 1:] == ordered[:, :-1], axis=1) & (kind.corners == 8),
+        "names a node twice, as one that is collapsed to a wedge or a pyramid does; expected distinct nodes: mesh all "
+        "of the body by tetrahedra, or by hexahedra",
+        labels,
+    )
     turned = np.all(volumes < 0, axis=1)
     bodies[turned] = bodies[turned][:, kind.turned]
     volumes[turned] *= -1
-    _refuse(np.max(np.abs(volumes), axis=1) <= FLAT * size, "has no volume; expected proper cells")
+    _refuse(np.max(np.abs(volumes), axis=1) <= FLAT * size, "has no volume; expected proper cells", labels)
     _refuse(
         np.min(volumes, axis=1) <= FLAT * size,
         "is turned inside out at a corner; expected hexahedra with corners in the order of VTK",
+        labels,
     )
     check_every_node_is_used(bodies, len(nodes), "cells", "cell")
     return nodes, bodies
 
 
-def _refuse(wrong: Mask, found: str) -> None:
+def _refuse(wrong: Mask, found: str, labels: Integers | None) -> None:
     if np.any(wrong):
-        raise InvalidArgumentError(f"cells row {int(np.argmax(wrong))} {found}")
+        raise InvalidArgumentError(f"{cell_name(int(np.argmax(wrong)), labels)} {found}")
 
 
 def _tetrahedron_volumes(corners: Floats) -> Floats:

@@ -83,7 +83,7 @@ def _answers(found: RootSet) -> list[str]:
     lines.append(f"Sum of the indices: {'unknown' if total is None else f'{total:+d}'}{note}.")
     if found.mirror_images is not None:
         lines += [f"{line[0].upper()}{line[1:]}." for line in found.mirror_images.notes(complete=found.complete)]
-    return lines
+    return lines + [f"Note: {line}." for line in found.notes]
 
 
 def _root_facts(found: RootSet, units: tuple[str, str] | None) -> str:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
+from enumsol.roots.far import far_notes
 from enumsol.roots.root import Enclosure, Root, RootFamily, summary
 from enumsol.support.arguments import positive_number, shown
 from enumsol.support.immutable import Immutable, Listed, Sealed
@@ -269,6 +270,14 @@ class RootSet(Sequence[Root], Immutable):
         """Whether the sum of the indices, where it is known and the body is held, is +1 (theory, (6.7))."""
         return self.rigid_bound is not None or self.index_sum in (None, 1)
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What may mislead about roots of a body in a mesh, each in a sentence: displacements that are not small.
+
+        They are also printed, and shown in reports.
+        """
+        return tuple(far_notes(self._roots))
+
     def __len__(self) -> int:
         return len(self._roots)
 
@@ -477,6 +486,7 @@ class RootSet(Sequence[Root], Immutable):
             lines.append(f"stalled: {self.stats.fallback_qps} of {of}, solved by a slower solver or not at all")
         if self.mirror_images is not None:
             lines += self.mirror_images.notes(complete=self.complete)
+        lines += [f"note: {note}" for note in self.notes]
         total = self.index_sum
         if self.rigid_bound is not None:
             # nothing that holds the body makes the sum +1

@@ -277,6 +277,16 @@ def test_notes_and_a_picture_beside_the_roots(here, capsys):
     assert_refused(*run(capsys, "solve", "body.msh", *OPTIONS, "--plot", "scene.txt"), "scene.txt")
 
 
+def test_commands_say_the_notes_of_a_described_problem(here, capsys):
+    """As solve does, whether it is made of options or of a file."""
+    (here / "body.toml").write_text(TOML + "friction = 9\n")
+    expected = "enumsol: note: friction is 9; coefficients of friction above 1 are rare\n"
+    for command in (("roots", "body.toml", "--alpha", "0"), ("solve", "body.toml", "--alpha", "0")):
+        _, out, err = run(capsys, *command)
+        assert "RootSet at alpha = 0" in out
+        assert err == expected
+
+
 MATERIAL = "--poisson 0 --friction 0 --clamp roof --clamp floor --pair upper:lower"
 
 

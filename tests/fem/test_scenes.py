@@ -35,6 +35,14 @@ def apart(gap):
     return lambda: blocks(4, gap=gap)
 
 
+def rolling():
+    """A block with a round bottom on a flat one."""
+    round_one = grid(8, 4, 4)
+    x, y = round_one.points.T
+    points = np.stack([x + 0.5, y + 1.0 + 1.2 * (1 - y) * (x - 0.5) ** 2], axis=1)
+    return together(("upper", fem.PartedMesh(points, round_one.cells, round_one.facets)), ("lower", grid(8, 2, 4, 2.0)))
+
+
 def wide():
     return together(("upper", shifted(grid(6, 1, 4, 3.0), (0, 1))), ("lower", grid(2, 1, 4)))
 
@@ -114,17 +122,28 @@ NOTED = [
     (
         one,
         {"load": {"left": (3e6, 0.0)}},
-        "the loads would strain the body by about .*, which is absurd; are young and",
+        "the loads would strain the body by about .*, which is far from small; are",
     ),
     (one, {"young": 2e13, "load": {"left": (1e-3, 0)}}, "the loads would strain the body by .* next to nothing; are"),
     (one, {"clamp": (), "displacement": {"top": (0.0, -3.0)}}, "a displacement of 3 is given, which is not small"),
     (one, {"friction": 30}, "friction is 30; coefficients of friction above 1 are rare"),
     (two, {"young": {"pad": 1.0, "disc": 1e10}}, r"the moduli of parts differ by a factor of 1e\+10"),
     (
-        two,
+        apart(0.5),
         {"contact": "upper.left", "pairs": ()},
-        "disc touches nothing: it has no contact part and is in no pair",
+        "the body with the boundary lower.bottom, .* touches nothing: it has no contact part and is in no pair",
     ),
+    (
+        rolling,
+        {"clamp": "lower.bottom", "spring": {"upper.top": (0.1, 0.1)}, "load": {"upper.top": (0.0, -0.01)}},
+        "the normals of the pair upper.bottom:lower.top turn along the contact, up to 46 degrees .* caught as in a",
+    ),
+    (
+        one,
+        {"young": 2e11, "gap": -1e-3, "load": {"left": (1.0, 0)}},
+        "the press fit of bottom is 0.001, while the loads strain the body of extent 1 by about .* fit together",
+    ),
+    (one, {"young": 2e11, "gap": 1e-3, "load": {"left": (1.0, 0)}}, "the gap of bottom is 0.001, while the loads"),
     (wide, {}, "4 of 7 nodes of upper.bottom face nothing of lower.top and have no contact"),
 ]
 
@@ -156,11 +175,26 @@ def test_there_are_thirty_of_them():
         (one, {"obstacle": {"hole": (0.5, 1.0, 1.5)}}),
         (one, {"contact": ["bottom", "right"], "gap": -1e-3}),
         (apart(0.1), {}),
+        (rolling, {}),
+        (one, {"young": 2e11, "gap": 1e-3, "load": {"left": (1.0, 0)}, "clamp": (), "spring": {"top": (1.0, 1.0)}}),
         (lambda: boxes(4, 2, 1), {"load": {"upper.right": (0.01, 0, 0)}}),
     ],
 )
 def test_right_scenes_are_neither(mesh, changes):
     assert scene_of(mesh, changes).notes == []
+
+
+def test_rollers_given_as_displacements_are_a_plane_of_symmetry():
+    """Also where a curved contact ends there, as decks of Abaqus say it."""
+    flat = grid(4, 2, 4)
+    x, y = flat.points.T
+    curved = fem.PartedMesh(np.stack([x, y + 0.1 * x * (2 - x) * (1 - y)], axis=1), flat.cells, flat.facets)
+    options = GOOD | {"clamp": "right", "load": {"top": (0.0, -0.01)}, "friction": 0.3}
+    mirrored = fem.mesh_problem(curved, **options, symmetry="left")
+    assert fem.mesh_problem(curved, **options, displacement={"left": (0.0, "free")}).fingerprint == mirrored.fingerprint
+    message = "contact node 0 is held or displaced in some components only, .*by symmetry of a part of the boundary"
+    for moved in ((0.1, "free"), ("free", 0.0)):
+        refusal(EnumsolError, message, fem.mesh_problem, curved, **options, displacement={"left": moved})
 
 
 def test_a_scene_in_words():
