@@ -13,7 +13,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.roots.root import Enclosure, Root, RootFamily, summary
 from enumsol.support.arguments import positive_number
 from enumsol.support.immutable import Immutable, Sealed
-from enumsol.support.messages import counted, html_lines, html_table
+from enumsol.support.messages import counted, found_of, html_lines, html_table
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -406,8 +406,7 @@ class RootSet(Sequence[Root], Immutable):
         if self.families:
             heading += f", {counted(len(self.families), 'family', 'families')}"
         if not self.whole:
-            # of nothing, zero is no bound
-            heading += f" found, at least {self.at_least} in all" if self.at_least else " found"
+            heading = found_of(heading, self.at_least)
         return f"{heading} ({self.arithmetic}, {self.method})"
 
     def _rows(self) -> list[tuple[str, str, str, str, str, str]]:

@@ -339,6 +339,40 @@ def test_supports_along_slopes_and_many_loads():
     assert [way for _, *way in body["held"]] == [[0, 0]] * 13
 
 
+def test_many_springs_loads_and_supports_have_about_twelve_signs_a_side():
+    sides = {"contact": "bottom", "clamp": "right", "spring": {"left": (2.0, 1.0)}, "load": {"top": (0.1, -0.3)}}
+    scene = fem.mesh_scene(fem.rectangle(60, 40, 1.5, 1.0).parted(), young=1, poisson=0.3, friction=0.3, **sides)
+    problem = scene.problem()
+    body, _ = body_record(problem, scene)
+    points, load = np.array(body["points"]), np.array(body["load"])
+    for places, along in (
+        (points[[k for k, _, _ in body["held"]]], 1), (points[body["springs"]], 1), (load[:, :2], 0)
+    ):  # fmt: skip
+        spots = np.sort(places[:, along])
+        assert len(spots) == 12
+        assert np.ptp(spots) > 0.97 * (1.5, 1.0)[along] - 0.05  # the corner in contact is no support
+        gaps = np.diff(spots)
+        assert gaps.max() < 1.5 * gaps.min()
+    # nothing of the load is lost
+    total = (problem.mesh.motion @ problem.f).reshape(-1, 2).sum(axis=0)
+    np.testing.assert_allclose(load[:, 2:4].sum(axis=0), total, rtol=1e-6)
+    assert body["summed"]
+
+
+def test_loads_and_supports_of_a_solid_are_told():
+    problem = gallery.get("block3d-9").build()
+    body, _ = body_record(problem)
+    forces = (problem.mesh.motion @ problem.f).reshape(-1, 3)
+    load = np.array(body["load"])
+    np.testing.assert_allclose(load[:, 3:6].sum(axis=0), forces.sum(axis=0), rtol=1e-6)
+    still = ~np.any(problem.mesh.motion.toarray().reshape(len(forces), -1), axis=1)
+    places = np.array(body["points"])[[k for k, *_ in body["held"]]]
+    assert 0 < len(places) <= 12
+    assert all(np.any(np.all(np.isclose(problem.mesh.points[still], place), axis=1)) for place in places)
+    # contact is below, and that is where it is first seen from
+    assert body["view"][2] < -0.3
+
+
 def test_commands_tell_what_a_toml_file_gave(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     mesh = fem.rectangle(2, 1)
