@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.model.cells import KINDS, boundary_facets, facet_outlines, outline_edges
+from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines, outline_edges
 from enumsol.model.shapes import SIGNS, BodyShape, body_shape, first_view, row_frames, row_tangents, signs
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
     from enumsol.fem import Scene
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import Floats, Integers
@@ -28,7 +30,8 @@ def body_record(problem: AnyProblem, scene: Scene | None = None) -> tuple[dict[s
     """What is drawn of a body of d dimensions and what moves it; and why it is not all of it, empty if it is.
 
     Displacements of the nodes, d components in turn, are ``u0 + alpha u1 - sum_k f_k c[k]`` over the d p contact
-    forces; a unit of force k acts on nodes as ``acts[k]``, each the node and d components.
+    forces; a unit of force k acts on nodes as ``acts[k]``, each the node and d components. Of solids there are stresses
+    ``s0 + alpha s1 - sum_k f_k s[k]`` of the cells at the facets of the surface, six each, if the page holds them.
     """
     if problem.mesh is None:
         body, why = bare_nodes(problem)
@@ -49,15 +52,46 @@ def body_record(problem: AnyProblem, scene: Scene | None = None) -> tuple[dict[s
             f"at most {_MOST_NUMBERS:,}"
         )
     motion = sp.csr_array(shape.motion[(d * nodes[:, None] + np.arange(d)).ravel()])
-    moved = [motion @ problem.factorization.solve(np.asarray(column)) for column in _loads(problem)]
+    solved = [problem.factorization.solve(np.asarray(column)) for column in _loads(problem)]
+    moved = [motion @ column for column in solved]
     moved[0] = moved[0] + shape.offset[nodes].ravel()
     forces = -sp.csr_array(problem.contact_rows @ shape.motion.T).toarray().reshape(d * problem.p, -1, d)
-    return body | {
+    return body | _stress_columns(problem, shape, solved) | {
         "u0": short_list(moved[0]),
         "u1": short_list(moved[1]),
         "c": [short_list(column) for column in moved[2:]],
         "acts": [vectors(force, nodes) for force in forces],
     }, ""
+
+
+def _stress_columns(problem: AnyProblem, shape: BodyShape, solved: Sequence[Floats]) -> dict[str, Any]:
+    """Stresses on the surface of a solid by columns, as displacements are given, if the page holds them."""
+    of = surface_stresses(problem, shape, len(solved))
+    if of is None:
+        return {}
+    still = of(np.zeros(problem.n))
+    first, *others = [short_list(of(column) - still * (k > 0)) for k, column in enumerate(solved)]
+    return {"s0": first, "s1": others[0], "s": others[1:]}
+
+
+def surface_stresses(problem: AnyProblem, shape: BodyShape, columns: int) -> Callable[[Floats], Floats] | None:
+    """The function from u to stresses of the cells at the facets of a solid's surface, xx, yy, zz, yz, zx, xy in turn.
+
+    None for a plane body, for one of which no material is known, and where a page does not hold so many columns.
+    """
+    if shape.points.shape[1] != 3 or problem.mesh is None or problem.mesh.lame is None:
+        return None
+    owner = {}
+    for rows, nodes in by_kind(3, shape.cells):
+        local = nodes[:, KINDS[3, nodes.shape[1]].facets]
+        for facet, row in zip(local.reshape(-1, local.shape[2]), np.repeat(rows, local.shape[1]), strict=True):
+            owner[frozenset(facet.tolist())] = row
+    cells = [owner[frozenset(facet.tolist())] for facet in boundary_facets(3, shape.cells)]
+    if 6 * len(cells) * columns > _MOST_NUMBERS:
+        return None
+    from enumsol.fem import cell_stresses  # scikit-fem takes a while
+
+    return lambda u: np.asarray(cell_stresses(problem, u)[cells][:, [0, 1, 2, 1, 2, 0], [0, 1, 2, 2, 0, 1]]).ravel()
 
 
 def most_fields(nodes: int, d: int) -> int:
@@ -89,13 +123,13 @@ def drawn_body(
     new[nodes] = np.arange(len(nodes))
     body = {"points": short_list(shape.points[nodes]), "rows": _rows(shape, nodes), "size": shape.size}
     if d == 3:
-        more = {
+        more = surroundings(problem, shape, new, _edges(faces), scene) | {
             "tangents": short_list(row_tangents(problem)),
             "view": short_list(first_view(row_frames(problem)[:, 0])),
         }
-        return body | _surface(shape, faces, new) | more | surroundings(
-            problem, shape, new, _edges(faces), scene
-        ), nodes
+        if problem.mesh is not None and problem.mesh.lame is not None:
+            more["mu"] = float(np.max(problem.mesh.lame[:, 1]))
+        return body | _surface(shape, faces, new) | more, nodes
     whole = len(nodes) == len(new)
     return body | {
         "cells": new[cells].tolist() if whole else None,

@@ -8,6 +8,8 @@ const COLOURINGS = {
   moved: { words: "by displacement", stops: SEQUENTIAL },
   shear: { words: "by largest shear stress in the plane", stops: SEQUENTIAL },
   mean: { words: "by mean stress in the plane", stops: DIVERGING },
+  mises: { words: "by von Mises stress", stops: SEQUENTIAL },
+  pressure: { words: "by mean stress", stops: DIVERGING },
 };
 const dimension = data.body ? data.body.points[0].length : 0;
 const unit = (powers) => {
@@ -44,6 +46,7 @@ function lookControls(redraw) {
   if (!data.body || nodesOnly) return;
   const names = ["none", "moved"];
   if (dimension === 2 && data.body.cells && data.body.lame) names.push("shear", "mean");
+  if (data.body.s0 || data.roots?.some((item) => item.s)) names.push("mises", "pressure");
   const option = ([value, text]) => element("option", { value }, text);
   const select = (words, entries, change) => {
     const made = element("select", {}, ...entries.map(option));

@@ -115,11 +115,29 @@ function scaleOf({ step, tail, tip }) {
   ];
 }
 
-// the surface, plain or coloured by displacement
+// the stress of the cells at the surface: that of von Mises, or its mean
+function surfaceStress(s, kind) {
+  return Array.from({ length: s.length / 6 }, (_, k) => {
+    const [x, y, z, yz, zx, xy] = s.slice(6 * k, 6 * k + 6);
+    return kind === "pressure" ? (x + y + z) / 3 : Math.sqrt(((x - y) ** 2 + (y - z) ** 2 + (z - x) ** 2) / 2 + 3 * (yz ** 2 + zx ** 2 + xy ** 2));
+  });
+}
+
+// the surface, plain or coloured by displacement or stress
 function skin(item) {
-  if (look.colour !== "moved") return { color: ink("body"), opacity: 0.35 };
-  const bar = { thickness: 10, len: 0.6, tickfont: { color: ink("dim"), size: 9 }, title: { text: safe(`displacement${unit("length")}`), font: { color: ink("dim"), size: 10 } } };
-  return { intensity: data.body.points.map((_, node) => lengthOf(item.u, node)), colorscale: "Viridis", cmin: 0, cmax: item.largest || 1, opacity: 1, showscale: true, colorbar: bar };
+  if (look.colour === "none" || (look.colour !== "moved" && !item.s)) return { color: ink("body"), opacity: 0.35 };
+  const { words, stops } = COLOURINGS[look.colour], moved = look.colour === "moved";
+  const values = moved ? data.body.points.map((_, node) => lengthOf(item.u, node)) : surfaceStress(item.s, look.colour);
+  // strains that are rounding of the displacements are none
+  const largest = values.reduce((found, x) => Math.max(found, Math.abs(x)), 0), rounding = moved ? 0 : (1e-6 * data.body.mu * item.largest) / data.body.size;
+  const most = largest > rounding ? largest : 0;
+  const title = safe(`${words.replace("by ", "")}${unit(moved ? "length" : "stress")}`);
+  const bar = { thickness: 10, len: 0.6, tickfont: { color: ink("dim"), size: 9 }, title: { text: title, font: { color: ink("dim"), size: 10 } } };
+  const colours = stops.map((colour, k) => [k / (stops.length - 1), `rgb(${colour.join(",")})`]);
+  // triangles come in turns, one of every facet
+  const own = moved ? { intensity: values } : { intensity: data.body.triangles[0].map((_, k) => values[k % values.length]), intensitymode: "cell" };
+  if (!most) own.intensity = own.intensity.map(() => 0);
+  return { ...own, colorscale: colours, cmin: stops === DIVERGING ? -(most || 1) : 0, cmax: most || 1, opacity: 1, showscale: most > 0, colorbar: bar };
 }
 
 function drawScenes() {

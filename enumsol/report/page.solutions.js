@@ -70,9 +70,14 @@ function drawCards() {
 // -- deformed bodies ----------------------------------------------------------------------------------------------
 
 function moves(f) {
-  const body = data.body, u = body.u0.map((x, i) => x + state.alpha * body.u1[i]);
-  f.forEach((force, k) => { if (force !== 0) body.c[k].forEach((x, i) => { u[i] -= force * x; }); });
-  return u;
+  return along(f, data.body.u0, data.body.u1, data.body.c);
+}
+
+// what is linear in alpha and in the contact forces
+function along(f, constant, slope, columns) {
+  const sum = constant.map((x, i) => x + state.alpha * slope[i]);
+  f.forEach((force, k) => { if (force !== 0) columns[k].forEach((x, i) => { sum[i] -= force * x; }); });
+  return sum;
 }
 
 function nodalForces(f) {
@@ -90,6 +95,7 @@ function moveBodies(solutions) {
   for (const item of solutions) {
     item.u = moves(item.f);
     item.forces = nodalForces(item.f);
+    if (data.body.s0) item.s = along(item.f, data.body.s0, data.body.s1, data.body.s);
   }
   prepare(solutions);
 }

@@ -15,6 +15,7 @@ from refusals import bad_argument, refusal
 
 import enumsol
 from enumsol import MissingDependencyError, branch_graph, enumerate_roots, fem, gallery, histories, write_report
+from enumsol.model.cells import boundary_facets
 from enumsol.model.shapes import body_shape
 from enumsol.report import body as bodies, content, history_page
 from enumsol.report.body import body_record
@@ -357,6 +358,20 @@ def test_many_springs_loads_and_supports_have_about_twelve_signs_a_side():
     total = (problem.mesh.motion @ problem.f).reshape(-1, 2).sum(axis=0)
     np.testing.assert_allclose(load[:, 2:4].sum(axis=0), total, rtol=1e-6)
     assert body["summed"]
+
+
+def test_stresses_of_a_solid_follow_the_contact_forces():
+    problem = gallery.get("wedge3d-2-3").build()
+    body, _ = body_record(problem)
+    root = enumerate_roots(problem, 1)[0]
+    forces = np.concatenate([root.lambda_n, root.lambda_t.ravel(order="F")])
+    # root.u solves with these forces at alpha = 1
+    found = np.array(body["s0"]) + np.array(body["s1"]) - forces @ np.array(body["s"])
+    sigma = fem.cell_stresses(problem, root.u)
+    six = sigma[:, [0, 1, 2, 1, 2, 0], [0, 1, 2, 2, 0, 1]]
+    away = np.linalg.norm(found.reshape(-1, 6)[:, None] - six, axis=2).min(axis=1)
+    assert away.max() < 1e-5 * np.abs(six).max()
+    assert len(found) == 6 * len(boundary_facets(3, problem.mesh.cells))
 
 
 def test_loads_and_supports_of_a_solid_are_told():

@@ -14,6 +14,7 @@ from refusals import bad_argument, refusal
 
 import enumsol
 from enumsol import MissingDependencyError, enumerate_roots, fem, gallery, write_report
+from enumsol.fem.bases import von_mises
 from enumsol.model.shapes import body_shape, slip_directions
 from enumsol.report import body, roots_content
 
@@ -267,11 +268,38 @@ def check_scenes(browser, roots):
         assert dict(arrows) == {name: count for name, count in expected.items() if count}
         assert dict(marked) == {name: names.count(name) for name in set(names)}
     check_first_view(browser, roots)
+    check_colours(browser, roots)
     places = {"eye": (-1.5, 0.5, 1.0), "center": (0, 0, 0), "up": (0, 0, 1)}
     camera = {name: dict(zip("xyz", place, strict=True)) for name, place in places.items()}
     browser.evaluate(f"Plotly.relayout(scenes[1], {{'scene.camera': {json.dumps(camera)}}}).then(() => 1)")
     browser.settle()
     assert browser.evaluate("scenes.map((s) => s._fullLayout.scene.camera.eye.x)") == [-1.5] * len(roots)
+
+
+def check_colours(browser, roots):
+    """Stresses on the surface are those of the cells of finite elements."""
+    choices = "[...document.querySelectorAll('#looks select')[1].options].map((o) => o.value)"
+    assert browser.evaluate(choices) == ["none", "moved", "mises", "pressure"]
+    sigma = fem.cell_stresses(roots[0].problem, roots[0].u)
+    for kind, own in (("mises", von_mises(sigma)), ("pressure", np.trace(sigma, axis1=1, axis2=2) / 3)):
+        found = np.array(browser.evaluate(f"surfaceStress(data.roots[0].s, '{kind}')"))
+        largest = np.max(np.abs(own))
+        # of every facet one cell, and every cell of this wedge has a facet on the surface
+        assert np.max(np.min(np.abs(found[:, None] - own), axis=1)) < 1e-5 * largest
+        assert np.max(np.min(np.abs(found[:, None] - own), axis=0)) < 1e-5 * largest
+        browser.evaluate(
+            f"{{const s = document.querySelectorAll('#looks select')[1]; s.value = '{kind}';"
+            "s.dispatchEvent(new Event('change')); 1}"
+        )
+        trace = "scenes[0].data.find((t) => t.type === 'mesh3d')"
+        assert browser.evaluate(f"[{trace}.intensitymode, {trace}.intensity.length]") == [
+            "cell", browser.evaluate("data.body.triangles[0].length")
+        ]  # fmt: skip
+        assert browser.evaluate(f"{trace}.cmax") == pytest.approx(np.max(np.abs(found)))
+        # the free body has no stress but rounding
+        free = next(k for k, root in enumerate(roots) if not root.lambda_n.any())
+        trace = f"scenes[{free}].data.find((t) => t.type === 'mesh3d')"
+        assert browser.evaluate(f"[{trace}.showscale, Math.max(...{trace}.intensity)]") == [False, 0]
 
 
 def check_first_view(browser, roots):
