@@ -10,7 +10,7 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines
-from enumsol.model.shapes import signs
+from enumsol.model.shapes import acting_nodes, signs
 from enumsol.support.array_types import Floats, Integers
 from enumsol.support.messages import counted
 from enumsol.support.plotting import new_figure
@@ -163,7 +163,7 @@ def draw_scene(scene: Any) -> Any:
     ax.plot(*places.T, "o", color=_CONTACT, markersize=4, label="contact nodes and their normals", zorder=5)
     _arrows(ax, places, _NORMAL * extent * scene.contacts.rows.normals, _CONTACT)
     for forces, colour, label in ((scene.forces, _LOAD, "loads"), (scene.slope, _SLOPE, "loads times alpha")):
-        shown = signs(mesh.points, np.flatnonzero(np.any(forces != 0, axis=1)), _edges(d, mesh.cells))
+        shown = signs(mesh.points, acting_nodes(forces), _edges(d, mesh.cells))
         if shown:
             sums = np.array([forces[group].sum(axis=0) for _, group in shown])
             long = _FORCE * extent / np.max(np.linalg.norm(sums, axis=1)) * sums

@@ -95,17 +95,18 @@ def _ways(data: HistoryData) -> dict[Node, int]:
 
 
 def _legend(data: HistoryData, colours: dict[tuple[Node, Node], str], ax: Any) -> None:
-    """Beside the drawing: the end of every history with a colour of its own, and what else there is to be seen."""
+    """Beside the drawing: where every history with a colour of its own goes, and what else there is to be seen."""
     from matplotlib.lines import Line2D
 
     handles = []
     for number, path in enumerate(data.paths() if _ways(data)[START] <= _COLOURED else ()):
-        (step, root), last = path[-1], colours[(path[-2] if len(path) > 1 else START), path[-1]]
-        own = "" if last == f"C{number}" else ", shared"
-        statuses = summary(data.graph.nodes[path[-1]]["root"].statuses)
-        handles.append(
-            Line2D([], [], color=last, label=shorten(f"{step}.{root}{own}: {statuses}", 34, placeholder=" ..."))
-        )
+        edges = zip((START, *path[:-1]), path, strict=True)
+        own = [edge[1] for edge in edges if colours[edge] == f"C{number}"]
+        if own:
+            ends = " to ".join(f"{step}.{root}" for step, root in dict.fromkeys((own[0], path[-1])))
+            statuses = summary(data.graph.nodes[path[-1]]["root"].statuses)
+            text = shorten(f"{ends}: {statuses}", 34, placeholder=" ...")
+            handles.append(Line2D([], [], color=f"C{number}", label=text))
     if _SHARED in colours.values():
         handles.append(Line2D([], [], color=_SHARED, label="several histories"))
     nodes = [(node, given["root"]) for node, given in data.graph.nodes(data=True) if given["root"] is not None]
@@ -121,7 +122,7 @@ def _legend(data: HistoryData, colours: dict[tuple[Node, Node], str], ax: Any) -
         handles.append(point("o", "white", "not followed"))
     if handles:
         where = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0)}
-        ax.legend(handles=handles, title="ends of histories", fontsize=8, title_fontsize=8, frameon=False, **where)
+        ax.legend(handles=handles, title="histories", fontsize=8, title_fontsize=8, frameon=False, **where)
 
 
 def _name_ends(data: HistoryData, across: dict[Node, float], up: dict[Node, float], ax: Any) -> None:

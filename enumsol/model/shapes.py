@@ -139,6 +139,12 @@ def slip_directions(problem: Any, root: Any) -> tuple[Integers, Floats]:
     return slides, moves[slides] / size[slides, None]
 
 
+def acting_nodes(values: Floats) -> Integers:
+    """Nodes at which values (N, k) are more than rounding of the largest."""
+    size = np.max(np.abs(values), axis=1)
+    return np.flatnonzero(size > _LEAST_FORCE * np.max(size, initial=0.0))
+
+
 def signs(points: Floats, nodes: Integers, edges: Integers) -> list[tuple[int, Integers]]:
     """Some of the nodes, and those that each of them stands for: about `SIGNS` evenly along each side, ends included.
 

@@ -8,7 +8,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines, outline_edges
-from enumsol.model.shapes import SIGNS, BodyShape, body_shape, first_view, row_frames, row_tangents, signs
+from enumsol.model.shapes import SIGNS, BodyShape, acting_nodes, body_shape, first_view, row_frames, row_tangents, signs
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -22,7 +22,7 @@ _MOST_NUMBERS = 150_000
 #: Boundary facets of a solid whose edges are all drawn; of more only those at which the surface bends.
 _MOST_EDGES = 2_000
 _DIGITS = 7
-#: Squares of directions below this are rounding, and directions, and forces below this part of the largest.
+#: Squares of directions below this are rounding, and directions.
 _ROUNDING = 1e-9
 
 
@@ -185,7 +185,7 @@ def surroundings(
     motion, (count, d) = shape.motion, shape.points.shape
     slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
     forces = np.hstack([(motion @ vector).reshape(-1, d) for vector in (problem.f, slope)])
-    acting = _nonzero(forces)
+    acting = acting_nodes(forces)
     if len(np.setdiff1d(acting, edges)) > SIGNS:  # a weight: its resultant
         weights = np.linalg.norm(forces[acting], axis=1)
         load = np.hstack([weights @ shape.points[acting] / weights.sum(), forces.sum(axis=0)])[None, :]
@@ -206,16 +206,10 @@ def surroundings(
     for kind in np.unique(across[(fixed > 0) & drawn].round(6), axis=0):
         alike = np.flatnonzero((fixed > 0) & drawn & np.all(across.round(6) == kind, axis=1))
         held += [[int(new[k]), *short_list(across[k])] for k, _ in signs(shape.points, alike, edges)]
-    sprung: Any = [] if scene is None else _nonzero(scene.springs.diagonal().reshape(count, d))
+    sprung: Any = [] if scene is None else acting_nodes(scene.springs.diagonal().reshape(count, d))
     sprung = np.array([node for node in sprung if drawn[node]], dtype=int)
     springs = [int(new[node]) for node, _ in signs(shape.points, sprung, edges)]
     return {"load": short_list(load), "summed": summed, "held": held, "springs": springs}
-
-
-def _nonzero(values: Floats) -> Integers:
-    """Rows of an array in which there is more than rounding of others."""
-    size = np.max(np.abs(values), axis=1)
-    return np.flatnonzero(size > _ROUNDING * np.max(size, initial=0.0))
 
 
 def _foundation(problem: AnyProblem, shape: BodyShape) -> dict[str, Any]:
