@@ -255,7 +255,7 @@ function drawBody(item, { force, alpha }) {
   const picture = svg("svg", { viewBox: box.join(" "), role: "img", class: "body", tabindex: 0, "aria-label": label }, ...inside);
   const touching = places.filter((_, k) => status(item.statuses, k) !== "open"), near = frameOf(touching.length ? touching : places, 0.06 * size);
   const [, , width, height] = frameOf(still, 0);
-  return { picture, box, words, near, cell: cells ? Math.sqrt((width * height) / cells.length) : 0 };
+  return { picture, box, words, near, cell: cells ? Math.sqrt((width * height) / cells.length) : Infinity };
 }
 
 // x, y, width and height of what points take up, with room around it

@@ -205,6 +205,19 @@ def test_lines_of_a_fine_mesh_are_thin_or_gone(browser, fine):
     assert "load (each arrow is a sum over nodes near it)" in browser.evaluate("byId('marks').textContent")
 
 
+def test_a_body_drawn_by_its_boundary_keeps_its_lines(browser, tmp_path, monkeypatch):
+    monkeypatch.setattr("enumsol.report.body._MOST_NUMBERS", 600)
+    acting = {"contact": "bottom", "clamp": "left", "load": {"top": (0.1, -0.3)}, "friction": 0.4}
+    write_report(
+        enumerate_roots(fem.mesh_problem(grid(20, 10, 4), young=7, poisson=0.3, **acting), 0), tmp_path / "p.html"
+    )
+    show(browser, tmp_path / "p.html", 320)
+    assert browser.evaluate("data.body.cells") is None
+    assert browser.evaluate("getComputedStyle(document.querySelector('path.after')).stroke") != "none"
+    assert browser.evaluate("document.querySelectorAll('svg.body line.load').length") == 12
+    assert browser.complaints() == []
+
+
 def test_three_cards_stand_side_by_side_on_a_wide_screen(browser, page):
     show(browser, page, 1600)
     tops = browser.evaluate(f"{CARDS}.map((c) => c.getBoundingClientRect().top)")
