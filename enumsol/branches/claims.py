@@ -12,8 +12,8 @@ import enum
 from bisect import bisect_left
 from dataclasses import dataclass, field
 from fractions import Fraction
-from itertools import accumulate
-from math import inf, nextafter
+from itertools import accumulate, pairwise
+from math import floor, inf, log10, nextafter
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -23,7 +23,7 @@ from enumsol.arithmetic.algebraic import CriticalAlpha
 from enumsol.arithmetic.rationals import rational
 from enumsol.branches.elements import Arc, Vertex, VertexKind, index_sum
 from enumsol.model.problem import ContactProblem
-from enumsol.support.messages import counted
+from enumsol.support.messages import counted, listed
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -32,8 +32,12 @@ if TYPE_CHECKING:
 
     Range = tuple[Fraction, Fraction]
 
-#: Ranges of alpha that a text names.
-_SHOWN = 6
+#: Ranges of alpha that a text names, and single alphas at which the number of solutions is another.
+_SHOWN, _SINGLE = 6, 3
+#: Numbers of solutions in words.
+_WORDS = ("none", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
+#: Ranges narrower than this share of the interval are no place to begin with: a slider hardly finds them.
+_NARROW = 0.005
 
 
 @dataclass
@@ -291,6 +295,108 @@ class MultiplicitySteps:
     between: tuple[int, ...]
     exact: bool
 
+    def ranges(self, narrow: float = 0.0) -> list[tuple[float, float, int]]:
+        """Ranges of alpha with their numbers, (low, high, number): single alphas inside of them may have another.
+
+        Ranges below ``narrow`` are left out.
+        """
+        pieces = [
+            (low, high, n) for (low, high), n in zip(pairwise(map(float, self.alphas)), self.between, strict=True)
+        ]
+        return _joined([piece for piece in _joined(pieces) if piece[1] - piece[0] >= narrow])
+
+    def busiest(self) -> float:
+        """The middle of the widest range with most solutions, or beside it where it is a critical alpha itself."""
+        ends = [float(alpha) for alpha in self.alphas]
+        ranges = self.ranges(_NARROW * (ends[-1] - ends[0])) or self.ranges()
+        if not ranges:
+            return ends[0]
+        low, high, _ = max(ranges, key=lambda span: (span[2], span[1] - span[0]))
+        middle = 0.5 * (low + high)
+        return 0.5 * (middle + min(x for x in ends if x > middle)) if middle in ends and middle < high else middle
+
+    def sentence(self) -> str:
+        """How many solutions there are where, as in "three solutions for alpha between 1 and 2, one elsewhere".
+
+        Empty where there is nowhere more than one.
+        """
+        width = float(self.alphas[-1] - self.alphas[0]) if self.alphas else 0.0
+        if not width > 0 or max((*self.between, *(self.at if self.exact else ()))) < 2:
+            return ""
+        digits = 4 - floor(log10(width))
+        ranges, spans = self.ranges(10.0**-digits) or self.ranges(), dict[int, list[str]]()
+        for low, high, number in sorted(ranges, key=lambda span: (-span[2], span[0])):
+            spans.setdefault(number, []).append(f"between {_rounded(low, digits)} and {_rounded(high, digits)}")
+        most = max(spans)
+        rest = min(spans, key=lambda number: (-len(spans[number]), number))
+        if len(ranges) > _SHOWN:
+            more = len(spans[most]) - 2
+            where = spans[most][:2] + ([f"in {counted(more, 'more range')}"] if more > 0 else [])
+            fewer = "fewer" if self.exact else self._words(min((*self.at, *self.between)))
+            return f"{self._head(most)} for alpha {listed(where)}, {fewer} elsewhere{self._odd(ranges, most)}"
+        parts = [(number, listed(spans[number])) for number in spans if number != rest]
+        if not parts:
+            return f"{self._head(rest)} throughout{self._single(ranges, rest, digits)}"
+        words = [f"{self._head(parts[0][0])} for alpha {parts[0][1]}"]
+        words += [f"{self._words(number)} {place}" for number, place in [*parts[1:], (rest, "elsewhere")]]
+        return ", ".join(words) + self._single(ranges, rest, digits)
+
+    def _head(self, number: int) -> str:
+        return f"{self._words(number)} solution{'' if number == 1 else 's'}"
+
+    def _odd(self, ranges: Sequence[tuple[float, float, int]], most: int) -> str:
+        """A note where there are fewer within ranges that are said to have most, or more anywhere."""
+        inside = [(low, high) for low, high, number in ranges if number == most]
+        places = [*zip(map(float, self.alphas), self.at, strict=True)]
+        places += [
+            (float(low + high) / 2, n) for (low, high), n in zip(pairwise(self.alphas), self.between, strict=True)
+        ]
+        odd = any(n < most and any(low < x < high for low, high in inside) for x, n in places)
+        above = self.exact and max(n for _, n in places) > most
+        return "; other numbers at single alphas" if odd or above else ""
+
+    def _words(self, number: int) -> str:
+        word = _WORDS[number] if number < len(_WORDS) else f"{number:,}"
+        if self.exact:
+            return word
+        return f"at least {word}" if number else "perhaps none"
+
+    def _single(self, ranges: Sequence[tuple[float, float, int]], rest: int, digits: int) -> str:
+        """Single alphas, and ranges too narrow to be told from them, whose number is none that was said of them."""
+        narrow, values = 10.0**-digits, dict[str, list[int]]()
+        said: dict[str, set[int]] = {}
+        for k, alpha in enumerate(map(float, self.alphas)):
+            place = _rounded(alpha, digits)
+            inside = k < len(self.between) and float(self.alphas[k + 1]) - alpha < narrow
+            values.setdefault(place, []).extend([self.at[k], *([self.between[k]] if inside else [])])
+            said.setdefault(place, set()).update(n for low, high, n in ranges if low <= alpha <= high)
+        found = []
+        for place, numbers in values.items():
+            expected = min(said[place]) if len(said[place]) == 1 else rest
+            low, high = min(numbers), max(numbers)
+            if low >= expected and (high <= expected or not self.exact):
+                continue
+            if len(numbers) > 1 and said[place] and min(said[place]) <= low and high <= max(said[place]):
+                continue  # the end of a range is only rounded
+            count = self._words(low) if low == high or not self.exact else f"{self._words(low)} to {self._words(high)}"
+            found.append(f"{count} {'at' if len(numbers) == 1 else 'near'} {place}")
+        if len(found) > _SINGLE:
+            return f"; other numbers at {len(found)} single alphas"
+        return f"; {listed(found)}" if found else ""
+
+
+def _joined(pieces: Iterable[tuple[float, float, int]]) -> list[tuple[float, float, int]]:
+    """Neighbouring pieces (low, high, number) of one number made one."""
+    found: list[tuple[float, float, int]] = []
+    for low, high, number in pieces:
+        begin = found.pop()[0] if found and found[-1][2] == number else low
+        found.append((begin, high, number))
+    return found
+
+
+def _rounded(alpha: float, digits: int) -> str:
+    return f"{round(alpha, digits) + 0.0:.12g}"
+
 
 @dataclass(frozen=True)
 class Uniqueness:
@@ -452,9 +558,10 @@ class Claims:
             line += "; nowhere several"
         elif found.none_by is not None and several is not None and several > found.none_by:
             line += f"; several at or right above alpha = {several:.8g}"
+        where = self.steps().sentence()
+        lines = [where, line] if where else [line]
         if self.standing is Standing.NOT_PROVEN:
-            line += ", not proven"
-        lines = [line]
+            lines = [f"{line}, not proven" for line in lines]
         if self.partly:
             lines.append(f"all solutions are known but for {ranges_text(self.open_ranges)}")
         if bound is not None:

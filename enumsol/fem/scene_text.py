@@ -10,6 +10,7 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines
+from enumsol.model.shapes import acting_nodes, signs
 from enumsol.support.array_types import Floats, Integers
 from enumsol.support.messages import counted
 from enumsol.support.plotting import in_units, new_figure
@@ -160,10 +161,12 @@ def draw_scene(scene: Any, units: tuple[str, str] | None = None) -> Any:
     ax.plot(*places.T, "o", color=_CONTACT, markersize=4, label="contact nodes and their normals", zorder=5)
     _arrows(ax, places, _NORMAL * extent * scene.contacts.rows.normals, _CONTACT)
     for forces, colour, label in ((scene.forces, _LOAD, "loads"), (scene.slope, _SLOPE, "loads times alpha")):
-        loaded = np.flatnonzero(np.any(forces != 0, axis=1))
-        if len(loaded):
-            long = _FORCE * extent / np.max(np.linalg.norm(forces, axis=1)) * forces[loaded]
-            _arrows(ax, mesh.points[loaded] - long, long, colour, label)
+        shown = signs(mesh.points, acting_nodes(forces), _edges(d, mesh.cells))
+        if shown:
+            sums = np.array([forces[group].sum(axis=0) for _, group in shown])
+            long = _FORCE * extent / np.max(np.linalg.norm(sums, axis=1)) * sums
+            some = ", summed over nodes side by side" if any(len(group) > 1 for _, group in shown) else ""
+            _arrows(ax, mesh.points[[node for node, _ in shown]] - long, long, colour, label + some)
     if d == 2:
         ax.autoscale_view()
         ax.set_aspect("equal", adjustable="datalim")
@@ -175,6 +178,16 @@ def draw_scene(scene: Any, units: tuple[str, str] | None = None) -> Any:
         getattr(ax, f"set_{direction}label")(in_units(direction, "length", units))
     figure.legend(loc="outside right upper", fontsize=7)
     return figure
+
+
+def _edges(dimension: int, cells: Integers) -> Integers:
+    """Edges of the boundary between neighbouring nodes, (k, 2)."""
+    facets = boundary_facets(dimension, cells)
+    if dimension == 3:
+        outlines = facet_outlines(facets)
+        return np.stack([outlines, np.roll(outlines, -1, axis=1)], axis=2).reshape(-1, 2)
+    along = facets if facets.shape[1] == 2 else facets[:, [0, 2, 1]]
+    return np.concatenate([along[:, k : k + 2] for k in range(along.shape[1] - 1)])
 
 
 def _arrows(ax: Any, places: Floats, vectors: Floats, colour: str, label: str | None = None) -> None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from textwrap import fill
+from textwrap import fill, shorten
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.loading.history_data import START, HistoryData, Node
+from enumsol.roots.root import summary
 from enumsol.support.arguments import shown
 from enumsol.support.plotting import axes_or_none, figure_of, in_units, new_figure
 
@@ -32,6 +33,9 @@ LABELS = {
 _DIMENSIONS = {"displacement": "length", "lambda_n": "force", "lambda_t": "force", "dissipated": "work"}
 #: Histories that have a colour of their own; ends that are labelled.
 _COLOURED, _NAMED = 10, 24
+#: Where a name may stand beside the end of a history, in points, best first; points on a line that it should not hide.
+_BESIDE = [(side * 6, up) for far in (4, 14, 24, 34, 44) for side in (1, -1) for up in (far, -far - 6)]
+_ALONG = np.linspace(0.0, 1.0, 16)
 _SHARED = "#555555"
 
 
@@ -40,7 +44,7 @@ def draw_history(data: HistoryData, x: Any, y: Any, ax: Any, units: tuple[str, s
     axes_or_none(ax)
     across, up = _values(data, x, "x"), _values(data, y, "y")
     if ax is None:
-        ax = new_figure(figsize=(7.0, 4.6)).add_subplot()
+        ax = new_figure(figsize=(8.4, 4.6)).add_subplot()
     colours = _colours(data)
     for before, node in data.graph.edges:
         ends = [place for place in (before, node) if place in across and place in up]
@@ -57,11 +61,15 @@ def draw_history(data: HistoryData, x: Any, y: Any, ax: Any, units: tuple[str, s
         marker = "o" if regular else "D"
         face = "white" if dropped else colour
         ax.plot(across[node], up[node], marker, markersize=4, color=colour, markerfacecolor=face, zorder=3)
-    _name_ends(data, across, up, ax)
+    for axis in [axis for quantity, axis in ((x, ax.xaxis), (y, ax.yaxis)) if quantity == "step"]:
+        axis.get_major_locator().set_params(integer=True)
+    _legend(data, colours, ax)
     ax.set_xlabel(_label(x, units))
     ax.set_ylabel(_label(y, units))
-    ax.set_title(data.closing_line, fontsize=9)
+    about = f"{_label(y, None)} over {_label(x, None)}" if _label(x, None) and _label(y, None) else "histories"
+    ax.set_title(fill(f"{about[0].upper()}{about[1:]}", 70) + f"\n{data.closing_line}", fontsize=9)
     ax.margins(0.07)
+    _name_ends(data, across, up, ax)
     return figure_of(ax)
 
 
@@ -73,10 +81,7 @@ def _label(quantity: Any, units: tuple[str, str] | None) -> str:
 
 def _colours(data: HistoryData) -> dict[tuple[Node, Node], str]:
     """Of every edge: that of the one history it belongs to, grey where there are several or too many."""
-    ways: dict[Node, int] = {}
-    for node in reversed(list(data.graph)):
-        following = list(data.graph.successors(node))
-        ways[node] = sum(ways[other] for other in following) or 1
+    ways = _ways(data)
     colours: dict[tuple[Node, Node], str] = {}
     for number, path in enumerate(data.paths() if ways[START] <= _COLOURED else ()):
         for edge in zip((START, *path[:-1]), path, strict=True):
@@ -84,20 +89,75 @@ def _colours(data: HistoryData) -> dict[tuple[Node, Node], str]:
     return {edge: colours.get(edge, _SHARED) for edge in data.graph.edges}
 
 
+def _ways(data: HistoryData) -> dict[Node, int]:
+    """How many histories lead on from every node."""
+    ways: dict[Node, int] = {}
+    for node in reversed(list(data.graph)):
+        ways[node] = sum(ways[other] for other in data.graph.successors(node)) or 1
+    return ways
+
+
+def _legend(data: HistoryData, colours: dict[tuple[Node, Node], str], ax: Any) -> None:
+    """Beside the drawing: where every history with a colour of its own goes, and what else there is to be seen."""
+    from matplotlib.lines import Line2D
+
+    handles = []
+    for number, path in enumerate(data.paths() if _ways(data)[START] <= _COLOURED else ()):
+        edges = zip((START, *path[:-1]), path, strict=True)
+        own = [edge[1] for edge in edges if colours[edge] == f"C{number}"]
+        if own:
+            ends = " to ".join(f"{step}.{root}" for step, root in dict.fromkeys((own[0], path[-1])))
+            statuses = summary(data.graph.nodes[path[-1]]["root"].statuses)
+            text = shorten(f"{ends}: {statuses}", 34, placeholder=" ...")
+            handles.append(Line2D([], [], color=f"C{number}", label=text))
+    if _SHARED in colours.values():
+        handles.append(Line2D([], [], color=_SHARED, label="several histories"))
+    nodes = [(node, given["root"]) for node, given in data.graph.nodes(data=True) if given["root"] is not None]
+
+    def point(marker: str, face: str, label: str) -> Line2D:
+        return Line2D(
+            [], [], linestyle="", marker=marker, color=_SHARED, markerfacecolor=face, markersize=4, label=label
+        )
+
+    if any(not root.regular for _, root in nodes):
+        handles.append(point("D", _SHARED, "root that is not regular"))
+    if any(node[0] < len(data.steps) and node not in data.followed for node, _ in nodes):
+        handles.append(point("o", "white", "not followed"))
+    if handles:
+        where = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0)}
+        ax.legend(handles=handles, title="histories", fontsize=8, title_fontsize=8, frameon=False, **where)
+
+
 def _name_ends(data: HistoryData, across: dict[Node, float], up: dict[Node, float], ax: Any) -> None:
-    """Names beside the ends of histories; ends at one place have one label."""
+    """Names beside the ends of histories, where they hide no other and few lines; ends at one place have one label."""
     places: dict[tuple[int, int], list[Node]] = {}
     spans = [max(values.values()) - min(values.values()) or 1.0 for values in (across, up)]
     for node, degree in data.graph.out_degree():
         if degree == 0 and node in across and node in up:
-            place = round(10 * across[node] / spans[0]), round(10 * up[node] / spans[1])
+            place = round(50 * across[node] / spans[0]), round(50 * up[node] / spans[1])
             places.setdefault(place, []).append(node)
-    middle = min(across.values(), default=0.0) + 0.5 * spans[0]
+    figure_of(ax).draw_without_rendering()  # until then nothing has a place
+    drawn = [
+        np.outer(1.0 - _ALONG, [across[a], up[a]]) + np.outer(_ALONG, [across[b], up[b]])
+        for a, b in data.graph.edges
+        if all(node in across and node in up for node in (a, b))
+    ]
+    lines = ax.transData.transform(np.concatenate(drawn)) if drawn else np.empty((0, 2))
+    names: list[Any] = []
     for nodes in list(places.values())[:_NAMED]:
         text = ", ".join(f"{step}.{number}" for step, number in nodes[:4]) + (", ..." if len(nodes) > 4 else "")
-        a, b = across[nodes[0]], up[nodes[0]]
-        side = {"xytext": (-6, 4), "ha": "right"} if a > middle else {"xytext": (6, 4), "ha": "left"}
-        ax.annotate(text, (a, b), textcoords="offset points", fontsize=8, **side)
+        label = ax.annotate(
+            text, (across[nodes[0]], up[nodes[0]]), xytext=(0, 0), textcoords="offset points", fontsize=8
+        )
+
+        def cost(offset: tuple[int, int], label: Any = label) -> tuple[int, int]:
+            label.set(ha="left" if offset[0] > 0 else "right", position=offset)
+            box = label.get_window_extent()
+            outside = box.x0 < ax.bbox.x0 or box.x1 > ax.bbox.x1 or box.y0 < ax.bbox.y0 or box.y1 > ax.bbox.y1
+            return outside + sum(box.overlaps(other) for other in names), int(box.count_contains(lines))
+
+        cost(min(_BESIDE, key=cost))
+        names.append(label.get_window_extent())
 
 
 def _values(data: HistoryData, quantity: Any, name: str) -> dict[Node, float]:

@@ -420,7 +420,7 @@ class History(Immutable):
         """A figure of one quantity of the roots against another, a line for every history.
 
         Points that several histories share are grey; a point is open where the history was not followed, and a rhombus
-        where the root is not regular.
+        where the root is not regular. Ends have their names, and a legend beside the drawing tells the histories apart.
 
         Parameters
         ----------

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,6 +24,14 @@ _LEAST_FORCE = 1e-9
 #: Displacements below this part of those without contact forces are what rounding leaves where forces cancel the load;
 #: larger, it would hide how a stiff body on very weak springs is deformed.
 _LEAST_MOVED = 1e-12
+#: Signs of loads, springs or supports along one side of a body.
+SIGNS = 12
+#: Cosine of the angle by which the boundary turns at most within a side.
+_SIDE = float(np.cos(np.radians(30.0)))
+#: Directions from which a solid may first be seen, as azimuths and elevations; the usual one is preferred a little.
+_AZIMUTHS, _ELEVATIONS, _USUAL, _PREFERRED = range(-180, 180, 15), (-35, -20, 20), (-57, 22), 0.2
+#: Cosine of the angle with a normal below which nothing more of a surface is gained.
+_OBLIQUE = 0.6
 
 
 @dataclass(frozen=True)
@@ -149,6 +157,124 @@ def slip_directions(problem: Any, root: Any) -> tuple[Integers, Floats]:
     slips = np.array([status is ContactStatus.SLIP for status in root.statuses])
     slides = np.flatnonzero(slips & (size > 0))
     return slides, moves[slides] / size[slides, None]
+
+
+def acting_nodes(values: Floats) -> Integers:
+    """Nodes at which values (N, k) are more than rounding of the largest."""
+    size = np.max(np.abs(values), axis=1)
+    return np.flatnonzero(size > _LEAST_FORCE * np.max(size, initial=0.0))
+
+
+def signs(points: Floats, nodes: Integers, edges: Integers) -> list[tuple[int, Integers]]:
+    """Some of the nodes, and those that each of them stands for: about `SIGNS` evenly along each side, ends included.
+
+    Parameters
+    ----------
+    points : (N, d) array
+        All nodes [length].
+    nodes : (k,) array of int
+        Those that have a sign.
+    edges : (m, 2) array of int
+        Edges of the boundary; the sides of a plane body are lines of these, those of a solid what they join.
+    """
+    edges = np.unique(np.sort(edges, axis=1), axis=0)
+    inside = np.isin(edges, nodes).all(axis=1) & (edges[:, 0] != edges[:, 1])
+    links: dict[int, list[int]] = {int(node): [] for node in nodes}
+    for a, b in edges[inside].tolist():
+        links[a].append(b)
+        links[b].append(a)
+    alone = [node for node, others in links.items() if not others]
+    for node in alone:
+        del links[node]
+    plane = points.shape[1] == 2
+    found, taken = [], set[int]()
+    for side in [*(_lines(points, links) if plane else _patches(links)), alone]:
+        every = np.array(list(dict.fromkeys(side)), dtype=int)
+        own = every[~np.isin(every, list(taken))]
+        if not len(own):
+            continue
+        chosen = every[_along(points[side], points[every]) if plane and side is not alone else _apart(points[every])]
+        # a corner has its sign already
+        chosen = chosen[np.isin(chosen, own)] if np.any(np.isin(chosen, own)) else own[:1]
+        taken.update(own.tolist())
+        nearest = np.argmin(np.linalg.norm(points[own][:, None] - points[chosen][None], axis=2), axis=1)
+        found += [(int(node), own[nearest == number]) for number, node in enumerate(chosen)]
+    return found
+
+
+def _lines(points: Floats, links: dict[int, list[int]]) -> Iterator[list[int]]:
+    """Lines of linked nodes, cut at corners; a closed one begins and ends with the same node."""
+
+    def smooth(node: int) -> bool:
+        if len(links[node]) != 2:
+            return False
+        before, after = (points[other] - points[node] for other in links[node])
+        return bool(-before @ after > _SIDE * np.linalg.norm(before) * np.linalg.norm(after))
+
+    used = set[frozenset[int]]()
+    for start in sorted(links, key=smooth):
+        for after in links[start]:
+            line, node = [start], after
+            while frozenset((line[-1], node)) not in used:
+                used.add(frozenset((line[-1], node)))
+                line.append(node)
+                if node == start or not smooth(node):
+                    break
+                node = next(other for other in links[node] if other != line[-2])
+            if len(line) > 1:
+                yield line
+
+
+def _patches(links: dict[int, list[int]]) -> Iterator[list[int]]:
+    """Sets of linked nodes."""
+    left = dict.fromkeys(links)
+    while left:
+        patch = [left.popitem()[0]]
+        for node in patch:
+            patch += [other for other in links[node] if other in left]
+            for other in links[node]:
+                left.pop(other, None)
+        yield sorted(patch)
+
+
+def _along(line: Floats, places: Floats) -> list[int]:
+    """Which of some places on a line have a sign: the nearest to points at equal distances along it."""
+    if len(places) < 1.3 * SIGNS:  # nearly as few
+        return list(range(len(places)))
+    lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    closed = bool(np.all(line[0] == line[-1]))
+    wanted = np.linspace(0.0, lengths[-1], SIGNS + closed)[:SIGNS]
+    even = np.stack([np.interp(wanted, lengths, axis) for axis in line.T], axis=1)
+    nearest = np.argmin(np.linalg.norm(places[:, None] - even[None], axis=2), axis=0)
+    return list(dict.fromkeys(nearest.tolist()))
+
+
+def _apart(places: Floats) -> list[int]:
+    """Which of some places have a sign: first the farthest from their middle, then always the farthest from these."""
+    distance = np.linalg.norm(places - places.mean(axis=0), axis=1)
+    chosen: list[int] = []
+    while len(chosen) < min(SIGNS, len(places)):
+        chosen.append(int(np.argmax(distance)))
+        away = np.linalg.norm(places - places[chosen[-1]], axis=1)
+        distance = away if len(chosen) == 1 else np.minimum(distance, away)
+    return chosen
+
+
+def first_view(normals: Floats) -> Floats:
+    """The direction from which most of the contact surface of a solid is seen, a unit vector (3,) out of the body.
+
+    ``normals`` (p, 3) are those of the contact rows out of the body, zero where not known.
+    """
+    usual = _direction(*_USUAL)
+    ways = np.array([usual, *(_direction(a, e) for e in _ELEVATIONS for a in _AZIMUTHS)])
+    # from straight above a solid looks flat
+    seen = np.mean(np.clip(normals @ ways.T, 0.0, _OBLIQUE), axis=0)
+    return np.asarray(ways[np.argmax(seen + _PREFERRED * (ways @ usual))])
+
+
+def _direction(azimuth: float, elevation: float) -> Floats:
+    a, e = np.radians((azimuth, elevation))
+    return np.array([np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)])
 
 
 def arrow_scale(largest: float, size: float) -> float:

@@ -7,10 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.model.cells import KINDS, boundary_facets, facet_outlines, outline_edges
-from enumsol.model.shapes import BodyShape, body_shape, row_tangents
+from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines, outline_edges
+from enumsol.model.shapes import SIGNS, BodyShape, acting_nodes, body_shape, first_view, row_frames, row_tangents, signs
 
 if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+
     from enumsol.fem import Scene
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import Floats, Integers
@@ -19,10 +21,8 @@ if TYPE_CHECKING:
 _MOST_NUMBERS = 150_000
 #: Boundary facets of a solid whose edges are all drawn; of more only those at which the surface bends.
 _MOST_EDGES = 2_000
-#: Of more loaded nodes than this the resultant is drawn.
-_MOST_LOADED = 150
 _DIGITS = 7
-#: Squares of directions below this are rounding.
+#: Squares of directions below this are rounding, and directions.
 _ROUNDING = 1e-9
 
 
@@ -30,7 +30,8 @@ def body_record(problem: AnyProblem, scene: Scene | None = None) -> tuple[dict[s
     """What is drawn of a body of d dimensions and what moves it; and why it is not all of it, empty if it is.
 
     Displacements of the nodes, d components in turn, are ``u0 + alpha u1 - sum_k f_k c[k]`` over the d p contact
-    forces; a unit of force k acts on nodes as ``acts[k]``, each the node and d components.
+    forces; a unit of force k acts on nodes as ``acts[k]``, each the node and d components. Of solids there are stresses
+    ``s0 + alpha s1 - sum_k f_k s[k]`` of the cells at the facets of the surface, six each, if the page holds them.
     """
     if problem.mesh is None:
         body, why = bare_nodes(problem)
@@ -51,15 +52,46 @@ def body_record(problem: AnyProblem, scene: Scene | None = None) -> tuple[dict[s
             f"at most {_MOST_NUMBERS:,}"
         )
     motion = sp.csr_array(shape.motion[(d * nodes[:, None] + np.arange(d)).ravel()])
-    moved = [motion @ problem.factorization.solve(np.asarray(column)) for column in _loads(problem)]
+    solved = [problem.factorization.solve(np.asarray(column)) for column in _loads(problem)]
+    moved = [motion @ column for column in solved]
     moved[0] = moved[0] + shape.offset[nodes].ravel()
     forces = -sp.csr_array(problem.contact_rows @ shape.motion.T).toarray().reshape(d * problem.p, -1, d)
-    return body | {
+    return body | _stress_columns(problem, shape, solved) | {
         "u0": short_list(moved[0]),
         "u1": short_list(moved[1]),
         "c": [short_list(column) for column in moved[2:]],
         "acts": [vectors(force, nodes) for force in forces],
     }, ""
+
+
+def _stress_columns(problem: AnyProblem, shape: BodyShape, solved: Sequence[Floats]) -> dict[str, Any]:
+    """Stresses on the surface of a solid by columns, as displacements are given, if the page holds them."""
+    of = surface_stresses(problem, shape, len(solved))
+    if of is None:
+        return {}
+    still = of(np.zeros(problem.n))
+    first, *others = [short_list(of(column) - still * (k > 0)) for k, column in enumerate(solved)]
+    return {"s0": first, "s1": others[0], "s": others[1:]}
+
+
+def surface_stresses(problem: AnyProblem, shape: BodyShape, columns: int) -> Callable[[Floats], Floats] | None:
+    """The function from u to stresses of the cells at the facets of a solid's surface, xx, yy, zz, yz, zx, xy in turn.
+
+    None for a plane body, for one of which no material is known, and where a page does not hold so many columns.
+    """
+    if shape.points.shape[1] != 3 or problem.mesh is None or problem.mesh.lame is None:
+        return None
+    owner = {}
+    for rows, nodes in by_kind(3, shape.cells):
+        local = nodes[:, KINDS[3, nodes.shape[1]].facets]
+        for facet, row in zip(local.reshape(-1, local.shape[2]), np.repeat(rows, local.shape[1]), strict=True):
+            owner[frozenset(facet.tolist())] = row
+    cells = [owner[frozenset(facet.tolist())] for facet in boundary_facets(3, shape.cells)]
+    if 6 * len(cells) * columns > _MOST_NUMBERS:
+        return None
+    from enumsol.fem import cell_stresses  # scikit-fem takes a while
+
+    return lambda u: np.asarray(cell_stresses(problem, u)[cells][:, [0, 1, 2, 1, 2, 0], [0, 1, 2, 2, 0, 1]]).ravel()
 
 
 def most_fields(nodes: int, d: int) -> int:
@@ -75,7 +107,8 @@ def drawn_body(
     ``points`` are the drawn nodes; contact row i stands at the mean of nodes ``rows[i]``, pairs (node, weight). Of a
     plane body there are cells, or the edges of its boundary if ``columns`` numbers for every component of every node
     are more than the page holds, and what `surroundings` gives; of a solid triangles and edges of its surface, and the
-    ``tangents`` of the contact rows, two vectors each.
+    ``tangents`` of the contact rows, two vectors each, and a ``view``, the direction out of the body from which its
+    contact surface is seen best. What `surroundings` gives is about a solid, too.
     """
     cells, d, new = shape.cells, shape.points.shape[1], np.full(len(shape.points), -1)
     touched = np.unique(sp.csr_array(problem.contact_rows @ shape.motion.T).indices // d)
@@ -90,27 +123,38 @@ def drawn_body(
     new[nodes] = np.arange(len(nodes))
     body = {"points": short_list(shape.points[nodes]), "rows": _rows(shape, nodes), "size": shape.size}
     if d == 3:
-        return body | _surface(shape, faces, new) | {"tangents": short_list(row_tangents(problem))}, nodes
+        more = surroundings(problem, shape, new, _edges(faces), scene) | {
+            "tangents": short_list(row_tangents(problem)),
+            "view": short_list(first_view(row_frames(problem)[:, 0])),
+        }
+        if problem.mesh is not None and problem.mesh.lame is not None:
+            more["mu"] = float(np.max(problem.mesh.lame[:, 1]))
+        return body | _surface(shape, faces, new) | more, nodes
     whole = len(nodes) == len(new)
     return body | {
         "cells": new[cells].tolist() if whole else None,
         "lines": None if whole else new[edges].tolist(),
         "rim": new[edges].tolist(),
-        **surroundings(problem, shape, new, scene),
+        **surroundings(problem, shape, new, edges, scene),
+        **_foundation(problem, shape),
     }, nodes
 
 
 def _surface(shape: BodyShape, faces: Integers, new: Integers) -> dict[str, Any]:
     """Triangles and edges of the surface of a solid."""
     outline = outline_edges(shape.points, faces)
-    after = np.roll(faces, -1, axis=1)
-    edges = np.unique(np.sort(np.stack([faces, after], axis=2).reshape(-1, 2), axis=1), axis=0)
     fan = [faces[:, [0, k, k + 1]] for k in range(1, faces.shape[1] - 1)]
     return {
         "triangles": new[np.concatenate(fan)].T.tolist(),
-        "edges": new[edges if len(faces) <= _MOST_EDGES else outline].tolist(),
+        "edges": new[_edges(faces) if len(faces) <= _MOST_EDGES else outline].tolist(),
         "outline": new[outline].tolist(),
     }
+
+
+def _edges(faces: Integers) -> Integers:
+    """All edges of the outlines of facets, (k, 2)."""
+    edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    return np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0)
 
 
 def bare_nodes(problem: AnyProblem) -> tuple[dict[str, Any] | None, str]:
@@ -128,48 +172,62 @@ def bare_nodes(problem: AnyProblem) -> tuple[dict[str, Any] | None, str]:
     return body, "The problem has no mesh: its contact nodes are drawn at their coordinates, without forces"
 
 
-def surroundings(problem: AnyProblem, shape: BodyShape, new: Integers, scene: Scene | None = None) -> dict[str, Any]:
-    """Load, supports, springs, foundation and material of a plane body, for the page.
+def surroundings(
+    problem: AnyProblem, shape: BodyShape, new: Integers, edges: Integers, scene: Scene | None = None
+) -> dict[str, Any]:
+    """Load, supports and springs of a body, for the page: of many nodes side by side some stand for all.
 
-    ``new`` is the number of every node among those that are drawn, -1 for others. ``load`` has (x, y) of a place,
-    forces in x and y and their derivatives with respect to alpha; ``held`` (node, x, y), a direction in which a node
-    cannot move, or 0, 0 for all; ``springs`` nodes; ``walls`` (row, x, y, gap), normals of the rigid foundation;
-    ``lame`` the coefficients of the cells, one pair if all are the same.
+    ``new`` is the number of every node among those that are drawn, -1 for others; ``edges`` are those of the boundary.
+    ``load`` has a place, forces and their derivatives with respect to alpha, d numbers each, ``summed`` whether some
+    of it is the sum over several nodes; ``held`` a node and a direction in which it cannot move, or zeros for several;
+    ``springs`` nodes.
     """
-    motion, drawn = shape.motion, new >= 0
+    motion, (count, d) = shape.motion, shape.points.shape
     slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
-    forces = np.hstack([(motion @ vector).reshape(-1, 2) for vector in (problem.f, slope)])
-    acting = np.flatnonzero(np.any(forces, axis=1))
-    load = np.hstack([shape.points[acting], forces[acting]])
-    if len(acting) > _MOST_LOADED:
+    forces = np.hstack([(motion @ vector).reshape(-1, d) for vector in (problem.f, slope)])
+    acting = acting_nodes(forces)
+    if len(np.setdiff1d(acting, edges)) > SIGNS:  # a weight: its resultant
         weights = np.linalg.norm(forces[acting], axis=1)
         load = np.hstack([weights @ shape.points[acting] / weights.sum(), forces.sum(axis=0)])[None, :]
-    x, y = motion[0::2], motion[1::2]
-    xx, yy, xy = (np.asarray(a.multiply(b).sum(axis=1)).ravel() for a, b in ((x, x), (y, y), (x, y)))
-    held = [[int(new[node]), 0, 0] for node in np.flatnonzero((xx + yy < _ROUNDING) & drawn)]
-    # of a node that moves along one direction (a, b), the square of what it is held across is 1 - a a, 1 - b b, - a b
-    guided = (np.abs(xx * yy - xy**2) < _ROUNDING) & (np.abs(xx + yy - 1.0) < _ROUNDING) & drawn
-    held += [
-        [int(new[k]), *short_list([np.sqrt(max(1 - xx[k], 0)), -np.sign(xy[k] or 1) * np.sqrt(max(1 - yy[k], 0))])]
-        for k in np.flatnonzero(guided)
-    ]
-    normals = np.asarray(problem.Bn @ motion.T @ np.tile(np.eye(2), (len(shape.points), 1)))
+        summed = True
+    else:
+        shown = signs(shape.points, acting, edges)
+        load = np.array([[*shape.points[node], *forces[group].sum(axis=0)] for node, group in shown])
+        summed = len(shown) < len(acting)
+    axes = [motion[k::d] for k in range(d)]
+    free = np.array([[np.asarray(a.multiply(b).sum(axis=1)).ravel() for a in axes] for b in axes])
+    sizes, ways = np.linalg.eigh(free.transpose(2, 0, 1))
+    fixed = np.sum(sizes < _ROUNDING, axis=1)
+    across = np.where((fixed == 1)[:, None], ways[:, :, 0], 0.0) + 0.0
+    across[np.abs(across) < _ROUNDING] = 0.0
+    across *= np.where(across[np.arange(count), np.argmax(np.abs(across), axis=1)] < 0, -1.0, 1.0)[:, None]
+    drawn = new >= 0
+    held: list[Any] = []
+    for kind in np.unique(across[(fixed > 0) & drawn].round(6), axis=0):
+        alike = np.flatnonzero((fixed > 0) & drawn & np.all(across.round(6) == kind, axis=1))
+        held += [[int(new[k]), *short_list(across[k])] for k, _ in signs(shape.points, alike, edges)]
+    sprung: Any = [] if scene is None else acting_nodes(scene.springs.diagonal().reshape(count, d))
+    sprung = np.array([node for node in sprung if drawn[node]], dtype=int)
+    springs = [int(new[node]) for node, _ in signs(shape.points, sprung, edges)]
+    return {"load": short_list(load), "summed": summed, "held": held, "springs": springs}
+
+
+def _foundation(problem: AnyProblem, shape: BodyShape) -> dict[str, Any]:
+    """Foundation and material of a plane body.
+
+    ``walls`` has (row, x, y, gap), normals of the rigid foundation; ``lame`` the coefficients of the cells, one pair if
+    all are the same.
+    """
+    normals = np.asarray(problem.Bn @ shape.motion.T @ np.tile(np.eye(2), (len(shape.points), 1)))
     walls = [
         [k, *short_list([*normal, problem.gap[k]])]
         for k, normal in enumerate(normals)
         if abs(normal @ normal - 1.0) < _ROUNDING  # rows of two bodies add up to nothing
     ]
-    springs: Any = [] if scene is None else np.flatnonzero(scene.springs.diagonal().reshape(-1, 2).any(axis=1))
     lame = None if problem.mesh is None else problem.mesh.lame
     if lame is not None and np.all(lame == lame[0]):
         lame = lame[:1]
-    return {
-        "load": short_list(load),
-        "held": held,
-        "springs": [int(new[node]) for node in springs if drawn[node]],
-        "walls": walls,
-        "lame": None if lame is None else short_list(lame),
-    }
+    return {"walls": walls, "lame": None if lame is None else short_list(lame)}
 
 
 def _loads(problem: AnyProblem) -> list[Floats]:

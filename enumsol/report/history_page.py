@@ -65,7 +65,7 @@ def _facts(history: History) -> str:
         ("contact nodes", str(problem.p)),
         ("degrees of freedom", f"{problem.n:,}"),
         ("steps", str(len(history.steps))),
-        ("histories", f"{total:,}" if total else "none reaches the last step"),
+        ("histories", f"{total:,}{'' if history.complete else ' found'}" if total else "none reaches the last step"),
         ("branchings", str(len(history.branchings))),
         ("arithmetic", history.arithmetic),
         ("increments", "not halved" if history.refinement is None else str(history.refinement)),

@@ -8,6 +8,8 @@ const COLOURINGS = {
   moved: { words: "by displacement", stops: SEQUENTIAL },
   shear: { words: "by largest shear stress in the plane", stops: SEQUENTIAL },
   mean: { words: "by mean stress in the plane", stops: DIVERGING },
+  mises: { words: "by von Mises stress", stops: SEQUENTIAL },
+  pressure: { words: "by mean stress", stops: DIVERGING },
 };
 const dimension = data.body ? data.body.points[0].length : 0;
 const unit = (powers) => {
@@ -44,6 +46,7 @@ function lookControls(redraw) {
   if (!data.body || nodesOnly) return;
   const names = ["none", "moved"];
   if (dimension === 2 && data.body.cells && data.body.lame) names.push("shear", "mean");
+  if (data.body.s0 || data.roots?.some((item) => item.s)) names.push("mises", "pressure");
   const option = ([value, text]) => element("option", { value }, text);
   const select = (words, entries, change) => {
     const made = element("select", {}, ...entries.map(option));
@@ -154,15 +157,24 @@ const outline = (groups, at, close) => groups.map((nodes) => `M${nodes.map((k) =
 function arrow(kind, [x, y], dx, dy, most, text) {
   const n = Math.hypot(dx, dy), head = Math.min(most, 0.5 * n), ux = dx / n, uy = dy / n;
   const corners = [[0, 0], [-ux - 0.4 * uy, -uy + 0.4 * ux], [-ux + 0.4 * uy, -uy - 0.4 * ux]];
-  return [
-    svg("line", { class: kind, x1: x - dx, y1: y - dy, x2: x - 0.8 * head * ux, y2: y - 0.8 * head * uy }),
-    svg("polygon", { class: kind === "force" ? "force arrow" : kind, points: corners.map(([a, b]) => `${x + head * a},${y + head * b}`).join(" ") }, tip(text)),
-  ];
+  const line = svg("line", { class: kind, x1: x - dx, y1: y - dy, x2: x - 0.8 * head * ux, y2: y - 0.8 * head * uy });
+  line.head = [x, y, 0.8 * head * ux, 0.8 * head * uy];
+  const points = corners.map(([a, b]) => `${x + head * a},${y + head * b}`).join(" ");
+  return [line, svg("polygon", { class: kind === "force" ? "force arrow" : kind, points, style: `transform-origin: ${x}px ${y}px` }, tip(text))];
 }
 
+// places and forces; what is far below the largest is rounding
 function loadsAt(alpha) {
-  return data.body.load.map(([x, y, fx, fy, gx, gy]) => [x, -y, fx + alpha * gx, -(fy + alpha * gy)]).filter(([, , fx, fy]) => fx !== 0 || fy !== 0);
+  const d = dimension, force = (row, c) => row[d + c] + alpha * row[2 * d + c];
+  const loads = data.body.load.map((row) => [row.slice(0, d), row.slice(0, d).map((_, c) => force(row, c))]);
+  const most = loads.reduce((found, [, vector]) => Math.max(found, Math.hypot(...vector)), 0);
+  return { loads: loads.filter(([, vector]) => Math.hypot(...vector) > 1e-9 * most), most };
 }
+
+const loadWords = (vector) => `load ${short(Math.hypot(...vector))}${unit("force")}${data.body.summed ? ", the sum over nodes near it" : ""}`;
+
+// a spring of length 4 s: points along it and across
+const zigzag = (s) => Array.from({ length: 9 }, (_, k) => [k * 0.5 * s, k === 0 || k === 8 ? 0 : (k % 2 ? 0.8 : -0.8) * s]);
 
 // springs and supports: what holds the body, at rest
 function holds(centre) {
@@ -174,8 +186,7 @@ function holds(centre) {
   }
   for (const node of springs) {
     const x = points[node][0], y = -points[node][1], n = Math.hypot(x - centre[0], y - centre[1]) || 1, ux = (x - centre[0]) / n, uy = (y - centre[1]) / n;
-    const turns = Array.from({ length: 9 }, (_, k) => [k * 0.5 * s, k === 0 || k === 8 ? 0 : (k % 2 ? 0.8 : -0.8) * s]);
-    made.push(svg("polyline", { class: "wall", points: turns.map(([a, b]) => `${x + a * ux - b * uy},${y + a * uy + b * ux}`).join(" ") }, tip("spring to the ground")));
+    made.push(svg("polyline", { class: "wall", points: zigzag(s).map(([a, b]) => `${x + a * ux - b * uy},${y + a * uy + b * ux}`).join(" ") }, tip("spring to the ground")));
   }
   return made;
 }
@@ -202,18 +213,19 @@ function drawBody(item, { force, alpha }) {
     cells.forEach((cell, k) => {
       const path = svg("path", { class: "after", d: outline([cell], at, close) }, tip(`${short(values[k])}${unit(look.colour === "moved" ? "length" : "stress")}`));
       path.style.fill = ramp.colour(values[k]);
+      path.style.setProperty("--own", path.style.fill);
       inside.push(path);
     });
   } else inside.push(svg("path", { class: cells ? "after" : "after empty", d: outline(groups, at, close) }));
+  if (cells) inside.push(svg("path", { class: "rim", d: outline(data.body.rim, at, "") }));
   inside.push(svg("path", { class: "before", d: outline(data.body.rim, still, "") }));
   const centre = still.reduce(([a, b], [x, y]) => [a + x / still.length, b + y / still.length], [0, 0]);
   inside.push(...walls(scale), ...holds(centre));
-  const loads = loadsAt(alpha), most = Math.max(...loads.map(([, , fx, fy]) => Math.hypot(fx, fy)), 0);
-  for (const [x, y, fx, fy] of loads) {
-    if (Math.hypot(fx, fy) < 1e-9 * most) continue;
-    const [dx, dy] = [fx, fy].map((value) => (0.11 * size * value) / most);
-    inside.push(...arrow("load", [x, y], dx, dy, 0.022 * size, `load ${short(Math.hypot(fx, fy))}${unit("force")}`));
-    seen.push([x - dx, y - dy]);
+  const { loads, most } = loadsAt(alpha);
+  for (const [[x, y], vector] of loads) {
+    const [dx, dy] = vector.map((value, c) => ((c ? -1 : 1) * 0.11 * size * value) / most);
+    inside.push(...arrow("load", [x, -y], dx, dy, 0.022 * size, loadWords(vector)));
+    seen.push([x - dx, -y - dy]);
   }
   for (const [node, fx, fy] of item.forces) {
     const length = Math.hypot(fx, fy);
@@ -221,9 +233,11 @@ function drawBody(item, { force, alpha }) {
     inside.push(...arrow("force", at[node], share * fx, -share * fy, 0.03 * size, `contact force ${short(length)}${unit("force")}`));
     seen.push([at[node][0] - share * fx, at[node][1] + share * fy]);
   }
-  rows.forEach((row, k) => {
-    const [x, y] = row.reduce(([a, b], [node, weight]) => [a + weight * at[node][0], b + weight * at[node][1]], [0, 0]);
-    inside.push(marker(status(item.statuses, k), x, y, 0.013 * size, `node ${data.nodes[k]}: ${status(item.statuses, k)}, lambda_n ${short(item.f[k])}${unit("force")}, lambda_t ${short(item.f[p + k])}${unit("force")}`));
+  const places = rows.map((row) => row.reduce(([a, b], [node, weight]) => [a + weight * at[node][0], b + weight * at[node][1]], [0, 0]));
+  const along = places.slice(1).map(([x, y], k) => Math.hypot(x - places[k][0], y - places[k][1])).sort((a, b) => a - b);
+  const mark = Math.min(0.013, 0.6 * (along[along.length >> 1] || size) / size) * size;
+  places.forEach(([x, y], k) => {
+    inside.push(marker(status(item.statuses, k), x, y, mark, `node ${data.nodes[k]}: ${status(item.statuses, k)}, lambda_n ${short(item.f[k])}${unit("force")}, lambda_t ${short(item.f[p + k])}${unit("force")}`));
   });
   const ends = (c, pick) => seen.reduce((found, point) => pick(found, point[c]), pick === Math.min ? Infinity : -Infinity);
   const room = 0.03 * size, box = [ends(0, Math.min) - room, ends(1, Math.min) - room, 0, 0];
@@ -239,24 +253,51 @@ function drawBody(item, { force, alpha }) {
   }
   const label = `${item.name}, deformed body, displacements times ${short(scale)}; statuses along the boundary: ${runs(item.statuses)}`;
   const picture = svg("svg", { viewBox: box.join(" "), role: "img", class: "body", tabindex: 0, "aria-label": label }, ...inside);
-  return { picture, box, words };
+  const touching = places.filter((_, k) => status(item.statuses, k) !== "open"), near = frameOf(touching.length ? touching : places, 0.06 * size);
+  const [, , width, height] = frameOf(still, 0);
+  return { picture, box, words, near, cell: cells ? Math.sqrt((width * height) / cells.length) : Infinity };
+}
+
+// x, y, width and height of what points take up, with room around it
+function frameOf(points, room) {
+  const [x, y] = [0, 1].map((c) => points.reduce(([low, high], point) => [Math.min(low, point[c]), Math.max(high, point[c])], [Infinity, -Infinity]));
+  return [x[0] - room, y[0] - room, x[1] - x[0] + 2 * room, y[1] - y[0] + 2 * room];
+}
+
+// lines of the mesh are thin where cells are small on the screen, and gone where they are tiny
+function thin(picture, cell) {
+  const frame = picture.getBoundingClientRect(), view = picture.viewBox.baseVal, pixels = cell * Math.min(frame.width / view.width, frame.height / view.height);
+  picture.classList.toggle("fine", pixels < 5);
+  picture.style.setProperty("--mesh", Math.min(1, pixels / 16).toFixed(2));
 }
 
 // the part of a picture that is seen: by buttons, by keys, by dragging, and by the wheel where the picture has the focus
-function zoomable(picture, whole, key) {
+function zoomable(picture, whole, key, near, cell) {
   let seen = views.get(key) ?? [0, 0, 1, 1];
   const show = () => {
     const [x, y, w, h] = whole;
     picture.setAttribute("viewBox", [x + seen[0] * w, y + seen[1] * h, seen[2] * w, seen[3] * h].join(" "));
+    // marks and heads of arrows keep about their size on the screen
+    const shrunk = seen[2] ** 0.8;
+    picture.style.setProperty("--shrunk", shrunk);
+    for (const line of picture.querySelectorAll("line")) {
+      if (!line.head) continue;
+      const [tipX, tipY, backX, backY] = line.head;
+      line.setAttribute("x2", tipX - shrunk * backX);
+      line.setAttribute("y2", tipY - shrunk * backY);
+    }
     if (seen[2] < 1) views.set(key, seen);
     else views.delete(key);
     picture.style.cursor = seen[2] < 1 ? "grab" : "";
+    thin(picture, cell);
   };
   const see = (x, y, part) => { seen = [Math.min(Math.max(x, 0), 1 - part), Math.min(Math.max(y, 0), 1 - part), part, part]; show(); };
   const zoom = (by, cx = 0.5, cy = 0.5) => {
     const part = Math.min(Math.max(seen[2] / by, 0.02), 1);
     see(seen[0] + cx * (seen[2] - part), seen[1] + cy * (seen[3] - part), part);
   };
+  const part = Math.min(Math.max(near[2] / whole[2], near[3] / whole[3], 0.02), 1), corner = [0, 1].map((c) => (near[c] + near[c + 2] / 2 - whole[c]) / whole[c + 2] - part / 2);
+  const contact = () => { const before = seen; see(...corner, part); if (String(before) === String(seen)) see(0, 0, 1); };
   const move = (x, y) => see(seen[0] + x * seen[2], seen[1] + y * seen[3], seen[2]);
   const keys = { "+": () => zoom(1.5), "=": () => zoom(1.5), "-": () => zoom(1 / 1.5), 0: () => see(0, 0, 1), ArrowLeft: () => move(-0.1, 0), ArrowRight: () => move(0.1, 0), ArrowUp: () => move(0, -0.1), ArrowDown: () => move(0, 0.1) };
   picture.addEventListener("keydown", (event) => {
@@ -277,15 +318,16 @@ function zoomable(picture, whole, key) {
   });
   picture.addEventListener("dblclick", () => see(0, 0, 1));
   show();
+  new ResizeObserver(() => thin(picture, cell)).observe(picture);
   const button = (text, words, act) => { const made = element("button", { type: "button", "aria-label": words }, text); made.addEventListener("click", act); return made; };
-  return element("span", { className: "end" }, button("\u2212", "zoom out", keys["-"]), button("+", "zoom in", keys["+"]), button("all", "see all of the body", keys[0]));
+  return element("span", { className: "end" }, button("\u2212", "zoom out", keys["-"]), button("+", "zoom in", keys["+"]), button("contact", "zoom to the contact, and back", contact), button("all", "see all of the body", keys[0]));
 }
 
 function bodyFigure(item, scales) {
   const holder = element("figure");
   const redraw = () => {
-    const { picture, box, words } = drawBody(item, scales);
-    const below = element("div", { className: "small" }, enlargementOf(item, redraw), zoomable(picture, box, item.key));
+    const { picture, box, words, near, cell } = drawBody(item, scales);
+    const below = element("div", { className: "small" }, enlargementOf(item, redraw), zoomable(picture, box, item.key, near, cell));
     const focused = holder.contains(document.activeElement) && document.activeElement.tagName === "INPUT";
     holder.replaceChildren(picture, ...(words ? [words] : []), below);
     if (focused) below.querySelector("input").focus();
@@ -317,9 +359,10 @@ function bodyKeys(items) {
   const keys = used.map((name) => element("span", {}, svg("svg", { width: 14, height: 14 }, marker(name, 7, 7, 5, name)), name));
   if (!data.body || nodesOnly || !items.length) return keys;
   keys.push(keyEntry("force", "contact force on the body"), keyEntry("before", "undeformed body"));
-  if (dimension === 3) return used.includes("slip") ? [...keys, keyEntry("load", "direction of slip")] : keys;
-  if (data.body.load.length) keys.push(keyEntry("load", data.body.load.length === 1 ? "load, the resultant" : "load"));
-  if (data.body.walls.length) keys.push(keyEntry("wall", "foundation (gaps are enlarged as displacements are)"));
+  if (dimension === 3 && used.includes("slip")) keys.push(keyEntry("slid", "direction of slip"));
+  const { load, summed } = data.body;
+  if (load.length) keys.push(keyEntry("load", !summed ? "load" : load.length === 1 ? "load, the resultant" : "load (each arrow is a sum over nodes near it)"));
+  if (dimension === 2 && data.body.walls.length) keys.push(keyEntry("wall", "foundation (gaps are enlarged as displacements are)"));
   if (data.body.held.length) keys.push(element("span", {}, svg("svg", { width: 12, height: 12 }, svg("rect", { class: "held", x: 2, y: 2, width: 8, height: 8 })), "support"));
   if (data.body.springs.length) keys.push(element("span", {}, svg("svg", { width: 30, height: 12 }, svg("polyline", { class: "wall", points: "0,6 4,1 10,11 16,1 22,11 26,6 30,6" })), "spring"));
   return keys;

@@ -3,8 +3,22 @@ const PARTS = tangents === 1 ? ["n", "t"] : ["n", "t1", "t2"];
 const PART_COLOURS = ["#1f5fa8", "#d9730d", "#2a9aa0"];
 const nodesOnly = data.body !== null && data.body.triangles === null;
 
+// what the body does, and what its nodes do
+function stance(codes) {
+  const counts = data.statuses.map((name, code) => [name, [...codes].filter((other) => Number(other) === code).length]).filter(([, count]) => count);
+  const has = (name) => counts.some(([other]) => other === name), word = has("stick") ? "held" : counts.every(([name]) => name === "open") ? "free" : "sliding";
+  return p === 1 || word === "free" ? word : `${word} (${counts.map(([name, count]) => `${count} ${name}`).join(", ")})`;
+}
+
+// no two cards have the same title
+function entitle(items) {
+  for (const item of items) item.title = item.statuses ? `${item.name}: ${stance(item.statuses)}` : item.name;
+  const titles = items.map((item) => item.title);
+  items.forEach((item, k) => { if (titles.indexOf(titles[k]) !== titles.lastIndexOf(titles[k])) item.title += `, ${item.words.split(",")[0]}`; });
+}
+
 function card(item, scales) {
-  const made = element("article", { className: "card", id: item.id ?? "" }), heading = element("h3", {}, item.name);
+  const made = element("article", { className: "card", id: item.id ?? "" }), heading = element("h3", {}, item.title);
   made.append(heading, element("p", {}, item.words));
   if (item.colour) {
     const dot = element("span", { className: "dot" });
@@ -97,8 +111,9 @@ function showCards(items, scales) {
   byId("range").textContent = `${first + 1} to ${first + shown.length} of ${items.length}`;
   byId("fewer").disabled = state.page === 0;
   byId("more").disabled = state.page === last;
+  entitle(items);
   const make = () => byId("cards").replaceChildren(...shown.map((item) => card(item, scales)));
-  if (solid) newScenes(items.filter((item) => item.u), scales.force, make);
+  if (solid) newScenes(items.filter((item) => item.u), scales, make);
   else make();
 }
 

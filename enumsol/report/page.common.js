@@ -57,7 +57,8 @@ function svg(name, attributes = {}, ...children) {
 const tip = (text) => { const made = svg("title"); made.textContent = text; return made; };
 
 function marker(name, x, y, size, text) {
-  const look = name === "open" ? { class: "stands stands-open", "stroke-width": size / 6 } : { fill: COLOURS[name], class: "stands", "stroke-width": size / 6 };
+  const place = { "stroke-width": size / 6, style: `transform-origin: ${x}px ${y}px` };
+  const look = name === "open" ? { class: "stands stands-open", ...place } : { fill: COLOURS[name], class: "stands", ...place };
   const h = size, corner = (...points) => svg("polygon", { ...look, points: points.map(([a, b]) => `${x + a * h},${y + b * h}`).join(" ") }, tip(text));
   if (name === "open") return svg("circle", { ...look, cx: x, cy: y, r: 0.85 * h }, tip(text));
   if (name === "stick") return corner([-0.8, -0.8], [0.8, -0.8], [0.8, 0.8], [-0.8, 0.8]);

@@ -11,7 +11,7 @@ const SYMBOLS = {
 const CARDS = solid ? 6 : 12;
 const arcs = new Map(data.arcs.map((arc) => [arc.number, arc]));
 const branches = new Map(data.branches.map((branch) => [branch.number, branch]));
-const state = { quantity: data.quantities[0], node: 0, branch: null, alpha: data.slider[0], page: 0 };
+const state = { quantity: data.quantities[0], node: 0, branch: null, alpha: data.start, page: 0 };
 let plotted = null;
 
 // -- quantities ---------------------------------------------------------------------------------------------------
@@ -241,10 +241,7 @@ function start() {
   lookControls(drawCards);
   repaints.push(drawDiagram);
   drawDiagram();
-  // where most solutions are
-  const most = data.steps.between.reduce((best, n, k) => (n > data.steps.between[best] ? k : best), 0);
-  const { alphas } = data.steps;
-  showAlpha(alphas.length > 1 ? (alphas[most] + alphas[most + 1]) / 2 : data.interval[0]);
+  showAlpha(data.start);
   document.body.dataset.ready = "yes";
 }
 

@@ -62,9 +62,9 @@ def write_report(
     branches, transitions and folds, and what is certified. It says "complete" only where ``graph.complete`` does; of a
     graph that was cut short it says what is missing.
 
-    Bodies can be enlarged in their displacements one by one or all at once, and coloured by displacement. In the plane
-    they can be zoomed, and coloured by stress; load, supports, foundation and contact forces are drawn, the latter with
-    a scale, and the statuses along the boundary in a strip. In 3D they can be turned; contact forces and directions of
+    Bodies can be enlarged in their displacements one by one or all at once, and coloured by displacement or stress.
+    Load, supports, springs and contact forces are drawn, the latter with a scale. In the plane bodies can be zoomed;
+    the foundation is drawn, and the statuses along the boundary in a strip. In 3D they can be turned; directions of
     slip are drawn. Without a mesh there are bars of the forces and displacements of the contact nodes, and in 3D these
     nodes at their coordinates. Pages follow the light or dark setting of the browser and print on A4.
 

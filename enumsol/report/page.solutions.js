@@ -30,6 +30,19 @@ function solutionsAt(alpha) {
   return found;
 }
 
+// whether nothing is missing there, in a graph that has gaps elsewhere
+function isKnown(alpha) {
+  const room = 1e-12 * (data.interval[1] - data.interval[0]);
+  return data.open_ranges.length > 0 && !data.open_ranges.some(([low, high]) => low - room <= alpha && alpha <= high + room);
+}
+
+// how many solutions there are at least; ends of arcs that were not followed further may be one and the same
+function leastAt(alpha, found) {
+  const { alphas, at, between } = data.steps, k = alphas.findIndex((x) => x >= alpha);
+  const apart = found.filter((item) => item.words !== "unsettled").length;
+  return Math.max(apart, k < 0 ? 0 : alphas[k] === alpha ? at[k] : between[k - 1] ?? 0);
+}
+
 function showAlpha(alpha) {
   const last = data.slider.length - 1;
   state.alpha = Math.min(Math.max(alpha, data.interval[0]), data.interval[1]);
@@ -45,8 +58,8 @@ function showAlpha(alpha) {
 function drawCards() {
   const found = solutionsAt(state.alpha), solved = found.filter((item) => item.f);
   const special = data.vertices.some((v) => v.alpha === state.alpha && v.kind !== "end");
-  const number = `${found.length} ${found.length === 1 ? "solution" : "solutions"}`;
-  byId("count").textContent = (data.complete ? number : data.exact_counts ? `${number} found, not proven` : `${number} found; there may be more`)
+  const number = `${found.length} ${found.length === 1 ? "solution" : "solutions"}`, least = leastAt(state.alpha, found);
+  byId("count").textContent = (data.complete || isKnown(state.alpha) ? number : data.exact_counts ? `${number} found, not proven` : `${number} found, at least ${least} ${least === 1 ? "exists" : "exist"}`)
     + ` at alpha = ${short(state.alpha)}` + (special ? ", a critical alpha (rounded)" : "");
   if (data.body) moveBodies(solved);
   const scales = scalesOf(solved, state.alpha), share = Number((100 * data.tolerance).toPrecision(3));
@@ -57,11 +70,17 @@ function drawCards() {
 // -- deformed bodies ----------------------------------------------------------------------------------------------
 
 function moves(f) {
-  const body = data.body, free = body.u0.map((x, i) => x + state.alpha * body.u1[i]), u = [...free];
-  f.forEach((force, k) => { if (force !== 0) body.c[k].forEach((x, i) => { u[i] -= force * x; }); });
+  const body = data.body, free = along([], body.u0, body.u1, body.c), u = along(f, body.u0, body.u1, body.c);
   // of a body at rest, the seven digits of these numbers leave rounding
   const largest = (values) => values.reduce((most, x) => Math.max(most, Math.abs(x)), 0);
   return largest(u) > 5e-7 * largest(free) ? u : u.map(() => 0);
+}
+
+// what is linear in alpha and in the contact forces
+function along(f, constant, slope, columns) {
+  const sum = constant.map((x, i) => x + state.alpha * slope[i]);
+  f.forEach((force, k) => { if (force !== 0) columns[k].forEach((x, i) => { sum[i] -= force * x; }); });
+  return sum;
 }
 
 function nodalForces(f) {
@@ -79,6 +98,7 @@ function moveBodies(solutions) {
   for (const item of solutions) {
     item.u = moves(item.f);
     item.forces = nodalForces(item.f);
+    if (data.body.s0) item.s = along(item.f, data.body.s0, data.body.s1, data.body.s);
   }
   prepare(solutions);
 }

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.model.shapes import body_shape
-from enumsol.report.body import bare_nodes, drawn_body, most_fields, short_list, vectors
+from enumsol.report.body import bare_nodes, drawn_body, most_fields, short_list, surface_stresses, vectors
 from enumsol.report.parts import STATUS_NAMES, status_codes
 
 if TYPE_CHECKING:
@@ -69,10 +69,12 @@ def _pictures(roots: Sequence[Root], scene: Scene | None) -> tuple[dict[str, Any
     count = most_fields(*shape.points[nodes].shape) - 1
     if count < 1:
         return _picture(None, f"The mesh is too large to draw: its boundary alone has {len(nodes):,} nodes"), []
+    stresses = surface_stresses(problem, shape, min(count, len(roots)))
     bodies = [
         {
             "u": short_list(shape.moves(root)[nodes].ravel()),
             "forces": vectors(shape.contact_forces(problem, root.lambda_n, root.lambda_t), nodes),
+            **({} if stresses is None else {"s": short_list(stresses(root.u))}),
         }
         for root in roots[:count]
     ]

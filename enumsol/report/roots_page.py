@@ -21,7 +21,7 @@ from enumsol.report.parts import (
 )
 from enumsol.report.roots_content import roots_content
 from enumsol.roots.root import summary
-from enumsol.support.messages import counted
+from enumsol.support.messages import counted, found_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -77,7 +77,7 @@ def _answers(found: RootSet) -> list[str]:
     elif found.whole:
         lines = [f"{number} found in floating-point arithmetic; nothing is proven."]
     else:
-        lines = [f"{number} found, at least {found.at_least} in all."]
+        lines = [f"{found_of(number, found.at_least)}."]
     total = found.index_sum
     note = "" if found.adds_up else " (not +1: something is missing or wrong)"
     lines.append(f"Sum of the indices: {'unknown' if total is None else f'{total:+d}'}{note}.")

@@ -13,8 +13,10 @@ from enumsol.model.shapes import (
     BodyShape,
     arrow_scale,
     body_shape,
+    first_view,
     largest_length,
     own_scales,
+    row_frames,
     slip_directions,
 )
 from enumsol.model.statuses import ContactStatus
@@ -36,8 +38,12 @@ MARKS = {
     ContactStatus.SLIP_MINUS: ("v", "#2a8a4a"),
     ContactStatus.SLIP: ("D", "#c23b4b"),
 }
-_FORCE, _SLIP, _BODY, _EDGE, _BEFORE = "#b3202c", "#6a3d9a", "#dfe6ee", "#8796a8", "#dcdcdc"
+_FORCE, _SLIP, _BODY, _EDGE, _BEFORE = "#b3202c", "#0a7d7a", "#dfe6ee", "#8796a8", "#dcdcdc"
 _BEFORE_IN_SPACE, _BEFORE_LINE = "#5b6672", {"linewidths": 0.8, "linestyles": "dashed"}
+#: Length of an arrow along a slip on the contact surface, whatever the slip, as a part of its size.
+_LONG = 0.15
+#: Points between a title and what is below it, by dimension: seen from below, axes of a solid stand on top.
+_PAD = {2: 6.0, 3: 18.0}
 #: Bodies side by side, and how many are drawn at most.
 _ACROSS, MOST_BODIES = 3, 12
 
@@ -55,7 +61,11 @@ def draw_body(
     elif shape.points.shape[1] == 3 and not hasattr(ax, "set_zlim"):
         raise InvalidArgumentError("ax is plane and the body is not; expected Axes with projection '3d', or None")
     _draw(ax, root, problem, shape, factor, arrows)
-    ax.set_title(f"alpha = {float(root.alpha):g}, {_index(root)}; {_scale_words(factor)}", fontsize=9)
+    ax.set_title(
+        f"alpha = {float(root.alpha):g}, {_index(root)}; {_scale_words(factor)}",
+        fontsize=9,
+        pad=_PAD[shape.points.shape[1]],
+    )
     _name_axes(ax, shape.points.shape[1], units)
     _legend(ax, [root], _strongest([root], problem, shape), units)
     return figure_of(ax)
@@ -77,7 +87,7 @@ def draw_bodies(roots: Sequence[Any], scale: float | None = None, units: tuple[s
         ax = _axes(figure, (rows, across, k + 1), shape)
         _draw(ax, root, problem, shape, factor, arrows)
         own = "" if one_scale else f"; {_scale_words(factor)}"
-        ax.set_title(f"root {k}: {_index(root)}{own}", fontsize=9)
+        ax.set_title(f"root {k}: {_index(root)}{own}", fontsize=9, pad=_PAD[shape.points.shape[1]])
         _name_axes(ax, shape.points.shape[1], units)
     if shape.points.shape[1] == 3:
         _same_view(figure.axes)
@@ -133,8 +143,10 @@ def _draw(ax: Any, root: Any, problem: Any, shape: BodyShape, scale: float, arro
         ax.margins(0.08)
     else:
         _solid(ax, shape, points)
+        x, y, z = first_view(row_frames(problem)[:, 0])
+        ax.view_init(elev=np.degrees(np.arcsin(z)), azim=np.degrees(np.arctan2(y, x)))
         if len(pressed):
-            options = {"arrow_length_ratio": 0.25, "zorder": 4}
+            options = {"linewidth": 1.8, "arrow_length_ratio": 0.3, "zorder": 4}
             ax.quiver(*(points - forces)[pressed].T, *forces[pressed].T, color=_FORCE, **options)
         slides, ways = slip_directions(problem, root)
         if len(slides):
@@ -212,18 +224,11 @@ def _legend(place: Any, roots: Sequence[Any], strongest: float, units: tuple[str
     place.legend(handles=handles, fontsize=8, frameon=False, **where)
 
 
-_MARKS = {
-    ContactStatus.OPEN: ("o", "none"),
-    ContactStatus.STICK: ("s", "tab:blue"),
-    ContactStatus.SLIP: ("o", "tab:red"),
-}
-
-
 def draw_root(root: Any, problem: ContactProblem3D, ax: Any, units: tuple[str, str] | None = None) -> Any:
     """See Root.plot."""
     if axes_or_none(ax) is not None or problem.mesh is None:
         return draw_slips(root, problem, ax, units)
-    figure = new_figure(figsize=(11.0, 5.0))
+    figure = new_figure(figsize=(12.5, 5.0))
     draw_body(root, problem, figure.add_subplot(121, projection="3d"), units=units)
     draw_slips(root, problem, figure.add_subplot(122), units)
     return figure
@@ -239,22 +244,26 @@ def draw_slips(root: Any, problem: ContactProblem3D, ax: Any, units: tuple[str, 
     moves = np.einsum("pk,pkc->pc", root.u_t, _tangents(problem, shown))[:, shown]
     if axes_or_none(ax) is None:
         ax = new_figure(figsize=(6.4, 5.0)).subplots()
-    for status, (marker, face) in _MARKS.items():
+    for status, (marker, face) in MARKS.items():
         at = places[[found is status for found in root.statuses]][:, shown]
         if len(at):
             ax.plot(*at.T, marker, mec="black", mfc=face, label=f"{status.value} ({len(at)})")
     size = np.linalg.norm(moves, axis=1)
     slides = np.array([found is ContactStatus.SLIP for found in root.statuses]) & (size > 0)
     if np.any(slides):
-        d = moves[slides] / size[slides, None]
-        colours = {"cmap": "viridis", "clim": (0.0, np.max(size[slides]))}  # equal slips in the same colour
-        ax.quiver(*places[slides][:, shown].T, *d.T, size[slides], angles="xy", width=0.005, **colours)
+        begin, d = places[slides][:, shown], moves[slides] / size[slides, None]
+        length = _LONG * float(np.max(np.ptp(places, axis=0))) or 1.0
+        options = {"angles": "xy", "scale_units": "xy", "scale": 1 / length, "width": 0.009, "zorder": 4}
+        low, high = np.min(size[slides]), np.max(size[slides])
+        said = f"{low:.3g}" if np.isclose(low, high) else f"{low:.3g} to {high:.3g}"
+        ax.quiver(*begin.T, *d.T, color=_SLIP, label=f"direction of slip ({said})", **options)
+        ax.update_datalim(begin + length * d)
     ax.set_aspect("equal", adjustable="box")
     ax.margins(0.15)
     ax.set_xlabel(in_units("xyz"[shown[0]], "length", units))
     ax.set_ylabel(in_units("xyz"[shown[1]], "length", units))
     ax.set_title(f"directions of slip at alpha = {float(root.alpha):g}, index {root.index:+d}")
-    ax.legend()
+    ax.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), fontsize=8, frameon=False)
     return figure_of(ax)
 
 

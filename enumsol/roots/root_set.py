@@ -14,7 +14,7 @@ from enumsol.roots.far import far_notes
 from enumsol.roots.root import Enclosure, Root, RootFamily, summary
 from enumsol.support.arguments import positive_number, shown
 from enumsol.support.immutable import Immutable, Listed, Sealed
-from enumsol.support.messages import counted, html_lines, html_table
+from enumsol.support.messages import counted, found_of, html_lines, html_table
 from enumsol.support.plotting import checked_units, kept
 
 if TYPE_CHECKING:
@@ -437,8 +437,7 @@ class RootSet(Sequence[Root], Immutable):
         if self.families:
             heading += f", {counted(len(self.families), 'family', 'families')}"
         if not self.whole:
-            # of nothing, zero is no bound
-            heading += f" found, at least {self.at_least} in all" if self.at_least else " found"
+            heading = found_of(heading, self.at_least)
         return f"{heading} ({self.arithmetic}, {self.method})"
 
     def _rows(self) -> list[tuple[str, str, str, str, str, str]]:

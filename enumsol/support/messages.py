@@ -32,6 +32,12 @@ def counted(number: int, singular: str, plural: str | None = None) -> str:
     return f"{number} {singular if number == 1 else plural or singular + 's'}"
 
 
+def found_of(found: str, least: int) -> str:
+    """What an incomplete search found beside the number that is proven to exist: "2 roots found, at least 3 exist"."""
+    bound = f", at least {least} {'exists' if least == 1 else 'exist'}" if least else ""  # zero is no bound
+    return f"{found} found{bound}"
+
+
 def listed(names: Iterable[object], suffix: str = "") -> str:
     """Names in a sentence, as in "a, b and c"; of many the first ones."""
     texts = [f"{name}{suffix}" for name in names]

@@ -125,7 +125,7 @@ def pulled(ny: int) -> enumsol.ContactProblem:
 
 def jamming(run: Run) -> None:
     history = enumsol.histories(pulled(2 if run.smoke else 4), PULLS)
-    figure = new_figure(figsize=(10.0, 4.2))
+    figure = new_figure(figsize=(13.0, 4.2))
     one, two = figure.subplots(1, 2)
     history.plot("displacement", "alpha", ax=one)
     one.set_ylabel("pull")

@@ -131,12 +131,12 @@ def test_roots_of_an_incomplete_graph_are_a_part(cut):
     assert roots.index_sum is None
     assert roots.at_least == len(roots) == len(cut.arcs)
     assert ("at least" in repr(roots)) == bool(cut.arcs)  # of nothing, zero is no bound
-    assert not cut.arcs or f"at least {len(cut.arcs)} in all" in repr(roots)
+    assert not cut.arcs or f"at least {len(cut.arcs)} exist" in repr(roots)
 
 
 def test_a_search_cut_short_gives_lower_bounds_in_text_and_table(capsys):
     out = printed(capsys, "roots", "gallery:wedge-14-5", "--alpha", 2.2, "--stop-after", 2, status=3)
-    assert "2 roots found, at least 2 in all" in out
+    assert "2 roots found, at least 2 exist" in out
     assert "index sum: unknown" in out
     out = printed(capsys, "table", "gallery:wedge-14-5", "--alphas", 2.2, "--max-nodes", 150, status=3)
     row = out.splitlines()[1].split()

@@ -250,6 +250,18 @@ def test_a_scene_as_a_picture(mesh, more, tmp_path):
     assert (tmp_path / "scene.png").stat().st_size > 5000
 
 
+def test_a_load_on_many_nodes_is_drawn_by_twelve_arrows():
+    acting = {"contact": "bottom", "clamp": "right", "load": {"top": (0.1, -0.3)}, "friction": 0.3}
+    scene = fem.mesh_scene(fem.rectangle(60, 5).parted(), young=1, poisson=0.3, **acting)
+    figure = scene.plot()
+    (arrows,) = [part for part in figure.axes[0].collections if "loads" in str(part.get_label())]
+    assert arrows.get_label() == "loads, summed over nodes side by side"
+    assert len(arrows.U) == 12
+    # by the scale of the longest, their sum is that of the loads
+    total = np.array([arrows.U.sum(), arrows.V.sum()])
+    np.testing.assert_allclose(total / np.linalg.norm(total), np.array([1, -3]) / np.sqrt(10), rtol=1e-6)
+
+
 def test_options_that_do_not_exist():
     message = "there is no option 'contacts'; did you mean contact"
     refusal(EnumsolError, message, fem.mesh_scene, one(), **GOOD, contacts="bottom")

@@ -145,7 +145,7 @@ def false_claims_of_roots(roots, graph_or_roots, alpha=None):
             yield f"a root {root.statuses} that the complete search does not have"
     text = repr(roots)
     if not roots.whole:
-        bound = f"found, at least {roots.at_least} in all" if roots.at_least else "found ("
+        bound = f"found, at least {roots.at_least} exist" if roots.at_least else "found ("
         if "index sum: unknown" not in text or bound not in text.splitlines()[0] or "complete: no" not in text:
             yield text
     elif f"{total}" not in text and total:

@@ -369,6 +369,27 @@ def test_damaged_files_are_refused(tmp_path, out_again, pulled_wedge):
     bad_argument("cannot be read", History.load, tmp_path / "none.json", pulled_wedge)
 
 
+def test_figures_have_titles_legends_and_names_that_do_not_overlap(out_again, pulled_wedge):
+    for x, y in (("displacement", "alpha"), ("step", "dissipated"), ("step", "lambda_n"), ("displacement", "lambda_t")):
+        figure = out_again.plot(x, y)
+        (ax,) = figure.axes
+        title = ax.get_title().lower()
+        assert all(label in title.replace("\n", " ") for label in (ax.get_xlabel(), ax.get_ylabel()))
+        assert "complete: yes" in title
+        words = [text.get_text() for text in ax.get_legend().get_texts()]
+        assert words[-1] == "several histories"
+        assert "4.4: 4 stick" in words
+        figure.draw_without_rendering()
+        boxes = [text.get_window_extent() for text in ax.texts]
+        assert len(boxes) >= 2
+        assert not any(one.overlaps(other) for k, one in enumerate(boxes) for other in boxes[:k])
+        assert all(ax.bbox.x0 <= box.x0 and box.x1 <= ax.bbox.x1 for box in boxes)
+        assert ax.get_legend().get_window_extent().x0 > ax.bbox.x1
+        assert x != "step" or all(tick == int(tick) for tick in ax.get_xticks())
+    left = histories(pulled_wedge, [-1, 0, 0.5, 1], follow="nearest").plot()
+    assert "not followed" in [text.get_text() for text in left.axes[0].get_legend().get_texts()]
+
+
 def test_every_history_is_a_line(out_again, tmp_path):
     figure = out_again.plot(file=tmp_path / "h.png")
     assert (tmp_path / "h.png").stat().st_size > 10_000

@@ -1,5 +1,7 @@
 """The page of a report in a headless browser: nothing complains, pointing, clicking and sliding work, it fits."""
 
+import re
+
 import pytest
 from browser import Browser, find_browser
 
@@ -78,6 +80,25 @@ def test_the_slider_shows_as_many_solutions_as_there_are(browser, pages, graphs)
     assert browser.evaluate("state.alpha") == fold
     assert cards(browser) == 2  # the free wedge, and the fold
     assert browser.complaints() == []
+
+
+def test_it_opens_where_most_solutions_are(browser, pages, graphs):
+    browser.show(pages["wedge"])
+    alpha = browser.evaluate("state.alpha")
+    assert graphs["wedge"].multiplicity_at(alpha) == 5
+    # they begin at 1.7278, and there are five up to 3
+    assert alpha == pytest.approx((graphs["wedge"].folds[-1].alpha + 3) / 2)
+    assert browser.evaluate("document.querySelector('.answers li').textContent").startswith(
+        "five solutions for alpha between 1.7278 and 3, three between 1.5217 and 1.7278, one elsewhere"
+    )
+    titles = browser.evaluate("[...document.querySelectorAll('.card h3')].map((h) => h.childNodes[1].textContent)")
+    assert len(set(titles)) == 5
+    assert titles[:2] == ["branch 0: free", "branch 1: held (11 open, 1 stick, 2 slip+)"]
+    assert titles[2].startswith("branch 1: sliding (")
+    # cards that would have the same title are told apart by their arcs
+    items = "[1, 2].map((k) => ({ name: 'b', words: `arc ${k}, x`, statuses: '0'.repeat(p) }))"
+    browser.evaluate(f"window.items = {items}; entitle(items)")
+    assert browser.evaluate("items.map((item) => item.title)") == ["b: free, arc 1", "b: free, arc 2"]
 
 
 def test_arrows_and_marks_are_those_of_the_roots(browser, pages, graphs):
@@ -166,11 +187,14 @@ def test_more_solutions_than_fit_are_on_further_pages(browser, pages):
 
 
 @pytest.mark.slow
-def test_a_graph_cut_short_never_counts_as_complete(browser, pages):
+def test_a_graph_cut_short_never_counts_as_complete(browser, pages, graphs):
     browser.show(pages["cut"])
     for position in range(0, browser.evaluate("data.slider.length"), 20):
         slide_to(browser, position)
-        assert "there may be more" in browser.evaluate("byId('count').textContent")
+        said = browser.evaluate("byId('count').textContent")
+        found, least = map(int, re.match(r"(\d+) solutions? found, at least (\d+) exists? at", said).groups())
+        assert found == cards(browser)
+        assert 1 <= least == max(found, graphs["cut"].at_least(browser.evaluate("state.alpha")))
     text = browser.evaluate("document.body.innerText")
     assert "complete: yes" not in text
     assert "at least" in browser.evaluate("byId('diagram').textContent")

@@ -15,6 +15,7 @@ from refusals import bad_argument, refusal
 
 import enumsol
 from enumsol import MissingDependencyError, branch_graph, enumerate_roots, fem, gallery, histories, write_report
+from enumsol.model.cells import boundary_facets
 from enumsol.model.shapes import body_shape
 from enumsol.report import body as bodies, content, history_page
 from enumsol.report.body import body_record
@@ -337,6 +338,54 @@ def test_supports_along_slopes_and_many_loads():
     assert (x, y, fx, slope) == (pytest.approx(0.5, abs=0.05), pytest.approx(0.5, abs=0.05), 0, [0, 0])
     assert fy == pytest.approx(-2, rel=0.05)  # without what the clamp takes
     assert [way for _, *way in body["held"]] == [[0, 0]] * 13
+
+
+def test_many_springs_loads_and_supports_have_about_twelve_signs_a_side():
+    sides = {"contact": "bottom", "clamp": "right", "spring": {"left": (2.0, 1.0)}, "load": {"top": (0.1, -0.3)}}
+    scene = fem.mesh_scene(fem.rectangle(60, 40, 1.5, 1.0).parted(), young=1, poisson=0.3, friction=0.3, **sides)
+    problem = scene.problem()
+    body, _ = body_record(problem, scene)
+    points, load = np.array(body["points"]), np.array(body["load"])
+    for places, along in (
+        (points[[k for k, _, _ in body["held"]]], 1), (points[body["springs"]], 1), (load[:, :2], 0)
+    ):  # fmt: skip
+        spots = np.sort(places[:, along])
+        assert len(spots) == 12
+        assert np.ptp(spots) > 0.97 * (1.5, 1.0)[along] - 0.05  # the corner in contact is no support
+        gaps = np.diff(spots)
+        assert gaps.max() < 1.5 * gaps.min()
+    # nothing of the load is lost
+    total = (problem.mesh.motion @ problem.f).reshape(-1, 2).sum(axis=0)
+    np.testing.assert_allclose(load[:, 2:4].sum(axis=0), total, rtol=1e-6)
+    assert body["summed"]
+
+
+def test_stresses_of_a_solid_follow_the_contact_forces():
+    problem = gallery.get("wedge3d-2-3").build()
+    body, _ = body_record(problem)
+    root = enumerate_roots(problem, 1)[0]
+    forces = np.concatenate([root.lambda_n, root.lambda_t.ravel(order="F")])
+    # root.u solves with these forces at alpha = 1
+    found = np.array(body["s0"]) + np.array(body["s1"]) - forces @ np.array(body["s"])
+    sigma = fem.cell_stresses(problem, root.u)
+    six = sigma[:, [0, 1, 2, 1, 2, 0], [0, 1, 2, 2, 0, 1]]
+    away = np.linalg.norm(found.reshape(-1, 6)[:, None] - six, axis=2).min(axis=1)
+    assert away.max() < 1e-5 * np.abs(six).max()
+    assert len(found) == 6 * len(boundary_facets(3, problem.mesh.cells))
+
+
+def test_loads_and_supports_of_a_solid_are_told():
+    problem = gallery.get("block3d-9").build()
+    body, _ = body_record(problem)
+    forces = (problem.mesh.motion @ problem.f).reshape(-1, 3)
+    load = np.array(body["load"])
+    np.testing.assert_allclose(load[:, 3:6].sum(axis=0), forces.sum(axis=0), rtol=1e-6)
+    still = ~np.any(problem.mesh.motion.toarray().reshape(len(forces), -1), axis=1)
+    places = np.array(body["points"])[[k for k, *_ in body["held"]]]
+    assert 0 < len(places) <= 12
+    assert all(np.any(np.all(np.isclose(problem.mesh.points[still], place), axis=1)) for place in places)
+    # contact is below, and that is where it is first seen from
+    assert body["view"][2] < -0.3
 
 
 def test_commands_tell_what_a_toml_file_gave(tmp_path, capsys, monkeypatch):

@@ -152,6 +152,78 @@ def test_pictures_are_zoomed_by_buttons_keys_and_a_larger_card(browser, page):
     assert browser.evaluate(width) > 1.8 * before
 
 
+def test_a_button_zooms_to_the_contact_and_back(browser, page):
+    show(browser, page)
+    number = browser.evaluate(
+        "data.roots.findIndex((item) => [...item.statuses].filter((code) => code !== '0').length === 2)"
+    )
+    card = f"{CARDS}[{number}]"
+    box = f"{card}.querySelector('svg.body').getAttribute('viewBox').split(' ').map(Number)"
+    mark = f"{card}.querySelector('polygon.stands').getBoundingClientRect().width"
+    whole, size = browser.evaluate(box), browser.evaluate(mark)
+    browser.evaluate(f"views.clear(); {card}.querySelector('[aria-label=\"zoom in\"]').click(); 1")
+    browser.evaluate(f"{card}.querySelector('[aria-label=\"zoom to the contact, and back\"]').click()")
+    x, y, width, height = browser.evaluate(box)
+    assert (width < 0.999 * whole[2]) == (height < 0.999 * whole[3])
+    places = browser.evaluate(
+        f"[...{card}.querySelectorAll('polygon.stands')].map((e) => e.style.transformOrigin.split(' ').map(parseFloat))"
+    )
+    assert len(places) == 2
+    assert all(x < a < x + width and y < b < y + height for a, b in places)
+    # marks keep about their size on the screen
+    assert browser.evaluate(mark) < 1.3 * size
+    browser.evaluate(f"{card}.querySelector('[aria-label=\"zoom to the contact, and back\"]').click()")
+    assert browser.evaluate(box) == pytest.approx(whole)
+
+
+@pytest.fixture(scope="module")
+def fine(tmp_path_factory):
+    acting = {"contact": "bottom", "spring": {"left": (5, 5)}, "load": {"top": (0.1, -0.3)}, "friction": 0.4}
+    scene = fem.mesh_scene(grid(60, 40, 4, 1.5), young=7, poisson=0.3, **acting)
+    path = tmp_path_factory.mktemp("pages") / "fine.html"
+    write_report(enumerate_roots(scene.problem(), 0), path, scene=scene)
+    return path
+
+
+def test_lines_of_a_fine_mesh_are_thin_or_gone(browser, fine):
+    width = "getComputedStyle(document.querySelector('path.after')).strokeWidth"
+    line = "getComputedStyle(document.querySelector('path.after')).stroke"
+    show(browser, fine, 1280)
+    cell = browser.evaluate("document.querySelector('path.rim').getBoundingClientRect().width") / 60
+    assert cell > 5
+    assert float(browser.evaluate(width).removesuffix("px")) == pytest.approx(cell / 16, rel=0.1)
+    show(browser, fine, 320)
+    assert browser.evaluate(line) == "none"
+    assert browser.evaluate("getComputedStyle(document.querySelector('path.rim')).stroke") != "none"
+    # seen from near they are there again
+    for _ in range(3):
+        browser.evaluate("document.querySelector('[aria-label=\"zoom in\"]').click()")
+    assert browser.evaluate(line) != "none"
+    # about twelve signs of 41 springs and 61 loads
+    assert browser.evaluate("document.querySelectorAll('svg.body polyline.wall').length") == 12
+    assert browser.evaluate("document.querySelectorAll('svg.body polygon.load').length") == 12
+    assert "load (each arrow is a sum over nodes near it)" in browser.evaluate("byId('marks').textContent")
+
+
+def test_a_body_drawn_by_its_boundary_keeps_its_lines(browser, tmp_path, monkeypatch):
+    monkeypatch.setattr("enumsol.report.body._MOST_NUMBERS", 600)
+    acting = {"contact": "bottom", "clamp": "left", "load": {"top": (0.1, -0.3)}, "friction": 0.4}
+    write_report(
+        enumerate_roots(fem.mesh_problem(grid(20, 10, 4), young=7, poisson=0.3, **acting), 0), tmp_path / "p.html"
+    )
+    show(browser, tmp_path / "p.html", 320)
+    assert browser.evaluate("data.body.cells") is None
+    assert browser.evaluate("getComputedStyle(document.querySelector('path.after')).stroke") != "none"
+    assert browser.evaluate("document.querySelectorAll('svg.body line.load').length") == 12
+    assert browser.complaints() == []
+
+
+def test_three_cards_stand_side_by_side_on_a_wide_screen(browser, page):
+    show(browser, page, 1600)
+    tops = browser.evaluate(f"{CARDS}.map((c) => c.getBoundingClientRect().top)")
+    assert [tops.count(top) for top in sorted(set(tops))] == [3, 2]
+
+
 def test_strips_and_words_for_screen_readers(browser, page):
     roots = enumerate_roots(gallery.get("wedge-14-5").build(), 2.2)
     show(browser, page)

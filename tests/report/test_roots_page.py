@@ -14,6 +14,7 @@ from refusals import bad_argument, refusal
 
 import enumsol
 from enumsol import MissingDependencyError, enumerate_roots, fem, gallery, write_report
+from enumsol.fem.bases import von_mises
 from enumsol.model.shapes import body_shape, slip_directions
 from enumsol.report import body, roots_content
 
@@ -123,7 +124,7 @@ def test_a_result_that_is_not_complete_says_so(found, pages):
     assert not re.search("complete: yes|It is proven", text)
     for said in (
         "This result is not complete. Every root shown is a solution, but there may be more.",
-        f"at least {found['cut'].at_least} in all",
+        f"at least {found['cut'].at_least} exist",
         "the search was stopped before it got here",
         "Nothing is claimed about solutions that are not listed",
     ):
@@ -257,14 +258,17 @@ def check_scenes(browser, roots):
     """Arrows and marks are those of the roots, and bodies are turned together."""
     traces = "scenes.map((s) => s.data.filter((t) => {0}).map((t) => [t.name, t.x.length]))"
     cones = browser.evaluate(traces.replace("{0}", "t.type === 'cone'"))
-    marks = browser.evaluate(traces.replace("{0}", "t.mode === 'markers'"))
+    marks = browser.evaluate(traces.replace("{0}", "t.mode === 'markers' && data.statuses.includes(t.name)"))
     shape = body_shape(roots[0].problem)
     for root, arrows, marked in zip(roots, cones, marks, strict=True):
         names = [status.value for status in root.statuses]
         forces = shape.contact_forces(root.problem, root.lambda_n, root.lambda_t)
-        expected = [int(np.sum(np.any(forces != 0, axis=1))), names.count("slip")]
-        assert [count for _, count in arrows] == [count for count in expected if count]
+        expected = {"force": int(np.sum(np.any(forces != 0, axis=1))), "way of slip": names.count("slip")}
+        expected |= {"load": int(np.sum(np.any((shape.motion @ root.problem.f).reshape(-1, 3), axis=1))), "scale": 1}
+        assert dict(arrows) == {name: count for name, count in expected.items() if count}
         assert dict(marked) == {name: names.count(name) for name in set(names)}
+    check_first_view(browser, roots)
+    check_colours(browser, roots)
     places = {"eye": (-1.5, 0.5, 1.0), "center": (0, 0, 0), "up": (0, 0, 1)}
     camera = {name: dict(zip("xyz", place, strict=True)) for name, place in places.items()}
     browser.evaluate(f"Plotly.relayout(scenes[1], {{'scene.camera': {json.dumps(camera)}}}).then(() => 1)")
@@ -272,11 +276,63 @@ def check_scenes(browser, roots):
     assert browser.evaluate("scenes.map((s) => s._fullLayout.scene.camera.eye.x)") == [-1.5] * len(roots)
 
 
+def check_colours(browser, roots):
+    """Stresses on the surface are those of the cells of finite elements."""
+    choices = "[...document.querySelectorAll('#looks select')[1].options].map((o) => o.value)"
+    assert browser.evaluate(choices) == ["none", "moved", "mises", "pressure"]
+    sigma = fem.cell_stresses(roots[0].problem, roots[0].u)
+    for kind, own in (("mises", von_mises(sigma)), ("pressure", np.trace(sigma, axis1=1, axis2=2) / 3)):
+        found = np.array(browser.evaluate(f"surfaceStress(data.roots[0].s, '{kind}')"))
+        largest = np.max(np.abs(own))
+        # of every facet one cell, and every cell of this wedge has a facet on the surface
+        assert np.max(np.min(np.abs(found[:, None] - own), axis=1)) < 1e-5 * largest
+        assert np.max(np.min(np.abs(found[:, None] - own), axis=0)) < 1e-5 * largest
+        browser.evaluate(
+            f"{{const s = document.querySelectorAll('#looks select')[1]; s.value = '{kind}';"
+            "s.dispatchEvent(new Event('change')); 1}"
+        )
+        trace = "scenes[0].data.find((t) => t.type === 'mesh3d')"
+        assert browser.evaluate(f"[{trace}.intensitymode, {trace}.intensity.length]") == [
+            "cell", browser.evaluate("data.body.triangles[0].length")
+        ]  # fmt: skip
+        assert browser.evaluate(f"{trace}.cmax") == pytest.approx(np.max(np.abs(found)))
+        # the free body has no stress but rounding
+        free = next(k for k, root in enumerate(roots) if not root.lambda_n.any())
+        trace = f"scenes[{free}].data.find((t) => t.type === 'mesh3d')"
+        assert browser.evaluate(f"[{trace}.showscale, Math.max(...{trace}.intensity)]") == [False, 0]
+
+
+def check_first_view(browser, roots):
+    """Bodies fill their pictures, one flank is looked at, and the scale is as long as it says."""
+    camera = browser.evaluate("scenes[0]._fullLayout.scene.camera")
+    eye, centre = (np.array([camera[name][axis] for axis in "xyz"]) for name in ("eye", "center"))
+    assert camera["projection"]["type"] == "orthographic"
+    way = (eye - centre) / np.linalg.norm(eye - centre)
+    normals = roots[0].problem.mesh.directions(roots[0].problem.Bn)
+    assert np.max(normals @ way / np.linalg.norm(normals, axis=1)) > 0.5
+    # the picture is two units high, and as wide as its proportions say
+    ratio = np.array([browser.evaluate(f"scenes[0]._fullLayout.scene.aspectratio.{axis}") for axis in "xyz"])
+    low, high = np.array(browser.evaluate("ranges")).T
+    points = np.array(browser.evaluate("[data.body.points, ...data.roots.map(displaced)].flat()"))
+    at = ratio * ((points - low) / (high - low) - 0.5) - centre
+    right = np.array([-way[1], way[0], 0]) / np.hypot(*way[:2])
+    across, up = np.ptp(at @ right) / 2, np.ptp(at @ np.cross(way, right)) / 2
+    wide, tall = browser.evaluate("[scenes[0].clientWidth, scenes[0].clientHeight]")
+    assert 0.7 < max(across / (wide / tall), up) <= 0.95
+    step, tail, tip = browser.evaluate("[scaled.step, scaled.tail, scaled.tip]")
+    force = browser.evaluate("compared.force")
+    assert 0.4 * force < step <= force
+    size = browser.evaluate("data.body.size")
+    assert np.linalg.norm(np.subtract(tip, tail)) == pytest.approx(0.16 * size * step / force)
+    words = "scenes[0].data.filter((t) => t.mode === 'text').map((t) => t.text[0].trim())"
+    assert browser.evaluate(words) == [browser.evaluate("short(scaled.step)") + " N"]
+
+
 @pytest.mark.slow
 @in_a_browser
 def test_many_roots_are_on_several_pages(browser, pages, found):
     browser.show(pages["many"])
-    shown = "[...document.querySelectorAll('#cards h3')].map((h) => h.firstChild.textContent)"
+    shown = "[...document.querySelectorAll('#cards h3')].map((h) => h.firstChild.textContent.split(':')[0])"
     assert browser.evaluate(shown) == [f"Root {k}" for k in range(6)]
     browser.evaluate("byId('more').click()")
     assert browser.evaluate(shown) == ["Root 6", "Root 7", "Root 8"]

@@ -189,7 +189,7 @@ def test_a_graph_without_arcs_says_that_none_was_found(browser, folder):
     assert text.count("None was found.") == 2
     assert "no status changes" not in text
     browser.show(folder / "none.html", 1000, 500)
-    assert browser.evaluate("byId('count').textContent") == "0 solutions found; there may be more at alpha = 0.25"
+    assert browser.evaluate("byId('count').textContent") == "0 solutions found, at least 1 exists at alpha = 0.25"
     assert browser.complaints() == []
 
 

@@ -318,7 +318,20 @@ def test_arrows_point_along_the_slips():
     np.testing.assert_allclose(np.stack([arrows.U, arrows.V], axis=1), expected, atol=1e-12)
     np.testing.assert_allclose(arrows.XY, problem.coordinates[slides][:, :2])
     assert sum(len(line.get_xdata()) for line in ax.lines) == problem.p
-    assert {text.get_text() for text in ax.get_legend().get_texts()} == {"open (1)", "stick (4)", "slip (4)"}
+    *entries, ways = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert entries == ["open (1)", "stick (4)", "slip (4)"]
+    low, high = map(float, re.fullmatch(r"direction of slip \((.*) to (.*)\)", ways).groups())
+    slips = np.linalg.norm(root.u_t[slides], axis=1)
+    assert (low, high) == (pytest.approx(slips.min(), rel=5e-3), pytest.approx(slips.max(), rel=5e-3))
+    # arrows are long enough to be seen, nothing of them is cut off, and the legend hides none
+    length = np.hypot(arrows.U, arrows.V) / arrows.scale
+    np.testing.assert_allclose(length, 0.15 * np.ptp(problem.coordinates, axis=0).max())
+    ends = arrows.XY + np.stack([arrows.U, arrows.V], axis=1) / arrows.scale
+    ax.figure.draw_without_rendering()
+    assert np.all(ax.bbox.count_contains(ax.transData.transform(ends)) == len(ends))
+    assert ax.get_legend().get_window_extent().x0 >= ax.bbox.x1
+    # contact is below, and that is where the body is seen from
+    assert body.elev < -15
 
 
 def test_without_a_mesh_the_local_axes_are_drawn():

@@ -235,7 +235,7 @@ def undecided_and_perturbed(problem):
     """Reasons of a problem's regions, and whether the problem with a load that is a little different is complete."""
     roots = enumerate_roots(problem, 0, max_nodes=400)
     assert not roots.complete
-    assert "at least 1 in all" in repr(roots)
+    assert "at least 1 exists" in repr(roots)
     change = 1e-4 * np.max(np.abs(problem.f)) * np.random.default_rng(5).normal(size=problem.n)
     near = enumerate_roots(dataclasses.replace(problem, f=problem.f + change), 0, max_nodes=400)
     return {(region.reason, region.hint) for region in roots.undecided}, near.complete
