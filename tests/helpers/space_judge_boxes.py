@@ -1,0 +1,291 @@
+"""Boxes that hold one solution in 3D, or one curve of them over alpha, for space_judge, in balls of many digits.
+
+The solutions are the zeros of y - P(y + rho w) (docs/theory.md, (12.10) and (12.16)); P takes lambda_n to max(lambda_n,
+0) and tau to the disc. Two zeros in a set differ by a vector in the kernel of some mean derivative there: where all of
+these are regular there is one at most. A zero is shown to exist in a narrow set around the one that Newton's method
+finds. Boxes are those of zeta = y - steps w (docs/proof_format.md, sections 7.5 and 7.8).
+"""
+
+from flint import arb, arb_mat
+from space_judge_data import Undecided, column, length_of
+from space_judge_leaves import Singular, solve
+
+_NEWTON = 60
+_POWERS = 40
+
+
+def product(rows, x):
+    return (arb_mat(rows) * column(x)).entries() if rows else []
+
+
+def size_of(values):
+    """Absolute values, upwards."""
+    return [abs(value).upper() for value in values]
+
+
+def reach(rows, radii):
+    """Bounds of the products of a matrix with all vectors within radii."""
+    return [sum((abs(a).upper() * r for a, r in zip(row, radii, strict=True)), arb(0)).upper() for row in rows]
+
+
+class NaturalMap:
+    """y - P(z), z = y + k steps w, and its derivatives; x = (zeta, alpha), or zeta where alpha is fixed.
+
+    nodes are (place of lambda_n, places of tau) and discs the two numbers of their radii, which are affine in alpha.
+    """
+
+    def __init__(self, S, g0, g1, nodes, discs, steps, alpha=None):
+        self.S, self.g0, self.g1, self.nodes, self.discs, self.steps = S, g0, g1, nodes, discs, steps
+        self.m, self.alpha, self.size = len(g0), alpha, len(g0) + (alpha is None)
+        m, table = self.m, S.tolist()
+        scaled = arb_mat([[steps[i] * table[i][j] + int(i == j) for j in range(m)] for i in range(m)])
+        self.T = scaled.inv()
+        self.drift = (self.T * column([a * b for a, b in zip(steps, g1, strict=True)])).entries()
+        self.Y = [[*row, self.drift[i]][: self.size] for i, row in enumerate(self.T.tolist())]
+        self.k = [arb(1)] * m
+        self.G = []
+
+    def alpha_of(self, x):
+        return x[-1] if self.alpha is None else self.alpha
+
+    def place_of(self, y, alpha):
+        """zeta."""
+        w = self.moves(y, alpha)
+        return [a - s * b for a, s, b in zip(y, self.steps, w, strict=True)]
+
+    def moves(self, y, alpha):
+        g = [a + alpha * b for a, b in zip(self.g0, self.g1, strict=True)]
+        return (column(g) - self.S * column(y)).entries()
+
+    def forces(self, x):
+        alpha = self.alpha_of(x)
+        load = [z + s * (a + alpha * b) for z, s, a, b in zip(x, self.steps, self.g0, self.g1, strict=False)]
+        return (self.T * column(load)).entries()
+
+    def argument(self, y, zeta):
+        """z."""
+        return [(1 + k) * a - k * b for k, a, b in zip(self.k, y, zeta, strict=False)]
+
+    @property
+    def Z(self):
+        """Derivatives of (z, alpha) by x."""
+        rows = [[(1 + k) * a for a in row] for k, row in zip(self.k, self.Y, strict=True)]
+        for i, k in enumerate(self.k):
+            rows[i][i] -= k
+        last = [arb(0)] * self.size
+        if self.alpha is None:
+            last[-1] = arb(1)
+        return [*rows, last]
+
+    def projected(self, z, alpha):
+        found = [arb(0)] * self.m
+        for (n, places), (F0, F1) in zip(self.nodes, self.discs, strict=True):
+            normal, F, length = z[n].max(arb(0)), F0 + alpha * F1, length_of([z[t] for t in places])
+            found[n] = normal
+            limit = F * normal
+            for t in places:
+                found[t] = z[t] if length <= limit else limit * z[t] / length if length > 0 else arb(0)
+        return found
+
+    def statuses(self, z, alpha):
+        """Of every node open, stick or slip where this is certain in balls, else None."""
+        found = []
+        for (n, places), (F0, F1) in zip(self.nodes, self.discs, strict=True):
+            F, length = F0 + alpha * F1, length_of([z[t] for t in places])
+            if z[n] < 0:
+                found.append("open")
+            elif z[n] > 0 and (not places or length < F * z[n]):
+                found.append("stick")
+            elif z[n] > 0 and length > F * z[n]:
+                found.append("slip")
+            else:
+                found.append(None)
+        return found
+
+    def derivative(self, z, alpha):
+        """Derivatives of P by (z, alpha) over balls: rows, and columns u and rows v of terms t u v', t in [0, 1]."""
+        P, U, V = [[arb(0)] * (self.m + 1) for _ in range(self.m)], [], []
+        for (n, t), (F0, F1) in zip(self.nodes, self.discs, strict=True):
+            F, zn, zt = F0 + alpha * F1, z[n], [z[k] for k in t]
+            if zn < 0:
+                continue
+            above = zn if zn > 0 else arb(0).union(zn.upper())
+            length = length_of(zt)
+            e = [x / length for x in zt] if t and length > 0 else None
+            if zn > 0:
+                P[n][n] = arb(1)
+            if not t:
+                if not zn > 0:
+                    P[n][n] = arb(0).union(arb(1))
+                continue
+            slips, sticks = length > F * above, length < F * above
+            if zn > 0 and sticks:
+                for k in t:
+                    P[k][k] = arb(1)
+            elif zn > 0 and slips and e:
+                self._slip(P, n, t, e, F, F * zn / length, F1 * zn)
+            elif slips and e:
+                middle = [(F * x).mid() for x in e]
+                self._slip(P, n, t, e, arb(0), arb(0).union((F * above / length).upper()), arb(0).union(F1 * above))
+                for k, x, y in zip(t, e, middle, strict=True):
+                    P[k][n] = arb(0).union(F * x - y)
+                U.append({n: arb(1), **dict(zip(t, middle, strict=True))})
+                V.append({n: arb(1)})
+            elif zn > 0 and e:
+                self._limit(P, U, V, n, t, e, F, zn, F1, length)
+            else:
+                self._anything(P, n, t, F, above, F1)
+                if not zn > 0:
+                    P[n][n] = arb(0).union(arb(1))
+        return P, U, V
+
+    def _slip(self, P, n, t, e, F, beta, turn):
+        for a, k in enumerate(t):
+            P[k][n], P[k][self.m] = F * e[a], turn * e[a]
+            for b, j in enumerate(t):
+                P[k][j] = beta * (int(a == b) - e[a] * e[b]) if len(t) > 1 else arb(0)
+
+    def _limit(self, P, U, V, n, t, e, F, zn, F1, length):
+        """Between stick and slip."""
+        beta = (F * zn / length).min(arb(1))
+        row = {n: F, self.m: F1 * zn, **{k: -x for k, x in zip(t, e, strict=True)}}
+        U.append({k: x.mid() for k, x in zip(t, e, strict=True)})
+        V.append({k: x.mid() for k, x in row.items()})
+        less = arb(0).union((beta - 1).lower())
+        for a, k in enumerate(t):
+            for place, x in row.items():
+                P[k][place] += arb(0).union(e[a] * x - e[a].mid() * x.mid())
+            for b, j in enumerate(t):
+                P[k][j] += int(a == b)
+                if len(t) > 1:
+                    P[k][j] += less * (int(a == b) - e[a] * e[b])
+
+    def _anything(self, P, n, t, F, above, F1):
+        for k in t:
+            P[k][n] = arb(0, abs(F).upper())
+            P[k][self.m] = arb(0, (abs(F1) * above).upper())
+            for j in t:
+                P[k][j] = arb(0).union(arb(1)) if j == k else arb(0, arb(0.5))
+
+    def equations(self, z, alpha, e):
+        """The bordered derivatives B: balls, columns u and rows v Z."""
+        P, U, V = self.derivative(z, alpha)
+        Z = arb_mat(self.Z)
+        rows = [
+            [a - b for a, b in zip(one, two, strict=True)]
+            for one, two in zip(self.Y, (arb_mat(P) * Z).tolist(), strict=True)
+        ]
+        if self.alpha is None:
+            rows.append(list(e))
+        columns = [[u.get(k, arb(0)) for k in range(self.size)] for u in U]
+        V = [(arb_mat([[v.get(k, arb(0)) for k in range(self.m + 1)]]) * Z).entries() for v in V]
+        return rows, columns, V
+
+    def zero_near(self, x, e=None, digits=-150):
+        """A point near the zero to which Newton's method leads, with e'x as it is."""
+        x = [value.mid() for value in x]
+        for _ in range(_NEWTON):
+            y, alpha = [v.mid() for v in self.forces(x)], self.alpha_of(x)
+            z = [v.mid() for v in self.argument(y, x)]
+            rows, *_ = self.equations(z, alpha, e)
+            N = [a - b for a, b in zip(y, self.projected(z, alpha), strict=True)]
+            N += [arb(0)] * (self.size - self.m)
+            B = arb_mat([[v.mid() for v in row] for row in rows])
+            step = [v.mid() for v in solve(B, column(N)).entries()]
+            x = [(a - b).mid() for a, b in zip(x, step, strict=True)]
+            if max(size_of(step)) <= arb(2) ** digits * (1 + max(size_of(x))):
+                return x
+        raise Undecided("Newton's method does not converge")
+
+    # -- tests ---------------------------------------------------------------------------------------------------------
+
+    def argument_at(self, centre, d, half, spread):
+        """Balls of (z, alpha) for centre + t d + b, |t| <= half, |b| <= spread."""
+        z = [*self.argument(self.forces(centre), centre), self.alpha_of(centre)]
+        Z = self.Z
+        moved = [half * a for a in size_of(product(Z, d))] if d else [arb(0)] * len(z)
+        return [a + arb(0, (b + c).upper()) for a, b, c in zip(z, moved, reach(Z, spread), strict=True)]
+
+    def bordered(self, z, e):
+        """Over balls of (z, alpha): Y near an inverse of B, and E, G, V of (12.13)."""
+        rows, U, V = self.equations(z[:-1], z[-1], e)
+        middle = arb_mat(rows)
+        for u, v in zip(U, V, strict=True):
+            middle -= column(u) * arb_mat([v]) / arb(2)
+        unit = arb_mat([[int(i == j) for j in range(self.size)] for i in range(self.size)])
+        Y = solve(arb_mat([[x.mid() for x in row] for row in middle.tolist()]), unit)
+        Y = arb_mat([[x.mid() for x in row] for row in Y.tolist()])
+        G = [(Y * column(u)).entries() for u in U]
+        return Y, (unit - Y * middle).tolist(), [list(row) for row in zip(*G, strict=True)], V, middle
+
+    def at_most_one(self, centre, radii, e=None, d=None, half=None):
+        """Whether e'(x - centre - t d) = 0 holds at no two zeros within radii of centre + t d, for every |t| <= half.
+
+        Returns the sign of det Y; Singular where this is not shown.
+        """
+        half = arb(0) if half is None else half
+        Y, E, G, V, _ = self.bordered(self.argument_at(centre, d, half, radii), e)
+        VG = self._crossed(V, G)
+        r, s = [max(x, arb(2) ** -200) for x in radii], [arb(0)] * len(V)
+        for _ in range(_POWERS):
+            for _ in range(8):
+                s = [((a + b) * arb(0.505)).upper() for a, b in zip(reach(VG, s), reach(V, r), strict=True)]
+            found = [((a + b) / 2).upper() for a, b in zip(reach(VG, s), reach(V, r), strict=True)]
+            wide = reach(E, [a + b for a, b in zip(self._along(G, s), r, strict=True)])
+            if all(a < b for a, b in zip([*wide, *found], [*r, *s], strict=True)):
+                return self.sign(Y)
+            if max(wide) > 1e3 * max(r):
+                break
+            r = [(a + b / 16).upper() for a, b in zip(wide, r, strict=True)]
+        raise Singular
+
+    def _crossed(self, V, G):
+        return [[sum((v[k] * G[k][j] for k in range(self.size)), arb(0)) for j in range(len(V))] for v in V]
+
+    def _along(self, G, s):
+        return reach(G, s) if s else [arb(0)] * self.size
+
+    def sign(self, Y):
+        det = Y.det()
+        if det > 0 or det < 0:
+            return 1 if det > 0 else -1
+        raise Singular
+
+    def zeros_around(self, centre, e=None, d=None, half=None, first=None):
+        """Radii within which, for every |t| <= half, there is exactly one zero; centre is near that of t = 0.
+
+        Returns the radii, bounds of (z, alpha) and of x - centre - t d at the zeros, and the sign of det Y.
+        """
+        half = arb(0) if half is None else half
+        d = [arb(0)] * self.size if d is None else d
+        alpha, y = self.alpha_of(centre), self.forces(centre)
+        z = self.argument(y, centre)
+        N = [a - b for a, b in zip(y, self.projected(z, alpha), strict=True)]
+        N += [arb(0)] * (self.size - self.m)
+        scale = max(size_of(centre)) + 1
+        r, s = [(first or arb(2) ** -120) * scale] * self.size, []
+        for _ in range(14):
+            spread = [a + b for a, b in zip(self._along(self.G, s) if s else [arb(0)] * self.size, r, strict=True)]
+            Y, E, G, V, middle = self.bordered(self.argument_at(centre, d, half, spread), e)
+            if len(s) != len(V):
+                s = [x.upper() for x in reach(V, r)]
+            self.G = G
+            a0 = (Y * column(N)).entries()
+            drift = (middle * column(d)).entries()
+            if self.alpha is None:
+                drift[-1] -= 1
+            a1 = (Y * column(drift)).entries() if half > 0 else [arb(0)] * self.size
+            # what is off in the middle is left in b as a whole
+            VG = self._crossed(V, G)
+            Vd = [abs(x).upper() for x in product(V, d)] if V else []
+            wide_s = [((a + b + half * c) / 2).upper() for a, b, c in zip(reach(VG, s), reach(V, r), Vd, strict=True)]
+            along = [a + b for a, b in zip(self._along(G, s), r, strict=True)]
+            wide = [(abs(a) + half * abs(b) + c).upper() for a, b, c in zip(a0, a1, reach(E, along), strict=True)]
+            if all(a < b for a, b in zip(wide_s, s, strict=True)) and all(a < b for a, b in zip(wide, r, strict=True)):
+                around = [(a + b).upper() for a, b in zip(self._along(G, wide_s), wide, strict=True)]
+                return spread, self.argument_at(centre, d, half, around), around, self.sign(Y)
+            r = [(a * 1.5 + b / 8 + scale * arb(2) ** -180).upper() for a, b in zip(wide, r, strict=True)]
+            s = [(a * 1.2 + b / 8 + arb(2) ** -200).upper() for a, b in zip(wide_s, s, strict=True)]
+            if max(r) > 1e3 * scale:
+                break
+        raise Singular
