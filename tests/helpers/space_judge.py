@@ -23,6 +23,7 @@ from space_judge_data import (
     margin,
     positive,
 )
+from space_judge_graph import Graph
 from space_judge_leaves import angles_of, explore, root_near, roots_of, sector_of
 
 DIGITS = 320
@@ -37,10 +38,17 @@ def judge_records(problem, records):
     need(len(records) > 1 and isinstance(records[0], dict), "no header")
     before, ctx.prec = ctx.prec, DIGITS
     try:
-        if records[0].get("kind") == "graph":
-            raise Undecided("graphs are not read")
-        need(records[0].get("kind") == "space", "an unknown kind of proof")
-        return Point(problem, records[0]).run(records[1:])
+        header, kind = records[0], records[0].get("kind")
+        need(kind in ("space", "graph"), "an unknown kind of proof")
+        need(header["format"] == "enumsol-proof" and integer(header["version"]) == 1, "another format or version")
+        need(header["problem"] == fingerprint(problem) and integer(header["p"]) == problem.p, "another problem")
+        need(header["data"] == "problem", "other data")
+        data = SpaceData(problem)
+        if data.modes is not None:
+            raise Undecided("bodies that nothing holds are not read")
+        if kind == "graph":
+            return Graph(problem, header, data, units(header, problem.p)[0]).run(records[1:])
+        return Point(problem, header, data).run(records[1:])
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError, ZeroDivisionError) as error:
         raise Refused(f"a record cannot be read: {error!r}") from error
     finally:
@@ -64,14 +72,9 @@ def units(record, p):
 class Point:
     """[7.5] A set of roots at one alpha."""
 
-    def __init__(self, problem, header):
-        need(header["format"] == "enumsol-proof" and integer(header["version"]) == 1, "another format or version")
-        need(header["problem"] == fingerprint(problem) and integer(header["p"]) == problem.p, "another problem")
-        need(header["data"] == "problem", "other data")
-        self.data, self.p = SpaceData(problem), problem.p
+    def __init__(self, problem, header, data):
+        self.data, self.p = data, problem.p
         self.alpha = decimal_fraction(header["alpha"])
-        if self.data.modes is not None:
-            raise Undecided("bodies that nothing holds are not read")
         self.scale, force = units(header, self.p)
         self.system = self.data.at(self.alpha)
         self.unit = [force[i] for i in self.system.node_of]

@@ -8,10 +8,11 @@ changes with the directions is split off from the middle of a box (docs/theory.m
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
 from flint import arb, arb_mat
 from space_judge_data import Undecided, column, corner, following, length_of, sector_of
 
-BOXES = 3000
+BOXES = 6000
 #: As many times a box of a zero is made narrower.
 _ROUNDS = 12
 
@@ -51,7 +52,12 @@ class Leaf:
     def __init__(self, system, codes, angles, alpha):
         self.system, self.codes = system, codes
         self.angles, self.alpha = [angle.mid() for angle in angles], alpha.mid()
-        p = len(codes)
+        self.sort()
+        self._middle()
+
+    def sort(self):
+        """Which nodes do what."""
+        system, codes, p = self.system, self.codes, len(self.codes)
         self.turning = [i for i in range(p) if sector_of(codes[i])]
         self.sliding = [i for i in range(p) if sector_of(codes[i]) or codes[i] in (2, 3)]
         self.contact = [i for i in range(p) if codes[i] != 0]
@@ -59,18 +65,21 @@ class Leaf:
         self.picked = self.contact + stuck
         #: of every sliding node the places of its tau, beside each other
         self.places = [place for i in self.sliding for place in system.tau[i]]
-        self._middle()
+
+    def columns(self, forces):
+        """E."""
+        E = [[arb(0)] * len(self.picked) for _ in range(self.system.m)]
+        for k, place in enumerate(self.picked):
+            E[place][k] = arb(1)
+        for i, force in zip(self.sliding, forces, strict=True):
+            for place, value in zip(self.system.tau[i], force, strict=True):
+                E[place][self.contact.index(i)] = value
+        return arb_mat(E) if self.picked else arb_mat(self.system.m, 0)
 
     def _middle(self):
         system, m, q = self.system, self.system.m, len(self.sliding)
-        E = [[arb(0)] * len(self.picked) for _ in range(m)]
-        for k, place in enumerate(self.picked):
-            E[place][k] = arb(1)
         self.forces = self.along(self.angles, self.alpha)
-        for i, force in zip(self.sliding, self.forces, strict=True):
-            for place, value in zip(system.tau[i], force, strict=True):
-                E[place][self.contact.index(i)] = value
-        E = arb_mat(E) if self.picked else arb_mat(m, 0)
+        E = self.columns(self.forces)
         T = arb_mat(m, len(self.places))
         for k, place in enumerate(self.places):
             T[place, k] = 1
@@ -152,6 +161,7 @@ class View:
             self.y = [a + b for a, b in zip(self.y, (leaf.dy * moved).entries(), strict=True)]
             self.w = [a + b for a, b in zip(self.w, (leaf.dw * moved).entries(), strict=True)]
         self.d = leaf.units(angles)
+        self.line = None
 
     def _part(self, row, j):
         """Entries of a row that belong to the tau of one sliding node."""
@@ -281,19 +291,21 @@ class View:
 def krawczyk(view, middle):
     """The angles to which Krawczyk's operator leads from a box, with the view of its middle."""
     if not view.angles:
+        view.line = [], []
         return []
     try:
         Y = arb_mat([[x.mid() for x in row] for row in middle.slopes]).inv()
     except ZeroDivisionError as error:
         raise Singular from error
-    change = view.alpha - middle.alpha
     steps = column([a - b for a, b in zip(view.angles, middle.angles, strict=True)])
-    at = column([a + b * change for a, b in zip(middle.G, view.by_alpha_of_G, strict=True)])
     unit = arb_mat(len(view.angles), len(view.angles))
     for k in range(len(view.angles)):
         unit[k, k] = 1
-    moved = (unit - Y * arb_mat(view.slopes)) * steps - Y * at
-    return [a + b for a, b in zip(middle.angles, moved.entries(), strict=True)]
+    rest = (unit - Y * arb_mat(view.slopes)) * steps - Y * column(middle.G)
+    drift, change = (Y * column(view.by_alpha_of_G)).entries(), view.alpha - middle.alpha
+    #: all zeros have angles - those of the middle = change of alpha times one of these + another one
+    view.line = [-x.mid() for x in drift], [a - (b - b.mid()) * change for a, b in zip(rest.entries(), drift, strict=True)]
+    return [a + b * change + c for a, b, c in zip(middle.angles, *view.line, strict=True)]
 
 
 @dataclass
@@ -358,14 +370,35 @@ def off_sectors(root):
     return False
 
 
+def contradicts(system, codes, angles, alpha):
+    """Whether the equations have no solution within the energy bound (theory, (12.5)), also where M is singular."""
+    leaf = Leaf.__new__(Leaf)
+    leaf.system, leaf.codes = system, codes
+    leaf.sort()
+    rows = (system.S * leaf.columns(leaf.along(angles, alpha))).tolist()
+    g, c = system.load(alpha), [value / 2 for value in (system.inverse * column(system.load(alpha))).entries()]
+    size = sum((a * b for a, b in zip(c, g, strict=True)), arb(0)) / 2
+    least = [abs(c[k]) + abs(system.inverse[k, k] * size).sqrt() for k in leaf.picked]
+    M = np.array([[float(x.mid()) for x in rows[k]] for k in leaf.picked])
+    for vector in np.linalg.svd(M)[0].T[::-1][:2] if M.size else ():
+        eta = [arb(float(x)) for x in vector]
+        load = sum((a * g[k] for a, k in zip(eta, leaf.picked, strict=True)), arb(0))
+        for j, bound in enumerate(least):
+            load += abs(sum((a * rows[k][j] for a, k in zip(eta, leaf.picked, strict=True)), arb(0))) * bound * arb(0, 1)
+        if load > 0 or load < 0:
+            return True
+    return False
+
+
 def halves(box):
     return [between(box.lower(), box.mid()), between(box.mid(), box.upper())]
 
 
-def explore(system, codes, alpha, settled, boxes=BOXES):
+def explore(system, codes, alpha, settled, piece=None, boxes=BOXES):
     """Cut the sectors of a leaf, and alphas, into boxes that hold no solution or are settled.
 
-    settled is asked of every box (angles, alpha, view or None) that may hold one.
+    settled is asked of every box (angles, alpha, view or None) that may hold one. A ball of alphas may be wider than
+    the piece that it stands for.
     """
     sectors = [angles_of(sector_of(code)) for code in codes if sector_of(code)]
     widths = [float(box.rad()) for box in sectors] + [max(float(alpha.rad()), 1e-300)]
@@ -374,11 +407,13 @@ def explore(system, codes, alpha, settled, boxes=BOXES):
         boxes -= 1
         if boxes < 0:
             raise Undecided("more boxes than the judge takes")
-        angles, piece = waiting.pop()
+        angles, part = waiting.pop()
+        if piece and (part < piece[0] or part > piece[1]):
+            continue
         left = angles
         try:
-            leaf = Leaf(system, codes, angles, piece)
-            view, middle = View(leaf, angles, piece), View(leaf, leaf.angles, leaf.alpha)
+            leaf = Leaf(system, codes, angles, part)
+            view, middle = View(leaf, angles, part), View(leaf, leaf.angles, leaf.alpha)
             view.narrowed(middle)
             if view.is_violated() or any(value > 0 or value < 0 for value in view.G):
                 continue
@@ -391,17 +426,21 @@ def explore(system, codes, alpha, settled, boxes=BOXES):
                 pass
         except Singular:
             view = None
-        if settled(angles, piece, view):
+            if contradicts(system, codes, angles, part):
+                continue
+        if settled(angles, part, view):
             continue
-        if any(a.rad() < 0.7 * b.rad() for a, b in zip(left, angles, strict=True)):
-            waiting.append((left, piece))
+        shares = [float(box.rad()) / width for box, width in zip([*angles, part], widths, strict=True)]
+        wide = [share > 1e-3 * max(shares) for share in shares]
+        if any(many and a.rad() < 0.7 * b.rad() for many, a, b in zip(wide, left, angles, strict=False)):
+            waiting.append((left, part))
             continue
-        shares = [float(box.rad()) / width for box, width in zip([*left, piece], widths, strict=True)]
+        shares = [float(box.rad()) / width for box, width in zip([*left, part], widths, strict=True)]
         k = max(range(len(shares)), key=shares.__getitem__)
         if shares[k] < 1e-25:
             raise Undecided("a box that is as narrow as this is not decided")
-        for half in reversed(halves([*left, piece][k])):
-            parts = [*left, piece]
+        for half in reversed(halves([*left, part][k])):
+            parts = [*left, part]
             parts[k] = half
             waiting.append((parts[:-1], parts[-1]))
 
