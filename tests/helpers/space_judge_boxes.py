@@ -132,16 +132,19 @@ class NaturalMap:
                 found.append(None)
         return found
 
-    def derivative(self, around):
+    def derivative(self, around, statuses=None):
         """Derivatives of P by (z, alpha): rows, columns u and rows v of terms t u v', t in [0, 1], and terms s D.
 
         A term s D is a bound of |s| and D, a number for every place of a row and a column.
         """
         P, U, V, terms = [[arb(0)] * (self.m + 1) for _ in range(self.m)], [], [], []
         z, alpha = around.z[:-1], around.z[-1]
-        for (n, t), (F0, F1) in zip(self.nodes, self.discs, strict=True):
+        for (n, t), (F0, F1), status in zip(self.nodes, self.discs, statuses or [None] * len(self.nodes), strict=True):
             F, zn, zt = F0 + alpha * F1, z[n], [z[k] for k in t]
-            if zn < 0:
+            if zn < 0 or status == "open":
+                continue
+            if status:
+                self._given(P, n, t, zt, F, zn, F1, status)
                 continue
             above = zn if zn > 0 else arb(0).union(zn.upper())
             length = length_of(zt)
@@ -193,6 +196,18 @@ class NaturalMap:
             for b, j in enumerate(t):
                 P[k][j] = beta * (int(a == b) - e[a] * e[b]) if len(t) > 1 else arb(0)
 
+    def _given(self, P, n, t, zt, F, zn, F1, status):
+        """A node in contact whose status is given."""
+        P[n][n] = arb(1)
+        if status == "stick":
+            for k in t:
+                P[k][k] = arb(1)
+            return
+        length = length_of(zt)
+        if not length > 0:
+            raise Singular
+        self._slip(P, n, t, [x / length for x in zt], F, F * zn / length, F1 * zn)
+
     def _turning(self, P, n, t, e, zt, F, beta, F1, zn, length):
         """A node that only slips (theory, (12.17b))."""
         size, (Fm, bm, nm) = length_of(e), (x.mid() for x in (F, beta, zn))
@@ -239,9 +254,9 @@ class NaturalMap:
             for j in t:
                 P[k][j] = arb(0).union(arb(1)) if j == k else arb(0, arb(0.5))
 
-    def equations(self, around, e):
+    def equations(self, around, e, statuses=None):
         """The bordered derivatives B: balls, columns u and rows v Z, and terms s D Z."""
-        P, U, V, terms = self.derivative(around)
+        P, U, V, terms = self.derivative(around, statuses)
         Z = arb_mat(self.Z)
         rows = [
             [a - b for a, b in zip(one, two, strict=True)]
@@ -284,9 +299,9 @@ class NaturalMap:
         moved = [half * a for a in product(self.Z, d)] if d else [arb(0)] * len(z)
         return Around(z, self.Z, moved, spread)
 
-    def bordered(self, around, e):
+    def bordered(self, around, e, statuses=None):
         """Over balls of (z, alpha): Y near an inverse of B, E, G and V of (12.13), B and terms Y D Z."""
-        rows, U, V, terms = self.equations(around, e)
+        rows, U, V, terms = self.equations(around, e, statuses)
         middle = arb_mat(rows)
         for u, v in zip(U, V, strict=True):
             middle -= column(u) * arb_mat([v]) / arb(2)

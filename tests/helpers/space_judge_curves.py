@@ -246,29 +246,34 @@ class Place:
                 return False
         return True
 
-    def along(self, low, high, holds, depth=0):
+    def along(self, low, high, holds, depth=0, deepest=_HALVINGS):
         """Whether something holds for all of the curve for t from low to high, in parts as short as it takes."""
         for s in self.slices if depth == 0 else ():
             begin, end = low.max(s.low), high.min(s.high)
-            if begin < end and not self.along(begin, end, holds, 1):
+            if begin < end and not self.along(begin, end, holds, 1, deepest):
                 return False
         if depth == 0:
             return True
-        middle, half = ((low + high) / 2).mid(), ((high - low) / 2).upper()
+        middle = ((low + high) / 2).mid()
         try:
-            ends = [self.zero(t) for t in (low.mid(), high.mid())]
-            x = [a.mid() for a in self.zero(middle)]
-            d = [((b - a) / (2 * half)).mid() for a, b in zip(*ends, strict=True)]
-            first = max(abs(a - (b + c) / 2).upper() for a, b, c in zip(x, *ends, strict=True))
-            _, z, around, _ = self.natural.zeros_around(x, self.e, d, half, first + arb(2) ** -100)
-            found = holds(x, d, half, around, z)
+            found = holds(*self.set_between(low.mid(), high.mid()))
         except Singular:
             found = None
         if found:
             return True
-        if found is False or depth > _HALVINGS:
+        if found is False or depth > deepest:
             return False
-        return all(self.along(*part, holds, depth + 1) for part in ((low, middle), (middle, high)))
+        return all(self.along(*part, holds, depth + 1, deepest) for part in ((low, middle), (middle, high)))
+
+    def set_between(self, low, high, *ends):
+        """x, d, half, radii and (z, alpha) of a set with all of the curve for t from low to high."""
+        middle, half = ((low + high) / 2).mid(), ((high - low) / 2).upper()
+        ends = ends or [self.zero(t) for t in (low, high)]
+        x = [a.mid() for a in self.zero(middle)]
+        d = [((b - a) / (2 * half)).mid() for a, b in zip(*ends, strict=True)]
+        first = max(abs(a - (b + c) / 2).upper() for a, b, c in zip(x, *ends, strict=True))
+        _, z, around, _ = self.natural.zeros_around(x, self.e, d, half, first + arb(2) ** -100)
+        return x, d, half, around, z
 
 
 def place_of(problem, record):

@@ -9,6 +9,7 @@ from itertools import combinations, pairwise
 from flint import arb, arb_mat, fmpq
 from rational_checker import are
 from rational_forms import decimal_fraction, exact, integer, need
+from space_judge_arcs import Walk
 from space_judge_certificates import equations, square
 from space_judge_curves import GraphProblem, dot, place_of
 from space_judge_data import Terms, Undecided, column, is_code, is_complete, is_definite, is_split, length_of
@@ -102,7 +103,7 @@ class Graph:
         self.problem = GraphProblem(data, low, high, steps)
         self.system = self.problem.system
         self.tangents = [len(places) for places in self.system.tau]
-        self.curves, self.leaves, self.gaps = [], 0, 0
+        self.curves, self.walks, self.leaves, self.gaps = [], [], 0, 0
 
     def run(self, records):
         position = 0
@@ -114,13 +115,20 @@ class Graph:
             end = position + 2 + 2 * count
             self.curves.append(Curve(self.problem, records[position + 1 : end], first))
             position = end
+            walk = None
             if are(records[position], {"parts": True}):
-                raise Undecided("arcs are not read")
+                walk = Walk(self, self.curves[-1], records, position + 1)
+                position = walk.position
+            self.walks.append(walk)
         self.apart()
         need(are(records[position], {"tree": True}), "no tree")
         position = self.tree(records, position + 1)
         gaps = self.gaps + sum(len(curve.open) for curve in self.curves)
-        counts = {"curves": len(self.curves), "arcs": None, "leaves": self.leaves, "gaps": gaps}
+        walked, arcs = [walk.counts() for walk in self.walks if walk], None
+        if len(walked) == len(self.walks):
+            arcs = sum(found for found, _ in walked)
+        gaps += sum(found for _, found in walked)
+        counts = {"curves": len(self.curves), "arcs": arcs, "leaves": self.leaves, "gaps": gaps}
         need(are(records[position:], [counts]), f"the counts are {counts}")
         return counts
 
