@@ -5,6 +5,8 @@ document. What a leaf claims is decided in its own way: exclusions as they stand
 into boxes, so that no claim is refused because the checker's way does not lead to it.
 """
 
+from math import log2
+
 from flint import arb, arb_mat, ctx, fmpq
 from rational_checker import are, record_of, records_of  # noqa: F401
 from rational_forms import Refused, decimal_fraction, exact, integer, need
@@ -14,7 +16,10 @@ from space_judge_data import (
     Terms,
     Undecided,
     column,
+    corner,
     fingerprint,
+    floating_margin,
+    following,
     is_code,
     is_complete,
     is_definite,
@@ -45,7 +50,9 @@ def judge_records(problem, records):
         need(header["data"] == "problem", "other data")
         data = SpaceData(problem)
         if data.modes is not None:
-            raise Undecided("bodies that nothing holds are not read")
+            bound = header["max_rigid_displacement"]
+            need(type(bound) is float and bound == problem.rigid_reach, "another bound of the rigid displacement")
+            need(kind == "space", "no graphs of bodies that nothing holds")
         if kind == "graph":
             return Graph(problem, header, data, units(header, problem.p)[0]).run(records[1:])
         return Point(problem, header, data).run(records[1:])
@@ -77,6 +84,7 @@ class Point:
         self.alpha = decimal_fraction(header["alpha"])
         self.scale, force = units(header, self.p)
         self.system = self.data.at(self.alpha)
+        self.full = self.system.bordered
         self.unit = [force[i] for i in self.system.node_of]
         self.tangents = [len(places) for places in self.system.tau]
         self.form = self.products = None
@@ -95,22 +103,8 @@ class Point:
                 due.append(codes)
             else:
                 self.leaves += 1
-                getattr(
-                    self,
-                    "leaf_"
-                    + {
-                        "x": "x",
-                        "f": "f",
-                        "e": "e",
-                        "n": "n",
-                        "r": "r",
-                        "l": "l",
-                        "j": "j",
-                        "m": "m",
-                        "z": "z",
-                        "u": "u",
-                    }[record[0]],
-                )(codes, *record[1:])
+                need(record[0] in ("xinru" if self.system.rigid else "xfenrljmzu"), "no such leaf")
+                getattr(self, f"leaf_{record[0]}")(codes, *record[1:])
         counts = {"roots": len(self.roots), "undecided": self.undecided, "leaves": self.leaves}
         need(are(records[position:], [counts]), f"the counts are {counts}")
         return counts
@@ -128,7 +122,22 @@ class Point:
 
     def leaf_x(self, codes, rows, text):
         """[4.5]"""
-        self.excluded(*margin(self.terms(codes, rows, text)))
+        terms = self.terms(codes, rows, text)
+        self.excluded(*(floating_margin(terms) if self.system.rigid else margin(terms)))
+
+    def leaf_i(self, codes, z):
+        """[5.6], [7.7] No forces that the assignment allows are in balance with the load."""
+        need(self.system.rigid, "a body that is held")
+        G, h, _ = self.system.rigid
+        z = floats(z, len(h))
+        for j, row in enumerate(self.data.G.tolist()):
+            largest = max(abs(float(x)) / 2.0 ** self.scale[0][k % self.p] for k, x in enumerate(row))
+            z[j] *= arb(2) ** (-round(log2(largest)) if largest else 0)
+        pull = (arb_mat([z]) * G).entries()
+        need(sum((a * b for a, b in zip(z, h, strict=True)), arb(0)) > 0, "z does not push against the load")
+        for i, (code, places) in enumerate(zip(codes, self.system.tau, strict=True)):
+            if code != 0:
+                need(pull[i] + most(code, [pull[k] for k in places]) <= 0, "forces may be in balance")
 
     def excluded(self, value, size):
         need(
@@ -176,12 +185,12 @@ class Point:
 
     def leaf_n(self, codes):
         need(is_complete(codes), "the assignment is still open")
-        need(not roots_of(self.system, codes, arb(self.alpha)), "there is a solution")
+        need(not roots_of(self.full, codes, arb(self.alpha)), "there is a solution")
 
     def leaf_r(self, codes, mid, rad, index):
         need(is_complete(codes), "the assignment is still open")
         root = self.root_at(codes, mid, rad, index)
-        for other in roots_of(self.system, codes, arb(self.alpha)):
+        for other in roots_of(self.full, codes, arb(self.alpha)):
             need(same(root, other), "the assignment holds another solution")
         self.count(root)
 
@@ -193,12 +202,12 @@ class Point:
             if sector_of(code):
                 x, y = (mid[place] for place in self.system.tau[i])
                 angles.append(arb.atan2(y, x) if length_of([x, y]) > 0 else angles_of(sector_of(code)))
-        root = root_near(self.system, codes, angles, arb(self.alpha))
+        root = root_near(self.full, codes, angles, arb(self.alpha))
         if root is None:
             raise Undecided("no root is found")
         need(root.view.is_strict(), "a condition does not hold strictly")
         need(integer(index) == root.index, "the index is another")
-        self.within(root.y, mid, rad)
+        self.within(root.y[: self.system.m], mid, rad)
         return root
 
     def ball(self, mid, rad):
@@ -283,6 +292,24 @@ class Boxed:
 
     def holds(self, zeta):
         return all(abs(a - b) <= c for a, b, c in zip(zeta, self.middle, self.radius, strict=True))
+
+
+def most(code, pull):
+    """The largest value of pull . tau for the tau of a node with lambda_n = 1."""
+    if not pull or code == 4:
+        return arb(0)
+    if code in (2, 3):
+        return pull[0] if code == 2 else -pull[0]
+    number = sector_of(code)
+    if number:
+        ends = [[arb(x) for x in d] for d in (corner(number), corner(following(number)))]
+        (a, b), (c, d) = ends
+        x, y = pull
+        if not (a * y - b * x > 0 and x * d - y * c > 0):
+            found = [x * u + y * v for u, v in ends]
+            beside = a * y - b * x < 0 or x * d - y * c < 0
+            return found[0].max(found[1]) if beside else found[0].max(found[1]).max(length_of(pull))
+    return length_of(pull)
 
 
 def same(root, other):

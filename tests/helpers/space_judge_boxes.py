@@ -7,6 +7,7 @@ finds. Boxes are those of zeta = y - steps w (docs/proof_format.md, sections 7.5
 """
 
 from copy import copy
+from functools import cached_property
 
 from flint import arb, arb_mat
 from space_judge_data import Undecided, column, length_of
@@ -72,6 +73,7 @@ class NaturalMap:
     def with_steps(self, k):
         """The same with k times the steps in z."""
         found = copy(self)
+        found.__dict__.pop("Z", None)
         found.k = k
         return found
 
@@ -96,7 +98,7 @@ class NaturalMap:
         """z."""
         return [(1 + k) * a - k * b for k, a, b in zip(self.k, y, zeta, strict=False)]
 
-    @property
+    @cached_property
     def Z(self):
         """Derivatives of (z, alpha) by x."""
         rows = [[(1 + k) * a for a in row] for k, row in zip(self.k, self.Y, strict=True)]
@@ -255,7 +257,7 @@ class NaturalMap:
                 P[k][j] = arb(0).union(arb(1)) if j == k else arb(0, arb(0.5))
 
     def equations(self, around, e, statuses=None):
-        """The bordered derivatives B: balls, columns u and rows v Z, and terms s D Z."""
+        """The bordered derivatives B: balls, columns u and rows v Z, and terms s D."""
         P, U, V, terms = self.derivative(around, statuses)
         Z = arb_mat(self.Z)
         rows = [
@@ -266,13 +268,13 @@ class NaturalMap:
             rows.append(list(e))
         columns = [[u.get(k, arb(0)) for k in range(self.size)] for u in U]
         V = [(arb_mat([[v.get(k, arb(0)) for k in range(self.m + 1)]]) * Z).entries() for v in V]
-        return rows, columns, V, [(s, self._product(D, Z)) for s, D in terms if s > 0]
+        return rows, columns, V, terms
 
-    def _product(self, D, Z):
-        found = arb_mat(self.size, self.size)
+    def _product(self, D):
+        found, Z = arb_mat(self.size, self.size), self.Z
         for (k, place), value in D.items():
             for j in range(self.size):
-                found[k, j] += value * Z[place, j]
+                found[k, j] += value * Z[place][j]
         return found
 
     def zero_near(self, x, e=None, digits=-150):
@@ -309,7 +311,7 @@ class NaturalMap:
         Y = solve(arb_mat([[x.mid() for x in row] for row in middle.tolist()]), unit)
         Y = arb_mat([[x.mid() for x in row] for row in Y.tolist()])
         G, E = [(Y * column(u)).entries() for u in U], (unit - Y * middle).tolist()
-        terms = [(s, (Y * D).tolist()) for s, D in terms]
+        terms = [(s, (Y * self._product(D)).tolist()) for s, D in terms if s > 0]
         for s, D in terms:
             E = [[a + arb(0, (s * abs(b)).upper()) for a, b in zip(*rows, strict=True)]
                  for rows in zip(E, D, strict=True)]

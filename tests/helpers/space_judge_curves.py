@@ -121,6 +121,10 @@ class Place:
         more = (t - self.t(x)) / dot(self.e, self.d)
         return [(a + more * b).mid() for a, b in zip(x, self.d, strict=True)]
 
+    def near(self, t, near=None):
+        """A point near that of the curve, of which nothing is shown."""
+        return self.natural.zero_near(self.start(t, near), self.e, digits=-70)
+
     def zero(self, t, near=None):
         try:
             x = self.natural.zero_near(self.start(t, near), self.e)
@@ -268,8 +272,8 @@ class Place:
     def set_between(self, low, high, *ends):
         """x, d, half, radii and (z, alpha) of a set with all of the curve for t from low to high."""
         middle, half = ((low + high) / 2).mid(), ((high - low) / 2).upper()
-        ends = ends or [self.zero(t) for t in (low, high)]
-        x = [a.mid() for a in self.zero(middle)]
+        ends = ends or [self.near(t) for t in (low, high)]
+        x = self.near(middle, [((a + b) / 2).mid() for a, b in zip(*ends, strict=True)])
         d = [((b - a) / (2 * half)).mid() for a, b in zip(*ends, strict=True)]
         first = max(abs(a - (b + c) / 2).upper() for a, b, c in zip(x, *ends, strict=True))
         _, z, around, _ = self.natural.zeros_around(x, self.e, d, half, first + arb(2) ** -100)

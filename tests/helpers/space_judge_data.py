@@ -130,7 +130,14 @@ class SpaceData:
         need(min(map(min, F)) >= 0, "friction is negative")
         system = System.scaled(self, F, [(arb(1), arb(0))] * self.p)
         fixed = [a + arb(alpha) * b for a, b in zip(system.g0, system.g1, strict=True)]
-        return System(system.S, fixed, [arb(0)] * system.m, system.discs, system.tau, system.axes)
+        rigid = ()
+        if self.modes is not None:
+            F = [fmpq(1)] * self.p, *F
+            G = [[value * arb(F[k // self.p][k % self.p]) for k, value in enumerate(row)] for row in self.G.tolist()]
+            places = [*range(self.p), *((1 + k) * self.p + i for i in range(self.p) for k in system.axes[i])]
+            h = [a + arb(alpha) * b for a, b in zip(self.h0, self.h1, strict=True)]
+            rigid = arb_mat([[row[k] for k in places] for row in G]), h, self.rho
+        return System(system.S, fixed, [arb(0)] * system.m, system.discs, system.tau, system.axes, rigid)
 
 
 def _independent(N):
@@ -153,6 +160,8 @@ class System:
     discs: list
     tau: list
     axes: list
+    #: [7.7] G~, h and rho of a body that nothing holds
+    rigid: tuple = ()
 
     @classmethod
     def scaled(cls, data, F, discs):
@@ -168,6 +177,22 @@ class System:
         S = (S + S.transpose()) / arb(2)
         need(is_definite(S), "S is not positive definite")
         return cls(S, *([D[a] * g[i] for a, i in enumerate(rows)] for g in (data.g0, data.g1)), discs, tau, axes)
+
+    @cached_property
+    def bordered(self):
+        """With minus the rigid displacement among the unknowns and the equilibrium among the equations."""
+        if not self.rigid:
+            return self
+        G, h, _ = self.rigid
+        m, r = self.m, len(h)
+        S = arb_mat(m + r, m + r)
+        for i in range(m):
+            for j in range(m):
+                S[i, j] = self.S[i, j]
+            for j in range(r):
+                S[i, m + j] = S[m + j, i] = G[j, i]
+        zeros = [arb(0)] * r
+        return System(S, [*self.g0, *h], [*self.g1, *zeros], self.discs, self.tau, self.axes, self.rigid)
 
     @property
     def m(self):
@@ -352,10 +377,10 @@ class Terms:
             for kept, value in zip(self.values, values, strict=True):
                 kept.append(value * fmpq(2) ** scale[kind not in FORCES][node])
 
-    def sums(self, end=0):
+    def sums(self, end=0, values=None):
         """Of the multiplied rows: coefficients of y, those times the radius of the discs, and of w."""
-        found = [[fmpq(0)] * self.system.m for _ in range(3)]
-        for (node, *parts), u in zip(self.rows, self.values[end], strict=True):
+        found = [[arb(0) if values else fmpq(0)] * self.system.m for _ in range(3)]
+        for (node, *parts), u in zip(self.rows, values or self.values[end], strict=True):
             for total, part in zip(found, parts, strict=True):
                 for place, factor in part:
                     total[node if place is None else place] += u * factor
@@ -372,3 +397,53 @@ def margin(terms, H=None, h=None):
     linear = (column(system.g0).transpose() * w)[0, 0]
     square = (v.transpose() * inverse * v)[0, 0] / 4
     return -linear - square, abs(linear) + square
+
+
+def floating_margin(terms):
+    """[5.6], [7.7] What (5.6) has on the left less what it has on the right, and a number of its size."""
+    system = terms.system
+    G, h, rho = system.rigid
+    best = None
+    for values in (terms.values[0], _in_balance(terms)):
+        if values is None:
+            continue
+        plain, radial, moves = terms.sums(values=values)
+        w = column(moves)
+        v = column(system.g0) + column(plain) + column(radial) - system.S * w
+        image = system.inverse * G.transpose()
+        right = 2 * column(h) - image.transpose() * v
+        z = column([value.mid() for value in (G * image).solve(right).entries()])
+        v += G.transpose() * z
+        linear = (column(h).transpose() * z - column(system.g0).transpose() * w)[0, 0]
+        square = (v.transpose() * system.inverse * v)[0, 0] / 4
+        off = [a + b for a, b in zip((G * w).entries(), h, strict=True)]
+        off = arb(0) if values is not terms.values[0] else sum((a * abs(b) for a, b in zip(rho, off, strict=True)), arb(0))
+        found = linear - square - off, abs(linear) + square + off
+        if best is None or not best[0] > 0:
+            best = found
+    return best
+
+
+def _in_balance(terms):
+    """Multipliers of the same signs near those of an exclusion, for which G y = h, or None."""
+    system = terms.system
+    G, h, _ = system.rigid
+    values = [arb(value) for value in terms.values[0]]
+    columns = []
+    for node, *_, moves in terms.rows:
+        y = [arb(0)] * system.m
+        for place, factor in moves:
+            y[node if place is None else place] -= factor
+        columns.append((G * column(y)).entries())
+    W, left = arb_mat(len(h), len(h)), list(h)
+    for u, part in zip(values, columns, strict=True):
+        W += column(part) * arb_mat([part]) * abs(u)
+        left = [a - u * b for a, b in zip(left, part, strict=True)]
+    try:
+        s = W.solve(column(left)).entries()
+    except ZeroDivisionError:
+        return None
+    shares = [sum((a * b for a, b in zip(s, part, strict=True)), arb(0)) for part in columns]
+    if not all(abs(share) < 1 for share in shares):
+        return None
+    return [u + abs(u) * share for u, share in zip(values, shares, strict=True)]

@@ -62,7 +62,9 @@ class Leaf:
         self.sliding = [i for i in range(p) if sector_of(codes[i]) or codes[i] in (2, 3)]
         self.contact = [i for i in range(p) if codes[i] != 0]
         stuck = [place for i in range(p) if codes[i] == 1 for place in system.tau[i]]
-        self.picked = self.contact + stuck
+        #: of a body that nothing holds, minus its rigid displacement
+        self.rigid = list(range(len(system.node_of), system.m))
+        self.picked = self.contact + stuck + self.rigid
         #: of every sliding node the places of its tau, beside each other
         self.places = [place for i in self.sliding for place in system.tau[i]]
 
@@ -122,7 +124,7 @@ class Leaf:
 
     def index(self, view):
         """[7.5] sign det M sign det dG/dpsi."""
-        det = self.M.det() if self.picked else arb(1)
+        det = self.M.det() * (-1) ** len(self.rigid) if self.picked else arb(1)
         both = det * (arb_mat(view.slopes).det() if self.turning else arb(1))
         if both > 0 or both < 0:
             return 1 if both > 0 else -1
@@ -269,6 +271,9 @@ class View:
                 yield self.w[places[0]] * (1 if code == 2 else -1)
         for _, v, d in self.directions():
             yield v[0] * d[0] + v[1] * d[1]
+        for k, place in enumerate(self.leaf.rigid):
+            yield self.system.rigid[2][k] - self.y[place]
+            yield self.system.rigid[2][k] + self.y[place]
 
     def is_violated(self):
         return any(value < 0 for value in self.conditions())
@@ -375,6 +380,8 @@ def contradicts(system, codes, angles, alpha):
     leaf = Leaf.__new__(Leaf)
     leaf.system, leaf.codes = system, codes
     leaf.sort()
+    if leaf.rigid:
+        return False
     rows = (system.S * leaf.columns(leaf.along(angles, alpha))).tolist()
     g, c = system.load(alpha), [value / 2 for value in (system.inverse * column(system.load(alpha))).entries()]
     size = sum((a * b for a, b in zip(c, g, strict=True)), arb(0)) / 2

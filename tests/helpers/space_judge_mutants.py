@@ -3,6 +3,7 @@
 from contextlib import suppress
 
 import proof_fuzz
+import space_graph_proofs
 import space_proofs
 from proof_fuzz import _pick
 from proof_tools import bytes_of, copied, of_kind, proof_of
@@ -99,6 +100,70 @@ def mutant(rng, records, data, general=0.1):
         with suppress(ValueError, IndexError, KeyError, TypeError):
             change(rng, changed)
     return proof_of(changed), " ".join(names)
+
+
+def without_arcs(records):
+    """A graph that is not cut into arcs."""
+    found, skipped = [], False
+    for record in records:
+        skipped = record == {"parts": True} or (skipped and isinstance(record, list))
+        if not skipped:
+            found.append(record)
+    return [*found[:-1], {**found[-1], "arcs": None}]
+
+
+def _places_of_parts(records):
+    """Where the records of parts are."""
+    found, inside = [], False
+    for k, record in enumerate(records):
+        inside = record == {"parts": True} or (inside and isinstance(record, list))
+        if inside and isinstance(record, list):
+            found.append(k)
+    return found
+
+
+def _part(rng, records):
+    """A part of a curve that is of another kind, elsewhere, left out, or with other boxes and places."""
+    places = _places_of_parts(records)
+    k, other = _pick(rng, places), _pick(rng, places)
+    special = [j for j in places if records[j][0] != "s"]
+    k = _pick(rng, special) if special and rng.random() < 0.7 else k
+    record = records[k]
+    how = int(rng.integers(7))
+    if how == 0:
+        del records[k]
+    elif how == 1:
+        records[k] = copied(records[other])
+    elif how == 2:
+        records[k] = ["u", None]
+    elif how == 3:
+        record[0] = str(_pick(rng, ("s", "f", "c", "h", "u")))
+    elif how == 4 and len(record) > 3:
+        record[2], record[3] = record[3], record[2]
+    elif how == 5:
+        j = int(rng.integers(1, len(record)))
+        record[j] = None if record[j] else copied(_pick(rng, [x for x in records if x[0] == "w"]))
+    else:
+        boxes = [x for x in record[1:] if isinstance(x, list)]
+        part = _pick(rng, boxes)[int(rng.integers(1, 5))]
+        j = int(rng.integers(len(part)))
+        part[j] += float(rng.normal()) * 10.0 ** int(rng.integers(-12, 0))
+
+
+def _count(rng, records):
+    key = _pick(rng, ("curves", "arcs", "leaves", "gaps"))
+    records[-1][key] = None if rng.random() < 0.2 else records[-1][key] + int(_pick(rng, (-1, 1)))
+
+
+def mutant_of_graph(rng, records):
+    """One mutant of a graph's proof, of its arcs or of the rest, and the name of the mutation."""
+    if not _places_of_parts(records) or rng.random() < 0.6:
+        return space_graph_proofs.mutant(rng, without_arcs(records))
+    changed = copied(records)
+    change = _pick(rng, (_part, _part, _part, _moved, _count))
+    with suppress(ValueError, IndexError, KeyError, TypeError):
+        change(rng, changed)
+    return proof_of(changed), change.__name__
 
 
 def checked(problem, proof):
