@@ -30,6 +30,7 @@ from space_judge_data import (
 )
 from space_judge_graph import Graph
 from space_judge_leaves import angles_of, explore, root_near, roots_of, sector_of
+from space_judge_products import ProductForm
 
 DIGITS = 320
 
@@ -172,14 +173,31 @@ class Point:
         need(self.form is not None, "no form is declared")
         self.excluded(*margin(self.terms(codes, rows, text), *self.form))
 
-    def product_form(self, *_):
-        raise Undecided("forms of products are not read")
+    def product_form(self, codes, point, multipliers):
+        """[7.5] A form of products."""
+        need(isinstance(codes, list) and len(codes) == self.p and all(map(is_code, codes, self.tangents)), "no codes")
+        need(6 not in codes, "a form about an undecided node")
+        point = self.ball(point, [0.0] * self.system.m)[0]
+        length, force = ([arb(2) ** value for value in part] for part in self.scale)
+        return ProductForm(self.system, codes, point, floats(multipliers, len(multipliers)), force, length)
+
+    def form_about(self, codes):
+        need(self.products is not None and self.products.serves(codes), "no form is about the assignment")
+        return self.products
 
     def leaf_e(self, codes):
-        raise Undecided("forms of products are not read")
+        need(self.form_about(codes).excludes(codes), "the form does not exclude the assignment")
 
-    def leaf_j(self, codes, *_):
-        raise Undecided("forms of products are not read")
+    def leaf_j(self, codes, centre, radius, rho, mid, rad, index):
+        """[7.5] All solutions of an assignment in a box that holds one, by their ellipsoid."""
+        form, box = self.form_about(codes), Boxed(self, centre, radius, rho, mid, rad, index)
+        rows, unit = self.system.S.tolist(), box.steps
+        for k, step in enumerate(unit):
+            row = [step * value for value in rows[k]]
+            row[k] += 1
+            off = form.bounds(form.about(row, -step * self.system.g0[k] - box.middle[k]))
+            need(form.is_empty or abs(off) <= box.radius[k], "the ellipsoid is not in the box")
+        self.count(box)
 
     # -- complete assignments ------------------------------------------------------------------------------------------
 
