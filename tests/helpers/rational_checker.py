@@ -91,7 +91,7 @@ def records_of(file):
         need(stream.eof and not stream.unused_data, "the stream does not end where the digest begins")
         need(text.endswith(b"\n"), "the last line has no end")
         return [record_of(line) for line in text.decode("ascii").split("\n")[:-1]]
-    except (zlib.error, ValueError) as error:
+    except (zlib.error, ValueError, RecursionError) as error:
         raise Refused(f"the stream cannot be read: {error}") from error
 
 

@@ -1,0 +1,197 @@
+"""A judge of proofs in 3D that shares no code with the package accepts and refuses what the checker does."""
+
+import ast
+from collections import Counter
+from functools import cache
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+import space_judge
+from effort import some
+from floating_space import known_body
+from problems3d import OneNode, degenerate_integers, in_space, random_over_alpha, random_plane_over_alpha
+from proof_tools import bytes_of, of_kind, put, records_of
+from space_graph_proofs import closed_branch
+from space_judge_mutants import checked, judged, mutant, mutant_of_graph
+from space_proofs import RANDOM, case, random_problem
+
+from enumsol import Proof, branch_graph, enumerate_roots, gallery
+
+#: What the checker says of a claim that is true and that its own bounds do not reach.
+COARSE = (
+    *("what it holds is not proven", "its enclosure does not hold the root", "it holds a root"),
+    *("its multipliers do not exclude it", "its solution is not proven to be the only one"),
+    *("is not proven to be one from end to end", "it is not proven that all its solutions lie on its curve"),
+    *("its roots are not proven to lie in its boxes", "its roots are not proven to be an arc through its box"),
+    *("it is not proven to hold no root",),
+)
+BLOCKS = [((1, 1, 1), (2, 1, 1), (2, 1, 2), (3, 2, 2)), (0.3, 0.5, 1.0, 2.0, 3.0)]
+WEDGES = [((1, 1, 2), (2, 1, 2)), (0.3, 0.5, 1.0, 1.5, 2.0, 3.0)]
+GRAPHS = [
+    *(("one node", seed, load) for seed in range(10) for load in (True, False)),
+    *(("over alpha", 1, seed) for seed in range(500, 508)),
+    *(("plane", 1, seed) for seed in range(6)),
+    *(("over alpha", 2, seed) for seed in (115, 100, 119)),
+    *(("two nodes", 1.3, 1.6), ("block over alpha", (1, 1, 1)), ("curves cut short", 2, 100)),
+]
+#: 300 proofs.
+ALL = [
+    *(("tree", name) for name in (*RANDOM, "end", "one tangent", "small friction")),
+    *(("tree", ("block", (2, 1, 2), alpha)) for alpha in (0.5, 1.0, 3.0)),
+    *(("random", p, seed) for p in range(1, 5) for seed in range(15)),
+    *(("cut short", p, seed) for p in range(2, 5) for seed in range(10)),
+    *(("degenerate", seed) for seed in range(45)),
+    *(("rest", seed) for seed in range(30)),
+    *(("wedge", *rest) for rest in product(*WEDGES)),
+    *(("block", *rest) for rest in product(*BLOCKS)),
+    *(("held by nothing", seed) for seed in range(100, 150)),
+    *GRAPHS,
+]
+
+
+@cache
+def found(name):
+    """Problem, records and bytes of a proof: by certificates where there are some, or by the tree."""
+    kind, *rest = name
+    if kind == "tree":
+        problem, _, records, data = case(*rest)
+        return problem, records, data
+    proof = graph_of(kind, *rest) if name in GRAPHS else roots_of(kind, *rest)
+    return proof[0], records_of(proof[1]), bytes_of(proof[1])
+
+
+def roots_of(kind, *rest):
+    alpha, options = 0.0, {}
+    if kind == "random":
+        problem = random_problem(*rest)
+    elif kind == "cut short":
+        problem, options = random_problem(*rest), {"max_nodes": 1 + 4 * rest[1]}
+    elif kind == "degenerate":
+        problem, options = degenerate_integers(*rest)[0], {"max_nodes": 200}
+    elif kind == "rest":
+        problem, options = degenerate_integers(*rest, kinds=("rest", "graze", "limit"))[0], {"max_nodes": 200}
+    elif kind == "wedge":
+        problem, alpha = gallery.wedge3d(*rest[0], friction=rest[1]), 1.0
+    elif kind == "block":
+        problem, alpha = gallery.block3d(*rest[0]), rest[1]
+    else:
+        problem, options = known_body(*rest).problem, {"max_nodes": 200}
+    return problem, enumerate_roots(problem, alpha, **options).proof
+
+
+def graph_of(kind, *rest):
+    interval, options = (0, 1), {"max_nodes": 300}
+    if kind == "one node":
+        problem = OneNode(*rest).problem
+    elif kind == "over alpha":
+        problem, interval = random_over_alpha(*rest), (0, 1 if rest[0] == 1 else 1 / 64)
+    elif kind == "plane":
+        problem = in_space(random_plane_over_alpha(*rest))
+    elif kind == "two nodes":
+        problem, interval = closed_branch(), rest
+    elif kind == "block over alpha":
+        problem, interval = gallery.block3d(*rest[0]), (0.5, 1)
+    else:
+        problem, options = random_over_alpha(*rest), {"max_nodes": 20}
+    return problem, branch_graph(problem, interval, **options).proof
+
+
+QUICK = [
+    *(("tree", name) for name in ((1, 22), (2, 0), "end", "one tangent", ("block", (2, 1, 2), 0.5))),
+    *(("random", 2, 3), ("random", 3, 4), ("random", 4, 4), ("cut short", 2, 4)),
+    *(("degenerate", 1), ("degenerate", 6), ("degenerate", 18), ("rest", 9), ("rest", 11)),
+    *(("wedge", (1, 1, 2), 1.0), ("block", (2, 1, 2), 1.0), ("held by nothing", 102), ("held by nothing", 113)),
+    *(("plane", 1, 5), ("one node", 5, True), ("over alpha", 2, 100)),
+]
+
+
+def compare(problem, proof):
+    """What both say of a proof, in a few words."""
+    report, reasons = checked(problem, proof)
+    counts, reason = judged(problem, proof)
+    if report and counts:
+        for name in counts:
+            assert name == "gaps" or counts[name] == getattr(report, name), (name, counts, report)
+        return "both accept"
+    if report:
+        assert reason.startswith("undecided"), (reason, "the checker accepts what the judge refuses")
+        return "accepted, and not decided by the judge"
+    if not counts:
+        return "refused, and not decided by the judge" if reason.startswith("undecided") else "both refuse"
+    coarse = [text for text in reasons.split("; ") if text.startswith(("leaf", "curve"))]
+    assert coarse, (reasons, "refused by the checker for its form")
+    assert all(text.endswith(COARSE) for text in coarse), reasons
+    return "refused, and true"
+
+
+def mutants(name, count):
+    """Of a proof."""
+    _, records, data = found(name)
+    rng = np.random.default_rng([len(records), count])
+    for _ in range(count):
+        yield (mutant_of_graph(rng, records) if name in GRAPHS else mutant(rng, records, data))[0]
+
+
+@pytest.mark.few(12)
+@pytest.mark.parametrize("name", QUICK, ids=str)
+def test_the_judge_accepts_what_the_checker_accepts(name):
+    problem, _, data = found(name)
+    assert compare(problem, Proof(data)) == "both accept"
+
+
+@pytest.mark.few(3)
+@pytest.mark.parametrize("name", QUICK, ids=str)
+def test_mutants_are_judged_alike(name):
+    told = Counter(compare(found(name)[0], proof) for proof in mutants(name, 5 if name in GRAPHS else 15))
+    assert told["both refuse"] > 0
+    assert not told["accepted, and not decided by the judge"]
+
+
+@pytest.mark.long
+def test_three_hundred_proofs_and_three_thousand_mutants():
+    """The judge leaves few open of those that the checker accepts, and refuses none."""
+    proofs, changed = Counter(), Counter()
+    for name in ALL:
+        proofs[compare(found(name)[0], Proof(found(name)[2]))] += 1
+        changed.update(compare(found(name)[0], proof) for proof in mutants(name, 10))
+    assert len(ALL) == sum(proofs.values()) == 300
+    assert sum(changed.values()) == 3000
+    assert proofs["both accept"] + proofs["accepted, and not decided by the judge"] == 300
+    assert proofs["accepted, and not decided by the judge"] < 10
+    assert changed["accepted, and not decided by the judge"] < 30
+
+
+def test_the_judge_imports_nothing_of_the_package():
+    waiting, seen = ["space_judge"], set()
+    while waiting:
+        name = waiting.pop()
+        file = Path(space_judge.__file__).parent / f"{name}.py"
+        if name in seen or not file.is_file():
+            assert not name.startswith("enumsol")
+            continue
+        seen.add(name)
+        for node in ast.walk(ast.parse(file.read_text())):
+            if isinstance(node, ast.Import):
+                waiting += [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom):
+                waiting.append(node.module)
+    assert {"space_judge_leaves", "rational_forms"} <= seen
+
+
+def test_the_judge_sees_wrong_claims():
+    """Each by the reason for which it is wrong."""
+    problem, records, _ = found(("tree", (2, 0)))
+    root, excluded = of_kind(records, "r")[0], of_kind(records, "x")[0]
+
+    def reason(*change):
+        with pytest.raises(space_judge.Refused) as refusal:
+            space_judge.judge_records(problem, put(records, *change))
+        return str(refusal.value)
+
+    assert "there is a solution" in reason((root,), ["n"])
+    assert "not in its ball" in reason((root, 1, 0), lambda x: x + 0.1)
+    assert "the index" in reason((root, 3), lambda x: -x)
+    assert "the margin is -" in reason((excluded,), ["x", [], ""])
+    assert "the counts" in reason((-1, "roots"), lambda x: x - 1)

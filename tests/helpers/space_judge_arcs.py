@@ -1,0 +1,276 @@
+"""Arcs of curves in 3D, for space_judge: where statuses change along a curve, and where alpha turns back.
+
+Numbers in brackets are sections of docs/proof_format.md; the mathematics is in docs/theory.md, section 12.10.
+"""
+
+from itertools import permutations
+
+from flint import arb
+from rational_forms import need
+from space_judge_boxes import Around
+from space_judge_curves import dot, place_of
+from space_judge_data import Undecided, column, length_of
+from space_judge_leaves import Singular
+
+#: As many nodes may change their statuses at one place.
+_TOGETHER = 3
+
+
+def sign(value):
+    """That of a ball, or None."""
+    return 1 if value > 0 else -1 if value < 0 else None
+
+
+def slope(natural, around, d, e, statuses=None):
+    """Bounds of the derivative of x along a curve, over balls of (z, alpha), and Y, E for the second one."""
+    Y, E, _, V, middle, terms = natural.bordered(around, e, statuses)
+    if V:
+        raise Singular
+    off = (middle * column(d)).entries()
+    off[-1] -= 1
+    first = (Y * column(off)).entries()
+    for s, D in terms:
+        first = [a + arb(0, (s * abs(dot(row, d))).upper()) for a, row in zip(first, D, strict=True)]
+    return [a - b for a, b in zip(d, solved(E, first), strict=True)], Y, E
+
+
+def solved(E, first):
+    """All x with x = first + E x for a matrix in balls; E must contract."""
+    radii = [abs(a).upper() for a in first]
+    for _ in range(30):
+        wide = [(abs(a).upper() + sum((abs(b).upper() * r for b, r in zip(row, radii, strict=True)), arb(0))).upper()
+                for a, row in zip(first, E, strict=True)]
+        if all(a <= b for a, b in zip(wide, radii, strict=True)) and _contracts(E, radii):
+            return [a + arb(0, sum((abs(b).upper() * r for b, r in zip(row, radii, strict=True)), arb(0)).upper())
+                    for a, row in zip(first, E, strict=True)]
+        radii = [(a * arb(1.1) + arb(2) ** -200).upper() for a in wide]
+    raise Singular
+
+
+def _contracts(E, radii):
+    return all(sum((abs(b).upper() * r for b, r in zip(row, radii, strict=True)), arb(0)) < r
+               for row, r in zip(E, radii, strict=True))
+
+
+def bend(natural, around, d, e):
+    """Bounds of the second derivative of alpha along a smooth curve (theory, (12.24))."""
+    first, Y, E = slope(natural, around, d, e)
+    z, alpha = around.z[:-1], around.z[-1]
+    moved = [dot(row, first) for row in natural.Z]
+    right = [arb(0)] * natural.size
+    for (n, t), (F0, F1), status in zip(natural.nodes, natural.discs, natural.statuses(z, alpha), strict=True):
+        if status != "slip":
+            continue
+        F, length, a, nu = F0 + alpha * F1, length_of([z[k] for k in t]), moved[-1], moved[n]
+        unit = [z[k] / length for k in t]
+        s = dot(unit, [moved[k] for k in t]) / length
+        b = [moved[k] / length - u * s for k, u in zip(t, unit, strict=True)]
+        square = dot(b, b)
+        for k, u, v in zip(t, unit, b, strict=True):
+            right[k] = 2 * F1 * a * nu * u + 2 * (F * nu + F1 * a * z[n]) * v - F * z[n] * (2 * s * v + square * u)
+    return solved(E, (Y * column(right)).entries())[-1]
+
+
+class Walk:
+    """The parts of one curve: ways of alpha, vertices and gaps, in turn."""
+
+    def __init__(self, graph, curve, records, position):
+        self.problem, self.low, self.high = graph.problem, arb(graph.problem.low), arb(graph.problem.high)
+        self.records, self.position = records, position
+        #: ("way", alpha, alpha, sign), ("vertex", alphas) or ("gap", alphas)
+        self.found = []
+        for k, box in enumerate(curve.boxes):
+            self.box = box
+            self.part(curve.points[k], curve.points[k + 1])
+        self.closed = curve.closed
+
+    def place(self, record, between):
+        """A point of the curve between two others."""
+        place = place_of(self.problem, record)
+        need(not place.half > 0, "a place with a length")
+        need(None not in place.statuses, "the statuses at a place are not strict")
+        need(self.box.has(place.point), "a place is not on its curve")
+        t = [self.box.t(x.point) for x in (between[0], place, between[1])]
+        need(t[0] < t[1] < t[2], "a place is not between the ends of its part")
+        return place
+
+    def own(self, record, *places):
+        """A box of a part alone."""
+        if record is None:
+            return
+        place = place_of(self.problem, record)
+        need(place.half > 0, "a box without a length")
+        need(all((a - b).is_zero() for a, b in zip(place.e, self.box.e, strict=True)), "a box with another border")
+        place.cut()
+        need(all(place.has(x.point) for x in places), "a box does not hold the ends of its part")
+
+    def part(self, start, end):
+        record = self.records[self.position]
+        self.position += 1
+        need(isinstance(record, list) and record, "the parts break off")
+        kind, own, *rest = record
+        if kind == "h":
+            (middle,) = rest
+            middle = self.place(middle, (start, end))
+            self.part(start, middle)
+            self.part(middle, end)
+        elif kind == "u":
+            need(not rest, "a gap with more")
+            low, high = self.box.t(start.point), self.box.t(end.point)
+            self.found.append(("gap", self.alphas(low, high)))
+        elif kind == "s":
+            need(not rest, "a part with more")
+            self.own(own, start, end)
+            self.way(start, end)
+        elif kind == "f":
+            before, after = rest
+            before = self.place(before, (start, end))
+            after = self.place(after, (before, end))
+            self.own(own, start, end, before, after)
+            self.way(start, before)
+            self.fold(before, after)
+            self.way(after, end)
+        else:
+            need(kind == "c", "no such part")
+            before, after, near = rest
+            before = self.place(before, (start, end))
+            after = self.place(after, (before, end))
+            self.own(own, start, end, before, after)
+            self.own(near, before, after)
+            self.part_up_to(start, before, after, end)
+
+    def part_up_to(self, start, before, after, end):
+        self.part(start, before)
+        self.corner(before, after)
+        self.part(after, end)
+
+    def alphas(self, low, high):
+        found = None
+        for s in self.box.slices:
+            if not (s.high < low or s.low > high):
+                alpha = s.at(s.low.union(s.high))[-1]
+                found = alpha if found is None else found.union(alpha)
+        return found
+
+    def rate(self, place):
+        """alpha's derivative by t of the box at a place."""
+        rate = place.direction[-1] / dot(place.direction, self.box.e)
+        need(sign(rate) is not None, "alpha rests at a place")
+        return sign(rate)
+
+    def way(self, start, end):
+        """Statuses stay, and alpha goes one way."""
+        natural, e = self.box.natural, self.box.e
+        statuses = end.statuses if None in start.statuses else start.statuses
+        need(None not in statuses, "the statuses at a place are not strict")
+        going = sign(end.point[-1] - start.point[-1])
+        need(going is not None, "alpha does not change")
+
+        def holds(x, d, half, around, z):
+            if natural.statuses(z[:-1], z[-1]) != statuses:
+                return None
+            set_ = natural.argument_at(x, d, half, around)
+            return True if sign(slope(natural, set_, d, e)[0][-1]) == going else None
+
+        t = [self.box.t(place.point).mid() for place in (start, end)]
+        need(self.box.along(*t, holds, deepest=40), "alpha is not shown to go one way")
+        self.found.append(("way", start.point[-1], end.point[-1], going))
+
+    def piece(self, before, after):
+        """The curve from one place to another in one set."""
+        low, high = (self.box.t(place.point).mid() for place in (before, after))
+        try:
+            return self.box.set_between(low, high, before.point, after.point)
+        except Singular as error:
+            raise Undecided("a place is not enclosed") from error
+
+    def fold(self, before, after):
+        natural, e = self.box.natural, self.box.e
+        need(before.statuses == after.statuses, "statuses change at a fold")
+        x, d, half, around, z = self.piece(before, after)
+        need(natural.statuses(z[:-1], z[-1]) == before.statuses, "statuses may change at a fold")
+        need(self.rate(before) == -self.rate(after), "alpha does not turn back")
+        try:
+            second = bend(natural, natural.argument_at(x, d, half, around), d, e)
+        except Singular as error:
+            raise Undecided("a fold is not shown") from error
+        if sign(second) is None:
+            raise Undecided("a fold is not shown")
+        need(sign(second) == -self.rate(before), "alpha bends the other way")
+        self.found.append(("vertex", z[-1]))
+
+    def corner(self, before, after):
+        """Some nodes change their statuses, each once; alpha turns back once or never, in whatever order."""
+        natural, e = self.box.natural, self.box.e
+        changing = [i for i, (a, b) in enumerate(zip(before.statuses, after.statuses, strict=True)) if a != b]
+        need(changing, "no status changes at a corner")
+        if len(changing) > _TOGETHER:
+            raise Undecided("many nodes change at once")
+        x, d, half, around, z = self.piece(before, after)
+        known = natural.statuses(z[:-1], z[-1])
+        need(all(a is not None or i in changing for i, a in enumerate(known)), "another status may change at a corner")
+        rates, set_ = {}, natural.argument_at(x, d, half, around)
+        for chosen in _subsets(changing):
+            statuses = [after.statuses[i] if i in chosen else before.statuses[i] for i in range(len(known))]
+            try:
+                first, *_ = slope(natural, Around(set_.z), d, e, statuses)
+            except Singular as error:
+                raise Undecided("a corner is not shown") from error
+            rates[chosen] = sign(first[-1])
+            moved = [dot(row, first) for row in natural.Z]
+            for i in changing:
+                need(self.monotone(i, before.statuses[i], after.statuses[i], z, moved), "a condition is not monotone")
+        if None in rates.values():
+            raise Undecided("alpha may rest at a corner")
+        turns = set()
+        for order in permutations(changing):
+            passed = [rates[frozenset(order[:k])] for k in range(len(order) + 1)]
+            turns.add(sum(a != b for a, b in zip(passed, passed[1:], strict=False)))
+        need(len(turns) == 1 and max(turns) < 2, "alpha turns back in some orders only")
+        self.found.append(("vertex", z[-1]))
+
+    def monotone(self, i, old, new, z, moved):
+        """Whether the condition between two statuses changes its sign once."""
+        natural = self.box.natural
+        (n, t), (F0, F1) = natural.nodes[i], natural.discs[i]
+        if "open" in (old, new):
+            return sign(moved[n]) == (1 if old == "open" else -1)
+        length = length_of([z[k] for k in t])
+        if not length > 0:
+            return False
+        along = dot([z[k] / length for k in t], [moved[k] for k in t])
+        F = F0 + z[-1] * F1
+        return sign(along - F * moved[n] - F1 * moved[-1] * z[n]) == (1 if new == "slip" else -1)
+
+    # -- counts --------------------------------------------------------------------------------------------------------
+
+    def counts(self):
+        """Arcs with alphas in the interval, and gaps."""
+        gaps, arcs, current = 0, [], None
+        for kind, *numbers in self.found:
+            if kind == "way":
+                low, high = numbers[:2]
+                current = [low, high] if current is None else [current[0], high]
+                continue
+            if current is not None:
+                arcs.append(current)
+            current = None
+            beyond = numbers[0] < self.low or numbers[0] > self.high
+            gaps += kind == "gap" or not (beyond or (numbers[0] > self.low and numbers[0] < self.high))
+        if current is not None:
+            if self.closed and arcs and self.found[0][0] == "way":
+                arcs[0] = [current[0], arcs[0][1]]
+            else:
+                arcs.append(current)
+        inside = 0
+        for one, two in arcs:
+            least, most = one.min(two), one.max(two)
+            inside += not (most < self.low or least > self.high)
+        return inside, gaps
+
+
+def _subsets(items):
+    found = [frozenset()]
+    for item in items:
+        found += [chosen | {item} for chosen in found]
+    return found
