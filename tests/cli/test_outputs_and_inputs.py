@@ -136,7 +136,6 @@ def test_a_file_of_another_kind_is_not_replaced(place, capsys, command, option, 
 
 
 def test_every_command_checks_its_files():
-    """What takes a file has a metavariable by which it is known whether it is read or written."""
     from enumsol.cli import files
     from enumsol.cli.app import app
 
