@@ -225,7 +225,7 @@ class TreeChecker(ABC):
         return None if unloaded else "the problem is not unloaded"
 
     def locate(self, forces: Ball, still: Mask, codes: tuple[int, ...] | None = None) -> None:
-        """Take note of where a root is, and of its statuses if they are certain, if anybody wants to know."""
+        """Add the place of a root, with its statuses if they are certain, to ``located`` if places are collected."""
         if self.located is not None:
             self.located.append((forces, still, codes))
 
