@@ -245,7 +245,7 @@ class TreeChecker(ABC):
         return None if unloaded else "the problem is not unloaded"
 
     def locate(self, name: Hashable, found: Located) -> None:
-        """Take note of where a root is, if anybody wants to know."""
+        """Add what a leaf shows of a root to ``located`` if places are collected."""
         if self.located is not None:
             self.located.setdefault(name, []).append(found)
 

@@ -132,6 +132,7 @@ _CALLED = (
     (r" \(rigid_modes is given\)", ""),
     (r'\barithmetic(?:=| )"(\w+)"', r"--arithmetic \1"),
     (r'\barithmetic is "(\w+)"', r"--arithmetic is \1"),
+    (r"^time_limit is", "--time-limit is"),
 )
 
 

@@ -90,7 +90,7 @@ class Display:
             self._progress.start()
 
     def counts(self) -> str:
-        """What stands behind the bar, as of now: also while nothing new is told, the time goes on."""
+        """The text behind the bar; its clock goes on while nothing new is reported."""
         now = time.perf_counter()
         said = ", ".join(part for part in (self._note, self._work) if part)
         left = remaining(self._told - self._begun, self._share, now - self._told)

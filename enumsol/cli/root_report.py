@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
     from enumsol.roots.root import Enclosure, Root, RootFamily
     from enumsol.roots.root_set import RootSet, Undecided
+    from enumsol.support.array_types import Floats
 
 #: The table over contact nodes is printed when it has at most so many rows.
 _ROWS = 24
@@ -29,19 +30,21 @@ def roots_as_text(found: RootSet) -> str:
 
     width = max(4, *(len(visible(label)) for label in found.node_ids))
     tangents = 2 if len(found) and found[0].lambda_t.ndim == 2 else 1
-    lines = [f"{'':>8} {node_heading(width, tangents)}"]
+    # a continuum has forces only
+    places = found[0].problem.coordinates if len(found) else None
+    lines = [f"{'':>8} {node_heading(width, tangents, places)}"]
     for k, root in enumerate(found):
-        lines += _root_rows(f"root {k}", root, found.node_ids, width)
+        lines += _root_rows(f"root {k}", root, found.node_ids, width, places)
     for k, family in enumerate(found.families):
         lines += _family_rows(k, family, found.node_ids, width)
     return "\n".join([*lines, "", repr(found)])
 
 
-def _root_rows(title: str, root: Root, node_ids: tuple[Any, ...], width: int) -> Iterator[str]:
+def _root_rows(title: str, root: Root, node_ids: tuple[Any, ...], width: int, places: Floats | None) -> Iterator[str]:
     from enumsol.roots.root import node_line  # as above
 
     for i, label in enumerate(node_ids):
-        yield f"{title if i == 0 else '':>8} {node_line(root, i, label, width)}"
+        yield f"{title if i == 0 else '':>8} {node_line(root, i, label, width, places)}"
 
 
 def _family_rows(k: int, family: RootFamily, node_ids: tuple[Any, ...], width: int) -> Iterator[str]:

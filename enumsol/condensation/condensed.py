@@ -192,7 +192,7 @@ class Condensation(Sealed):
 
     @classmethod
     def from_problem(cls, problem: WithProducts) -> Self:
-        """Condense with one sparse factorization; of what is n long only a block of columns is dense."""
+        """Condense with one sparse factorization; dense columns of length n are made a block at a time."""
         offset = np.concatenate([problem.gap, problem.slip_offset.ravel(order="F")])
         products = problem.products
         size = len(products.mid)

@@ -176,6 +176,8 @@ def enumerate_roots(
          0    +1     yes  2.04e-01            0  open
          1    -1     yes  6.24e-01      0.33333  slip-
          2    +1     yes  2.70e-01          1.5  stick
+    index: the sign of a determinant; regular: no node is between two statuses
+    margin: distance to the next change of status, relative to the largest values
     index sum: +1
     complete: yes (proven)
     """

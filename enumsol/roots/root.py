@@ -318,10 +318,10 @@ class Root(ContactState):
         return signs
 
     def __repr__(self) -> str:
-        return "\n".join([root_heading(self), *node_table(self, self.problem.node_ids)])
+        return "\n".join([root_heading(self), *node_table(self, self.problem.node_ids, self.problem.coordinates)])
 
     def _repr_html_(self) -> str:
-        return root_html(self, self.problem.node_ids)
+        return root_html(self, self.problem.node_ids, self.problem.coordinates)
 
 
 @dataclass(frozen=True)
@@ -421,35 +421,48 @@ def root_heading(root: Root) -> str:
     return f"Root at alpha = {float(root.alpha):g}: index {index}, {regular}, margin {root.margin:.2e}"
 
 
-def root_html(root: Root, labels: tuple[Any, ...]) -> str:
+def root_html(root: Root, labels: tuple[Any, ...], places: Floats | None = None) -> str:
     """A root in a notebook: its heading, and a table over the contact nodes; of many the first."""
     shown = min(len(labels), _PRINTED_NODES)
     heads = _node_heads(1 if root.lambda_t.ndim == 1 else 2)
-    rows = [(labels[i], root.statuses[i].value, *(f"{x:.6g}" for x in _node_numbers(root, i))) for i in range(shown)]
+    rows = [
+        (labels[i], root.statuses[i].value, *(f"{x:.6g}" for x in _node_numbers(root, i)), *_place(places, i))
+        for i in range(shown)
+    ]
     more = [f"... {len(labels) - shown} more nodes; all of them: {summary(root.statuses)}"]
     return (
         html_lines([root_heading(root)])
-        + html_table(("node", "status", *heads), rows)
+        + html_table(("node", "status", *heads, *_places_head(places)), rows)
         + html_lines(more if shown < len(labels) else [])
     )
 
 
-def node_table(state: ContactState, labels: tuple[Any, ...]) -> list[str]:
-    """Lines of a table over the contact nodes; of many the first."""
+def node_table(state: ContactState, labels: tuple[Any, ...], places: Floats | None = None) -> list[str]:
+    """Lines of a table over the contact nodes, with their places if these are known; of many the first."""
     shown = min(len(labels), _PRINTED_NODES)
     width = max(4, *(len(visible(label)) for label in labels[:shown]))
     lines = [
-        node_heading(width, 1 if state.lambda_t.ndim == 1 else 2),
-        *(node_line(state, i, labels[i], width) for i in range(shown)),
+        node_heading(width, 1 if state.lambda_t.ndim == 1 else 2, places),
+        *(node_line(state, i, labels[i], width, places) for i in range(shown)),
     ]
     if shown < len(labels):
         lines.append(f"... {len(labels) - shown} more nodes; all of them: {summary(state.statuses)}")
     return lines
 
 
-def node_heading(width: int, tangents: int = 1) -> str:
+def node_heading(width: int, tangents: int = 1, places: Floats | None = None) -> str:
     """The heading of lines over contact nodes, whose labels take that width."""
-    return f"{'node':>{width}} {'status':<7} " + " ".join(f"{name:>12}" for name in _node_heads(tangents))
+    names = " ".join(f"{name:>12}" for name in _node_heads(tangents))
+    return "  ".join([f"{'node':>{width}} {'status':<7} {names}", *_places_head(places)])
+
+
+def _places_head(places: Floats | None) -> tuple[str, ...]:
+    return () if places is None else (f"at ({', '.join('xyz'[: places.shape[1]])})",)
+
+
+def _place(places: Floats | None, i: int) -> tuple[str, ...]:
+    """Where in the body a contact node is, if that is known."""
+    return () if places is None else (f"({', '.join(f'{x + 0.0:.4g}' for x in places[i])})",)
 
 
 def _node_heads(tangents: int) -> list[str]:
@@ -457,10 +470,10 @@ def _node_heads(tangents: int) -> list[str]:
     return ["lambda_n", *across[0], "u_n", *across[1]]
 
 
-def node_line(state: ContactState, i: int, label: object, width: int) -> str:
-    """Status, forces and displacements of a contact node, below `node_heading`."""
+def node_line(state: ContactState, i: int, label: object, width: int, places: Floats | None = None) -> str:
+    """Status, forces and displacements of a contact node, and where it is, below `node_heading`."""
     text = " ".join(f"{number:>12.6g}" for number in _node_numbers(state, i))
-    return f"{visible(label):>{width}} {state.statuses[i].value:<7} {text}"
+    return "  ".join([f"{visible(label):>{width}} {state.statuses[i].value:<7} {text}", *_place(places, i)])
 
 
 def _node_numbers(state: ContactState, i: int) -> list[float]:

@@ -28,6 +28,11 @@ if TYPE_CHECKING:
 
 _PRINTED_ROOTS, _PRINTED_REGIONS = 20, 5
 _HEADS = ("", "index", "regular", "margin", "max lambda_n", "contact")
+#: What the heads mean, below the table.
+_EXPLAINED = (
+    "index: the sign of a determinant; regular: no node is between two statuses",
+    "margin: distance to the next change of status, relative to the largest values",
+)
 
 
 @dataclass(frozen=True)
@@ -498,11 +503,14 @@ class RootSet(Sequence[Root], Immutable):
         rows = [_HEADS, *self._rows()] if len(self) else []
         widths = (6, 5, 7, 9, 12)
         table = [" ".join(f"{c:>{w}}" for c, w in zip(row, widths, strict=False)) + f"  {row[-1]}" for row in rows]
-        return "\n".join([self._heading(), *table, *self._notes()])
+        return "\n".join([self._heading(), *table, *self._explained(), *self._notes()])
+
+    def _explained(self) -> tuple[str, ...]:
+        return _EXPLAINED if len(self) else ()
 
     def _repr_html_(self) -> str:
         table = html_table(("root", *_HEADS[1:]), self._rows()) if len(self) else ""
-        return html_lines([self._heading()]) + table + html_lines(self._notes())
+        return html_lines([self._heading()]) + table + html_lines([*self._explained(), *self._notes()])
 
 
 def _moving(family: RootFamily) -> str:

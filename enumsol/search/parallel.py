@@ -37,7 +37,7 @@ class Searchable(Protocol):
 
     @property
     def arithmetic(self) -> str:
-        """In which it is searched."""
+        """The arithmetic of the search."""
 
     @property
     def has_solution(self) -> bool:

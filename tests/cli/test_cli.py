@@ -52,7 +52,12 @@ def test_roots_of_the_first_example(capsys):
     rows = [line.split() for line in out.splitlines()[1:4]]
     assert [row[3] for row in rows] == ["open", "slip-", "stick"]
     assert [float(row[4]) for row in rows] == pytest.approx([0.0, 1 / 3, 1.5], abs=1e-6)
-    assert max(map(len, out.splitlines())) <= 80
+    assert max(map(len, out.splitlines())) <= 90
+    # what the heads mean, and where the node is
+    assert out.splitlines()[0].endswith("at (x, y)")
+    assert all(line.endswith("  (0, 0)") for line in out.splitlines()[1:4])
+    for head in ("index: the sign of", "regular: no node", "margin: distance"):
+        assert head in out
 
 
 def test_fast_arithmetic_is_not_proven_but_succeeds(capsys):
@@ -157,7 +162,7 @@ def test_all_solutions_in_3d(capsys, tmp_path):
     arguments = ("roots", "gallery:one-node-3d-3", "--alpha", 0, "--proof", proof, "--csv", table)
     out = printed(capsys, *arguments)
     assert out.endswith("index sum: +1\ncomplete: yes (proven)\n")
-    assert [line.split()[-7] for line in out.splitlines()[1:4]] == ["stick", "slip", "open"]
+    assert [line.split()[-10] for line in out.splitlines()[1:4]] == ["stick", "slip", "open"]
     heads = table.read_text().splitlines()[0].split(",")
     assert heads[4:10] == ["lambda_n", "lambda_t1", "lambda_t2", "u_n", "u_t1", "u_t2"]
     assert "complete: yes" in printed(capsys, "verify", "gallery:one-node-3d-3", proof)
@@ -278,12 +283,12 @@ def test_bad_problems_get_one_sentence(capsys, tmp_path, case):
         ("roots gallery:chain-2 --alpha 5 --csv /tmp", "--csv is /tmp, a directory; expected"),
         ("roots gallery:chain-2 --alpha 5 --csv - --json -", "--json and --csv are both -"),
         ("roots gallery:chain-2 --alpha 5 --proof -", "a proof is a binary file; expected the name"),
-        ("roots gallery:chain-2 --alpha 5 --time-limit -1", "time_limit is -1.0; expected a positive"),
+        ("roots gallery:chain-2 --alpha 5 --time-limit -1", "--time-limit is -1.0; expected a positive"),
         ("roots gallery:chain-2 --alpha 5 --max-nodes 0", "'--max-nodes'"),
         ("roots gallery:chain-2 --alpha 5 --stop-after two", "'--stop-after'"),
         ("roots gallery:chain-2 --alpha 5 --arithmetic sloppy", "'sloppy' is not one of"),
         ("roots gallery:chain-2 --alpha 5 --method exhaustive", "for the oracle"),
-        ("roots gallery:one-node-3d --alpha 0 --arithmetic exact", 'is "exact", which problems in 3D'),
+        ("roots gallery:one-node-3d --alpha 0 --arithmetic exact", "--arithmetic is exact, which problems in 3D"),
         ("roots gallery:one-node-3d --alpha 0 --method exhaustive", "method is"),
         ("roots gallery:chain-2 --alpha 5 --method exhaustive --jobs 2", "expected 1 job"),
         ("roots gallery:clamped-block-16 --alpha 5 --method exhaustive --arithmetic fast", "hours"),

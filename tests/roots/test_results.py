@@ -297,11 +297,14 @@ def test_one_line_a_node_under_a_heading(capsys):
     roots = enumsol.enumerate_roots(gallery.two_node_square(), 3.5)
     heading, columns, *rows = printed(roots[1], capsys)
     assert heading == f"Root at alpha = 3.5: index -1, regular, margin {roots[1].margin:.2e}"
-    assert columns.split() == ["node", "status", "lambda_n", "lambda_t", "u_n", "u_t"]
+    assert columns.split() == ["node", "status", "lambda_n", "lambda_t", "u_n", "u_t", "at", "(x,", "y)"]
     assert [row.split() for row in rows] == [
-        ["0", "slip-", "0.5", "-1.75", "0", "-1"],
-        ["1", "open", "0", "0", "-0.25", "-0.75"],
+        ["0", "slip-", "0.5", "-1.75", "0", "-1", "(0,", "0)"],
+        ["1", "open", "0", "0", "-0.25", "-0.75", "(1,", "0)"],
     ]
+    # whose places are not known
+    bare = enumsol.enumerate_roots(gallery.two_node_square().replace(mesh=None, coordinates=None), 3.5)
+    assert printed(bare[1], capsys)[1].split()[-1] == "u_t"
 
 
 def test_a_root_that_is_not_regular_says_so(capsys):
@@ -367,7 +370,7 @@ def test_roots_and_root_sets():
     one = Cells(roots[1]._repr_html_())
     assert set(labels) <= set(one.cells)
     assert (one.tags.count("script"), one.tags.count("tr")) == (0, 3)
-    assert set(repr(roots[1]).split()[-5:]) <= set(one.cells)
+    assert {*repr(roots[1]).split()[-7:-2], "(1, 0)", "at (x, y)"} <= set(one.cells)
 
 
 def test_a_family():

@@ -259,7 +259,7 @@ class PieceTree:
         return Known(self._problem, chains, self._sampled, self._sought, self.more is None)
 
     def _follow(self, x: Array) -> bool:
-        """Whether there is a new curve through a solution, which is not followed where a known one seems to have it."""
+        """Whether a new curve through a solution was followed; none is if a known curve seems to pass through it."""
         chain = None if self.more is None or self._is_known(x) else self.more(x)
         if chain is not None:
             self._take(KnownCurve(self._given, chain))

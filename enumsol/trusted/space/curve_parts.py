@@ -1,7 +1,8 @@
 """The trusted tests of what a curve in 3D does over alpha between two of its points (theory, section 12.10).
 
-On a run statuses hold and alpha goes one way. A turn is where one condition changes its sign, or a few do too near to
-each other to be told apart, or where alpha turns back, once; or a part of which nothing of this is shown, left open.
+A run is a part on which all statuses hold and alpha goes one way. A turn is a part in which one condition changes its
+sign, or several do so close together that their order is not known, or alpha turns back once. A turn of which none of
+this is proven is left open.
 """
 
 from __future__ import annotations
@@ -233,7 +234,7 @@ class LinkParts:
     # -- places and boxes ------------------------------------------------------------------------------------------
 
     def place(self, point: SolutionCurve) -> Place:
-        """At a joint."""
+        """The place of a joint between two boxes."""
         return Place(point, CurveMotion(self.problem, point, self.border))
 
     def place_at(self, point: SolutionCurve | None) -> Place | None:
