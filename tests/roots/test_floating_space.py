@@ -126,6 +126,8 @@ def test_a_body_that_is_free_to_slide_names_the_mode():
     roots = checked(block_on_table3d(1, push=(0.0, 0.0), friction=0.0))
     assert not roots.complete
     assert any("free to move as a whole" in part.reason and "rigid mode" in part.reason for part in roots.undecided)
+    hints = {part.hint for part in roots.undecided if "free to move as a whole" in part.reason}
+    assert hints == {"hold the body by a spring or a fixed point, or give a smaller max_rigid_displacement"}
 
 
 def test_what_the_text_says():

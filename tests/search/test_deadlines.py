@@ -25,6 +25,7 @@ from enumsol.relaxation.convex_forms import FormAscent
 from enumsol.search import form_policy as forms
 from enumsol.search.interval.subintervals import IntervalSearch
 from enumsol.search.solvers import Solvers
+from enumsol.search.space.space_fathoming import DefiniteForm
 from enumsol.selections.rational_selections import ExactSelections
 from enumsol.support.conic import conic_answer
 from enumsol.support.deadlines import Deadline, TimeOverError, attended, current, look, over, within
@@ -341,3 +342,9 @@ def test_a_conic_program_is_solved_in_a_thread_as_it_is_without_one():
 
     small, large = answer(1), answer(10**9)
     assert small.x == large.x == pytest.approx([0.0, 1.0], abs=1e-6)
+
+
+def test_better_numbers_for_one_certificate_in_3d_are_sought_while_there_is_time(clock, takes):
+    takes(DefiniteForm, "_gradient")
+    cut(clock, enumerate_roots, gallery.block3d(3, 3, 2, friction=5.0), 0, time_limit=3.0)
+    assert clock[0] > 3.0

@@ -395,7 +395,6 @@ class DefiniteForm:
         for hardness in _HARDNESS:
             if left <= 0 or least > _GOOD:
                 break
-            look()
             options = {"maxfun": min(_ROUND, left), "maxiter": _ROUND}
             given = columns, hardness
             found = minimize(self._value, x, given, method="L-BFGS-B", jac=True, bounds=bounds, options=options)
@@ -419,6 +418,7 @@ class DefiniteForm:
         return shares / root, root
 
     def _matrix(self, turn: Floats, mu: Floats, kappa: Floats, nu: Floats) -> Floats:
+        look()  # its eigenvalues take seconds where there are some hundred nodes, and many such matrices are tried
         S, tau, p = self._S, self._system.tau, self._system.p
         form = S.copy()
         form[:p] = mu[:, None] * S[:p]
