@@ -47,9 +47,10 @@ class FileCommand(TyperCommand):
     def invoke(self, ctx: Any) -> Any:
         """Check the files, then run the command."""
         named = [(option.metavar, option.opts[0], option, ctx.params.get(option.name)) for option in self.params]
-        given = [(metavar, name, value) for metavar, name, _, value in named if isinstance(value, str) and value != "-"]
-        outputs = [(_called(name), value) for metavar, name, value in given if metavar in _WRITTEN]
-        check_files([(str(metavar), value) for metavar, _, value in given if metavar in _READ], outputs)
+        given = [(metavar, name, value) for metavar, name, _, value in named if isinstance(value, str)]
+        outputs = [(_called(name), value) for metavar, name, value in given if metavar in _WRITTEN and value != "-"]
+        inputs = [(metavar, "/dev/stdin" if value == "-" else value) for metavar, _, value in given if metavar in _READ]
+        check_files(inputs, outputs)
         for name, value in outputs:
             kind = "--report" if (ctx.info_name, name) == ("report", "--output") else name
             if kind in _BEGINNINGS:

@@ -5,7 +5,7 @@ import shutil
 from pathlib import Path
 
 import pytest
-from command_line import assert_refused, run
+from command_line import assert_refused, call, run
 
 import enumsol
 from enumsol import gallery
@@ -65,6 +65,13 @@ INPUTS = [
     ("verify", "p.npz", "g.proof", "--json", "g.proof"),
     ("collection", "check", "answers", "--csv", "answers/triangle-3.csv"),
 ]
+
+
+def test_what_stdin_reads_is_an_input(place):
+    with (place / "points.csv").open() as points:
+        done = call("audit", "p.npz", "-", "--graph", "g.json", "--csv", "points.csv", cwd=place, stdin=points)
+    assert_refused(done.returncode, done.stdout, done.stderr, "which would replace /dev/stdin (POINTS)")
+    assert "alpha,lambda_n_0" in (place / "points.csv").read_text()
 
 
 def content(folder):
