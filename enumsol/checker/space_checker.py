@@ -246,8 +246,7 @@ class SpaceChecker(TreeChecker):
             forces[(1 + k) * p + nodes] = y[system.tau[nodes, k]] * Ball(system.F[nodes, k], system.F_rad[nodes, k])
         zero = (forces.mid == 0) & (forces.rad == 0)
         forces = Ball(forces.mid * unit, np.where(zero, 0.0, forces.rad * unit + TINY))
-        loose = isinstance(found, LooseSolution)
-        still = ~(found.slip | found.open) if loose else np.array(codes) == STICK
+        still = ~(found.slip | found.open) if isinstance(found, LooseSolution) else np.array(codes) == STICK
         # where a coefficient is 0 a sticking node may move all the same
         self.locate(id(found), Located(forces, np.concatenate([still & (system.tau[:, k] >= 0) for k in (0, 1)])))
 
