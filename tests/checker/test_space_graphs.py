@@ -9,6 +9,7 @@ from complete import accepted_report, all_roots, complete_report
 from problems3d import random_over_alpha
 from proof_tools import of_kind, proof_of, put, records_of, replaced
 
+import enumsol
 from enumsol import enumerate_roots, gallery, verify
 from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space.cover import SpaceCover
@@ -117,3 +118,33 @@ def test_a_flat_block_takes_one_node():
     cover.search(max_nodes=1)
     assert (len(cover.chains), cover.gaps, cover.stopped) == (1, [], None)
     complete_report(problem, cover.proof())
+
+
+def several_changes_at_once(load=(2, -5, -1), friction=(2.0, 1.0), slope=(-1.0, -0.5)):
+    """One node whose load is (3, -3, 0) at alpha = 1, where its coefficients may be 1 and 0.5."""
+    e, A = np.eye(3), [[5.25, -4, 0], [-4, 5.25, 0], [0, 0, 1.25]]
+    more = np.array([3, -3, 0]) - load
+    data = {"friction": friction, "friction_slope": slope, "load_slope": more}
+    return enumsol.ContactProblem3D(A, e[:1], e[1:2], e[2:], load, **data)
+
+
+@pytest.mark.slow
+def test_the_proof_of_an_incomplete_graph_is_accepted():
+    problem = several_changes_at_once()
+    graph = enumsol.branch_graph(problem, (0, 1))
+    assert not graph.complete
+    assert not accepted_report(problem, graph.proof).complete
+
+
+@pytest.mark.few(0, 3)
+@pytest.mark.parametrize("seed", range(40))
+def test_proofs_of_random_graphs_are_accepted(seed):
+    """In whole numbers, with several changes of statuses at one end."""
+    rng = np.random.default_rng(seed)
+    F = float(rng.integers(1, 5)) / 2
+    ratio, slope = float(rng.choice([0.5, 1, 2])), float(rng.choice([-F, -F / 2, 0, 0.5]))
+    data = {"friction": (F, F * ratio), "slope": (slope, slope * ratio)}
+    problem = several_changes_at_once(rng.integers(-5, 6, 3), **data)
+    graph = enumsol.branch_graph(problem, (0, 1), max_nodes=200)
+    if graph.proof is not None:
+        assert accepted_report(problem, graph.proof).complete == graph.complete

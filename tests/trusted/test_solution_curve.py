@@ -181,3 +181,18 @@ def test_a_fold_lies_in_a_box():
         inside = [root for root in roots if lies_in(box, Ball.exact(given.placed(np.append(forces(root), alpha))))]
         counts.append(len(inside))
     assert counts == [2, 0]
+
+
+def test_a_box_near_a_corner_is_taken_if_a_checker_shows_it_without_a_guess():
+    e, A = np.eye(3), [[5.25, -4, 0], [-4, 5.25, 0], [0, 0, 1.25]]
+    data = {"friction": (2.0, 1.0), "friction_slope": (-1.0, -0.5), "load_slope": [1, 2, 1]}
+    given = AlphaProblem.of(enumsol.ContactProblem3D(A, e[:1], e[1:2], e[2:], [2, -5, -1], **data).enclosure)
+    x = np.array([2.9986325370611766, -3.00269126764778, -0.0027139271375546115, 0.998643025293231])
+    d = np.array([0.5651579670684634, 1.0965476128867346, 1.1140677107885602, 0.5570456365767223])
+    border, shown = np.array([0.15038130783348774, 0.26167978671193165, 0.28176922598145937, 0.563968987695235]), 0
+    # for the first of these a box with a guess of what is beside it served
+    for half in 0.0006431023222115313 * np.array([1.0, 0.5, 0.25, 0.125, 2.0**-6, 2.0**-9]):
+        curve = curve_around(given, x, d, border, half, rho=np.ones(3), roomy=False)
+        assert curve is None or only_curve(given, curve.box) is not None
+        shown += curve is not None
+    assert shown

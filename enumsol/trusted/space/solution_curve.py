@@ -688,7 +688,11 @@ class _CurveMap:
             shares = step.shares(radius, self.half)
             if shares is None:
                 return None
-            step, found = self.tried(radius, ERRORS, self.beside(step, shares))
+            side = self.beside(step, shares)
+            step, found = self.tried(radius, ERRORS, side)
+            if found is not None and not roomy and np.any(side):
+                # a checker begins without a side, from where another treatment of a corner may be come to
+                found = self.mapped(radius, ERRORS)
             if found is not None:
                 break
         if found is None or straight is None:
