@@ -20,6 +20,7 @@ def graphs():
         "bare": branch_graph(bare, (0, 10)),
         "cut": branch_graph(square, (0, 10), max_nodes=8),
         "chain": branch_graph(gallery.chain(3), (0, 10)),
+        "square": branch_graph(square, (0, 10)),
     }
 
 
@@ -78,6 +79,15 @@ def test_the_slider_shows_as_many_solutions_as_there_are(browser, pages, graphs)
     assert browser.evaluate("state.alpha") == fold
     assert cards(browser) == 2  # the free wedge, and the fold
     assert browser.complaints() == []
+
+
+def test_rounding_is_not_enlarged(browser, pages):
+    """One of the five bodies rests: what seven digits leave of its displacements is drawn as nothing."""
+    browser.show(pages["square"])
+    browser.evaluate("showAlpha(3.5)")
+    scales = browser.evaluate("[...document.querySelectorAll('#cards input[type=number]')].map((i) => Number(i.value))")
+    assert len(scales) == 5
+    assert max(scales) < 1e3
 
 
 def test_arrows_and_marks_are_those_of_the_roots(browser, pages, graphs):
