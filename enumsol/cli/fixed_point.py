@@ -72,8 +72,9 @@ def fixed_point(
     body, names = load_problem(problem), units_of(problem, units)
     value = _alpha(alpha, problem, body)
     options: dict[str, Any] = {"tolerance": tolerance, "max_iterations": max_iterations, "anderson": anderson}
+    files = {"json_file": json_file, "csv_file": csv_file}
     if starts is not None:
-        _basins(_in_2d(body, problem), problem, value, starts, options, json_file, csv_file, plot_file, names)
+        _basins(_in_2d(body, problem), problem, value, starts, options, files, plot_file, names)
     output.check_places(vtu_file, body, problem)
     found, ended = so_far(lambda: _approximate(body, value, start, options))
 
@@ -85,8 +86,7 @@ def fixed_point(
     output.deliver(
         (npz_file, found.save),
         (vtu_file, show),
-        json_file=json_file,
-        csv_file=csv_file,
+        **files,
         text=lambda: in_units(repr(found), names),
         content=lambda: _content(found, problem),
         frame=found.to_frame,
@@ -158,8 +158,7 @@ def _basins(
     alpha: Alpha,
     starts: int,
     options: dict[str, Any],
-    json_file: str | None,
-    csv_file: str | None,
+    files: dict[str, str | None],
     plot_file: str | None,
     units: tuple[str, str] | None,
 ) -> None:
@@ -175,8 +174,7 @@ def _basins(
     table, ended = so_far(lambda: basin_table(body, roots, starts, **options))
     output.deliver(
         (plot_file, lambda path: output.write_figure(path, plot_basins(table, units=units))),
-        json_file=json_file,
-        csv_file=csv_file,
+        **files,
         text=lambda: _basin_text(table, len(roots), roots.closing_line),
         content=lambda: {"problem": name, "alpha": float(alpha), **_basin_content(table, len(roots))},
         frame=lambda: table,

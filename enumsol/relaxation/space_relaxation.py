@@ -10,9 +10,10 @@ from weakref import WeakSet
 
 import numpy as np
 
+from enumsol.errors import MissingDependencyError
 from enumsol.model.sectors import SECTORS, cut, end_number, middle_number, nearest, start_number, width_level, width_of
 from enumsol.model.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
-from enumsol.relaxation.engine import FEASIBILITY_TOLERANCE, PRUNE_MARGIN
+from enumsol.relaxation.engine import FEASIBILITY_TOLERANCE, PRUNE_MARGIN, not_compiled
 from enumsol.relaxation.imposed_rows import EQUALITY, INEQUALITY
 from enumsol.trusted.space import sector_rows
 
@@ -121,15 +122,17 @@ class SpaceEngine:
 
     Raises
     ------
-    ImportError
+    MissingDependencyError
         The compiled solver is not available.
     """
 
     name = "active-set"
 
     def __init__(self, system: SpaceSystem, rows: int = _ROWS) -> None:
-        from enumsol.relaxation import _active_set  # compiled
-
+        try:
+            from enumsol.relaxation import _active_set
+        except ImportError as error:
+            raise MissingDependencyError(f"the search in 3D needs it, but {not_compiled(error)}") from error
         self.system = system
         p = system.p
         self.slots = rows // p

@@ -199,7 +199,7 @@ def test_ctrl_c_stops_a_graph(jobs):
         (("graph", "gallery:one-node-6.1", "--from", "-1", "--to", "1"), "negative in the interval"),
         (("graph", "gallery:one-node-6.1", "--from", "0"), "missing option '--to'"),
         (("graph", "gallery:nothing", "--from", "0", "--to", "1"), "no problem named 'nothing'"),
-        ((*GRAPH, "--time-limit", "-1"), "time_limit is -1.0"),
+        ((*GRAPH, "--time-limit", "-1"), "--time-limit is -1.0"),
     ],
 )
 def test_bad_calls_get_one_sentence(capsys, tmp_path, monkeypatch, arguments, part):

@@ -172,6 +172,13 @@ def test_missing_compiled_engine_warns_and_works(monkeypatch):
     assert len(roots) == 3
     with pytest.raises(ImportError):
         enumsol.enumerate_roots(gallery.one_node_triangle(), 5.0, "fast", engine="active-set")
+    # what README says is not there then
+    for needs, call in (
+        ("the search in 3D", lambda: enumsol.enumerate_roots(gallery.get("one-node-3d-3").build(), 0)),
+        ("branch_graph", lambda: enumsol.branch_graph(gallery.two_node_square(), (0, 10))),
+    ):
+        with pytest.raises(enumsol.MissingDependencyError, match=f"{needs} needs it, but the compiled active-set"):
+            call()
 
 
 def test_compiled_engine_is_there():

@@ -22,6 +22,7 @@ def graphs():
         "bare": branch_graph(bare, (0, 10)),
         "cut": branch_graph(square, (0, 10), max_nodes=8),
         "chain": branch_graph(gallery.chain(3), (0, 10)),
+        "square": branch_graph(square, (0, 10)),
     }
 
 
@@ -99,6 +100,15 @@ def test_it_opens_where_most_solutions_are(browser, pages, graphs):
     items = "[1, 2].map((k) => ({ name: 'b', words: `arc ${k}, x`, statuses: '0'.repeat(p) }))"
     browser.evaluate(f"window.items = {items}; entitle(items)")
     assert browser.evaluate("items.map((item) => item.title)") == ["b: free, arc 1", "b: free, arc 2"]
+
+
+def test_rounding_is_not_enlarged(browser, pages):
+    """One of the five bodies rests: what seven digits leave of its displacements is drawn as nothing."""
+    browser.show(pages["square"])
+    browser.evaluate("showAlpha(3.5)")
+    scales = browser.evaluate("[...document.querySelectorAll('#cards input[type=number]')].map((i) => Number(i.value))")
+    assert len(scales) == 5
+    assert max(scales) < 1e3
 
 
 def test_arrows_and_marks_are_those_of_the_roots(browser, pages, graphs):

@@ -263,7 +263,7 @@ def test_the_command(tmp_path, capsys):
     [
         (["-o", "-"], "--output is -"),
         (["-o", "nowhere/page.html"], "--output is nowhere/page.html"),
-        (["--units", "N"], "--units is N"),
+        (["--units", "N"], "--units is 'N'"),
         (["--to", "-1"], "--from is 0"),
     ],
 )
@@ -400,7 +400,7 @@ def test_commands_tell_what_a_toml_file_gave(tmp_path, capsys, monkeypatch):
         assert run(capsys, verb, "block.toml", "--alpha", 0, "--report", f"{verb}.html", "--units", "kN,m")[0] == 0
         assert "top: 0.1, -0.3 kN/m²" in text_of(tmp_path / f"{verb}.html")
     answer = run(capsys, "roots", "block.toml", "--alpha", 0, "--units", "kN")
-    assert_refused(*answer, "--units is kN; expected units of force and length")
+    assert_refused(*answer, "--units is 'kN'; expected units of force and length")
 
 
 def test_no_outline_is_as_wide_as_a_body_is_long():

@@ -559,8 +559,8 @@ def middle_inverse(M: Ball) -> tuple[Floats, Floats] | None:
 class Step:
     """x - Y N(x), N the natural map, for all x = c + t d + b within a radius of a point c, |t| <= h.
 
-    Every value is c + t d + move + t drift + E b + sum (a_k + t b_k + t_k V_k b) G_k with |t_k| <= 1/2 and with move,
-    drift, E, a_k and b_k within the bounds below. Without d, h is 0.
+    Every value is c + t d + move + t drift + E b + sum (a_k + t b_k + t_k V_k b) G_k with |t_k| <= 1/2, the a_k of
+    ``first``, and all other numbers within the bounds below. Without d, h is 0.
 
     Attributes
     ----------
