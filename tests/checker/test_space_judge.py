@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import space_judge
-from effort import some
 from floating_space import known_body
 from problems3d import OneNode, degenerate_integers, in_space, random_over_alpha, random_plane_over_alpha
 from proof_tools import bytes_of, of_kind, put, records_of

@@ -27,10 +27,12 @@ from space_judge_data import (
     length_of,
     margin,
     positive,
+    sector_of,
 )
 from space_judge_graph import Graph
-from space_judge_leaves import angles_of, explore, root_near, roots_of, sector_of
+from space_judge_leaves import angles_of
 from space_judge_products import ProductForm
+from space_judge_zeros import explore, root_near, roots_of
 
 DIGITS = 320
 

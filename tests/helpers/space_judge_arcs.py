@@ -3,7 +3,7 @@
 Numbers in brackets are sections of docs/proof_format.md; the mathematics is in docs/theory.md, section 12.10.
 """
 
-from itertools import permutations
+from itertools import pairwise, permutations
 
 from flint import arb
 from rational_forms import need
@@ -38,18 +38,24 @@ def solved(E, first):
     """All x with x = first + E x for a matrix in balls; E must contract."""
     radii = [abs(a).upper() for a in first]
     for _ in range(30):
-        wide = [(abs(a).upper() + sum((abs(b).upper() * r for b, r in zip(row, radii, strict=True)), arb(0))).upper()
-                for a, row in zip(first, E, strict=True)]
+        wide = [
+            (abs(a).upper() + sum((abs(b).upper() * r for b, r in zip(row, radii, strict=True)), arb(0))).upper()
+            for a, row in zip(first, E, strict=True)
+        ]
         if all(a <= b for a, b in zip(wide, radii, strict=True)) and _contracts(E, radii):
-            return [a + arb(0, sum((abs(b).upper() * r for b, r in zip(row, radii, strict=True)), arb(0)).upper())
-                    for a, row in zip(first, E, strict=True)]
+            return [
+                a + arb(0, sum((abs(b).upper() * r for b, r in zip(row, radii, strict=True)), arb(0)).upper())
+                for a, row in zip(first, E, strict=True)
+            ]
         radii = [(a * arb(1.1) + arb(2) ** -200).upper() for a in wide]
     raise Singular
 
 
 def _contracts(E, radii):
-    return all(sum((abs(b).upper() * r for b, r in zip(row, radii, strict=True)), arb(0)) < r
-               for row, r in zip(E, radii, strict=True))
+    return all(
+        sum((abs(b).upper() * r for b, r in zip(row, radii, strict=True)), arb(0)) < r
+        for row, r in zip(E, radii, strict=True)
+    )
 
 
 def bend(natural, around, d, e):
@@ -225,7 +231,7 @@ class Walk:
         turns = set()
         for order in permutations(changing):
             passed = [rates[frozenset(order[:k])] for k in range(len(order) + 1)]
-            turns.add(sum(a != b for a, b in zip(passed, passed[1:], strict=False)))
+            turns.add(sum(a != b for a, b in pairwise(passed)))
         need(len(turns) == 1 and max(turns) < 2, "alpha turns back in some orders only")
         self.found.append(("vertex", z[-1]))
 

@@ -313,8 +313,10 @@ class NaturalMap:
         G, E = [(Y * column(u)).entries() for u in U], (unit - Y * middle).tolist()
         terms = [(s, (Y * self._product(D)).tolist()) for s, D in terms if s > 0]
         for s, D in terms:
-            E = [[a + arb(0, (s * abs(b)).upper()) for a, b in zip(*rows, strict=True)]
-                 for rows in zip(E, D, strict=True)]
+            E = [
+                [a + arb(0, (s * abs(b)).upper()) for a, b in zip(*rows, strict=True)]
+                for rows in zip(E, D, strict=True)
+            ]
         return Y, E, [list(row) for row in zip(*G, strict=True)], V, middle, terms
 
     def at_most_one(self, centre, radii, e=None, d=None, half=None):

@@ -417,7 +417,11 @@ def floating_margin(terms):
         linear = (column(h).transpose() * z - column(system.g0).transpose() * w)[0, 0]
         square = (v.transpose() * system.inverse * v)[0, 0] / 4
         off = [a + b for a, b in zip((G * w).entries(), h, strict=True)]
-        off = arb(0) if values is not terms.values[0] else sum((a * abs(b) for a, b in zip(rho, off, strict=True)), arb(0))
+        off = (
+            arb(0)
+            if values is not terms.values[0]
+            else sum((a * abs(b) for a, b in zip(rho, off, strict=True)), arb(0))
+        )
         found = linear - square - off, abs(linear) + square + off
         if best is None or not best[0] > 0:
             best = found
