@@ -1,6 +1,6 @@
 """Arcs of curves in 3D, for space_judge: where statuses change along a curve, and where alpha turns back.
 
-Numbers in brackets are sections of docs/proof_format.md; the mathematics is in docs/theory.md, section 12.10.
+Numbers in brackets are sections of docs/proof_format.md; the mathematics is in theory, section 12.10.
 """
 
 from itertools import pairwise, permutations

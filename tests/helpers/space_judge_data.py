@@ -1,4 +1,4 @@
-"""Data, sectors, rows and exclusions of docs/proof_format.md, section 7, in balls of many digits, for space_judge.
+"""Data, sectors, rows and exclusions of proofs in 3D (docs/proof_format.md), in balls of many digits, for space_judge.
 
 Nothing of enumsol is imported; of a ContactProblem3D the arrays are read. Numbers in brackets are the document's
 sections.

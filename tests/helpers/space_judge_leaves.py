@@ -1,7 +1,7 @@
 """Solutions of a complete assignment in 3D, for space_judge: boxes of directions (and alphas) cut until all is known.
 
-For given directions the equations are linear: y = E x, P (g - S E x) = 0 (docs/proof_format.md, section 7.5). What
-changes with the directions is split off from the middle of a box (docs/theory.md, (12.3a) and (12.3b)), and zeros of
+For given directions the equations are linear: y = E x, P (g - S E x) = 0 (docs/proof_format.md). What
+changes with the directions is split off from the middle of a box (theory, section 12.3), and zeros of
 (7.3) are told by Krawczyk's operator, in balls of many digits.
 """
 

@@ -1,6 +1,6 @@
 """Forms of products, for space_judge: all solutions of an assignment in an ellipsoid.
 
-Numbers in brackets are sections of docs/proof_format.md; the mathematics is in docs/theory.md, section 12.11.
+Numbers in brackets are sections of docs/proof_format.md; the mathematics is in theory, section 12.11.
 """
 
 from flint import arb, arb_mat, fmpq
