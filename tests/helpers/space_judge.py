@@ -223,6 +223,11 @@ class Point:
                 x, y = (mid[place] for place in self.system.tau[i])
                 angles.append(arb.atan2(y, x) if length_of([x, y]) > 0 else angles_of(sector_of(code)))
         root = root_near(self.full, codes, angles, arb(self.alpha))
+        if root is None and self.system.rigid:
+            near = [a + arb(0, b.upper()) for a, b in zip(mid, rad, strict=True)]
+            for other in roots_of(self.full, codes, arb(self.alpha)):
+                if all(a.overlaps(b) for a, b in zip(other.y, near, strict=False)):
+                    root = other
         if root is None:
             raise Undecided("no root is found")
         need(root.view.is_strict(), "a condition does not hold strictly")

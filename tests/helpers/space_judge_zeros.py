@@ -227,9 +227,11 @@ def roots_of(system, codes, alpha):
     def settled(angles, _, view):
         if view is None:
             return False
-        if any(all(a.contains(b) for a, b in zip(root.box, angles, strict=True)) for root in known):
+        # behind the angles there may be a component of x that is left free
+        if any(all(a.contains(b) for a, b in zip(root.box, view.angles, strict=False)) for root in known):
             return True
-        root = root_in(system, codes, [a.mid() + arb(0, float(a.rad()) * 1.5 + 1e-30) for a in angles], alpha)
+        wide = [a.mid() + arb(0, float(a.rad()) * 1.5 + 1e-30) for a in view.angles]
+        root = root_in(system, codes, wide, alpha, view.leaf.free)
         if root is not None:
             known.append(root)
         return root is not None
