@@ -122,8 +122,7 @@ class Walk:
             self.part(middle, end)
         elif kind == "u":
             need(not rest, "a gap with more")
-            low, high = self.box.t(start.point), self.box.t(end.point)
-            self.found.append(("gap", self.alphas(low, high)))
+            self.found.append(("gap", self.alphas(own)))
         elif kind == "s":
             need(not rest, "a part with more")
             self.own(own, start, end)
@@ -150,12 +149,14 @@ class Walk:
         self.corner(before, after)
         self.part(after, end)
 
-    def alphas(self, low, high):
+    def alphas(self, own):
+        """Those of a box, which need not be shown to hold anything, or of the curve's box."""
+        if own is not None:
+            place = place_of(self.problem, own)
+            return place.c[-1] + arb(0, (place.half * abs(place.d[-1]) + place.radius[-1]).upper())
         found = None
-        for s in self.box.slices:
-            if not (s.high < low or s.low > high):
-                alpha = s.at(s.low.union(s.high))[-1]
-                found = alpha if found is None else found.union(alpha)
+        for alpha in self.box.alphas():
+            found = alpha if found is None else found.union(alpha)
         return found
 
     def rate(self, place):
@@ -262,7 +263,8 @@ class Walk:
                 arcs.append(current)
             current = None
             beyond = numbers[0] < self.low or numbers[0] > self.high
-            gaps += kind == "gap" or not (beyond or (numbers[0] > self.low and numbers[0] < self.high))
+            within = kind == "vertex" and numbers[0] > self.low and numbers[0] < self.high
+            gaps += not beyond and not within
         if current is not None:
             if self.closed and arcs and self.found[0][0] == "way":
                 arcs[0] = [current[0], arcs[0][1]]

@@ -239,6 +239,10 @@ class Place:
             if not (t < s.low or t > s.high)
         )
 
+    def alphas(self):
+        """A ball of alpha for each part of the curve."""
+        return [s.at(s.low.union(s.high))[-1] for s in self.slices]
+
     def has_all(self, x, slope, moves, step, moved):
         """The same for all x + step slope + moves moved."""
 
