@@ -161,15 +161,13 @@ def test_there_are_three_hundred_proofs():
 @pytest.mark.long
 @pytest.mark.parametrize("kind", sorted({name[0] for name in ALL}))
 def test_three_hundred_proofs_and_three_thousand_mutants(kind):
-    """Of one node over alpha the judge leaves one graph open: near a fold at which the equations are singular."""
+    """The judge refuses none that the checker accepts; what the checker alone refuses is true."""
     proofs, changed, names = Counter(), Counter(), [name for name in ALL if name[0] == kind]
     for name in names:
         proofs[compare(found(name)[0], Proof(found(name)[2]))] += 1
         changed.update(compare(found(name)[0], proof) for proof in mutants(name, 10))
-    few = int(kind == "one node")
-    assert proofs["both accept"] >= len(names) - few
-    assert proofs["accepted, and not decided by the judge"] <= few
-    assert changed["accepted, and not decided by the judge"] <= 10 * few
+    assert proofs == {"both accept": len(names)}
+    assert not changed["accepted, and not decided by the judge"]
     assert changed["both refuse"] > changed["refused, and true"] + changed["refused, and not decided by the judge"]
 
 

@@ -296,6 +296,10 @@ class View:
     def is_violated(self):
         return any(value < 0 for value in self.conditions())
 
+    def is_vague(self):
+        """Whether the normal force of a node that turns is hardly known."""
+        return any(self.y[i].rad() > abs(self.y[i]).mid() / 4 for i in self.leaf.turning)
+
     def is_strict(self):
         return all(value > 0 for value in self.conditions())
 

@@ -123,6 +123,15 @@ def with_one_free(system, codes, angles, alpha):
     for free in rigid or [i for i, code in enumerate(codes) if sector_of(code)]:
         try:
             box = [*angles, free_bounds(system, free, alpha)]
+            # the equations are affine in the free component
+            leaf = Leaf(system, codes, [*angles, arb(0)], alpha, free)
+            plain = View(leaf, [*angles, arb(0)], alpha)
+            for at, row in zip(plain.G, plain.slopes, strict=True):
+                if row[-1] > 0 or row[-1] < 0:
+                    found = -at / row[-1]
+                    if not found.overlaps(box[-1]):
+                        return plain, None
+                    box[-1] = box[-1].intersection(found)
             view, left = narrow(system, codes, box, alpha, free)
             for _ in range(6):
                 if left is None:
@@ -203,6 +212,12 @@ def explore(system, codes, alpha, settled, piece=None, boxes=BOXES):
             continue
         if settled(angles, part, view):
             continue
+        if part.rad() > 0 and view is not None and view.leaf.free is None and view.is_vague():
+            # the equations are nearly singular: the same with one component of x left free
+            other, found = with_one_free(system, codes, angles, part)
+            if found is None or settled(angles, part, other):
+                continue
+            left = [a.intersection(b) for a, b in zip(left, found, strict=True)]
         if view is not None and view.left is not None:
             part = view.left
         shares = [float(box.rad()) / width for box, width in zip([*angles, part], widths, strict=True)]
