@@ -2,6 +2,7 @@
 
 import ast
 from collections import Counter
+from fractions import Fraction
 from functools import cache
 from itertools import product
 from pathlib import Path
@@ -9,15 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 import space_judge
-from effort import some
 from floating_space import known_body
 from problems3d import OneNode, degenerate_integers, in_space, random_over_alpha, random_plane_over_alpha
-from proof_tools import bytes_of, of_kind, put, records_of
+from proof_tools import bytes_of, of_kind, proof_of, put, records_of
 from space_graph_proofs import closed_branch
 from space_judge_mutants import checked, judged, mutant, mutant_of_graph
-from space_proofs import RANDOM, case, random_problem
+from space_proofs import RANDOM, case, random_problem, values_of, with_values
 
 from enumsol import Proof, branch_graph, enumerate_roots, gallery
+from enumsol.branches.space.cover import SpaceCover
 
 #: What the checker says of a claim that is true and that its own bounds do not reach.
 COARSE = (
@@ -25,7 +26,9 @@ COARSE = (
     *("its multipliers do not exclude it", "its solution is not proven to be the only one"),
     *("is not proven to be one from end to end", "it is not proven that all its solutions lie on its curve"),
     *("its roots are not proven to lie in its boxes", "its roots are not proven to be an arc through its box"),
-    *("it is not proven to hold no root",),
+    *("it is not proven to hold no root", "its ellipsoid does not exclude it"),
+    *("its box is not proven to hold one solution", "its roots are not proven to lie in its box"),
+    *("a place is not proven to be on its curve",),
 )
 BLOCKS = [((1, 1, 1), (2, 1, 1), (2, 1, 2), (3, 2, 2)), (0.3, 0.5, 1.0, 2.0, 3.0)]
 WEDGES = [((1, 1, 2), (2, 1, 2)), (0.3, 0.5, 1.0, 1.5, 2.0, 3.0)]
@@ -82,7 +85,11 @@ def roots_of(kind, *rest):
 
 
 def graph_of(kind, *rest):
-    interval, options = (0, 1), {"max_nodes": 300}
+    interval = 0, 1
+    if kind == "curves cut short":
+        cover = SpaceCover(random_over_alpha(*rest), (Fraction(0), Fraction(1, 64)))
+        cover.search(max_nodes=5)
+        return cover.problem, cover.proof()
     if kind == "one node":
         problem = OneNode(*rest).problem
     elif kind == "over alpha":
@@ -91,11 +98,9 @@ def graph_of(kind, *rest):
         problem = in_space(random_plane_over_alpha(*rest))
     elif kind == "two nodes":
         problem, interval = closed_branch(), rest
-    elif kind == "block over alpha":
-        problem, interval = gallery.block3d(*rest[0]), (0.5, 1)
     else:
-        problem, options = random_over_alpha(*rest), {"max_nodes": 20}
-    return problem, branch_graph(problem, interval, **options).proof
+        problem, interval = gallery.block3d(*rest[0]), (0.5, 1)
+    return problem, branch_graph(problem, interval, max_nodes=300).proof
 
 
 QUICK = [
@@ -103,7 +108,7 @@ QUICK = [
     *(("random", 2, 3), ("random", 3, 4), ("random", 4, 4), ("cut short", 2, 4)),
     *(("degenerate", 1), ("degenerate", 6), ("degenerate", 18), ("rest", 9), ("rest", 11)),
     *(("wedge", (1, 1, 2), 1.0), ("block", (2, 1, 2), 1.0), ("held by nothing", 102), ("held by nothing", 113)),
-    *(("plane", 1, 5), ("one node", 5, True), ("over alpha", 2, 100)),
+    *(("plane", 1, 5), ("one node", 5, True), ("curves cut short", 2, 100)),
 ]
 
 
@@ -120,7 +125,7 @@ def compare(problem, proof):
         return "accepted, and not decided by the judge"
     if not counts:
         return "refused, and not decided by the judge" if reason.startswith("undecided") else "both refuse"
-    coarse = [text for text in reasons.split("; ") if text.startswith(("leaf", "curve"))]
+    coarse = [text for text in reasons.split("; ") if text.startswith(("leaf", "curve", "a place"))]
     assert coarse, (reasons, "refused by the checker for its form")
     assert all(text.endswith(COARSE) for text in coarse), reasons
     return "refused, and true"
@@ -149,18 +154,52 @@ def test_mutants_are_judged_alike(name):
     assert not told["accepted, and not decided by the judge"]
 
 
+def test_there_are_three_hundred_proofs():
+    assert len({str(name) for name in ALL}) == len(ALL) == 300
+
+
 @pytest.mark.long
-def test_three_hundred_proofs_and_three_thousand_mutants():
-    """The judge leaves few open of those that the checker accepts, and refuses none."""
-    proofs, changed = Counter(), Counter()
-    for name in ALL:
+@pytest.mark.parametrize("kind", sorted({name[0] for name in ALL}))
+def test_three_hundred_proofs_and_three_thousand_mutants(kind):
+    """The judge refuses none that the checker accepts; what the checker alone refuses is true."""
+    proofs, changed, names = Counter(), Counter(), [name for name in ALL if name[0] == kind]
+    for name in names:
         proofs[compare(found(name)[0], Proof(found(name)[2]))] += 1
         changed.update(compare(found(name)[0], proof) for proof in mutants(name, 10))
-    assert len(ALL) == sum(proofs.values()) == 300
-    assert sum(changed.values()) == 3000
-    assert proofs["both accept"] + proofs["accepted, and not decided by the judge"] == 300
-    assert proofs["accepted, and not decided by the judge"] < 10
-    assert changed["accepted, and not decided by the judge"] < 30
+    assert proofs == {"both accept": len(names)}
+    assert not changed["accepted, and not decided by the judge"]
+    assert changed["both refuse"] > changed["refused, and true"] + changed["refused, and not decided by the judge"]
+
+
+BORDERS = [
+    *((("random", 1, 0), 0), (("plane", 1, 5), 0)),
+    *((name, leaf) for name in (("tree", (2, 5)), ("held by nothing", 113)) for leaf in range(3)),
+]
+
+
+@pytest.mark.few(1)
+@pytest.mark.parametrize(("name", "leaf"), BORDERS, ids=str)
+def test_an_exclusion_at_its_very_border_is_refused(name, leaf):
+    """Multipliers times the first float with which they exclude no more, upwards and downwards."""
+    problem, records, _ = found(name)
+    k = of_kind(records, "x")[leaf]
+
+    def scaled(factor):
+        record = records[k]
+        for at in range(2, len(record)):
+            record = with_values(record, [factor * value for value in values_of(record, at)], at)
+        return proof_of(put(records, (k,), record))
+
+    for end in (0.0, 1e9):
+        right, wrong = 1.0, end
+        if end and judged(problem, scaled(end))[0]:
+            continue  # multipliers that contradict each other exclude the better the larger they are
+        while (middle := 0.5 * (right + wrong)) not in (right, wrong):
+            if judged(problem, scaled(middle))[0]:
+                right = middle
+            else:
+                wrong = middle
+        assert checked(problem, scaled(wrong))[0] is None
 
 
 def test_the_judge_imports_nothing_of_the_package():

@@ -27,10 +27,12 @@ from space_judge_data import (
     length_of,
     margin,
     positive,
+    sector_of,
 )
 from space_judge_graph import Graph
-from space_judge_leaves import angles_of, explore, root_near, roots_of, sector_of
+from space_judge_leaves import angles_of
 from space_judge_products import ProductForm
+from space_judge_zeros import explore, root_near, roots_of
 
 DIGITS = 320
 
@@ -221,6 +223,11 @@ class Point:
                 x, y = (mid[place] for place in self.system.tau[i])
                 angles.append(arb.atan2(y, x) if length_of([x, y]) > 0 else angles_of(sector_of(code)))
         root = root_near(self.full, codes, angles, arb(self.alpha))
+        if root is None and self.system.rigid:
+            near = [a + arb(0, b.upper()) for a, b in zip(mid, rad, strict=True)]
+            for other in roots_of(self.full, codes, arb(self.alpha)):
+                if all(a.overlaps(b) for a, b in zip(other.y, near, strict=False)):
+                    root = other
         if root is None:
             raise Undecided("no root is found")
         need(root.view.is_strict(), "a condition does not hold strictly")

@@ -1,9 +1,9 @@
 """Arcs of curves in 3D, for space_judge: where statuses change along a curve, and where alpha turns back.
 
-Numbers in brackets are sections of docs/proof_format.md; the mathematics is in docs/theory.md, section 12.10.
+Numbers in brackets are sections of docs/proof_format.md; the mathematics is in theory, section 12.10.
 """
 
-from itertools import permutations
+from itertools import pairwise, permutations
 
 from flint import arb
 from rational_forms import need
@@ -38,18 +38,24 @@ def solved(E, first):
     """All x with x = first + E x for a matrix in balls; E must contract."""
     radii = [abs(a).upper() for a in first]
     for _ in range(30):
-        wide = [(abs(a).upper() + sum((abs(b).upper() * r for b, r in zip(row, radii, strict=True)), arb(0))).upper()
-                for a, row in zip(first, E, strict=True)]
+        wide = [
+            (abs(a).upper() + sum((abs(b).upper() * r for b, r in zip(row, radii, strict=True)), arb(0))).upper()
+            for a, row in zip(first, E, strict=True)
+        ]
         if all(a <= b for a, b in zip(wide, radii, strict=True)) and _contracts(E, radii):
-            return [a + arb(0, sum((abs(b).upper() * r for b, r in zip(row, radii, strict=True)), arb(0)).upper())
-                    for a, row in zip(first, E, strict=True)]
+            return [
+                a + arb(0, sum((abs(b).upper() * r for b, r in zip(row, radii, strict=True)), arb(0)).upper())
+                for a, row in zip(first, E, strict=True)
+            ]
         radii = [(a * arb(1.1) + arb(2) ** -200).upper() for a in wide]
     raise Singular
 
 
 def _contracts(E, radii):
-    return all(sum((abs(b).upper() * r for b, r in zip(row, radii, strict=True)), arb(0)) < r
-               for row, r in zip(E, radii, strict=True))
+    return all(
+        sum((abs(b).upper() * r for b, r in zip(row, radii, strict=True)), arb(0)) < r
+        for row, r in zip(E, radii, strict=True)
+    )
 
 
 def bend(natural, around, d, e):
@@ -116,8 +122,7 @@ class Walk:
             self.part(middle, end)
         elif kind == "u":
             need(not rest, "a gap with more")
-            low, high = self.box.t(start.point), self.box.t(end.point)
-            self.found.append(("gap", self.alphas(low, high)))
+            self.found.append(("gap", self.alphas(own)))
         elif kind == "s":
             need(not rest, "a part with more")
             self.own(own, start, end)
@@ -144,12 +149,14 @@ class Walk:
         self.corner(before, after)
         self.part(after, end)
 
-    def alphas(self, low, high):
+    def alphas(self, own):
+        """Those of a box, which need not be shown to hold anything, or of the curve's box."""
+        if own is not None:
+            place = place_of(self.problem, own)
+            return place.c[-1] + arb(0, (place.half * abs(place.d[-1]) + place.radius[-1]).upper())
         found = None
-        for s in self.box.slices:
-            if not (s.high < low or s.low > high):
-                alpha = s.at(s.low.union(s.high))[-1]
-                found = alpha if found is None else found.union(alpha)
+        for alpha in self.box.alphas():
+            found = alpha if found is None else found.union(alpha)
         return found
 
     def rate(self, place):
@@ -225,7 +232,7 @@ class Walk:
         turns = set()
         for order in permutations(changing):
             passed = [rates[frozenset(order[:k])] for k in range(len(order) + 1)]
-            turns.add(sum(a != b for a, b in zip(passed, passed[1:], strict=False)))
+            turns.add(sum(a != b for a, b in pairwise(passed)))
         need(len(turns) == 1 and max(turns) < 2, "alpha turns back in some orders only")
         self.found.append(("vertex", z[-1]))
 
@@ -256,7 +263,8 @@ class Walk:
                 arcs.append(current)
             current = None
             beyond = numbers[0] < self.low or numbers[0] > self.high
-            gaps += kind == "gap" or not (beyond or (numbers[0] > self.low and numbers[0] < self.high))
+            within = kind == "vertex" and numbers[0] > self.low and numbers[0] < self.high
+            gaps += not beyond and not within
         if current is not None:
             if self.closed and arcs and self.found[0][0] == "way":
                 arcs[0] = [current[0], arcs[0][1]]

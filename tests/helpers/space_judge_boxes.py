@@ -1,9 +1,9 @@
 """Boxes that hold one solution in 3D, or one curve of them over alpha, for space_judge, in balls of many digits.
 
-The solutions are the zeros of y - P(y + rho w) (docs/theory.md, (12.10) and (12.16)); P takes lambda_n to max(lambda_n,
+The solutions are the zeros of y - P(y + rho w) (theory, (12.10) and (12.16)); P takes lambda_n to max(lambda_n,
 0) and tau to the disc. Two zeros in a set differ by a vector in the kernel of some mean derivative there: where all of
 these are regular there is one at most. A zero is shown to exist in a narrow set around the one that Newton's method
-finds. Boxes are those of zeta = y - steps w (docs/proof_format.md, sections 7.5 and 7.8).
+finds. Boxes are those of zeta = y - steps w (docs/proof_format.md).
 """
 
 from copy import copy
@@ -181,7 +181,7 @@ class NaturalMap:
         return P, U, V, terms
 
     def _along_the_set(self, around, n, t, F0, F1, F, e, length):
-        """|z_t| - F z_n and F z_n / |z_t|, by their derivatives as well (theory, (12.17c))."""
+        """|z_t| - F z_n and F z_n / |z_t|, by their derivatives as well (theory, section 12.8)."""
         zn, alpha = around.z[n], around.middle[-1]
         at = length_of([around.middle[k] for k in t])
         limit = (F0 + alpha * F1) * around.middle[n]
@@ -211,7 +211,7 @@ class NaturalMap:
         self._slip(P, n, t, [x / length for x in zt], F, F * zn / length, F1 * zn)
 
     def _turning(self, P, n, t, e, zt, F, beta, F1, zn, length):
-        """A node that only slips (theory, (12.17b))."""
+        """A node that only slips (theory, section 12.8)."""
         size, (Fm, bm, nm) = length_of(e), (x.mid() for x in (F, beta, zn))
         e = [x / size for x in e]
         if len(t) == 1:
@@ -313,8 +313,10 @@ class NaturalMap:
         G, E = [(Y * column(u)).entries() for u in U], (unit - Y * middle).tolist()
         terms = [(s, (Y * self._product(D)).tolist()) for s, D in terms if s > 0]
         for s, D in terms:
-            E = [[a + arb(0, (s * abs(b)).upper()) for a, b in zip(*rows, strict=True)]
-                 for rows in zip(E, D, strict=True)]
+            E = [
+                [a + arb(0, (s * abs(b)).upper()) for a, b in zip(*rows, strict=True)]
+                for rows in zip(E, D, strict=True)
+            ]
         return Y, E, [list(row) for row in zip(*G, strict=True)], V, middle, terms
 
     def at_most_one(self, centre, radii, e=None, d=None, half=None):

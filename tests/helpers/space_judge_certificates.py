@@ -1,6 +1,6 @@
 """One solution by one certificate, one in a box and all in an ellipsoid, for space_judge, in balls of many digits.
 
-Numbers in brackets are sections of docs/proof_format.md; the mathematics is in docs/theory.md, sections 12.6, 12.7
+Numbers in brackets are sections of docs/proof_format.md; the mathematics is in theory, sections 12.6, 12.7
 and 12.11.
 """
 

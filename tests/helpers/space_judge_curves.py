@@ -79,7 +79,7 @@ class GraphProblem:
 
 @dataclass
 class Slice:
-    """A part of a box: all zeros for t from low to high lie within radii of x + (t - middle) d, and only one in wide."""
+    """A part of a box: all zeros for t from low to high lie within radii of x + (t - middle) d, one alone in wide."""
 
     low: arb
     high: arb
@@ -152,7 +152,9 @@ class Place:
         except Singular as error:
             raise Undecided("a point is not shown to hold one solution") from error
         x = self.zero(arb(0))
-        need(all(abs(a) < r for a, r in zip(self.off(x, arb(0)), self.radius, strict=True)), "a point holds no solution")
+        need(
+            all(abs(a) < r for a, r in zip(self.off(x, arb(0)), self.radius, strict=True)), "a point holds no solution"
+        )
         return x
 
     @cached_property
@@ -195,12 +197,17 @@ class Place:
             set_, z, around, sign = self.natural.zeros_around(x, self.e, d, half, first_try + arb(2) ** -100)
             off = self.off(x, middle)
             drift = [half * abs(a - b) for a, b in zip(d, self.d, strict=True)]
-            wide = [max(r, (_ROOM * (abs(a) + b + c)).upper())
-                    for r, a, b, c in zip(self.radius, off, drift, set_, strict=True)]
+            wide = [
+                max(r, (_ROOM * (abs(a) + b + c)).upper())
+                for r, a, b, c in zip(self.radius, off, drift, set_, strict=True)
+            ]
             line = [a + middle * b for a, b in zip(self.c, self.d, strict=True)]
             # zeros at the ends are those of the slice beside
-            held = all(abs(a - b - s * half * c) <= r for end, s in ((first, -1), (last, 1))
-                       for a, b, c, r in zip(end, x, d, set_, strict=True))
+            held = all(
+                abs(a - b - s * half * c) <= r
+                for end, s in ((first, -1), (last, 1))
+                for a, b, c, r in zip(end, x, d, set_, strict=True)
+            )
             if held and self.natural.at_most_one([a.mid() for a in line], wide, self.e, self.d, half) == sign:
                 yield Slice(low, high, x, d, around, wide, z, sign)
                 return
@@ -226,17 +233,26 @@ class Place:
         t = self.t(x)
         if abs(t) > self.half or (low is not None and t < low) or (high is not None and t > high):
             return False
-        return any(all(a.overlaps(b) for a, b in zip(s.at(t), x, strict=True))
-                   for s in self.slices if not (t < s.low or t > s.high))
+        return any(
+            all(a.overlaps(b) for a, b in zip(s.at(t), x, strict=True))
+            for s in self.slices
+            if not (t < s.low or t > s.high)
+        )
+
+    def alphas(self):
+        """A ball of alpha for each part of the curve."""
+        return [s.at(s.low.union(s.high))[-1] for s in self.slices]
 
     def has_all(self, x, slope, moves, step, moved):
         """The same for all x + step slope + moves moved."""
-        if not moves and not self.slices:
-            return False
 
         def bounds(row, shift):
-            return (dot(row, x) - shift + step * dot(row, slope)
-                    + sum((dot(row, move) * m for move, m in zip(moves, moved, strict=True)), arb(0)))
+            return (
+                dot(row, x)
+                - shift
+                + step * dot(row, slope)
+                + sum((dot(row, move) * m for move, m in zip(moves, moved, strict=True)), arb(0))
+            )
 
         t = bounds(self.e, dot(self.e, self.c))
         if not abs(t) <= self.half:

@@ -1,4 +1,4 @@
-"""Data, sectors, rows and exclusions of docs/proof_format.md, section 7, in balls of many digits, for space_judge.
+"""Data, sectors, rows and exclusions of proofs in 3D (docs/proof_format.md), in balls of many digits, for space_judge.
 
 Nothing of enumsol is imported; of a ContactProblem3D the arrays are read. Numbers in brackets are the document's
 sections.
@@ -417,7 +417,11 @@ def floating_margin(terms):
         linear = (column(h).transpose() * z - column(system.g0).transpose() * w)[0, 0]
         square = (v.transpose() * system.inverse * v)[0, 0] / 4
         off = [a + b for a, b in zip((G * w).entries(), h, strict=True)]
-        off = arb(0) if values is not terms.values[0] else sum((a * abs(b) for a, b in zip(rho, off, strict=True)), arb(0))
+        off = (
+            arb(0)
+            if values is not terms.values[0]
+            else sum((a * abs(b) for a, b in zip(rho, off, strict=True)), arb(0))
+        )
         found = linear - square - off, abs(linear) + square + off
         if best is None or not best[0] > 0:
             best = found

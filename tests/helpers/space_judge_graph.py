@@ -4,16 +4,16 @@ Numbers in brackets are sections of docs/proof_format.md.
 """
 
 from functools import cached_property
-from itertools import combinations, pairwise
+from itertools import combinations
 
-from flint import arb, arb_mat, fmpq
+from flint import arb, arb_mat
 from rational_checker import are
 from rational_forms import decimal_fraction, exact, integer, need
 from space_judge_arcs import Walk
 from space_judge_certificates import equations, square
 from space_judge_curves import GraphProblem, dot, place_of
 from space_judge_data import Terms, Undecided, column, is_code, is_complete, is_definite, is_split, length_of
-from space_judge_leaves import explore, roots_of
+from space_judge_zeros import explore, roots_of
 
 #: As many times a piece is halved where an exclusion is shown to hold over it.
 _HALVINGS = 24
@@ -64,8 +64,9 @@ class Curve:
             if box.may_pass(x):
                 t = box.t(x)
                 part = (t.mid(), box.half) if end else (-box.half, t.mid())
-                if part[0] < part[1] and not box.along(*part, lambda x, d, half, around, z: (
-                        True if z[-1] < low or z[-1] > high else None)):
+                if part[0] < part[1] and not box.along(
+                    *part, lambda x, d, half, around, z: True if z[-1] < low or z[-1] > high else None
+                ):
                     return False
         return True
 
@@ -157,8 +158,14 @@ class Graph:
                 due += [(low, high, (*codes[:node], child, *codes[node + 1 :])) for child in reversed(children)]
             else:
                 self.leaves += 1
-                test = {"x": self.leaf_x, "n": self.leaf_n, "r": self.leaf_r, "k": self.leaf_k, "m": self.leaf_m,
-                        "u": self.leaf_u}[record[0]]
+                test = {
+                    "x": self.leaf_x,
+                    "n": self.leaf_n,
+                    "r": self.leaf_r,
+                    "k": self.leaf_k,
+                    "m": self.leaf_m,
+                    "u": self.leaf_u,
+                }[record[0]]
                 test(low, high, codes, *record[1:])
         return position
 
@@ -227,17 +234,31 @@ class Graph:
                 lift[k, place] = factor
         C = (natural.S * lift).tolist()
         plain = lift.tolist()
-        C = arb_mat([[a + s * b for a, b in zip(*rows, strict=True)]
-                     for s, *rows in zip(natural.steps, plain, C, strict=True)])
+        C = arb_mat(
+            [[a + s * b for a, b in zip(*rows, strict=True)] for s, *rows in zip(natural.steps, plain, C, strict=True)]
+        )
         return C, *([s * a for s, a in zip(natural.steps, g, strict=True)] for g in (natural.g0, natural.g1))
 
-    def spread(self, view):
+    def spread(self, view, across=False):
         """(zeta, alpha) of all solutions in a view: a point, how it moves with alpha, and what else moves it."""
         leaf, (C, shift, slope) = view.leaf, self.lifted
         x = [a - b - leaf.alpha * c for a, b, c in zip((C * leaf.y).entries(), shift, slope, strict=True)]
         drift = [a - b for a, b in zip((C * column(view.by_alpha[0])).entries(), slope, strict=True)]
         moves = [(C * column(dy)).entries() for dy, _ in view.by_angle]
-        shares, rest = view.line or ([arb(0)] * len(moves), [a - b for a, b in zip(view.angles, leaf.angles, strict=True)])
+        if across and view.across:
+            # alpha as a function of the one angle
+            rate, step, rest = view.across
+            return (
+                [*x, leaf.alpha],
+                [*(a + rate * b for a, b in zip(moves[0], drift, strict=True)), rate],
+                [[*drift, arb(1)]],
+                step,
+                [rest],
+            )
+        shares, rest = view.line or (
+            [arb(0)] * len(moves),
+            [a - b for a, b in zip(view.angles, leaf.angles, strict=True)],
+        )
         for share, move in zip(shares, moves, strict=True):
             drift = [a + share * b for a, b in zip(drift, move, strict=True)]
         return [*x, leaf.alpha], [*drift, arb(1)], [[*move, arb(0)] for move in moves], view.alpha - leaf.alpha, rest
@@ -245,10 +266,9 @@ class Graph:
     def box(self, number):
         """The curve of a box and its place there."""
         integer(number)
-        for curve in self.curves:
-            if curve.first <= number < curve.first + len(curve.boxes):
-                return curve, number - curve.first
-        need(False, "there is no such box")
+        found = [curve for curve in self.curves if curve.first <= number < curve.first + len(curve.boxes)]
+        need(found, "there is no such box")
+        return found[0], number - found[0].first
 
     def on(self, low, high, codes, boxes, alphas=None):
         """Show that all solutions of an assignment over a piece lie where some boxes have the only ones."""
@@ -258,8 +278,8 @@ class Graph:
         def settled(_, alpha, view):
             if view is None or not (low >= first or alpha >= arb(first)) or not (high <= last or alpha <= arb(last)):
                 return False
-            spread = self.spread(view)
-            return any(box.has_all(*spread) for box in boxes)
+            spreads = [self.spread(view, across) for across in ((False, True) if view.across else (False,))]
+            return any(box.has_all(*spread) for box in boxes for spread in spreads)
 
         explore(self.system, codes, between(low, high), settled, piece=(arb(low), arb(high)))
 
@@ -279,7 +299,6 @@ class Graph:
             need(not gap.overlaps(between(first, last)), "the curve ends here")
         found = roots_of(self.system, tuple(leaf), arb(alpha))
         need(len(found) == 1, "no root in the leaf")
-        x, *_ = self.spread(found[0].view)
         spread = self.spread(found[0].view)
         need(curve.boxes[k].has_all(*spread), "the root is not in the box")
         self.on(low, high, codes, curve.boxes, (first, last))
@@ -293,12 +312,16 @@ class Graph:
         count = len(curve.boxes)
         run = [(begin + k) % count for k in range((end - begin) % count + 1)]
         ends = curve.points[begin].point[-1], curve.points[end + 1].point[-1]
-        need((ends[0] <= arb(low) and ends[1] >= arb(high)) or (ends[1] <= arb(low) and ends[0] >= arb(high)),
-             "boxes do not pass the piece")
+        need(
+            (ends[0] <= arb(low) and ends[1] >= arb(high)) or (ends[1] <= arb(low) and ends[0] >= arb(high)),
+            "boxes do not pass the piece",
+        )
         form = PieceForm(self, low, high, codes, numbers)
         for k in run:
-            need(curve.boxes[k].along(*(t.mid() for t in curve.t(k)), form.holds_along(curve.boxes[k])),
-                 "the form is not shown to be definite")
+            need(
+                curve.boxes[k].along(*(t.mid() for t in curve.t(k)), form.holds_along(curve.boxes[k])),
+                "the form is not shown to be definite",
+            )
 
 
 def _times(one, two):
@@ -340,7 +363,7 @@ class PieceForm:
         self.low, self.high = arb(low), arb(high)
         need(min(self.mu) > 0 and min(self.kappa) > 0, "mu or kappa is not positive")
         self.ends = []
-        for i, places in enumerate(self.system.tau):
+        for i in range(p):
             r = [self.system.radius(i, alpha) for alpha in (self.low, self.high)]
             need(all(dot(self.nu[i], self.nu[i]) * a * a <= self.mu[i] ** 2 for a in r), "nu is longer than mu")
             self.ends.append([[r[0] * a, r[1] * b] for a, b in zip(one[i], two[i], strict=True)])
@@ -359,12 +382,18 @@ class PieceForm:
             if alpha < low or alpha > high:
                 return True
             zeta = [a + arb(0, (half * abs(b) + c).upper()) for a, b, c in zip(x, d, around, strict=True)]
-            spread = natural.argument_at(x, d, half, around)
-            y = [a + arb(0, ((abs(dot(row, d)) * half).upper()
-                 + sum((abs(b).upper() * c for b, c in zip(row, around, strict=True)), arb(0))).upper())
-                 for a, row in zip(natural.forces(x), natural.Y, strict=True)]
+            y = [
+                a
+                + arb(
+                    0,
+                    (
+                        (abs(dot(row, d)) * half).upper()
+                        + sum((abs(b).upper() * c for b, c in zip(row, around, strict=True)), arb(0))
+                    ).upper(),
+                )
+                for a, row in zip(natural.forces(x), natural.Y, strict=True)
+            ]
             w = [(a - b) / s for a, b, s in zip(y, zeta, natural.steps, strict=False)]
-            del spread
             return self._definite(natural, y, w, z, alpha.intersection(low.union(high))) or None
 
         return holds
@@ -419,7 +448,3 @@ class PieceForm:
         if largest > 0:
             return [r * value / largest for value in zt], None
         return psi, length_of(psi) + r
-
-
-def unused(_):
-    return fmpq(0), pairwise

@@ -1,20 +1,14 @@
 """Solutions of a complete assignment in 3D, for space_judge: boxes of directions (and alphas) cut until all is known.
 
-For given directions the equations are linear: y = E x, P (g - S E x) = 0 (docs/proof_format.md, section 7.5). What
-changes with the directions is split off from the middle of a box (docs/theory.md, (12.3a) and (12.3b)), and zeros of
+For given directions the equations are linear: y = E x, P (g - S E x) = 0 (docs/proof_format.md). What
+changes with the directions is split off from the middle of a box (theory, section 12.3), and zeros of
 (7.3) are told by Krawczyk's operator, in balls of many digits.
 """
 
-from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
 from flint import arb, arb_mat
-from space_judge_data import Undecided, column, corner, following, length_of, sector_of
-
-BOXES = 6000
-#: As many times a box of a zero is made narrower.
-_ROUNDS = 12
+from space_judge_data import column, corner, following, length_of, sector_of
 
 
 class Singular(Exception):  # noqa: N818
@@ -35,10 +29,6 @@ def between(low, high):
     return low.union(high)
 
 
-def inside(inner, outer):
-    return outer.contains_interior(inner)
-
-
 def angles_of(number):
     """All directions of a sector."""
     (x, y), (u, v) = ((arb(a), arb(b)) for a, b in (corner(number), corner(following(number))))
@@ -47,10 +37,14 @@ def angles_of(number):
 
 
 class Leaf:
-    """The equations of an assignment around the middle of a box of angles and alphas."""
+    """The equations of an assignment around the middle of a box of angles and alphas.
 
-    def __init__(self, system, codes, angles, alpha):
-        self.system, self.codes = system, codes
+    One component of x, a normal force or a coordinate of the rigid displacement, may be left free: it is one more
+    unknown behind the angles, and its equation one more beside G (theory, section 12.9).
+    """
+
+    def __init__(self, system, codes, angles, alpha, free=None):
+        self.system, self.codes, self.free = system, codes, free
         self.angles, self.alpha = [angle.mid() for angle in angles], alpha.mid()
         self.sort()
         self._middle()
@@ -64,7 +58,7 @@ class Leaf:
         stuck = [place for i in range(p) if codes[i] == 1 for place in system.tau[i]]
         #: of a body that nothing holds, minus its rigid displacement
         self.rigid = list(range(len(system.node_of), system.m))
-        self.picked = self.contact + stuck + self.rigid
+        self.picked = [place for place in self.contact + stuck + self.rigid if place != self.free]
         #: of every sliding node the places of its tau, beside each other
         self.places = [place for i in self.sliding for place in system.tau[i]]
 
@@ -74,8 +68,8 @@ class Leaf:
         for k, place in enumerate(self.picked):
             E[place][k] = arb(1)
         for i, force in zip(self.sliding, forces, strict=True):
-            for place, value in zip(self.system.tau[i], force, strict=True):
-                E[place][self.contact.index(i)] = value
+            for place, value in zip(self.system.tau[i], force, strict=True) if i != self.free else ():
+                E[place][self.picked.index(i)] = value
         return arb_mat(E) if self.picked else arb_mat(self.system.m, 0)
 
     def _middle(self):
@@ -86,21 +80,34 @@ class Leaf:
         for k, place in enumerate(self.places):
             T[place, k] = 1
         SE, ST, g, slope = system.S * E, system.S * T, column(system.load(self.alpha)), column(system.g1)
-        self.M = self._pick(SE)
+        own, push = self._own()
+        self.M, last = self._pick(SE), self.angles[-1] if self.free is not None else arb(0)
+        right = [g - push * last, slope, ST, -push]
         if self.picked:
-            right = [self._pick(part) for part in (g, slope, ST)]
-            x, xs, B = (solve(self.M, part) for part in right)
+            x, xs, B, xf = (solve(self.M, self._pick(part)) for part in right)
         else:
-            x, xs, B = arb_mat(0, 1), arb_mat(0, 1), arb_mat(0, len(self.places))
-        self.y, self.ys = E * x, E * xs
-        self.w, self.ws = g - SE * x, slope - SE * xs
+            x, xs, B, xf = (arb_mat(0, part.ncols()) for part in right)
+        self.y, self.ys, self.yf = E * x + own * last, E * xs, E * xf + own
+        self.w, self.ws, self.wf = g - SE * x - push * last, slope - SE * xs, -(SE * xf) - push
         #: what unit tangential forces at the sliding nodes change y and w by
         self.dy, self.dw = T - E * B, SE * B - ST
-        rows = [self.contact.index(i) for i in self.sliding]
-        self.xc = [x[k, 0] for k in rows]
-        self.xcs = [xs[k, 0] for k in rows]
-        self.QB = [[B[k, j] for j in range(len(self.places))] for k in rows]
+        none = [arb(0)] * len(self.places)
+        rows = [None if i == self.free else self.picked.index(i) for i in self.sliding]
+        self.xc = [last if k is None else x[k, 0] for k in rows]
+        self.xcs = [arb(0) if k is None else xs[k, 0] for k in rows]
+        self.xcf = [arb(1) if k is None else xf[k, 0] for k in rows]
+        self.QB = [none if k is None else [B[k, j] for j in range(len(self.places))] for k in rows]
         self.q = q
+
+    def _own(self):
+        """The column of the free component, and what it pushes back by."""
+        own = arb_mat(self.system.m, 1)
+        if self.free is not None:
+            own[self.free, 0] = 1
+            for i, force in zip(self.sliding, self.forces, strict=True):
+                for place, value in zip(self.system.tau[i], force, strict=True) if i == self.free else ():
+                    own[place, 0] = value
+        return own, self.system.S * own
 
     def _pick(self, matrix):
         return arb_mat([[matrix[k, j] for j in range(matrix.ncols())] for k in self.picked]) if self.picked else None
@@ -125,7 +132,8 @@ class Leaf:
     def index(self, view):
         """[7.5] sign det M sign det dG/dpsi."""
         det = self.M.det() * (-1) ** len(self.rigid) if self.picked else arb(1)
-        both = det * (arb_mat(view.slopes).det() if self.turning else arb(1))
+        both = det * (arb_mat(view.slopes).det() if view.angles else arb(1))
+        both = both if self.free is None else -both
         if both > 0 or both < 0:
             return 1 if both > 0 else -1
         raise Singular
@@ -154,16 +162,17 @@ class View:
             if leaf.q
             else None
         )
-        free = [a + step * b for a, b in zip(leaf.xc, leaf.xcs, strict=True)]
+        more = angles[-1] - leaf.angles[-1] if leaf.free is not None else arb(0)
+        free = [a + step * b + more * c for a, b, c in zip(leaf.xc, leaf.xcs, leaf.xcf, strict=True)]
         self.xc = solve(self.K, column(free)).entries() if leaf.q else []
         moved = column([d * x for part, x in zip(self.D, self.xc, strict=True) for d in part]) if leaf.q else None
-        self.y = [a + step * b for a, b in zip(leaf.y.entries(), leaf.ys.entries(), strict=True)]
-        self.w = [a + step * b for a, b in zip(leaf.w.entries(), leaf.ws.entries(), strict=True)]
+        self.y = (leaf.y + leaf.ys * step + leaf.yf * more).entries()
+        self.w = (leaf.w + leaf.ws * step + leaf.wf * more).entries()
         if leaf.q:
             self.y = [a + b for a, b in zip(self.y, (leaf.dy * moved).entries(), strict=True)]
             self.w = [a + b for a, b in zip(self.w, (leaf.dw * moved).entries(), strict=True)]
         self.d = leaf.units(angles)
-        self.line = None
+        self.line = self.left = self.across = None
 
     def _part(self, row, j):
         """Entries of a row that belong to the tau of one sliding node."""
@@ -200,6 +209,12 @@ class View:
                 for j, d in zip(leaf.sliding, turned, strict=True)
             ]
             found.append(self.moves(change, [arb(0)] * leaf.q))
+        if leaf.free is not None:
+            y, w = leaf.yf.entries(), leaf.wf.entries()
+            if leaf.q:
+                moved = self.moves([[arb(0)] * len(d) for d in self.D], leaf.xcf)
+                y, w = ([a + b for a, b in zip(*part, strict=True)] for part in ((y, moved[0]), (w, moved[1])))
+            found.append((y, w))
         return found
 
     @cached_property
@@ -222,7 +237,8 @@ class View:
 
     @cached_property
     def G(self):
-        return [v[0] * d[1] - v[1] * d[0] for _, v, d in self.directions()]
+        found = [v[0] * d[1] - v[1] * d[0] for _, v, d in self.directions()]
+        return found if self.leaf.free is None else [*found, self.w[self.leaf.free]]
 
     def _of_G(self, dw, node=None):
         """The derivatives of G for derivatives of w; node is the one that turns."""
@@ -231,12 +247,12 @@ class View:
             x, y = (dw[place] for place in self.system.tau[i])
             turn = v[0] * d[0] + v[1] * d[1] if i == node else arb(0)
             found.append(x * d[1] - y * d[0] + turn)
-        return found
+        return found if self.leaf.free is None else [*found, dw[self.leaf.free]]
 
     @cached_property
     def slopes(self):
         """dG/dpsi by rows."""
-        columns = [self._of_G(dw, i) for i, (_, dw) in zip(self.leaf.turning, self.by_angle, strict=True)]
+        columns = [self._of_G(dw, i) for i, (_, dw) in zip([*self.leaf.turning, None], self.by_angle, strict=False)]
         return [list(row) for row in zip(*columns, strict=True)]
 
     @cached_property
@@ -250,6 +266,8 @@ class View:
         found = []
         for k, s in enumerate(steps):
             value = leaf.y[k, 0] - s * leaf.w[k, 0] + step * (leaf.ys[k, 0] - s * leaf.ws[k, 0])
+            if leaf.free is not None:
+                value += (self.angles[-1] - leaf.angles[-1]) * (leaf.yf[k, 0] - s * leaf.wf[k, 0])
             for j, moved in enumerate(flat):
                 value += (leaf.dy[k, j] - s * leaf.dw[k, j]) * moved
             found.append(value)
@@ -277,6 +295,10 @@ class View:
 
     def is_violated(self):
         return any(value < 0 for value in self.conditions())
+
+    def is_vague(self):
+        """Whether the normal force of a node that turns is hardly known."""
+        return any(self.y[i].rad() > abs(self.y[i]).mid() / 4 for i in self.leaf.turning)
 
     def is_strict(self):
         return all(value > 0 for value in self.conditions())
@@ -309,162 +331,8 @@ def krawczyk(view, middle):
     rest = (unit - Y * arb_mat(view.slopes)) * steps - Y * column(middle.G)
     drift, change = (Y * column(view.by_alpha_of_G)).entries(), view.alpha - middle.alpha
     #: all zeros have angles - those of the middle = change of alpha times one of these + another one
-    view.line = [-x.mid() for x in drift], [a - (b - b.mid()) * change for a, b in zip(rest.entries(), drift, strict=True)]
+    view.line = (
+        [-x.mid() for x in drift],
+        [a - (b - b.mid()) * change for a, b in zip(rest.entries(), drift, strict=True)],
+    )
     return [a + b * change + c for a, b, c in zip(middle.angles, *view.line, strict=True)]
-
-
-@dataclass
-class Root:
-    """The only solution of a leaf's equations in a box of angles: its numbers in narrow balls."""
-
-    codes: tuple
-    box: list
-    angles: list
-    y: list
-    w: list
-    view: View
-    index: int
-
-
-def root_in(system, codes, box, alpha):
-    """The only zero in a box of angles, or None where that is not shown."""
-    try:
-        leaf = Leaf(system, codes, box, alpha)
-        middle, view = View(leaf, leaf.angles, leaf.alpha), View(leaf, box, alpha)
-        found = krawczyk(view, middle)
-        if not all(inside(a, b) for a, b in zip(found, box, strict=True)):
-            return None
-        for _ in range(_ROUNDS):
-            leaf = Leaf(system, codes, found, alpha)
-            middle, view = View(leaf, leaf.angles, leaf.alpha), View(leaf, found, alpha)
-            found = [a.intersection(b) for a, b in zip(krawczyk(view, middle), found, strict=True)]
-        index = leaf.index(view)
-    except Singular:
-        return None
-    view.narrowed(middle)
-    return Root(codes, box, found, view.y, view.w, view, index)
-
-
-def root_near(system, codes, angles, alpha):
-    """The zero to which Newton's method leads from some angles, or None."""
-    angles = [angle.mid() for angle in angles]
-    try:
-        for _ in range(40):
-            leaf = Leaf(system, codes, angles, alpha)
-            view = View(leaf, leaf.angles, leaf.alpha)
-            if not angles:
-                break
-            step = solve(arb_mat(view.slopes), column(view.G)).entries()
-            if not all(abs(value) < 3 for value in step):
-                return None
-            angles = [(a - b).mid() for a, b in zip(angles, step, strict=True)]
-            if all(abs(value) < arb(2) ** -100 for value in step):
-                break
-    except Singular:
-        return None
-    return root_in(system, codes, [angle + arb(0, arb(2) ** -60) for angle in angles], alpha)
-
-
-def off_sectors(root):
-    """Whether the direction of a root is certainly not in one of its leaf's sectors."""
-    for i, _, (x, y) in root.view.directions():
-        number = sector_of(root.codes[i])
-        (a, b), (c, e) = corner(number), corner(following(number))
-        if arb(a) * y - arb(b) * x < 0 or x * arb(e) - y * arb(c) < 0:
-            return True
-    return False
-
-
-def contradicts(system, codes, angles, alpha):
-    """Whether the equations have no solution within the energy bound (theory, (12.5)), also where M is singular."""
-    leaf = Leaf.__new__(Leaf)
-    leaf.system, leaf.codes = system, codes
-    leaf.sort()
-    if leaf.rigid:
-        return False
-    rows = (system.S * leaf.columns(leaf.along(angles, alpha))).tolist()
-    g, c = system.load(alpha), [value / 2 for value in (system.inverse * column(system.load(alpha))).entries()]
-    size = sum((a * b for a, b in zip(c, g, strict=True)), arb(0)) / 2
-    least = [abs(c[k]) + abs(system.inverse[k, k] * size).sqrt() for k in leaf.picked]
-    M = np.array([[float(x.mid()) for x in rows[k]] for k in leaf.picked])
-    for vector in np.linalg.svd(M)[0].T[::-1][:2] if M.size else ():
-        eta = [arb(float(x)) for x in vector]
-        load = sum((a * g[k] for a, k in zip(eta, leaf.picked, strict=True)), arb(0))
-        for j, bound in enumerate(least):
-            load += abs(sum((a * rows[k][j] for a, k in zip(eta, leaf.picked, strict=True)), arb(0))) * bound * arb(0, 1)
-        if load > 0 or load < 0:
-            return True
-    return False
-
-
-def halves(box):
-    return [between(box.lower(), box.mid()), between(box.mid(), box.upper())]
-
-
-def explore(system, codes, alpha, settled, piece=None, boxes=BOXES):
-    """Cut the sectors of a leaf, and alphas, into boxes that hold no solution or are settled.
-
-    settled is asked of every box (angles, alpha, view or None) that may hold one. A ball of alphas may be wider than
-    the piece that it stands for.
-    """
-    sectors = [angles_of(sector_of(code)) for code in codes if sector_of(code)]
-    widths = [float(box.rad()) for box in sectors] + [max(float(alpha.rad()), 1e-300)]
-    waiting = [(sectors, alpha)]
-    while waiting:
-        boxes -= 1
-        if boxes < 0:
-            raise Undecided("more boxes than the judge takes")
-        angles, part = waiting.pop()
-        if piece and (part < piece[0] or part > piece[1]):
-            continue
-        left = angles
-        try:
-            leaf = Leaf(system, codes, angles, part)
-            view, middle = View(leaf, angles, part), View(leaf, leaf.angles, leaf.alpha)
-            view.narrowed(middle)
-            if view.is_violated() or any(value > 0 or value < 0 for value in view.G):
-                continue
-            try:
-                found = krawczyk(view, middle)
-                if not all(a.overlaps(b) for a, b in zip(found, angles, strict=True)):
-                    continue
-                left = [a.intersection(b) for a, b in zip(angles, found, strict=True)]
-            except Singular:
-                pass
-        except Singular:
-            view = None
-            if contradicts(system, codes, angles, part):
-                continue
-        if settled(angles, part, view):
-            continue
-        shares = [float(box.rad()) / width for box, width in zip([*angles, part], widths, strict=True)]
-        wide = [share > 1e-3 * max(shares) for share in shares]
-        if any(many and a.rad() < 0.7 * b.rad() for many, a, b in zip(wide, left, angles, strict=False)):
-            waiting.append((left, part))
-            continue
-        shares = [float(box.rad()) / width for box, width in zip([*left, part], widths, strict=True)]
-        k = max(range(len(shares)), key=shares.__getitem__)
-        if shares[k] < 1e-25:
-            raise Undecided("a box that is as narrow as this is not decided")
-        for half in reversed(halves([*left, part][k])):
-            parts = [*left, part]
-            parts[k] = half
-            waiting.append((parts[:-1], parts[-1]))
-
-
-def roots_of(system, codes, alpha):
-    """All solutions of a complete assignment at one alpha; solutions at the border of conditions are not decided."""
-    known = []
-
-    def settled(angles, _, view):
-        if view is None:
-            return False
-        if any(all(a.contains(b) for a, b in zip(root.box, angles, strict=True)) for root in known):
-            return True
-        root = root_in(system, codes, [a.mid() + arb(0, float(a.rad()) * 1.5 + 1e-30) for a in angles], alpha)
-        if root is not None:
-            known.append(root)
-        return root is not None
-
-    explore(system, codes, alpha, settled)
-    return [root for root in known if not (root.view.is_violated() or off_sectors(root))]

@@ -1,6 +1,6 @@
 """Forms of products, for space_judge: all solutions of an assignment in an ellipsoid.
 
-Numbers in brackets are sections of docs/proof_format.md; the mathematics is in docs/theory.md, section 12.11.
+Numbers in brackets are sections of docs/proof_format.md; the mathematics is in theory, section 12.11.
 """
 
 from flint import arb, arb_mat, fmpq
@@ -28,7 +28,7 @@ class ProductForm:
                     need(len(values) == many, "too few multipliers")
                     self.add(product(values))
         need(not left, "too many multipliers")
-        weight = _HEAVY * max(max(abs(x).upper() for x in self.K.entries()), arb(2) ** -200)
+        weight = _HEAVY * max(*(abs(x).upper() for x in self.K.entries()), arb(2) ** (-200))
         for form in self.equations():
             size = length_of(form[0])
             self.add([(weight / size**2, form, form)])
@@ -37,7 +37,7 @@ class ProductForm:
         self.centre = (self.inverse * column(self.h)).entries()
         self.least = self.k - sum((a * b for a, b in zip(self.centre, self.h, strict=True)), arb(0))
 
-    # -- linear forms: rows and constants --------------------------------------------------------------------------------
+    # -- linear forms: rows and constants ------------------------------------------------------------------------------
 
     def y(self, place):
         unit = 1 / self.force[self.system.node_of[place]]
@@ -111,7 +111,7 @@ class ProductForm:
 
             yield along, 1
 
-    # -- what follows ----------------------------------------------------------------------------------------------------
+    # -- what follows --------------------------------------------------------------------------------------------------
 
     @property
     def is_empty(self):
@@ -130,12 +130,11 @@ class ProductForm:
 
     def serves(self, codes):
         """Whether it is about all that an assignment allows."""
-        for i, (mine, code) in enumerate(zip(self.codes, codes, strict=True)):
+        for mine, code in zip(self.codes, codes, strict=True):
             inner, outer = sector_of(code), sector_of(mine)
             contact = mine == 5 and code not in (0, 6)
             if not (mine == code or contact or (inner and outer and holds(outer, inner))):
                 return False
-            del i
         return True
 
     def excludes(self, codes):
@@ -160,6 +159,8 @@ class ProductForm:
 
 def _sum(*parts):
     """A sum of linear forms with weights."""
-    row = [sum((w * x for (w, _), x in zip(parts, column_, strict=True)), arb(0))
-           for column_ in zip(*(form[0] for _, form in parts), strict=True)]
+    row = [
+        sum((w * x for (w, _), x in zip(parts, column_, strict=True)), arb(0))
+        for column_ in zip(*(form[0] for _, form in parts), strict=True)
+    ]
     return row, sum((w * form[1] for w, form in parts), arb(0))
