@@ -16,7 +16,8 @@ def node_in_space(friction, friction_slope, **options):
 
 
 def sheet():
-    return enumsol.ContactProblem([[1, 0.5], [0.5, 1]], E[:1, :2], E[1:2, :2], [1, 0.5], friction=(0.0, 1.0))
+    A = [[1, 0.5], [0.5, 1]]
+    return enumsol.ContactProblem(A, E[:1, :2], E[1:2, :2], [1, 0.5], friction=0.0, friction_slope=1.0)
 
 
 def unloaded(**options):

@@ -60,8 +60,8 @@ What checker and search share
       variables in which friction is isotropic; of bodies that nothing holds the same with G and h,
       and ``trusted.space.resultants``, what multipliers and balance prove; ``model.problem3d``
       and ``model.friction``, the data and their checks;
-    - for histories: ``trusted.positions``, where a root leaves the contact nodes; ``model.restart``, the problem of a
-      step;
+    - for histories: ``trusted.positions``, where a root leaves the contact nodes, in 3D by its leaf
+      ``trusted.space.leaf_positions``; ``model.restart``, the problem of a step;
     - ``condensation.unloaded`` and ``condensation.free_displacements``: the alpha at which g vanishes, and for the
       search whether it does at all (then there is no proof), and the solution of A X = K in rationals;
       ``condensation.data``: F(alpha) and f(alpha) without rounding; of ``arithmetic.rationals`` the pivots of a
@@ -74,8 +74,8 @@ What checker and search share
     - ``model.problem``, ``model.mesh``, ``model.cells``, ``model.contact_body``, ``condensation.data``,
       ``condensation.condensed``, ``condensation.factorization``, ``support.deadlines``, ``support.immutable``,
       ``support.arguments``, ``support.array_arguments``, ``support.array_types``, ``support.files``,
-      ``support.messages`` and ``errors``: the data, their checks and their fingerprint, the factorization of A (no
-      bound assumes that it is accurate), S and g as computed;
+      ``support.saved``, ``support.messages`` and ``errors``: the data, their checks and their fingerprint, the
+      factorization of A (no bound assumes that it is accurate), S and g as computed;
     - numpy, scipy and python-flint.
 
     They are shared because the two must agree. A leaf is written when its inequality is proven positive, and a second

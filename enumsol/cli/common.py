@@ -13,10 +13,7 @@ import typer
 from enumsol.cli.progress import Display
 from enumsol.cli.streams import is_quiet, say
 from enumsol.errors import EnumsolError, Interrupted, InvalidArgumentError, OutOfMemoryError, OutputError
-from enumsol.support.arguments import text_of
-from enumsol.support.files import unreadable
 from enumsol.support.messages import visible
-from enumsol.support.plotting import checked_units
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -35,8 +32,6 @@ GALLERY, COLLECTION = "gallery:", "collection:"
 TOML = ".toml"
 #: Usual endings of files that meshio reads and that are no problems.
 MESHES = (".msh", ".vtu", ".vtk", ".inp", ".xdmf", ".med", ".bdf", ".mesh", ".e", ".exo")
-#: Bytes of a TOML file that is read here, as in `enumsol.fem`, which refuses larger ones.
-_LARGEST = 1_000_000
 #: As many processes as Windows lets one wait for.
 _MOST_ON_WINDOWS = 61
 
@@ -58,11 +53,11 @@ def described(problem: str) -> dict[str, Any]:
     """What a TOML file says besides the problem: steps, units and title; what is wrong with it is said elsewhere."""
     if not problem.endswith(TOML):
         return {}
+    from enumsol.support.files import unreadable  # numpy: not for --help
+    from enumsol.support.saved import LARGEST_TOML, toml_from
 
-    if unreadable(Path(problem)) is not None or Path(problem).stat().st_size > _LARGEST:
+    if unreadable(Path(problem)) is not None or Path(problem).stat().st_size > LARGEST_TOML:
         return {}
-    from enumsol.support.saved import toml_from  # numpy: not for --help
-
     try:
         return toml_from(Path(problem).read_bytes())
     except (OSError, ValueError):
@@ -77,6 +72,8 @@ def units_of(problem: str, text: str | None) -> tuple[str, str] | None:
     InvalidArgumentError
         They are not two texts.
     """
+    from enumsol.support.plotting import checked_units  # numpy: not for --help
+
     if text is not None:
         return checked_units(text, "--units")
     return checked_units(described(problem).get("units"))
@@ -89,6 +86,8 @@ def in_units(text: str, units: tuple[str, str] | None) -> str:
 
 def title_of(problem: str, text: str | None = None) -> str:
     """The heading of a page or a figure: what is asked for, the title in a TOML file, or the name of the problem."""
+    from enumsol.support.arguments import text_of  # numpy: not for --help
+
     found = described(problem).get("title", problem) if text is None else text
     return text_of(found, "title")
 

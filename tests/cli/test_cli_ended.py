@@ -55,7 +55,7 @@ def test_what_was_found_is_printed_where_the_memory_does_not_suffice(capsys, mon
     status, out, err = run(capsys, "roots", "gallery:wedge-8-5", "--alpha", 2)
     assert status == 71
     assert "complete: no (out of memory after 22 nodes)" in out
-    assert_one_line(err, "enumerate_roots ran out of memory")
+    assert_one_line(err, "enumsol roots ran out of memory")
 
 
 @pytest.mark.parametrize("command", [["roots", "--alpha", "1"], ["graph", "--from", "0", "--to", "1"]])

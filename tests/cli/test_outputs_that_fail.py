@@ -256,7 +256,8 @@ def test_gallery_write_on_a_full_disk(place, capsys, monkeypatch, file):
 def test_an_fclib_file_on_a_full_disk(place):
     pytest.importorskip("h5py")
     problem, message = gallery.one_node_triangle(), r"full\.h5 cannot be written \(No space left on device\)"
-    refusal(enumsol.OutputError, message, enumsol.write_problem, problem.replace(friction=0.3), place / "full.h5")
+    problem = problem.replace(friction=0.3, friction_slope=0)
+    refusal(enumsol.OutputError, message, enumsol.write_problem, problem, place / "full.h5")
 
 
 @pytest.mark.slow

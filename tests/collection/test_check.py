@@ -275,7 +275,7 @@ def test_one_problem_is_listed_and_written(tmp_path, capsys):
     lines = printed(capsys, "collection", "list").splitlines()
     assert [line.split()[0] for line in lines] == list(collection.COLLECTION)
     out = printed(capsys, "collection", "export", tmp_path, "collection:node-3d-3", "--json", tmp_path / "said.json")
-    assert out.startswith(f"wrote 1 problems to {tmp_path}/problems, ")
+    assert out.startswith(f"wrote 1 problem to {tmp_path}/problems, ")
     assert json.loads((tmp_path / "said.json").read_text()) == {"folder": str(tmp_path), "names": ["node-3d-3"]}
     assert {path.name for path in tmp_path.rglob("node-3d-3.*")} == {
         f"node-3d-3.{x}" for x in ("npz", "h5", "json", "proof")

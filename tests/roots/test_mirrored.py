@@ -10,7 +10,9 @@ from refusals import bad_argument
 import enumsol
 from enumsol import Mirror, fem, gallery
 from enumsol.cli import main
+from enumsol.roots.enumeration import not_begun
 from enumsol.roots.mirrored import paired_roots, problem_asymmetry
+from enumsol.search.outcome import StopReason
 
 
 @pytest.fixture(scope="module")
@@ -164,7 +166,8 @@ def test_a_missing_partner_is_said(wedge):
     assert "these are still to be found" in images.notes(complete=False)[1]
     twice = paired_roots([roots[0], roots[0]], mirror, asymmetry)
     assert (twice.images, twice.ambiguous, twice.missing) == ((None, None), (0, 1), ())
-    bad_argument("no isolated roots to compare", enumsol.enumerate_roots(problem, 1, max_nodes=1).mirrored, "y")
+    none = not_begun(problem, 1.0, "verified", "tree", 0.0, StopReason.TIME_LIMIT)
+    bad_argument("no isolated roots to compare", none.mirrored, "y")
 
 
 @pytest.mark.parametrize(

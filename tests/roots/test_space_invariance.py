@@ -20,7 +20,7 @@ def with_second_tangent(problem, rng, ratio):
     wider = [sp.hstack([rows, sp.csr_array((p, p))]) for rows in (problem.Bn, problem.Bt)]
     last = sp.hstack([sp.csr_array((p, n)), sp.eye_array(p)])
     slope = None if problem.load_slope is None else np.append(problem.load_slope, np.zeros(p))
-    F, F_slope = problem.friction
+    F, F_slope = problem.affine_friction
     return ContactProblem3D(
         scipy.linalg.block_diag(problem.A.toarray(), np.eye(p) + X @ X.T / (4 * p)), *wider, last,
         np.append(problem.f, np.zeros(p)), gap=problem.gap, friction=(F, ratio * F),

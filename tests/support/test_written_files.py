@@ -46,7 +46,7 @@ def results():
         "history.json": enumsol.histories(TRIANGLE, [1, 2]).save,
         "history.svg": lambda place: enumsol.histories(TRIANGLE, [1, 2]).plot(file=place),
         "problem.npz": lambda place: enumsol.write_problem(problem, place),
-        "problem.h5": lambda place: enumsol.write_problem(problem.replace(friction=0.3), place),
+        "problem.h5": lambda place: enumsol.write_problem(problem.replace(friction=0.3, friction_slope=0), place),
         "body.vtu": lambda place: enumsol.write_vtu(body, enumsol.enumerate_roots(body, 0.1), place),
         "exported": lambda place: enumsol.collection.export(place, ["triangle-3"]),
         "folder": lambda place: enumsol.write_problem(problem, place),

@@ -265,8 +265,8 @@ def test_all_data_of_a_box_are_held_in_any_units():
     pair, none = Pair(1), np.zeros(2)
     matrices = np.eye(4), np.eye(4)[:2], np.eye(4)[2:]
     pair.problems = (
-        ContactProblem(*matrices, [1, 2, 3, 4], [0, 1], ([1, 2], [1, 0]), [1, 2, 0, -1]),
-        ContactProblem(*matrices, [2, 1, 0, 4], none, ([1, 0], [0, 3]), [-3, 0, 0, 2]),
+        ContactProblem(*matrices, [1, 2, 3, 4], [0, 1], np.array([1, 2]), np.array([1, 0]), [1, 2, 0, -1]),
+        ContactProblem(*matrices, [2, 1, 0, 4], none, np.array([1, 0]), np.array([0, 3]), [-3, 0, 0, 2]),
     )
     enclosures = tuple(problem.enclosure for problem in pair.problems)
     box = (0.25, 0.5), (0.25, 0.5)
