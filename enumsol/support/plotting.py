@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from io import BytesIO
 from typing import Any
@@ -28,15 +29,27 @@ def new_figure(**options: Any) -> Any:
     return figure
 
 
+#: How matplotlib writes the powers of ten along an axis.
+_LOGARITHMIC = "mathdefault"
+
+
 @cache
 def _figure_class() -> Any:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from matplotlib.text import Text
 
     class NotebookFigure(Figure):
         def __init__(self, **options: Any) -> None:
             super().__init__(**options)
             FigureCanvasAgg(self)
+
+        def draw(self, renderer: Any) -> None:
+            # a dollar sign in a title or a name begins no formula; logarithmic axes have formulas of their own
+            for text in self.findobj(Text):
+                if _LOGARITHMIC not in (said := text.get_text()) and "$" in said:
+                    text.set_text(re.sub(r"(?<!\\)\$", r"\\$", said))
+            super().draw(renderer)
 
         def _repr_png_(self) -> bytes:
             drawn = BytesIO()

@@ -68,3 +68,12 @@ def test_no_figure_is_forgotten():
     found |= {name for name in fixed_points.__all__ if name[:4] == "plot"}
     assert found <= FIGURES.keys()
     assert len(found) >= 7
+
+
+def test_a_dollar_sign_in_a_name_begins_no_formula(tmp_path):
+    problem = enumsol.gallery.one_node_triangle().replace(node_ids=["a $x_{$"])
+    graph = enumsol.branch_graph(problem, (0, 1))
+    figure = graph.plot(nodes=problem.node_ids, title="costs $x_{$ 5", file=tmp_path / "graph.png")
+    assert (tmp_path / "graph.png").stat().st_size > 1000
+    figure.draw_without_rendering()
+    assert r"costs \$x_{\$ 5" in words(figure)
