@@ -2,7 +2,6 @@
 
 import functools
 from collections import Counter
-from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -11,9 +10,9 @@ from complete import complete_report
 from effort import some
 from problems3d import OneNode, in_space, random_over_alpha, random_plane_over_alpha
 from proof_tools import copied, proof_of, records_of
-from space_graph_proofs import GraphTruth, Parts, closed_branch, mutant
+from space_graph_proofs import Parts, closed_branch, mutant
+from space_judge_mutants import checked, judged
 
-from enumsol import ProofFormatError, verify
 from enumsol.branches.space.cover import SpaceCover
 
 
@@ -50,33 +49,30 @@ def proven(name):
 @pytest.mark.parametrize("name", CASES)
 def test_mutants_are_refused_or_say_what_is_true(name):
     problem, proof, records = proven(name)
-    truth, rng, told = GraphTruth(problem, records), np.random.default_rng(40), Counter()
-    assert not truth.falsehoods(complete_report(problem, proof), proof)
-    for k in range(some(20, of=250)):
+    rng, told = np.random.default_rng(40), Counter()
+    complete_report(problem, proof)
+    assert judged(problem, proof)[0]
+    for k in range(some(20, of=100)):
         found, how = mutant(rng, records)
-        try:
-            report = verify(problem, found)
-        except ProofFormatError:
-            told["unreadable"] += 1
-            continue
-        told[report.ok] += 1
-        if report.ok:
-            assert not truth.falsehoods(report, found), (k, how)
+        report, _ = checked(problem, found)
+        told[bool(report)] += 1
+        if report:
+            counts, reason = judged(problem, found)
+            assert counts, (k, how, reason)
+            assert counts["curves"] == report.curves
     assert told[False] > told[True] > 0
 
 
 @pytest.mark.few(0, 1)
 @pytest.mark.parametrize("name", ["three curves", "closed"])
 def test_the_judge_of_mutants_sees_wrong_claims(name):
-    """Each of these would be wrong if it was accepted."""
-    problem, proof, records = proven(name)
-    truth, report = GraphTruth(problem, records, count=8), complete_report(problem, proof)
+    problem, _, records = proven(name)
 
-    def judged(change):
+    def refused(change):
         parts = Parts.of(copied(records))
         change(parts)
         parts.count()
-        return truth.falsehoods(replace(report, curves=len(parts.curves)), proof_of(parts.records()))
+        return judged(problem, proof_of(parts.records()))[0] is None
 
     def no_solutions(parts):
         parts.tree = [["n"] if record[0] in ("k", "r", "m") else record for record in parts.tree]
@@ -95,6 +91,6 @@ def test_the_judge_of_mutants_sees_wrong_claims(name):
         for record in parts.curves[-1]:
             record[1] = [x * 1.01 for x in record[1]]
 
-    assert not judged(lambda parts: None)
+    assert not refused(lambda parts: None)
     for change in (no_solutions, other_curve, a_curve_twice, too_short, moved):
-        assert judged(change), change.__name__
+        assert refused(change), change.__name__

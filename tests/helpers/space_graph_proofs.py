@@ -1,25 +1,17 @@
-"""Mutants of graphs' proofs in 3D, and whether all that one says is true: of its curves, and of every leaf."""
+"""Mutants of graphs' proofs in 3D, of their curves and of their trees; space_judge says whether they are true."""
 
 import itertools
 from dataclasses import dataclass, field
 from fractions import Fraction
 
-import numpy as np
 import proof_fuzz
 import space_proofs
-from complete import all_roots
-from oracles3d import violation
 from problems3d import in_space
 from proof_fuzz import _pick
-from proof_tools import bytes_of, copied, proof_of, records_of
+from proof_tools import bytes_of, copied, proof_of
 
 from enumsol import gallery
-from enumsol.trusted.space.solution_curve import AlphaProblem, curve_point
 
-#: Directions and boxes are compared within this.
-_NEAR = 1e-8
-#: As many pieces of leaves that the proof does not have are looked at.
-_PIECES = 12
 _CENTRE, _DIRECTION, _BORDER, _RADIUS, _RHO, _HALF = range(1, 7)
 
 
@@ -444,173 +436,3 @@ def mutant(rng, records, general=0.1):
     if rng.random() < 0.05:
         _counts(rng, parts)
     return proof_of(parts.records()), " ".join(names)
-
-
-# -- what an accepted one says -----------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class _Solution:
-    """A regular root: its forces, and node by node its status and the angle of its friction, without units."""
-
-    forces: np.ndarray
-    statuses: tuple
-    angles: tuple
-
-
-class GraphTruth:
-    """The solutions of a problem at alphas of any interval that a mutant of a proof may name.
-
-    Leaves that the proof does not have are judged at an alpha of their own, too, as pieces may be short.
-    """
-
-    def __init__(self, problem, records, count=16, seed=5):
-        self.problem = problem
-        self._shares, self._known = np.sort(np.random.default_rng(seed).uniform(0.001, 0.999, count)), {}
-        self._given = list(_all_leaves(records))
-
-    def solutions(self, alpha):
-        if alpha not in self._known:
-            F = self.problem.friction_at(alpha)
-            found = []
-            for root in all_roots(self.problem, alpha):
-                tau = root.lambda_t / np.where(F > 0, F, 1.0)
-                angles = np.arctan2(tau[:, 1], tau[:, 0])
-                forces = np.concatenate([root.lambda_n, *root.lambda_t.T])
-                found.append(_Solution(forces, tuple(s.value for s in root.statuses), tuple(angles.tolist())))
-            self._known[alpha] = found
-        return self._known[alpha]
-
-    def falsehoods(self, report, proof):
-        """What is wrong of that which an accepted mutant says: an empty list, if all of it is true."""
-        records = records_of(proof)
-        parts = Parts.of(records)
-        low, high = map(Fraction, parts.header["interval"])
-        wrong = []
-        gaps = len(parts.places("u"))
-        told = report.interval, report.curves, report.open, report.complete
-        if told != ((low, high), len(parts.curves), gaps, gaps == 0):
-            wrong.append(f"the report says {told}")
-        given = AlphaProblem.of(self.problem.enclosure, np.array(parts.header["steps"]))
-        curves = [_Curve(given, curve) for curve in parts.curves]
-        wrong += [f"curve {k}: {why}" for k, curve in enumerate(curves) for why in curve.wrong(self.problem, low, high)]
-        leaves = list(_all_leaves(records))
-        pieces = {leaf[:2] for leaf in leaves if leaf not in self._given}
-        alphas = [_at(low, high, share) for share in self._shares]
-        alphas += [_at(*ends, self._shares[0] / 2 + 0.3) for ends in itertools.islice(sorted(pieces), _PIECES)]
-        for alpha in alphas:
-            solutions = self.solutions(alpha)
-            where = [[k for k, curve in enumerate(curves) if curve.has(x, alpha)] for x in solutions]
-            passes = sum(curve.passes(alpha) for curve in curves)
-            if any(len(found) > 1 for found in where) or passes > len(solutions):
-                wrong.append(f"curves at {alpha}: {where}, {passes} pass, {len(solutions)} solutions")
-            for x, found in zip(solutions, where, strict=True):
-                mine = [leaf for leaf in leaves if leaf[0] < alpha < leaf[1] and _belongs(x, leaf[2])]
-                if not mine:
-                    wrong.append(f"a solution at {alpha} belongs to no leaf")
-                for _, _, codes, leaf in mine:
-                    if leaf[0] != "u" and not set(found) & _curves_of(leaf, parts):
-                        wrong.append(f"at {alpha} a solution on {found} below {codes}, where {leaf[:1]} is said")
-        return wrong
-
-
-class _Curve:
-    """The points and boxes of a curve, in floats."""
-
-    def __init__(self, given, records):
-        self.given, self.records = given, records
-        points = records[::2]
-        self.closed = records[0] == records[-1]
-        self._alphas = np.array([record[_CENTRE][-1] for record in points])
-        self._away = np.array([record[_RADIUS][-1] for record in points])
-
-    def has(self, solution, alpha):
-        """Whether a solution lies in one of the boxes, or beside one where the curve bends beyond it."""
-        x = self.given.placed(np.append(solution.forces, alpha))
-        return any(self._on(record, x) for record in self.records[1::2])
-
-    def _on(self, record, x):
-        c, d, e, radius = (np.array(part) for part in record[_CENTRE : _RADIUS + 1])
-        t, near = e @ (x - c), _NEAR * (1 + np.abs(x))
-        if not abs(t) <= record[_HALF] * (1 + _NEAR) + _NEAR:
-            return False
-        if np.all(np.abs(x - c - t * d) <= radius + near):
-            return True
-        # the solution that Newton's method finds at this t, from the middle of the box
-        found = curve_point(self.given, c + t * d, e)
-        return found is not None and bool(np.all(np.abs(found.x - x) <= 10 * near))
-
-    def passes(self, alpha):
-        """How often it passes an alpha, at least: by the sides of its points, two of which may be the same one."""
-        sides = [np.sign(a - alpha) for a, r in zip(self._alphas, self._away, strict=True) if abs(a - alpha) > r]
-        return sum(one != other for one, other in itertools.pairwise(sides))
-
-    def wrong(self, problem, low, high):
-        """What is wrong of its points: they are solutions, and the ends lie beyond the interval."""
-        for record, alpha in zip(self.records[::2], self._alphas, strict=True):
-            # beyond the interval it may be negative
-            F = np.transpose(problem.friction) + alpha * np.transpose(problem.friction_slope)
-            data = problem.condensed
-            lam = self.given.unplaced(np.array(record[_CENTRE]))[:-1]
-            far = max(record[_RADIUS]) / np.abs(lam).max() if lam.any() else np.inf
-            if np.all(F >= 0) and violation(data.S, data.free_displacements(alpha), F, lam) > 1e-6 + 1e2 * far:
-                yield f"the point at {alpha} is no solution"
-        if not self.closed and any(low < alpha - r and alpha + r < high for alpha, r in self._ends()):
-            yield "it ends inside the interval"
-
-    def _ends(self):
-        return [(self._alphas[k], self._away[k]) for k in (0, -1)]
-
-
-def _curves_of(leaf, parts):
-    """The curves on which a leaf says that all its solutions lie."""
-    if leaf[0] not in ("k", "r", "m"):
-        return set()
-    starts = parts.first_boxes()
-    return {int(np.searchsorted(starts, box, side="right")) - 1 for box in _boxes_of(leaf)}
-
-
-def _at(low, high, share):
-    return float(low) + float(share) * float(high - low)
-
-
-def _all_leaves(records):
-    """Both ends of the piece, codes and record of every leaf."""
-    parts = Parts.of(records)
-    waiting = [(*map(Fraction, parts.header["interval"]), (6,) * parts.header["p"])]
-    for record in parts.tree:
-        low, high, codes = waiting.pop()
-        if record[0] == "a":
-            alpha = Fraction(record[1])
-            waiting += [(alpha, high, codes), (low, alpha, codes)]
-        elif record[0] == "b":
-            _, node, children = record
-            waiting += [(low, high, (*codes[:node], code, *codes[node + 1 :])) for code in reversed(children)]
-        else:
-            yield low, high, codes, record
-
-
-def _belongs(solution, codes):
-    """Whether a solution surely has the statuses of an assignment; not on the border of a sector."""
-    return all(map(_has, solution.statuses, solution.angles, codes))
-
-
-def _has(status, angle, code):
-    if code in (5, 6):
-        return code == 6 or status != "open"
-    if code <= 3:
-        return status == ("open", "stick", "slip+", "slip-")[code]
-    if code == 4:
-        return status != "open"
-    return status == "slip" and _within(angle, code - 8)
-
-
-def _within(angle, number):
-    """Whether a direction lies in a sector and not at its ends (docs/proof_format.md, under Sectors)."""
-    begin, end = (_angle(share) for share in space_proofs.arc_of_sector(number))
-    return 1e-7 < (angle - begin) % (2 * np.pi) < (end - begin) % (2 * np.pi) - 1e-7
-
-
-def _angle(share):
-    quarter, s = divmod(4 * share, 1)
-    return float(np.arctan2(16, 63) + 0.5 * np.pi * int(quarter) + 2 * np.arctan(float(s)))

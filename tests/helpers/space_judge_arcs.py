@@ -110,16 +110,18 @@ class Walk:
         place.cut()
         need(all(place.has(x.point) for x in places), "a box does not hold the ends of its part")
 
-    def part(self, start, end):
+    def part(self, start, end, known=True):
+        """The next record and those that follow from it; known: another box is known that holds the part."""
         record = self.records[self.position]
         self.position += 1
         need(isinstance(record, list) and record, "the parts break off")
         kind, own, *rest = record
+        need(known or own is not None or kind in ("u", "h"), "a part without a box")
         if kind == "h":
             (middle,) = rest
             middle = self.place(middle, (start, end))
-            self.part(start, middle)
-            self.part(middle, end)
+            self.part(start, middle, False)
+            self.part(middle, end, False)
         elif kind == "u":
             need(not rest, "a gap with more")
             self.found.append(("gap", self.alphas(own)))
@@ -142,12 +144,9 @@ class Walk:
             after = self.place(after, (before, end))
             self.own(own, start, end, before, after)
             self.own(near, before, after)
-            self.part_up_to(start, before, after, end)
-
-    def part_up_to(self, start, before, after, end):
-        self.part(start, before)
-        self.corner(before, after)
-        self.part(after, end)
+            self.part(start, before)
+            self.corner(before, after)
+            self.part(after, end, after.statuses == end.statuses)
 
     def alphas(self, own):
         """Those of a box, which need not be shown to hold anything, or of the curve's box."""
@@ -253,28 +252,30 @@ class Walk:
 
     def counts(self):
         """Arcs with alphas in the interval, and gaps."""
-        gaps, arcs, current = 0, [], None
+        gaps, arcs, current, before = 0, [], None, None
         for kind, *numbers in self.found:
             if kind == "way":
-                low, high = numbers[:2]
-                current = [low, high] if current is None else [current[0], high]
+                current = _hull(current, before, *numbers[:2])
                 continue
+            before = numbers[0]
             if current is not None:
-                arcs.append(current)
+                arcs.append(_hull(current, before))
             current = None
-            beyond = numbers[0] < self.low or numbers[0] > self.high
-            within = kind == "vertex" and numbers[0] > self.low and numbers[0] < self.high
-            gaps += not beyond and not within
-        if current is not None:
-            if self.closed and arcs and self.found[0][0] == "way":
-                arcs[0] = [current[0], arcs[0][1]]
-            else:
-                arcs.append(current)
-        inside = 0
-        for one, two in arcs:
-            least, most = one.min(two), one.max(two)
-            inside += not (most < self.low or least > self.high)
-        return inside, gaps
+            beyond = before < self.low or before > self.high
+            gaps += not beyond and not (kind == "vertex" and before > self.low and before < self.high)
+        if current is not None and self.closed and arcs and self.found[0][0] == "way":
+            arcs[0] = _hull(arcs[0], current)
+        elif current is not None:
+            arcs.append(current)
+        return sum(not (arc < self.low or arc > self.high) for arc in arcs), gaps
+
+
+def _hull(*balls):
+    """A ball around those of these that are not None."""
+    first, *others = [ball for ball in balls if ball is not None]
+    for ball in others:
+        first = first.union(ball)
+    return first
 
 
 def _subsets(items):
