@@ -93,3 +93,17 @@ def test_histories_are_read_back(make, options, tmp_path):
     again = read_back(history, tmp_path / "history.json", problem)
     assert str(again) == str(history)
     assert again.reasons == history.reasons
+
+
+def test_a_history_of_a_body_that_nothing_holds_is_read_back(tmp_path):
+    problem = enumsol.gallery.block_on_table()
+    history = enumsol.histories(problem, [0.25, 0.5, 1], arithmetic="exact")
+    again = read_back(history, tmp_path / "history.json", problem)
+    assert str(again) == str(history)
+    pairs = [zip(history.stages(k), again.stages(k), strict=True) for k in (1, 2, 3)]
+    found = [(stage.roots, other.roots) for pair in pairs for stage, other in pair]
+    assert all(one.rigid_bound == two.rigid_bound for one, two in found)
+    roots = [pair for one, two in found for pair in zip(one, two, strict=True)]
+    assert roots
+    assert all(np.array_equal(one.rigid_coordinates, two.rigid_coordinates) for one, two in roots)
+    assert all(np.array_equal(one.u, two.u) for one, two in roots)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.condensation.condensed import condensation_of
 from enumsol.errors import InvalidArgumentError
 from enumsol.loading import history_data
 from enumsol.loading.steps import LoadStep
@@ -21,7 +22,7 @@ from enumsol.model.restart import SlipStart, restarted
 from enumsol.model.statuses import ContactStatus
 from enumsol.proof.proof_file import Proof
 from enumsol.roots.root import Enclosure, Polytope, Root, RootFamily, summary
-from enumsol.roots.root_set import RootSet, SearchStats, Undecided
+from enumsol.roots.root_set import RigidBound, RootSet, SearchStats, Undecided
 from enumsol.support.arguments import file_path, positive_integer, shown
 from enumsol.support.files import reading, write_file
 from enumsol.support.immutable import Immutable, Listed
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
 
     from enumsol.model.problem3d import AnyProblem
 
-FORMAT, VERSION = "enumsol-history", 1
+FORMAT, VERSION = "enumsol-history", 2
 _ARRAYS = ("lambda_n", "lambda_t", "u_n", "u_t")
 #: What the file holds as it is: of a root, and of the roots of a stage.
 _OF_ROOT, _OF_ROOTS = ("index", "regular", "margin"), ("stopped", "at_least", "certified_data")
@@ -97,7 +98,7 @@ def load_history(file: str | Path, problem: Any) -> history_data.HistoryData:
 
 def _kind(problem: AnyProblem, steps: Any) -> dict[str, Any]:
     """Kinds of what a file holds."""
-    p, shape = problem.p, problem.slip_offset.shape
+    p, shape, modes = problem.p, problem.slip_offset.shape, 0 if problem.modes is None else problem.modes.r
     known = {status.value for status in ContactStatus}
     statuses, slips = (known,) * p, Array(*shape)
     vectors = dict(zip(_ARRAYS, (Array(p), slips) * 2, strict=True))
@@ -105,15 +106,16 @@ def _kind(problem: AnyProblem, steps: Any) -> dict[str, Any]:
     root = {
         **{"statuses": statuses, "active": ([known],) * p, **vectors},
         **{"index": Maybe(int), "regular": bool, "margin": is_number, "bounds": Maybe(bounds)},
-        **{"slips": Maybe([is_fraction]), "angles": Maybe(((str, str),) * p)},
+        **{"slips": Maybe([is_fraction]), "angles": Maybe(((str, str),) * p), "rigid": Maybe(Array(modes))},
     }
-    part = (statuses, Array(None, p, 2), range(3 * p + 7))
+    part = (statuses, Array(None, p, 2), range(3 * p + 7), Maybe(Array(None, modes)))
     stage = {
         **{"step": range(1, 1 + len(steps)), "offset": slips, "radius": Maybe(slips), "exact": Maybe([is_fraction])},
         **{"reasons": [str], "alpha": is_fraction, "as_float": bool, "roots": [root]},
         "families": [{"polytopes": [part], "index": Maybe(int), "proven": bool}],
         "undecided": [((Maybe(str),) * p, str, str, int)],
         **{"stopped": Maybe(str), "at_least": int, "certified_data": {"problem", "condensed"}},
+        "bound_needed": Maybe(bool),
         **{"stats": {"nodes": int, "closed": int, "seconds": float}, "proof": Maybe(str)},
     }
     node = (int, int)
@@ -170,6 +172,7 @@ def _stage(stage: history_data.Stage) -> dict[str, Any]:
         "families": [_family(family) for family in roots.families],
         "undecided": [[_names(part.statuses), part.reason, part.hint, part.leaves] for part in roots.undecided],
         **{name: getattr(roots, name) for name in _OF_ROOTS},
+        "bound_needed": None if roots.rigid_bound is None else roots.rigid_bound.needed,
         "stats": {"nodes": roots.stats.nodes, "closed": roots.stats.closed, "seconds": roots.stats.seconds},
         "proof": None if roots.proof is None else base64.b64encode(roots.proof.content()).decode(),
     }
@@ -196,6 +199,7 @@ def _read_stage(
         stats=SearchStats(**record["stats"]),
         node_ids=problem.node_ids,
         proof=proof,
+        rigid_bound=None if record["bound_needed"] is None else RigidBound(body.rigid_reach, record["bound_needed"]),
     )
     return history_data.Stage(number, record["step"], start, roots, body, tuple(record["reasons"]))
 
@@ -210,6 +214,7 @@ def _root(root: Root) -> dict[str, Any]:
         "bounds": None if bounds is None else {name: getattr(bounds, name).tolist() for name in _ARRAYS},
         "slips": None if root.exact_slips is None else [str(value) for value in root.exact_slips],
         "angles": None if root.slip_angle is None else [[float(a).hex() for a in pair] for pair in root.slip_angle],
+        "rigid": None if root.rigid_coordinates is None else root.rigid_coordinates.tolist(),
     }
 
 
@@ -224,18 +229,26 @@ def _read_root(record: dict[str, Any], alpha: Any, problem: Any) -> Root:
         **{name: record[name] for name in _OF_ROOT},
         enclosure=None if bounds is None else Enclosure(*(np.array(bounds[name]) for name in _ARRAYS)),
         slip_angle=None if angles is None else np.array([[float.fromhex(a) for a in pair] for pair in angles]),
-        _condensed=problem.condensed,
+        _condensed=condensation_of(problem),
+        _rigid=None if record["rigid"] is None else np.array(record["rigid"]),
         _exact_slips=None if slips is None else tuple(map(Fraction, slips)),
     )
 
 
 def _family(family: RootFamily) -> dict[str, Any]:
-    parts = [[_names(part.statuses), part.vertices.tolist(), part.dimension] for part in family.polytopes]
+    parts = [[_names(part.statuses), part.vertices.tolist(), part.dimension, _list(part)] for part in family.polytopes]
     return {"polytopes": parts, "index": family.index, "proven": family.vertices_proven}
 
 
+def _list(part: Polytope) -> list[Any] | None:
+    return None if part.rigid_coordinates is None else part.rigid_coordinates.tolist()
+
+
 def _read_family(record: dict[str, Any], alpha: Any) -> RootFamily:
-    parts = tuple(Polytope(_statuses(names), np.array(v), dimension) for names, v, dimension in record["polytopes"])
+    parts = tuple(
+        Polytope(_statuses(names), np.array(vertices), dimension, None if rigid is None else np.array(rigid))
+        for names, vertices, dimension, rigid in record["polytopes"]
+    )
     return RootFamily(alpha, parts, record["index"], vertices_proven=record["proven"])
 
 
