@@ -151,11 +151,11 @@ MESH_OPTIONS = {
     "friction": Given(
         _BODY,
         "[NAME=]F",
-        "Coefficient of friction, by contact parts; without it and --friction-slope it is alpha itself.",
+        "Coefficient of friction, by contact parts (in 3D also F1,F2); without it and --friction-slope it is alpha.",
         _each(_one_or_two),
         True,
     ),
-    "friction_slope": Given(_BODY, "[NAME=]F", "The same, times alpha.", _each(_number), True),
+    "friction_slope": Given(_BODY, "[NAME=]F", "The same, times alpha.", _each(_one_or_two), True),
     "friction2": Given(
         _BODY, "[NAME=]F", "In 3D, coefficient of friction along the second axis.", _each(_one_or_two), True
     ),
@@ -334,11 +334,11 @@ def _scene(mesh: str, options: dict[str, Any]) -> Scene:
     if place.suffix in SUFFIXES or mesh.startswith(GALLERY):
         raise InvalidArgumentError(f"{mesh} is a problem; expected a mesh (enumsol roots {mesh} solves a problem)")
     refuse_misspelt(mesh, meshes=True)
-    refuse_old_friction(options, lambda name, part, number: f"{_flags(name)[0]} {part and f'{part}='}{number}")
     if (found := unreadable(place)) is not None:
         raise InvalidArgumentError(f"{mesh}: {found}; expected a mesh with named parts, or a {TOML} file")
     check_keys(options, lambda name: _flags(name)[0])
-    return fem.mesh_scene(mesh, **options)
+    written = lambda name, part, number: f"{_flags(name)[0]} {part and f'{part}='}{number}"  # noqa: E731
+    return fem.mesh_scene(refuse_old_friction(mesh, options, written), **options)
 
 
 def _problem(mesh: str, scene: Scene) -> AnyProblem:

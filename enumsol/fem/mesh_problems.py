@@ -93,12 +93,13 @@ def mesh_problem(
     thickness : float, or mapping of names to float
         In 2D, of the whole body or of every part of it; all forces and stiffnesses are multiplied by it. By default
         they are per unit thickness [length].
-    friction, friction_slope : float, or mapping of names to float, optional
+    friction, friction_slope : float, in 3D also (float, float), or mapping of names to these, optional
         Coefficient friction + alpha friction_slope [-], of all contact nodes or of every contact part and of the first
-        part of every pair (the slope is 0 for parts that are not named). A node of two parts has the coefficient of the
-        one that `contact` names first. Without both the coefficient is alpha; without one of them that one is 0.
-    friction2, friction2_slope : as friction and friction_slope, optional
-        In 3D, coefficient along the second axis; without both as along the first.
+        part of every pair (the slope is 0 for parts that are not named); in 3D a pair is along both axes. A node of two
+        parts has the coefficient of the one that `contact` names first. Without both the coefficient is alpha; without
+        one of them that one is 0.
+    friction2, friction2_slope : float, or mapping of names to float, optional
+        In 3D, coefficient along the second axis, in place of pairs; without both as along the first.
     axis : (3,) array_like, optional
         In 3D, direction whose projection on the tangent plane is the first axis; default as `solid_contact_problem`.
     clamp : name or names
@@ -255,8 +256,9 @@ def _of_file(path: Any, made: Callable[[Scene], T]) -> T:
         checked_units(options.pop("units", None))
         text_of(options.pop("title", ""), "title")
         check_keys(options, also=(_PAIRS,))
-        refuse_old_friction(options, lambda name, part, number: f"{name}{part and f'.{part}'} = {number}")
-        return made(mesh_scene(place.parent / name, **options))
+        written = "{0}.{1} = {2}".format, "{0} = {2}".format
+        source = refuse_old_friction(place.parent / name, options, lambda *said: written[not said[1]](*said))
+        return made(mesh_scene(source, **options))
     except (InvalidArgumentError, InvalidProblemError) as error:
         raise InvalidProblemError(f"{place}: {error}") from error
 

@@ -81,6 +81,7 @@ class Scene:
         if options["friction"] is options["friction_slope"] is None:
             options = {**options, **dict(zip(("friction", "friction_slope"), given_friction(None, None), strict=True))}
         mesh = source if isinstance(source, PartedMesh) else read_mesh(source, options["groups"])
+        options = along_axes(mesh.points.shape[1], options, _in_python)
         options = {**options, "plane": _plane(mesh) if options["plane"] is None else options["plane"]}
         coefficients = lame_of(mesh, options["young"], options["poisson"], options["plane"])
         thickness = thickness_of(mesh, options["thickness"])
@@ -261,7 +262,6 @@ def _coefficients(dimension: int, parts: Sequence[str], options: Mapping[str, An
             of_rows(slope, f"{name}_slope", parts, finite_number, other),
         )
 
-    refuse_old_friction(options, _in_python)
     F, slope = along("friction")
     second = [name for name in ("friction2", "friction2_slope") if options[name] is not None]
     if dimension == 2:
@@ -274,8 +274,8 @@ def _coefficients(dimension: int, parts: Sequence[str], options: Mapping[str, An
     return {"friction": (F, F2), "friction_slope": (slope, slope2)}
 
 
-def refuse_old_friction(options: Mapping[str, Any], written: Callable[[str, str, str], str]) -> None:
-    """Refuse pairs, which once stood for F0 + alpha F1 and in 3D would be taken for coefficients along two axes.
+def refuse_old_friction(source: Any, options: Mapping[str, Any], written: Callable[[str, str, str], str]) -> Any:
+    """Refuse pairs in 2D in the words of a file or a command; the mesh, which is read if there are any.
 
     ``written`` is how a number is given for an option and a part, "" for all parts.
 
@@ -284,15 +284,51 @@ def refuse_old_friction(options: Mapping[str, Any], written: Callable[[str, str,
     InvalidArgumentError
         The sentence says what to write.
     """
-    for name in ("friction", "friction2"):
-        value = options.get(name)
-        for part, own in value.items() if isinstance(value, Mapping) else [("", value)]:
+    if not any(map(_is_pair, (own for name in _FRICTION for _, own in _by_part(options.get(name))))):
+        return source
+    mesh = read_mesh(source, options.get("groups"))
+    along_axes(mesh.points.shape[1], options, written)
+    return mesh
+
+
+def along_axes(dimension: int, options: Mapping[str, Any], written: Callable[[str, str, str], str]) -> dict[str, Any]:
+    """Options without pairs, which are coefficients along two axes in 3D, and are refused in 2D: see above."""
+    found = dict(options)
+    for name in _FRICTION:
+        for part, own in _by_part(options.get(name)):
+            if not _is_pair(own) or (dimension == 3 and not name.startswith("friction2")):
+                continue
             instead = old_friction(own, *(partial(written, option, str(part)) for option in (name, f"{name}_slope")))
-            if instead:
-                raise InvalidArgumentError(
-                    f"{name}{part and f' of {part}'} is the pair {shown(own)}; expected one coefficient "
-                    f"(in 3D, friction2 is that along the second axis): {instead}"
-                )
+            more = "" if dimension == 3 or name.endswith("_slope") else f": {instead}"
+            raise InvalidArgumentError(
+                f"{name}{part and f' of {part}'} is the pair {shown(own)}; expected one coefficient{more}"
+            )
+    pairs = [name for name in _FRICTION if any(_is_pair(own) for _, own in _by_part(options.get(name)))]
+    if not pairs:
+        return found
+    second = [name for name in ("friction2", "friction2_slope") if options.get(name) is not None]
+    if second:
+        raise InvalidArgumentError(f"{pairs[0]} is a pair, and {second[0]} is given; expected one of the two")
+    for name in ("friction", "friction_slope"):
+        other, value = name.replace("friction", "friction2"), options.get(name)
+        if isinstance(value, Mapping):
+            both = {part: own if _is_pair(own) else (own, own) for part, own in value.items()}
+            found[name], found[other] = ({part: own[k] for part, own in both.items()} for k in (0, 1))
+        elif value is not None:
+            found[name], found[other] = value if _is_pair(value) else (value, value)
+    return found
+
+
+_FRICTION = "friction", "friction_slope", "friction2", "friction2_slope"
+
+
+def _is_pair(value: Any) -> bool:
+    return isinstance(value, (tuple, list)) and len(value) == 2
+
+
+def _by_part(value: Any) -> list[tuple[Any, Any]]:
+    """Values by part, "" for all parts."""
+    return list(value.items()) if isinstance(value, Mapping) else [("", value)]
 
 
 def _in_python(option: str, part: str, number: str) -> str:

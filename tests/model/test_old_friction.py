@@ -47,7 +47,7 @@ def test_what_is_not_given_is_zero_and_without_both_friction_is_alpha():
 @pytest.mark.parametrize("kind", [tuple, list])
 def test_a_pair_is_refused_by_what_makes_problems_in_2d(kind):
     pair, write = kind((0, 1)), r"for F\(alpha\) = 0 \+ 1 alpha write friction=0 and friction_slope=1"
-    bad_argument(f"expected one coefficient .*: {write}$", gallery.dovetail, friction=pair)
+    bad_argument(f"expected one coefficient.*: {write}$", gallery.dovetail, friction=pair)
     bad_problem(write, gallery.two_node_square, friction=pair)
     bad_problem(write, gallery.one_node_triangle().replace, friction=pair, friction_slope=0)
     bad_problem(
@@ -73,7 +73,6 @@ def test_another_coefficient_does_not_take_over_a_slope_unseen():
     assert gallery.one_node_triangle().replace(gap=1.0).friction_slope.tolist() == [1]
 
 
-@pytest.mark.parametrize("mesh", [MESH, fem.box(1, 1, 1)])
 @pytest.mark.parametrize(
     ("given", "found", "write"),
     [
@@ -83,13 +82,38 @@ def test_another_coefficient_does_not_take_over_a_slope_unseen():
             "friction of bottom is the pair",
             'friction={"bottom": 0.5} and friction_slope={"bottom": 1}',
         ),
-        ({"friction": 0.5, "friction2": (0.5, 1)}, "friction2 is the pair", "friction2=0.5 and friction2_slope=1"),
     ],
 )
-def test_a_pair_is_refused_in_scenes(mesh, given, found, write):
-    message = rf"{found}.*; expected one coefficient \(.*\): for F\(alpha\) = 0.5 \+ 1 alpha write {write}$"
+def test_a_pair_is_refused_in_plane_scenes(given, found, write):
+    message = rf"{found}.*; expected one coefficient: for F\(alpha\) = 0.5 \+ 1 alpha write {write}$"
     for make in (fem.mesh_problem, fem.mesh_scene):
-        bad_argument(message, make, mesh, **SCENE, **given)
+        bad_argument(message, make, MESH, **SCENE, **given)
+
+
+def test_a_pair_is_two_axes_in_space():
+    def both(**given):
+        problem = fem.mesh_problem(fem.box(1, 1, 1), **SCENE, **given)
+        return problem.fingerprint
+
+    assert both(friction=(0.5, 0.25)) == both(friction=0.5, friction2=0.25)
+    assert both(friction={"bottom": [0.5, 0.25]}) == both(friction={"bottom": 0.5}, friction2={"bottom": 0.25})
+    assert both(friction=(0.5, 0.25), friction_slope=1) == both(
+        friction=0.5, friction_slope=1, friction2=0.25, friction2_slope=1
+    )
+    assert both(friction=0.5, friction_slope=(1, 2)) == both(
+        friction=0.5, friction_slope=1, friction2=0.5, friction2_slope=2
+    )
+    solid = fem.box(1, 1, 1)
+    bad_argument(
+        "friction is a pair, and friction2 is given", fem.mesh_problem, solid, **SCENE, friction=(1, 2), friction2=1
+    )
+    bad_argument(
+        r"friction2 is the pair \(0.5, 1\); expected one coefficient$",
+        fem.mesh_problem,
+        solid,
+        **SCENE,
+        friction2=(0.5, 1),
+    )
 
 
 def test_scenes_take_slopes_by_part_and_along_both_axes():
@@ -103,9 +127,7 @@ def test_scenes_take_slopes_by_part_and_along_both_axes():
     assert parts(friction=0.5, friction2=0.25, friction2_slope=3) == [[0.5, 0.25], [0, 3]]
     assert parts(friction={"bottom": 0.5}, friction2_slope={"bottom": 3}) == [[0.5, 0], [0, 3]]
     bad_argument("friction2_slope is given for a plane body", fem.mesh_problem, MESH, **SCENE, friction2_slope=1)
-    bad_argument(
-        "friction_slope is .*; expected a finite number", fem.mesh_problem, MESH, **SCENE, friction_slope=(0, 1)
-    )
+    bad_argument("friction_slope is the pair .*; expected one", fem.mesh_problem, MESH, **SCENE, friction_slope=(0, 1))
 
 
 @pytest.fixture
