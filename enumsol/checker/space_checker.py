@@ -145,7 +145,7 @@ class SpaceChecker(TreeChecker):
         if found is None:
             return "it holds no root"
         self.roots.append((codes, found))
-        self._locate(found, codes)
+        self._locate(codes, found, codes)
         return self._placed(found, said.enclosure)
 
     def _missed(self, codes: Codes, said: space_records.MissedByProducts) -> str | None:
@@ -189,7 +189,7 @@ class SpaceChecker(TreeChecker):
         if not within(box):
             return "its roots are not proven to lie in its box"
         self.boxed.append((codes, found))
-        self._locate(found)
+        self._locate(codes, found)
         return self._placed(found, said.enclosure)
 
     def _only(self, codes: Codes, said: space_records.OnlyRoot) -> str | None:
@@ -200,7 +200,7 @@ class SpaceChecker(TreeChecker):
             if found is None:
                 return "its root is not proven to be the only one in it"
             self.roots.append((said.leaf, found))
-            self._locate(found, said.leaf)
+            self._locate(tuple(said.leaf), found, said.leaf)
             return self._placed(found, said.enclosure)
         if said.leaf:
             found = only_root(self.system, said.numbers, said.leaf)
@@ -209,7 +209,7 @@ class SpaceChecker(TreeChecker):
         if found is None:
             return "its solution is not proven to be the only one"
         self.regular += 1
-        self._locate(found, said.leaf)
+        self._locate(tuple(said.leaf), found, said.leaf)
         return self._placed(found, said.enclosure)
 
     def _placed(self, found: SpaceRoot | LooseSolution, said: EnclosureRecord) -> str | None:
@@ -227,14 +227,17 @@ class SpaceChecker(TreeChecker):
         regular = distinct_roots(self.roots)
         boxed = apart_in_boxes(regular.kept, self.boxed)
         self.doubtful = len(regular.doubtful) + len(boxed.doubtful)
-        self.same = {id(root): id(other) for (_, root), (_, other) in (*regular.same, *boxed.same)}
+        self.same = {_name(*one): _name(*other) for one, other in (*regular.same, *boxed.same)}
         return len(regular.kept) + len(boxed.kept), 0
 
     def locate_rational_roots(self) -> None:
         """Nothing: in 3D there are none."""
 
-    def _locate(self, found: SpaceRoot | LooseSolution, codes: Codes = ()) -> None:
-        """Take note of a root: forces in the problem's units, and statuses, by its leaf's ``codes`` if there is one."""
+    def _locate(self, name: Codes, found: SpaceRoot | LooseSolution, codes: Codes = ()) -> None:
+        """Take note of a root: forces in the problem's units, and statuses, by its leaf's ``codes`` if there is one.
+
+        ``name`` are the codes by which it is counted.
+        """
         if self.located is None:
             return
         p, system, y = self.problem.p, self.system, found.y
@@ -253,10 +256,15 @@ class SpaceChecker(TreeChecker):
             still = np.array(codes) == STICK
         # where a coefficient is 0 a sticking node may move all the same
         still = np.concatenate([still & (system.tau[:, k] >= 0) for k in (0, 1)])
-        self.locate(id(found), Located(forces, still, certain))
+        self.locate(_name(name, found), Located(forces, still, certain))
 
     def _claim(self, isolated: int, families: int) -> dict[str, int]:
         return {"roots": self.regular + isolated, "undecided": self.undecided, "leaves": self.leaves}
+
+
+def _name(codes: Codes, found: SpaceRoot | LooseSolution) -> tuple[int, ...]:
+    """What tells roots apart that are not proven to be one: the solution of a leaf's box may lie beyond the leaf."""
+    return (*codes, int(isinstance(found, LooseSolution)))
 
 
 def _units(header: dict[str, Any], p: int) -> tuple[Floats, Floats]:

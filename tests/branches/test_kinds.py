@@ -45,7 +45,7 @@ def beside_grazing(rng):
         friction.append(int(rng.integers(0, 6)))
     rows, slope = np.eye(2 * p), np.zeros(p)
     slope[0] = 1.0
-    return ContactProblem(A, rows[0::2], rows[1::2], f, friction=friction, friction_slope=slope)
+    return ContactProblem(A, rows[0::2], rows[1::2], f, friction=np.array(friction), friction_slope=slope)
 
 
 @pytest.mark.parametrize("arithmetic", ["verified", "exact", "fast"])

@@ -71,7 +71,7 @@ def test_a_block_is_unique_between_all_values():
         assert [strip.unique for strip in found.strips] == [((0.5, 3.0),)] * len(found.strips)
         assert found.unique_between == 1
         assert "100 %" in repr(found)
-    constant = block.replace(friction=0.5, load_slope=shear)
+    constant = block.replace(friction=0.5, friction_slope=0, load_slope=shear)
     by_friction = multiplicity_map(constant, (0.0, 0.25), {"friction": [0.5, 0.55]})
     assert by_friction.strips[0].unique == ((0.0, 0.25),)
     assert by_friction.to_frame()["to_next"].tolist() == [1.0, 0.0]
@@ -135,7 +135,7 @@ def test_folds_are_linked_between_neighbours(over_gap):
 @pytest.mark.slow
 def test_other_parameters_and_an_executor():
     node = enumsol.gallery.one_node_triangle(f=(1.5, -4.0))
-    path = node.replace(f=0 * node.f, friction=5.0, load_slope=node.f)
+    path = node.replace(f=0 * node.f, friction=5.0, friction_slope=0, load_slope=node.f)
     by_friction = multiplicity_map(path, (0.1, 1), {"friction": [1, 5]})
     assert [row.between for row in by_friction.rows] == [(1,), (3,)]
     by_load = multiplicity_map(node, (1, 5), {"load": (node.f, [0, 1.0])})
