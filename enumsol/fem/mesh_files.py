@@ -8,9 +8,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
-import struct
 import warnings
-import zlib
 from collections.abc import Sequence
 from pathlib import Path
 from types import MappingProxyType
@@ -25,7 +23,7 @@ from enumsol.fem.meshes import ALL, PartedMesh, SolidMesh
 from enumsol.model.cells import KINDS, TRIANGLES, as_quadrilaterals, boundary_facets, facet_rows, numbers_of_nodes
 from enumsol.support.arguments import file_path, shown
 from enumsol.support.array_types import Floats, Integers, NDArray
-from enumsol.support.files import unreadable
+from enumsol.support.files import DAMAGE, unreadable
 from enumsol.support.messages import shortened
 
 #: Third coordinates of a plane mesh may differ by this share of its extent.
@@ -36,23 +34,6 @@ _FAMILIES = ("cell_tags", "point_tags")
 _NUMBERS = ("medit:ref", "su2:tag", "CellEntityIds")
 #: How the names of decks end.
 _DECK = ".inp"
-#: What meshio raises on damaged files or files of another kind; it may also exit.
-_DAMAGE = (
-    ArithmeticError,
-    AssertionError,
-    AttributeError,
-    EOFError,
-    LookupError,
-    MemoryError,
-    OSError,
-    RuntimeError,
-    SyntaxError,
-    SystemExit,
-    TypeError,
-    ValueError,
-    struct.error,
-    zlib.error,
-)
 
 
 def read_mesh(source: str | os.PathLike[str] | Any, groups: str | None = None) -> PartedMesh:
@@ -150,7 +131,7 @@ def _by_meshio(meshio: Any, place: Path) -> tuple[Any, str]:
         raise MissingDependencyError(
             f"{place}: meshio needs {package} for this format, which is not installed; expected it, or another format"
         ) from error
-    except (*_DAMAGE, meshio.ReadError) as error:
+    except (*DAMAGE, OSError, SystemExit, meshio.ReadError) as error:  # meshio may also exit
         if place.suffix.lower() == _DECK:
             _refuse_torn(place)
         reason = "" if isinstance(error, SystemExit) else str(error)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
-import zlib
 from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +10,7 @@ import scipy.sparse as sp
 
 from enumsol.errors import InvalidProblemError
 from enumsol.io.arrays import FORMAT_VERSION, arrays_of, check_names, layout_of, problem_from_arrays, refusing
-from enumsol.support.files import write_file
+from enumsol.support.files import DAMAGE, write_file
 from enumsol.support.saved import archive_arrays, check_shape
 
 if TYPE_CHECKING:
@@ -23,18 +21,6 @@ if TYPE_CHECKING:
 
 _VERSION = "enumsol_format"
 _PARTS = ("data", "indices", "indptr", "shape", "format")
-#: What numpy and zipfile raise on files that are damaged or are something else.
-_DAMAGE = (
-    ValueError,
-    EOFError,
-    OSError,
-    NotImplementedError,
-    RuntimeError,
-    SyntaxError,
-    MemoryError,
-    zipfile.BadZipFile,
-    zlib.error,
-)
 
 
 def read(path: Path) -> AnyProblem:
@@ -80,7 +66,9 @@ def write(problem: AnyProblem, path: Path) -> None:
 
 
 def _load(path: Path) -> dict[str, NDArray[Any]]:
-    damaged = refusing(_DAMAGE, "it is not a readable .npz archive", "a complete one, by numpy.savez or write_problem")
+    damaged = refusing(
+        (*DAMAGE, OSError), "it is not a readable .npz archive", "a complete one, by numpy.savez or write_problem"
+    )
     with path.open("rb") as file, damaged:
         if file.read(2) != b"PK":
             raise InvalidProblemError("it is not a .npz archive despite its name; expected what numpy.savez writes")

@@ -24,7 +24,7 @@ _NO_ROOM = frozenset((errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.
 
 
 #: What Python and its libraries raise on files that are damaged or are something else.
-_DAMAGE = (
+DAMAGE = (
     ArithmeticError,
     AssertionError,
     AttributeError,
@@ -183,7 +183,7 @@ def reading(place: Path, content: str, writer: str) -> Iterator[None]:
     except OSError as error:
         reason = error.strerror or error
         raise InvalidArgumentError(f"{place} cannot be read ({reason}); expected a file of {writer}") from error
-    except _DAMAGE as error:
+    except DAMAGE as error:
         missing = f"{error} is missing" if isinstance(error, KeyError) else str(error)
         reason = shortened(missing).rstrip(".") or type(error).__name__
         raise InvalidArgumentError(
