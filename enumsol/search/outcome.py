@@ -107,10 +107,11 @@ class SearchOutcome:
             setattr(self, count, getattr(self, count) + getattr(part, count))
 
     def count_unexamined(self) -> None:
-        """Have the reason of an early end say how many subtrees all parts of the search left."""
+        """Have the reason of an early end say how many subtrees all parts of the search left; none if that is none."""
         if self.stopped is not None and self.stopped.unexamined is not None:
             left = sum(not part.examined for part in self.undecided)
-            self.stopped = replace(self.stopped, unexamined=left)
+            # the known root may have been all that waited
+            self.stopped = replace(self.stopped, unexamined=left) if left else None
 
 
 class StopReason(enum.Enum):

@@ -60,10 +60,12 @@ class SearchSetup(ABC):
 
     @cached_property
     def known_root(self) -> Codes | None:
-        """A complete selection that is proven to hold a root, found without the tree; None where that failed."""
+        """A complete selection that is proven to hold a strict root, found without the tree; None where that failed."""
         certifier = self.certifier(Unrecorded())
         for codes in self._suggested():
-            if not isinstance(certifier.selection(codes), UndecidedPart | Refine | None):
+            answer = certifier.selection(codes)
+            # a degenerate one may belong to others, which only a search tells
+            if not isinstance(answer, UndecidedPart | Refine | None) and getattr(answer, "strict", True):
                 return codes
         return None
 

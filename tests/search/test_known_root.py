@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from generators import dense_compliance, from_condensed, named
 from interruptions import CtrlC, interrupted
+from problems3d import from_compliance, random_coupled
 
 import enumsol
 from enumsol import fem
@@ -109,3 +110,15 @@ def test_roots_of_a_search_that_was_stopped_are_among_all(seed):
         assert all(sum(same(root, other) for other in every) == 1 for root in found)
         assert len({tuple(root.lambda_n.round(8)) + tuple(root.lambda_t.round(8)) for root in found}) == len(found)
         assert len(found) >= 1 or found.undecided
+
+
+@pytest.mark.parametrize("seed", [0, 22, 49, 128])
+def test_a_search_that_leaves_nothing_but_the_known_root_is_complete(seed):
+    S, g, F = random_coupled(np.random.default_rng([30, seed]), 1)
+    problem = from_compliance(S, g, tuple(F.T))
+    for nodes in (1, 2, 3, 4):
+        found = enumsol.enumerate_roots(problem, 0, max_nodes=nodes)
+        report = enumsol.verify(problem, found.proof)
+        assert report.ok
+        assert found.complete == report.complete
+        assert found.complete or found.undecided

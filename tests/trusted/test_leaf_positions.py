@@ -5,6 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from flint import arb, arb_mat, ctx
+from problems3d import from_compliance
 
 import enumsol
 from enumsol import fem
@@ -109,6 +110,10 @@ def as_ball(bounds):
     return Ball(0.5 * (low + high), (0.5 * (high - low)) * (1 + 1e-12) + 1e-300)
 
 
+def as_known(forces):
+    return Ball(forces, 1e-9 * np.abs(forces))
+
+
 def certain(root):
     return [{"open": OPEN, "stick": STICK, "slip": SECTORS + 1}[str(status)] for status in root.statuses]
 
@@ -160,6 +165,23 @@ def test_no_leaf_says_where_nodes_are_whose_directions_it_may_not_hold():
     assert leaf_positions(problem.enclosure, Fraction(0), wide, certain(root)) is None
     sticking = leaf_positions(problem.enclosure, Fraction(0), Ball(forces, np.zeros(12)), [STICK] * 4)
     assert sticking is None
+
+
+def test_a_force_of_open_sign_does_not_choose_between_slips_along_one_axis():
+    # two roots that slip at both nodes, the second one to opposite sides
+    S, F = np.eye(6), np.array([7.0, 4.0])
+    S[:4, :4] = [[12.25, 0, -2, 8], [0, 0.25, 0, 0], [-2, 0, 10.25, -2], [8, 0, -2, 12.25]]
+    problem = from_compliance(S, np.array([-16.875, 0.125, 1307.0, -88.0, 0, 0]), (F, 0 * F))
+    slipping = [root for root in enumsol.enumerate_roots(problem, 0) if certain(root) == [SECTORS + 1] * 2]
+    one, other = (np.concatenate([root.lambda_n, root.lambda_t.T.ravel()]) for root in slipping)
+    assert one[3] * other[3] < 0
+    middle = 0.25 * one + 0.75 * other  # the sign is that of the other one
+    both = Ball(middle, np.abs(middle - one) * (1 + 1e-9))
+    found = [
+        leaf_positions(problem.enclosure, Fraction(0), ball, certain(slipping[0])) for ball in (both, as_known(one))
+    ]
+    assert found[0] is None
+    assert np.all(np.abs(found[1].mid - slipping[0].u_t.T.ravel())[:2] < 1e-6)
 
 
 @pytest.mark.parametrize("spring", [1e2, 1.0])

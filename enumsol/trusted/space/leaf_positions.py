@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 #: The level of the sectors around directions of slip, or that at which they are so many times as wide as these are
 #: uncertain: narrow, so that the leaf contracts at once, and wide enough to hold the directions for certain.
 _LEVEL, _SHARE = 17, 64.0
+#: More than the angle between any two directions.
+_ANY = 4.0
 
 
 def leaf_positions(enclosure: CondensedEnclosure, alpha: Fraction, forces: Ball, codes: Sequence[int]) -> Ball | None:
@@ -47,8 +49,12 @@ def leaf_positions(enclosure: CondensedEnclosure, alpha: Fraction, forces: Ball,
     tau = Ball(*pairs) * enclosed.inverse_friction * Ball.exact(enclosed.tau_scale)
     size, wide = np.linalg.norm(tau.mid, axis=1), upper_norm(tau.rad, axis=1)
     # up to 1/2 arcsin is at most 1.05 times as large as its argument; otherwise any angle
-    angle = np.where(wide < 0.5 * size, 1.1 * wide / np.where(size > 0, size, 1.0), 4.0)
+    angle = np.where(wide < 0.5 * size, 1.1 * wide / np.where(size > 0, size, 1.0), _ANY)
     codes = [_code(*node) for node in zip(codes, enclosed.tau.tolist(), tau.mid.tolist(), angle.tolist(), strict=True)]
+    along = np.isin(codes, (SLIP_PLUS, SLIP_MINUS))
+    # along one axis the force's sign is known where its angle is
+    if np.any(angle[along] >= _ANY):
+        return None
     leaf = Leaf(enclosed, codes)
     root = leaf.settle()
     if not isinstance(root, SpaceRoot):
