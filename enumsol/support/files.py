@@ -23,7 +23,7 @@ from enumsol.support.messages import shortened
 _NO_ROOM = frozenset((errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EPIPE))
 
 
-#: What Python and its libraries raise on files that are damaged or are something else.
+#: Errors that Python and its libraries raise on damaged files and on files of another kind.
 _DAMAGE = (
     ArithmeticError,
     AssertionError,
@@ -65,7 +65,7 @@ def writing(place: Path, name: str) -> Iterator[None]:
         ) from error
 
 
-#: What is written to a file, or what writes it there.
+#: Content of a file, or a function that writes it there.
 Content = bytes | str | Callable[[Path], object]
 
 
@@ -98,7 +98,7 @@ def write_file(place: Path, content: Content, name: str) -> None:
 
 
 def _is_written_in_place(place: Path, target: Path) -> bool:
-    """Whether a file cannot be replaced by another one; PermissionError where it may not be written at all."""
+    """True if a file cannot be replaced by another one; PermissionError where it may not be written at all."""
     try:
         status = place.stat()
     except FileNotFoundError:
