@@ -32,11 +32,11 @@ if TYPE_CHECKING:
 
     Range = tuple[Fraction, Fraction]
 
-#: Ranges of alpha that a text names, and single alphas at which the number of solutions is another.
+#: Most ranges of alpha that a text names, and most single alphas with another number of solutions.
 _SHOWN, _SINGLE = 6, 3
 #: Numbers of solutions in words.
 _WORDS = ("none", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
-#: Ranges narrower than this share of the interval are no place to begin with: a slider hardly finds them.
+#: Ranges narrower than this share of the interval are no place to begin in: a slider hardly finds them again.
 _NARROW = 0.005
 
 
@@ -316,9 +316,9 @@ class MultiplicitySteps:
         return 0.5 * (middle + min(x for x in ends if x > middle)) if middle in ends and middle < high else middle
 
     def sentence(self) -> str:
-        """How many solutions there are where, as in "three solutions for alpha between 1 and 2, one elsewhere".
+        """Numbers of solutions over ranges of alpha, as in "three solutions for alpha between 1 and 2, one elsewhere".
 
-        Empty where there is nowhere more than one.
+        Empty if there is nowhere more than one solution.
         """
         width = float(self.alphas[-1] - self.alphas[0]) if self.alphas else 0.0
         if not width > 0 or max((*self.between, *(self.at if self.exact else ()))) < 2:
@@ -345,7 +345,7 @@ class MultiplicitySteps:
         return f"{self._words(number)} solution{'' if number == 1 else 's'}"
 
     def _odd(self, ranges: Sequence[tuple[float, float, int]], most: int) -> str:
-        """A note where there are fewer within ranges that are said to have most, or more anywhere."""
+        """Note, if single alphas within ranges of most solutions have fewer, or any alpha has more."""
         inside = [(low, high) for low, high, number in ranges if number == most]
         places = [*zip(map(float, self.alphas), self.at, strict=True)]
         places += [
@@ -386,7 +386,7 @@ class MultiplicitySteps:
 
 
 def _joined(pieces: Iterable[tuple[float, float, int]]) -> list[tuple[float, float, int]]:
-    """Neighbouring pieces (low, high, number) of one number made one."""
+    """Pieces (low, high, number), of which neighbours with the same number are merged."""
     found: list[tuple[float, float, int]] = []
     for low, high, number in pieces:
         begin = found.pop()[0] if found and found[-1][2] == number else low
@@ -464,16 +464,16 @@ class Claims:
 
     @property
     def whole(self) -> bool:
-        """Whether nothing is known to be missing: counts are then exact and not lower bounds."""
+        """True if nothing is known to be missing: counts are then exact and not lower bounds."""
         return self.standing is not Standing.INCOMPLETE
 
     def knows(self, alpha: Fraction) -> bool:
-        """Whether nothing is known to be missing at this alpha."""
+        """True if nothing is known to be missing at this alpha."""
         return not any(low <= alpha <= high for low, high in self.open_ranges)
 
     @property
     def partly(self) -> bool:
-        """Whether something is missing, but not everywhere."""
+        """True if something is missing, but not everywhere."""
         return not self.whole and self.open_ranges != (self._interval,)
 
     def multiplicity(self, alpha: Fraction) -> Multiplicity:
@@ -531,7 +531,7 @@ class Claims:
         return Uniqueness(known=True, throughout=limit is None, limit=limit, several_by=several, none_by=none)
 
     def sentences(self, bound: float | None) -> list[str]:
-        """What a user asks first, as lines of text.
+        """Answers to what a user asks first, as lines of text.
 
         Parameters
         ----------
@@ -595,7 +595,7 @@ def uniqueness_bound(problem: ContactProblem | ContactProblem3D, interval: tuple
 
 
 def _cover(spans: Iterable[tuple[int, int]], count: int) -> tuple[list[int], list[int]]:
-    """How many of some arcs pass over each of ``count`` critical alphas, and over each interval between two of them."""
+    """Numbers of arcs that pass over each of ``count`` critical alphas, and over each interval between two of them."""
     through, beside = np.zeros((2, count + 1), dtype=int)
     for tail, head in spans:
         beside[tail] += 1

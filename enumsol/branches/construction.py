@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 #: Of the time that is left when arcs are begun: for working them out, and for joining them too, where there is a limit.
 #: To join them takes a fifth as long as to work them out by exact algebra, to make a graph of them another tenth.
 _WORKED_OUT, _JOINED = 0.55, 0.75
-#: What takes bodies that nothing holds where there is no graph of them, in messages.
+#: Alternatives in messages about bodies that nothing holds and that have no graph.
 _AT_SINGLE_ALPHAS = " (weak ones will do), or multiplicity_table, which counts the solutions at single alphas"
 
 
@@ -181,7 +181,7 @@ class _Construction:
         return self._graph(search, found, way.made(search, found, ended=reason))
 
     def _nothing(self, reason: StopReason) -> BranchGraph:
-        """What is known before the body is condensed."""
+        """Graph without vertices and arcs, of a call that ended before the body was condensed."""
         why = f"{Stop(reason)} before the body was condensed to its contact nodes"
         given = self.problem, None, self.interval, self.arithmetic
         stats = GraphStats(seconds=time.perf_counter() - self.started)

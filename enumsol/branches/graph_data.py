@@ -122,7 +122,7 @@ class GraphData(Immutable):
 
     @property
     def complete(self) -> bool:
-        """Whether it is proven that no solution is missing: proven leaves, nothing undecided, degrees balanced."""
+        """True if it is proven that no solution is missing: proven leaves, nothing undecided, degrees balanced."""
         return self.arithmetic != "fast" and not self.reasons
 
     @cached_property
@@ -248,7 +248,7 @@ def graph_text(data: GraphData) -> str:
 
 
 def graph_html(data: GraphData) -> str:
-    """The same in a notebook."""
+    """HTML of the graph for a notebook."""
     rows = [
         (
             branch.number,

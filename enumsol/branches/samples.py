@@ -103,7 +103,7 @@ class SampledGraph:
         return tuple(frozenset(group) for group in sorted(nx.connected_components(self.graph), key=min))
 
     def missed(self, exact: BranchGraph) -> Missed:
-        """What the samples miss of the exact graph."""
+        """Arcs and branches of the exact graph that the samples miss."""
         seen: set[int] = set()
         for alpha in self.alphas:
             if exact.interval[0] <= alpha <= exact.interval[1]:
@@ -212,17 +212,17 @@ def _link(
 
 
 def _alone(pair: tuple[int, int], pairs: Sequence[tuple[int, int]]) -> bool:
-    """Whether both roots of a pair are in no other one."""
+    """True if both roots of a pair are in no other one."""
     return sum(a == pair[0] for a, _ in pairs) == 1 and sum(b == pair[1] for _, b in pairs) == 1
 
 
 def _may_continue(a: Root, b: Root) -> bool:
-    """Whether one selection holds at two roots, which a branch may have; along a regular one the index is the same."""
+    """True if one selection holds at two roots, which a branch may have; along a regular one the index is the same."""
     return a.statuses == b.statuses and (a.index == b.index or not (a.regular and b.regular))
 
 
 def _may_flip(problem: AnyProblem, a: Root, b: Root) -> bool:
-    """Whether the statuses differ at one node by a flip that both roots predict to happen between the samples."""
+    """True if the statuses differ at one node by a flip that both roots predict to happen between the samples."""
     nodes = [i for i, (x, y) in enumerate(zip(a.statuses, b.statuses, strict=True)) if x is not y]
     if len(nodes) != 1:
         return False

@@ -76,7 +76,7 @@ class Made:
     followed: Followed | None = None
 
     def proof(self, search: IntervalSearch, problem: ContactProblem) -> Callable[[], Proof | None] | None:
-        """What makes the proof, once it is asked for; None when there is none, or the time was over."""
+        """Function that makes the proof once it is asked for; None when there is none, or the time was over."""
         if not search.checkable or not search.pieces or any(not stop.interrupted for stop in self.stops):
             return None
         if search.stopped is not None:
@@ -109,7 +109,7 @@ class Way:
 
     @property
     def condensed(self) -> CondensedProblem:
-        """What the relaxations of the search are about."""
+        """Condensed problem that the relaxations of the search are about."""
         return self.problem.condensed
 
     @property
@@ -161,7 +161,7 @@ class Way:
 
 
 def _some(search: IntervalSearch, ended: StopReason | None, few: int) -> int | None:
-    """How many arcs, or boxes of them, are worked out: after an interruption only as much as takes a moment."""
+    """Number of arcs, or of boxes of them, to work out (None: all); after an interruption only a few."""
     if ended is None:
         return None
     return few if search.stopped is not None and search.stopped.interrupted else 0
@@ -320,7 +320,7 @@ def _floating(problem: ContactProblem) -> ExactCondensed:
 
 
 def _exact_work(problem: ContactProblem, candidates: set[Codes]) -> float:
-    """What exact algebra of selections costs, in units of 1e-7 s: (slips whose friction varies + 1) size^4 n.
+    """Cost of exact algebra of selections in units of 1e-7 s: (slips whose friction varies + 1) size^4 n.
 
     The entries of S have digits in proportion to n, and determinants so many times their number as their size.
     Measured, within a factor of two, with dovetails, wedges and clips of 6 to 14 contact nodes and 56 to 210 degrees of

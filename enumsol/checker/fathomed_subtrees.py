@@ -44,7 +44,7 @@ def closed_by_balls(system: EnclosedSystem, said: Closed, force: Floats) -> tupl
 
 
 def one_regular_root(system: EnclosedSystem, said: Closed, force: Floats) -> bool:
-    """Whether a record proves that all data in the balls have one root, regular and in its selection."""
+    """True if a record proves that all data in the balls have one root, regular and in its selection."""
     ball = _solution(system, said, force)
     return ball is not None and ball.regular is not None
 

@@ -44,7 +44,7 @@ class _Stage:
     following: list[int]
     roots: int = 0
     complete: bool = False
-    #: Of every root, where each of the leaves that hold it shows it to leave the nodes.
+    #: Balls in which every root leaves the nodes, one for each of the leaves that hold it.
     ends: list[list[Ball]] = field(default_factory=list)
 
 
@@ -174,7 +174,7 @@ class HistoryChecker:
         ]
 
     def _said(self, number: int, count: int, record: Any) -> _Stage:
-        """What the record of a stage says."""
+        """Stage that a record describes."""
         shape = self.problem.slip_offset.shape
         size = int(np.prod(shape))
         try:
@@ -230,7 +230,7 @@ class HistoryChecker:
                 yield self.stages[number]
 
     def _all_followed(self, stage: _Stage) -> bool:
-        """Whether every root of a stage leaves the nodes in the ball of a start that follows.
+        """True if every root of a stage leaves the nodes in the ball of a start that follows.
 
         All leaves that hold a root have its end in their balls, so that any of these balls shows it.
         """

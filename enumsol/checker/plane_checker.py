@@ -384,7 +384,7 @@ class Checker(TreeChecker):
         return len(found) - len(families) + apart, len(families)
 
     def _meet(self, k: int, m: int) -> bool:
-        """Whether two root sets have a point in common."""
+        """True if two root sets have a point in common."""
         from enumsol.checker.rational import hull_of_selections
 
         return bool(hull_of_selections(self.rational, self.polytopes[k][0], self.polytopes[m][0]).points)

@@ -380,12 +380,12 @@ class FloatingRationalSystem(RationalSystem):
         return super().conditions(codes, point)
 
     def bounds(self, point: Vector) -> Vector:
-        """What is left to the bounds of the rigid displacement."""
+        """Distances of the rigid displacement from its bounds."""
         moved = list(zip(point[2 * self.p :], self.reach, strict=True))
         return [*(most - x for x, most in moved), *(most + x for x, most in moved)]
 
     def rests_on_reach(self, codes: Sequence[int], points: Sequence[Sequence[Fraction]]) -> bool:
-        """Whether a selection, which holds these points, holds others without the bounds.
+        """True if a selection, which holds these points, holds others without the bounds.
 
         True as well if it has too many candidate vertices to find out.
         """

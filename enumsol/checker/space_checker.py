@@ -263,7 +263,7 @@ class SpaceChecker(TreeChecker):
 
 
 def _name(codes: Codes, found: SpaceRoot | LooseSolution) -> tuple[int, ...]:
-    """What tells roots apart that are not proven to be one: the solution of a leaf's box may lie beyond the leaf."""
+    """Name of a root; roots not proven to be one differ in it, for a solution may lie beyond its leaf."""
     return (*codes, int(isinstance(found, LooseSolution)))
 
 
@@ -291,7 +291,7 @@ class FloatingSpaceChecker(WithinReach, SpaceChecker):
 
     @cached_property
     def free(self) -> FloatingSpace:
-        """The same without bounds of the rigid displacement."""
+        """System without bounds of the rigid displacement."""
         return unbounded(self.system)
 
     def _limits(self, codes: Codes, kind: type[Record]) -> records.Limits:

@@ -34,7 +34,7 @@ _END = object()
 
 @dataclass(frozen=True, eq=False)
 class Located:
-    """What a leaf shows of a root.
+    """Place of a root, as a leaf shows it.
 
     Attributes
     ----------
@@ -69,9 +69,9 @@ class TreeChecker(ABC):
     leaves: int = 0
     _all: int = 0
     data: Data = "problem"
-    #: What leaves show of their roots, by the roots' names, if someone wants to know where these leave the nodes.
+    #: Places of the roots in leaves, by the roots' names; None if nobody asks where the roots leave the nodes.
     located: dict[Hashable, list[Located]] | None = None
-    #: Names of roots that are those of other names.
+    #: Names of roots by other names of the same roots.
     same: dict[Hashable, Hashable] = field(default_factory=dict)
     #: The problem's balls, where whoever asks for the check has made them already.
     enclosure: CondensedEnclosure | None = None
@@ -131,15 +131,15 @@ class TreeChecker(ABC):
 
     @abstractmethod
     def _covers(self, node: int, code: int, children: list[int]) -> bool:
-        """Whether codes, in any order, cover a partial one of a node."""
+        """True if codes, in any order, cover a partial one of a node."""
 
     @abstractmethod
     def _limits(self, codes: Codes, kind: type[Record]) -> Limits:
-        """What a record of this kind may say that stands at this assignment."""
+        """Limits of what a record of this kind may say at this assignment."""
 
     @abstractmethod
     def _tests(self) -> dict[type[Record], Test]:
-        """How the other leaves are checked, by their kinds."""
+        """Tests of the other leaves, by their kinds."""
 
     @abstractmethod
     def _at_rest(self) -> None:
@@ -226,12 +226,12 @@ class TreeChecker(ABC):
             return f"its record cannot be followed ({error})"
 
     def _untested(self) -> str:
-        """What is said of a leaf for whose kind there is no test."""
+        """Text about a leaf for whose kind there is no test."""
         raise NotImplementedError
 
     @cached_property
     def tests(self) -> dict[type[Record], Test]:
-        """Those of this checker, one for each kind."""
+        """Tests of this checker, one for each kind of record."""
         return {**self._tests(), UndecidedRecord: self._undecided, Unloaded: self._unloaded}
 
     def _undecided(self, codes: Codes, said: UndecidedRecord) -> str | None:
@@ -245,12 +245,12 @@ class TreeChecker(ABC):
         return None if unloaded else "the problem is not unloaded"
 
     def locate(self, name: Hashable, found: Located) -> None:
-        """Add what a leaf shows of a root to ``located`` if places are collected."""
+        """Add the place of a root in a leaf to ``located`` if places are collected."""
         if self.located is not None:
             self.located.setdefault(name, []).append(found)
 
     def located_roots(self) -> list[list[Located]]:
-        """What the leaves that hold it show of every root, one by one."""
+        """Places of every root, one for each of the leaves that hold it."""
         roots: dict[Hashable, list[Located]] = {}
         for name, found in (self.located or {}).items():
             roots.setdefault(self.same.get(name, name), []).extend(found)

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
 
 __all__ = ["main"]
 
-#: As ``ExitStatus.INTERRUPTED``, whose module is loaded below.
+#: Value of ``ExitStatus.INTERRUPTED``, whose module is loaded below.
 _INTERRUPTED = 130
 
 

@@ -108,7 +108,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
 
 
 def _in_a_sentence(error: Any) -> str:
-    """What typer could not make sense of, and what it would."""
+    """Sentence on what typer could not make sense of, and what it would accept."""
     if (
         (option := getattr(error, "option_name", None)) is None
         or error.ctx is None
@@ -123,7 +123,7 @@ def _in_a_sentence(error: Any) -> str:
     )
 
 
-#: What messages of the library call by its name in Python, and what it is called here.
+#: Names in Python that messages of the library use, and their names on the command line.
 _CALLED = (
     (r"\bbranch_graph\b", "enumsol graph"),
     (r"\bhistories(?= cannot)", "enumsol history"),

@@ -37,7 +37,7 @@ _MOST_ON_WINDOWS = 61
 
 
 class ExitStatus(enum.IntEnum):
-    """What the command line tells its caller; 71 and 74 are those of sysexits.h."""
+    """Exit statuses of the command line; 71 and 74 are those of sysexits.h."""
 
     DONE = 0
     BAD_INPUT = 2
@@ -50,7 +50,7 @@ class ExitStatus(enum.IntEnum):
 
 
 def described(problem: str) -> dict[str, Any]:
-    """What a TOML file says besides the problem: steps, units and title; what is wrong with it is said elsewhere."""
+    """Tables of a TOML file, for its steps, units and title; empty if unreadable, which is reported elsewhere."""
     if not problem.endswith(TOML):
         return {}
     from enumsol.support.files import unreadable  # numpy: not for --help
@@ -80,7 +80,7 @@ def units_of(problem: str, text: str | None) -> tuple[str, str] | None:
 
 
 def in_units(text: str, units: tuple[str, str] | None) -> str:
-    """What is printed about forces and displacements, below a line that names their units if they are known."""
+    """Text about forces and displacements, below a line that names their units if they are known."""
     return text if units is None else f"forces in {units[0]}, displacements in {units[1]}\n\n{text}"
 
 
@@ -93,7 +93,7 @@ def title_of(problem: str, text: str | None = None) -> str:
 
 
 def scene_of(name: str) -> Scene | None:
-    """What a TOML file tells of mesh, material, supports and loads; None for other problems, which are matrices.
+    """Scene of a TOML file: mesh, material, supports and loads; None for other problems, which are matrices.
 
     Raises
     ------
@@ -229,7 +229,7 @@ def note(text: str) -> None:
 
 
 def so_far(search: Callable[[], T]) -> tuple[T | Any, EnumsolError | None]:
-    """What a search found, even if it ended early, and the error that ended it, if any."""
+    """Result of a search, even if it ended early, and the error that ended it, if any."""
     try:
         return search(), None
     except (Interrupted, OutOfMemoryError, OutputError) as error:
@@ -255,7 +255,7 @@ def processors() -> int:
 
 
 def capped(jobs: int) -> int:
-    """That many processes, or as many as there are processors: more of them only take memory."""
+    """Number of processes, at most as many as there are processors: more of them only take memory."""
     most = processors()
     if sys.platform == "win32":
         most = min(most, _MOST_ON_WINDOWS)

@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 
 #: Metavariables of what a command writes, and of what it reads.
 _WRITTEN, _READ = ("FILE",), ("PROBLEM", "MESH", "POINTS", "PROOF", "SOLUTIONS", "GRAPH", "STEPS")
-#: How the files begin that some options write, and what these are.
+#: First bytes of the files that some options write, and the kinds of these files in words.
 _BEGINNINGS = {
     "--proof": (b"enumsol-proof ", "a proof"),
     "--save": (b'{"format": "enumsol-', "a saved graph or history"),
     "--report": (b"<!DOCTYPE html>", "an HTML page"),
     "--graphml": (b"<?xml", "a GraphML file"),
 }
-#: How meshes name files that belong to them: XDMF the heavy data, Abaqus what it includes.
+#: Patterns by which meshes name files that belong to them: heavy data of XDMF, included files of Abaqus.
 _REFERENCES = {".xdmf": rb"([^\s<>]+):/", ".inp": rb"(?i)input\s*=\s*([^,\r\n]+)"}
 #: Files of a problem in a directory.
 _MATRICES = ("*.mtx", "node_ids.json")
@@ -59,7 +59,7 @@ class FileCommand(TyperCommand):
 
 
 def _called(name: str) -> str:
-    """What a message calls an option, or an argument."""
+    """Name of an option or an argument in messages."""
     return name if name.startswith("-") else name.upper()
 
 
@@ -130,7 +130,7 @@ def _references(place: Path) -> list[str]:
 
 
 def _same(a: Path, b: Path) -> bool:
-    """Whether two names are those of one regular file, which may not be there yet."""
+    """True if two names are those of one regular file, which may not be there yet."""
     try:
         return a.samefile(b) and a.is_file()
     except (OSError, ValueError):
@@ -142,6 +142,6 @@ def _same(a: Path, b: Path) -> bool:
 
 
 def _folds(folder: Path) -> bool:
-    """Whether upper and lower case are the same in the names of a folder."""
+    """True if upper and lower case are the same in the names of a folder."""
     other = folder.with_name(folder.name.swapcase())
     return other != folder and other.exists() and other.samefile(folder)

@@ -222,7 +222,7 @@ class _Followed:
 
     @property
     def arrived(self) -> bool:
-        """Whether every path left the interval or closed."""
+        """True if every path left the interval or closed."""
         return not self.failures and all(path.status in _ARRIVED for path in self.paths)
 
     def as_text(self) -> str:
@@ -265,7 +265,7 @@ class _Followed:
 
 
 def _passes(path: Path, root: Root, problem: AnyProblem) -> bool:
-    """Whether the path runs through a regular root, which in 2D is the only one of its selection at that alpha."""
+    """True if the path runs through a regular root, which in 2D is the only one of its selection at that alpha."""
     if not root.regular:
         return False
     alpha = float(root.alpha)
@@ -279,7 +279,7 @@ def _passes(path: Path, root: Root, problem: AnyProblem) -> bool:
 
 
 def _leads_to(path: Path, k: int, root: Root, problem: AnyProblem) -> bool:
-    """Whether Newton's method from between two points of a path finds a root."""
+    """True if Newton's method from between two points of a path finds a root."""
     import numpy as np  # not for --help
 
     from enumsol.continuation import NotConverged, newton

@@ -66,7 +66,7 @@ def with_options(*options: Parameter, after: int) -> Callable[[Callable[..., Non
 
 
 def problem_names(incomplete: str) -> list[str]:
-    """What an argument PROBLEM may become: problems of both lists, and files and directories that may hold one."""
+    """Completions of an argument PROBLEM: problems of both lists, and files and directories that may hold one."""
     from glob import escape, glob  # for a shell that completes only
 
     from enumsol import collection, gallery

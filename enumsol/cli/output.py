@@ -213,7 +213,7 @@ def check_plot(path: str | None) -> None:
 
 
 def checking_commands(proven: bool, source: str | None, command: str, place: str, proof: str | None) -> list[str]:
-    """How the reader of a page checks the proof; none where there is none, or no file of the problem.
+    """Commands by which the reader of a page checks the proof; none where there is none, or no file of the problem.
 
     ``command`` with the options ``place`` gives the proof again where it is in no file.
     """

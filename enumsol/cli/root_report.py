@@ -56,7 +56,7 @@ def _family_rows(k: int, family: RootFamily, node_ids: tuple[Any, ...], width: i
 
 
 def uniqueness(found: RootSet) -> str:
-    """Whether there is one solution, in a line."""
+    """Line that says whether there is one solution."""
     if found.unique is None:
         why = "fast arithmetic proves nothing" if found.arithmetic == "fast" else found.closing_line
         return f"unique: not known ({why})"
@@ -119,7 +119,7 @@ def _root(root: Root) -> dict[str, Any]:
 
 
 def _rigid_bound(found: RootSet) -> dict[str, Any]:
-    """Of a body that nothing holds, within which rigid displacements solutions were sought."""
+    """Bound of the rigid displacements within which solutions were sought, for a body that nothing holds."""
     bound = found.rigid_bound
     return {} if bound is None else {"max_rigid_displacement": bound.largest, "bound_needed": bound.needed}
 

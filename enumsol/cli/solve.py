@@ -203,7 +203,7 @@ MESH_OPTIONS = {
 
 
 def _flags(name: str) -> tuple[str, ...]:
-    """How the command line spells an option of `fem.mesh_problem`, the usual way first."""
+    """Spellings of an option of `fem.mesh_problem` on the command line, the usual one first."""
     return (*(["--pair"] if name == "pairs" else []), "--" + name.replace("_", "-"))
 
 
@@ -316,7 +316,7 @@ def solve(
 
 
 def _scene(mesh: str, options: dict[str, Any]) -> Scene:
-    """What the mesh and the options, or a TOML file, describe."""
+    """Scene that the mesh and the options, or a TOML file, describe."""
     from enumsol import fem  # numpy: not for --help
     from enumsol.fem.mesh_problems import check_keys
     from enumsol.fem.scenes import refuse_old_friction

@@ -122,7 +122,7 @@ _QUIET = ContextVar("enumsol_quiet", default=False)
 
 
 def is_quiet() -> bool:
-    """Whether texts, notes and progress are left out."""
+    """True if texts, notes and progress are left out."""
     return _QUIET.get()
 
 

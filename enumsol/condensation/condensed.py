@@ -52,12 +52,12 @@ class CondensedSystem:
 
     @cached_property
     def scaled(self) -> ScaledSystem:
-        """The same problem without units (see ScaledSystem)."""
+        """System without units (see ScaledSystem)."""
         return ScaledSystem.from_system(self)
 
     @cached_property
     def proposals(self) -> ScaledSystem:
-        """The same for floats that only propose, where rationals decide (see ScaledSystem.from_system)."""
+        """System without units for floats that only propose, where rationals decide (see ScaledSystem.from_system)."""
         return ScaledSystem.from_system(self, proposals=True)
 
 
@@ -164,7 +164,7 @@ def lifted(S: Floats) -> Floats:
 
 
 def _definite(S: Floats) -> bool:
-    """Whether S less its rounding is positive definite."""
+    """True if S less its rounding is positive definite."""
     return factor_above(S - _rounding(S) * np.diag(np.diagonal(S))) is not None
 
 
@@ -207,7 +207,7 @@ class Condensation(Sealed):
 
     @cached_property
     def definite(self) -> bool:
-        """Whether S is positive definite beyond rounding."""
+        """True if S is positive definite beyond rounding."""
         units = node_units(self.S, len(self.problem.gap))
         factor = np.tile(units, len(self.S) // len(units))
         return _definite(self.S * factor[:, None] * factor)
@@ -292,7 +292,7 @@ class FloatingCondensation(Condensation):
 
     @classmethod
     def of(cls, problem: FloatingData) -> FloatingCondensation:
-        """That of a problem."""
+        """Condensation of a problem."""
         held = problem.on_springs.condensed
         return cls(held.S, held.g0, held.g1, problem)
 

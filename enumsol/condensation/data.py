@@ -79,7 +79,7 @@ class ProblemData(CondensableData, Protocol):
 
     @property
     def affine_friction(self) -> tuple[Floats, Floats]:
-        """Both friction and friction_slope."""
+        """Coefficients of friction at alpha = 0, and their derivatives."""
 
     @property
     def p(self) -> int:

@@ -277,7 +277,7 @@ class ExactCondensed:
 
     @classmethod
     def floating(cls, problem: Any) -> ExactCondensed:
-        """That of a body that nothing holds: condensed on springs, with G and h, without any rounding.
+        """Condensation of a body that nothing holds: on springs, with G and h, without any rounding.
 
         Raises
         ------
@@ -327,12 +327,12 @@ class ExactCondensed:
 
     @cached_property
     def loaded(self) -> bool:
-        """Whether g depends on alpha."""
+        """True if g depends on alpha."""
         return any(v != 0 for v in self.g1)
 
     @cached_property
     def unloaded(self) -> bool:
-        """Whether g = 0 for every alpha, so that lambda = 0 is the only solution."""
+        """True if g = 0 for every alpha, so that lambda = 0 is the only solution."""
         return not self.reach and not self.loaded and all(v == 0 for v in self.g0)
 
     @cached_property
@@ -347,7 +347,7 @@ class ExactCondensed:
 
     @cached_property
     def integers(self) -> _Integers:
-        """The same data as integers over common denominators."""
+        """Data as integers over common denominators."""
         dS = lcm(*(int(v.q) for row in self.rows for v in row))
         dg = lcm(*(int(v.q) for v in (*self.g0, *self.g1)))
         dF = lcm(*(int(v.q) for v in (*self.F0, *self.F1)))

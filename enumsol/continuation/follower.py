@@ -386,7 +386,7 @@ class Follower(Generic[_Path]):
         return None
 
     def _passes(self, start: CurvePoint, end: CurvePoint, x: Floats, codes: Codes) -> bool:
-        """Whether the piece from start to end of one curve goes through a known point of the same selection."""
+        """True if the piece from start to end of one curve goes through a known point of the same selection."""
         equation = self.equation
         if codes != start.codes or equation.dot(x - start.x, start.tangent) <= FORWARD_TOLERANCE:
             return False
@@ -401,7 +401,7 @@ class Follower(Generic[_Path]):
         return same_curve(equation, start, middle, sharp=True) and same_curve(equation, middle, end, sharp=True)
 
     def _on_piece(self, start: CurvePoint, end: CurvePoint, point: CurvePoint) -> bool:
-        """Whether the curve between two points runs through a third one, and not beside it on another curve."""
+        """True if the curve between two points runs through a third one, and not beside it on another curve."""
         equation, row = self.equation, self.equation.metric @ point.tangent
         chord = end.x - start.x
         along = float(row @ chord)

@@ -279,7 +279,7 @@ def facet_basis(basis: Any, facets: Integers, *, lumped: bool = False) -> Any:
 
 
 def between_corners(element: Any) -> bool:
-    """Whether facets are triangles of second order, of which the nodes between corners can be in contact."""
+    """True if facets are triangles of second order, of which the nodes between corners can be in contact."""
     from skfem import ElementTetP2  # as above
 
     return isinstance(getattr(element, "elem", element), ElementTetP2)

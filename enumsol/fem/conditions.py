@@ -165,7 +165,7 @@ class Piece:
     name: str
 
     def free_motions(self, points: Floats, hold: sp.csc_array) -> int:
-        """How many of its rigid motions nothing holds; ``hold`` is a stiffness of supports and springs."""
+        """Number of its rigid motions that nothing holds; ``hold`` is a stiffness of supports and springs."""
         motions = _rigid_motions(points, self.nodes)
         values = np.linalg.eigvalsh(motions.T @ (hold @ motions))
         return int(np.sum(values <= _HELD * max(values[-1], np.finfo(np.float64).tiny)))
@@ -206,7 +206,7 @@ def pieces_of(mesh: PartedMesh) -> list[Piece]:
 
 
 def _name_of(mesh: PartedMesh, inside: Mask) -> str:
-    """What one of several bodies is called."""
+    """Name of one of several bodies."""
     names = [name for name, rows in mesh.bodies.items() if np.all(inside[mesh.cells[rows]])]
     if not names:
         sides = [name for name, rows in mesh.facets.items() if np.all(inside[rows])]

@@ -1,4 +1,4 @@
-"""What files of meshes hold by a count of their own, against which is held what meshio read of them.
+"""Contents of mesh files, counted without meshio and compared with what it read of them.
 
 Formats of lines of text are counted here, in which meshio passes over what it does not know.
 """
@@ -18,7 +18,7 @@ from enumsol.support.array_types import Integers
 
 #: Files may include others to this depth.
 _DEEPEST = 20
-#: What takes the entries of a line of data, and where the first comment before it in its block is.
+#: Function of the entries of a line of data and the place of the first comment before it in its block.
 Taker = Callable[[list[str], str], None]
 #: Keywords of decks that make or move nodes and cells.
 _MAKERS = ("NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM")
@@ -27,7 +27,7 @@ _CARDS = ("CTRI", "CTRAX", "CQUAD", "CTETRA", "CHEXA", "CPENTA", "CPYRA", "CPLST
 #: Types of elements whose formulation is taken as it is: plane stress or strain, or solid; and their variants.
 _PLAIN, _VARIANT = re.compile(r"(CPS|CPE|C3D)\d+"), re.compile(r"((?:CPS|CPE|C3D)\d+)[A-Z]+")
 _STRANGE = {"S": "shells", "R": "rigid", "M": "membranes", "C": "no plane elements"}
-#: What meshio says of what it leaves out of cells.
+#: Messages of meshio about cells that it leaves out.
 _LEFT_OUT = re.compile(
     r"meshio doesn't know (?:Gmf)?(?:Edges|Tri|Quad|Tetra|Hexa|Prism|Pyramid)\w*|could not parse line"
     r"|\$(?:Nodes|Elements) not closed|End-of-file reached before"
@@ -67,7 +67,7 @@ class _Set:
 
 @dataclass
 class Deck:
-    """What a deck of Abaqus or CalculiX (`.inp`) holds.
+    """Contents of a deck of Abaqus or CalculiX (`.inp`).
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class Deck:
 
     @classmethod
     def read(cls, place: Path) -> Deck:
-        """That of a file and of those that it includes.
+        """Contents of a deck and of the files that it includes.
 
         Raises
         ------
@@ -118,7 +118,7 @@ class Deck:
         return deck
 
     def _begin(self, where: str, text: str) -> Taker | None:
-        """What takes the lines of data after a keyword, if they are of the mesh."""
+        """Function that takes the lines of data after a keyword; None if they are not of the mesh."""
         word, *pairs = text[1:].split(",")
         keyword = " ".join(word.upper().split())
         options = {name.strip().upper(): value.strip() for name, _, value in (pair.partition("=") for pair in pairs)}
@@ -224,7 +224,7 @@ def taken_as(types: Sequence[str]) -> list[str]:
 
 
 def _key(name: str) -> str:
-    """What two spellings of a name share: only those in quotes tell cases apart."""
+    """Name as it is compared: upper and lower case differ only in quotes."""
     return name.strip('"') if name.startswith('"') else name.upper()
 
 
@@ -263,13 +263,13 @@ def _lines(place: Path, first: Path, depth: int) -> Iterator[tuple[str, str]]:
 
 
 def deck_of(place: Path, mesh: Any | None) -> Deck:
-    """What a deck holds, if meshio has read all of it.
+    """Contents of a deck, if meshio has read all of it.
 
     Parameters
     ----------
     place : Path
     mesh : meshio.Mesh or None
-        What it read; None if it could not, which may have the same reasons.
+        Mesh that meshio read; None if it could not, which may have the same reasons.
 
     Raises
     ------
@@ -307,7 +307,7 @@ def deck_of(place: Path, mesh: Any | None) -> Deck:
 
 
 def _check_sets(deck: Deck, mesh: Any) -> None:
-    """Hold the members of all sets that were read against those of the deck."""
+    """Compare the members of all sets that were read with those in the deck."""
     nodes = {number: place for place, number in enumerate(deck.nodes)}
     cells = {number: place for place, number in enumerate(n for block in deck.blocks for n in block.numbers)}
     firsts = np.cumsum([0, *(len(block.numbers) for block in deck.blocks)])
@@ -333,15 +333,15 @@ def _compare(deck: Deck, kind: str, name: str, places: Mapping[int, int], read: 
 
 
 def refuse_partial(place: Path, mesh: Any, said: str) -> None:
-    """Refuse what meshio read of a file of another format than decks if it is not all of it.
+    """Refuse an incomplete mesh that meshio read from a file of another format than decks.
 
     Parameters
     ----------
     place : Path
     mesh : meshio.Mesh
-        What it read.
+        Mesh that meshio read.
     said : str
-        What it said of it.
+        Text that meshio printed meanwhile.
 
     Raises
     ------
@@ -377,7 +377,7 @@ def _nastran(place: Path) -> dict[str, int]:
 
 
 def _gmsh(place: Path) -> dict[str, int]:
-    """What the sections of a file of text say that they hold."""
+    """Numbers of nodes and cells that the sections of a text file announce; empty for a binary file."""
     found: dict[str, int] = {}
     with place.open("rb") as file:
         if file.readline().strip() != b"$MeshFormat" or file.readline().split()[1:2] != [b"0"]:

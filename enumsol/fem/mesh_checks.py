@@ -59,7 +59,7 @@ def node_numbers(value: ArrayLike, name: str, count: int, *, distinct: bool = Tr
 
 
 def cell_name(row: int, labels: Integers | None = None) -> str:
-    """What messages call a cell: by its number in the file, if that is known, or by its row."""
+    """Name of a cell in messages: its number in the file, if that is known, or its row."""
     return f"cells row {row}" if labels is None else f"element {labels[row]}"
 
 

@@ -32,7 +32,7 @@ _PHYSICAL = "gmsh:physical"
 #: What meshio calls the families of a MED file, of cells and of points; numbers of groups in formats without names.
 _FAMILIES = ("cell_tags", "point_tags")
 _NUMBERS = ("medit:ref", "su2:tag", "CellEntityIds")
-#: How the names of decks end.
+#: Suffix of the names of decks.
 _DECK = ".inp"
 
 
@@ -120,7 +120,7 @@ def _read(source: Any, groups: str | None, dimension: int | None) -> PartedMesh:
 
 
 def _by_meshio(meshio: Any, place: Path) -> tuple[Any, str]:
-    """What meshio reads, and what it says of it."""
+    """Mesh that meshio reads, and the text that it prints meanwhile."""
     said = io.StringIO()
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said), warnings.catch_warnings():
@@ -144,7 +144,7 @@ def _by_meshio(meshio: Any, place: Path) -> tuple[Any, str]:
 
 
 def _refuse_torn(place: Path) -> None:
-    """Refuse a deck that meshio cannot read for what it lost of it."""
+    """Refuse a deck that meshio cannot read if parts of it are lost, and name them."""
     try:
         deck_of(place, None)
     except InvalidArgumentError:

@@ -160,7 +160,7 @@ def mesh_problem(
 
 
 def mesh_scene(mesh: PartedMesh | str | os.PathLike[str] | Any, **options: Any) -> Scene:
-    """What a mesh and the options of `mesh_problem` describe: ``print(scene)``, ``scene.plot()``, ``scene.notes``.
+    """Scene that a mesh and options of `mesh_problem` describe: ``print(scene)``, ``scene.plot()``, ``scene.notes``.
 
     The scene lists the bodies, the parts with their areas, the resultant of the loads, the contact nodes with their
     gaps, which bodies are free to move, and what may not have been intended. ``scene.problem()`` is what `mesh_problem`
@@ -233,7 +233,7 @@ def read_mesh_problem(path: str | os.PathLike[str]) -> AnyProblem:
 
 
 def read_mesh_scene(path: str | os.PathLike[str]) -> Scene:
-    """What a TOML file describes, see `mesh_scene`.
+    """Scene that a TOML file describes, see `mesh_scene`.
 
     Parameters
     ----------

@@ -179,7 +179,7 @@ class Mesh:
     right: Integers
 
     def parted(self) -> PartedMesh:
-        """The same with its sides as parts named bottom, top, left and right, for `mesh_problem`."""
+        """Mesh with its sides as parts named bottom, top, left and right, for `mesh_problem`."""
         sides = {name: edges_along(getattr(self, name)) for name in ("bottom", "top", "left", "right")}
         return PartedMesh(self.points, self.triangles, MappingProxyType(sides))
 

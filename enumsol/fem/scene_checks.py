@@ -29,9 +29,9 @@ _FIT, _SMALL = 0.05, 0.25
 _DEEP = 0.5
 #: Strains by loads above this come from wrong units: the length of the body.
 _ABSURD = 1.0
-#: Loads that strain the body by less than this hardly mean to.
+#: Loads that strain the body by less than this are hardly intended.
 _NOTHING = 1e-12
-#: Where normals of a pair turn away by more than this from those that they face, they make a pocket [degrees].
+#: Normals of a pair that turn away by more than this from those they face make a pocket [degrees].
 _TURN = 10.0
 #: Loads and press fits that strain the body so differently are hardly in the same units.
 _UNEVEN = 1e5
@@ -150,7 +150,7 @@ def _refuse_cracks(scene: Any, nodes: Any, parts: list[str]) -> None:
 
 
 def scene_notes(scene: Any) -> list[str]:
-    """What may not have been intended."""
+    """Notes on what may not have been intended."""
     checks = (
         *(_formulations, _unjoined, _unfaced, _shared, _alone, _rest, _loaded_contact),
         *(_turning, _reach, _units, _proportions, _friction, _held),
@@ -160,12 +160,12 @@ def scene_notes(scene: Any) -> list[str]:
 
 
 def _formulations(scene: Any) -> list[str]:
-    """Elements of the file that others take the place of."""
+    """Notes on elements of the file that others take the place of."""
     return taken_as(scene.mesh.types)
 
 
 def _unjoined(scene: Any) -> list[str]:
-    """Nodes that coincide, but for those of contacts."""
+    """Notes on nodes that coincide, but for those of contacts."""
     joined = [_nodes_of(scene.mesh, group) for group in scene.contacts.groups]
     return unjoined(scene.mesh, _bodies(scene), [piece.name for piece in scene.pieces], joined)
 
@@ -180,7 +180,7 @@ def _nodes_of(mesh: PartedMesh, group: Group) -> Mask:
 
 
 def _turning(scene: Any) -> list[str]:
-    """Pairs of a body that could roll, whose normals turn along the contact more than what they face does."""
+    """Notes on pairs of a body that could roll, whose normals turn along the contact more than what they face does."""
     mesh, notes, first = scene.mesh, [], 0
     hold = holding(scene.held.supports, sp.csc_array(scene.springs.shape))
     loose = np.any([piece.nodes for piece in scene.pieces if piece.free_motions(mesh.points, hold)], axis=0)
@@ -271,7 +271,7 @@ def _reach(scene: Any) -> list[str]:
 
 
 def _strains(scene: Any) -> dict[str, float]:
-    """About how much the loads strain the body, and how much their slopes do."""
+    """Approximate strains of the body by the loads and by their slopes."""
     thickness = 1.0 if scene.body.thickness is None else float(np.min(scene.body.thickness))
     force = float(np.min(_stiffness(scene))) * _extent(scene) ** (scene.dimension - 1) * thickness
     return {
@@ -286,7 +286,7 @@ def _stiffness(scene: Any) -> Floats:
 
 
 def _proportions(scene: Any) -> list[str]:
-    """Loads and press fits, or gaps that only strain can close, that are out of proportion."""
+    """Notes on loads and press fits, or gaps that only strain can close, that are out of proportion."""
     strain, extent, notes = max(_strains(scene).values()), _extent(scene), []
     held = not scene.options["spring"] and not any(p.free_motions(scene.mesh.points, scene.hold) for p in scene.pieces)
     for group, gaps in scene.gaps_of_groups:
@@ -329,7 +329,7 @@ def _units(scene: Any) -> list[str]:
 
 
 def _extent(scene: Any) -> float:
-    """That of the largest body [length]."""
+    """Extent of the largest body [length]."""
     return max(float(np.max(np.ptp(scene.mesh.points[piece.nodes], axis=0))) for piece in scene.pieces)
 
 

@@ -93,7 +93,7 @@ def shape_volumes(nodes: Floats, cells: Integers) -> Floats:
 
 
 def outward(facets: Integers, cells: Integers) -> Integers:
-    """The same facets with the corners in the body's order: counterclockwise as seen from outside.
+    """Facets with their corners in the body's order: counterclockwise as seen from outside.
 
     Raises
     ------

@@ -102,7 +102,7 @@ def _refuse_covered(mesh: PartedMesh, own: tuple[Integers, Integers], facets: In
 
     rows, corners = own
     dimension = mesh.points.shape[1]
-    # a facet by its corners, its middle and its nodes: places, each with the nodes that cells there may share
+    # corners and middles of the facets, each with the nodes that a cell there may have in common with the facet
     spread = [facets[:, k : k + 1] for k in range(dimension)] + [facets[:, :dimension]]
     curved = facets.shape[1] > (2 if dimension == 2 else 4) or (dimension, mesh.cells.shape[1]) in ((3, 10), (2, 6))
     places = np.concatenate([mesh.points[nodes].mean(axis=1) for nodes in spread])

@@ -119,12 +119,12 @@ class FixedPoint(TrescaState):
 
     @property
     def converged(self) -> bool:
-        """Whether the estimated distance from the limit is within the tolerance."""
+        """True if the estimated distance from the limit is within the tolerance."""
         return self.outcome is Outcome.CONVERGED
 
     @property
     def beyond_bound(self) -> bool:
-        """Whether a body that nothing holds has moved as a whole beyond the bound of its rigid displacement.
+        """True if a body that nothing holds has moved as a whole beyond the bound of its rigid displacement.
 
         `enumerate_roots` lists solutions within this bound, and so not this one (theory, section 14.2).
         """
@@ -160,7 +160,7 @@ class FixedPoint(TrescaState):
 
     @property
     def why(self) -> str:
-        """How the iteration ended, in a sentence."""
+        """Sentence on how the iteration ended."""
         slips, forces = self.increments[-1] if len(self.increments) else (np.nan, np.nan)
         depends = getattr(self.problem, "depends_on_solution", False)
         last = f"last increment {forces:.2e} in forces" + (f", {slips:.2e} in slips" if depends else "")

@@ -249,7 +249,7 @@ class _Iteration:
         return self._result(outcome, period)
 
     def _iterate(self, limit: int) -> tuple[Outcome, int | None]:
-        """How the iteration with this system ends, and the length of a cycle."""
+        """Outcome of the iteration with this system, and the length of a cycle."""
         while len(self.increments) < limit:
             self.data = TrescaData(self.system, self.bound, self.system.coefficients(self.slip))
             self.x, _, _ = solve_scaled(self.data, self.x)
@@ -298,7 +298,7 @@ class _Iteration:
         return np.maximum(self.system.split(self.x)[0], 0.0), self.system.slip(self.x)
 
     def _increment(self, data: TrescaData, slip: Floats, image: Floats, image_slip: Floats) -> float:
-        """How far the limit may be, relative to the tolerance: at most 1 has converged."""
+        """Distance at which the limit may be, relative to the tolerance: at most 1 has converged."""
         system = self.system
         force = system.force_norm(image - data.bound)
         change = float(np.linalg.norm(self.slip_weights * (image_slip - slip)))
@@ -330,7 +330,7 @@ class _Iteration:
         return moved * max(1.0, q / (1.0 - q))
 
     def _stalled(self) -> bool:
-        """Whether increments are small and shrink no more: rounding."""
+        """True if increments are small and shrink no more: rounding."""
         last, before = self.sizes[-_PATIENCE:], self.sizes[:-_PATIENCE]
         return bool(before) and min(before) <= min(_SMALL, *last)
 

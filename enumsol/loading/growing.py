@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     Shape = tuple[tuple[Any, ...], ...]
 
 
-#: What may decide a step in 3D whose start is known too little.
+#: Advice on a step in 3D whose start is not known closely enough.
 _CURE = "change the load of this step slightly, or hold the body by stiffer springs"
 #: Histories that are compared at most.
 _MOST = 20_000
@@ -306,7 +306,7 @@ class _Limits:
         return None
 
     def left(self) -> dict[str, Any]:
-        """What one search may still take, as options of enumerate_roots."""
+        """Nodes and time that one search may still take, as options of enumerate_roots."""
         seconds = None if self.seconds is None else max(self.seconds - (time.perf_counter() - self.started), 1e-3)
         return {"max_nodes": None if self.max_nodes is None else self.max_nodes - self.nodes, "time_limit": seconds}
 
@@ -357,7 +357,7 @@ class _Growing:
 
     @property
     def so_far(self) -> str:
-        """How far it came."""
+        """Words on the step that was reached and the number of roots so far."""
         found = counted(sum(len(stage.roots) for stage in self.stages), "root")
         return f" in step {self.stages[-1].step if self.stages else 1}; {found} so far"
 
@@ -372,7 +372,7 @@ class _Growing:
             stage = self._stage(number, step, item)
             nodes = [(number, count + j) for j in range(len(stage.roots))]
             count += len(nodes)
-            # whatever else is known of a stage is known before it is
+            # added before the stage itself, so that an interruption leaves no stage without them
             self.parents[len(self.stages) :] = [tuple(item.parents)]
             self.node_of[stage.number] = nodes
             self.stages.append(stage)
@@ -489,7 +489,7 @@ class _Growing:
         return stage.roots[self.node_of[stage.number].index(node)]
 
     def history(self, *more: str) -> HistoryData:
-        """What was found so far, with more reasons why something may be missing."""
+        """Histories found so far, with more reasons why something may be missing."""
         return HistoryData(
             self.problem,
             tuple(self.steps),

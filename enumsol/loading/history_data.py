@@ -67,7 +67,7 @@ class Stage:
 
     @property
     def largest_radius(self) -> float:
-        """How far the start may be from its midpoint, at most [length]."""
+        """Largest distance of the start from its midpoint [length]."""
         return 0.0 if self.start.radius is None else float(np.max(self.start.radius))
 
 
@@ -385,7 +385,7 @@ _HEADS = ("step", "alpha", "roots", "from", "histories", "dissipated")
 
 
 def history_text(history: HistoryData, units: tuple[str, str] | None = None) -> str:
-    """What print shows, with units of forces and lengths if they are given."""
+    """Text that print shows, with units of forces and lengths if they are given."""
     heads, body = steps_table(history, units)
     rows = [heads, *body]
     widths = (4, 10, 6, 5, 10, max(11, len(heads[-1])))
@@ -396,7 +396,7 @@ def history_text(history: HistoryData, units: tuple[str, str] | None = None) -> 
 
 
 def history_html(history: HistoryData) -> str:
-    """What a notebook shows."""
+    """HTML that a notebook shows."""
     tree = html_lines(["tree", *tree_lines(history)])
     return html_lines([_heading(history)]) + html_table(_HEADS, _rows(history)) + tree + html_lines(_notes(history))
 

@@ -153,7 +153,7 @@ class _Rows:
         return self.result()
 
     def _row_calls(self) -> Iterator[Call[int]]:
-        """Of map_row, while there is time; the options have what is left of it."""
+        """Calls of map_row, while there is time; the options have what is left of it."""
         for place, value in enumerate(self.values):
             if (left := self._left()) == 0:
                 return
@@ -161,7 +161,7 @@ class _Rows:
             yield place, map_row, (self.make, value, self.interval, options)
 
     def _strip_calls(self, rows: Sequence[MapRow]) -> Iterator[Call[None]]:
-        """Of map_strip, while there is time."""
+        """Calls of map_strip, while there is time."""
         for pair in pairwise(rows):
             if (left := self._left()) == 0:
                 return
@@ -259,7 +259,7 @@ class MultiplicityMap(Immutable):
 
     @property
     def complete(self) -> bool:
-        """Whether every row is proven to be complete, and none is missing."""
+        """True if every row is proven to be complete, and none is missing."""
         return self.missing is None and bool(self.rows) and all(row.complete for row in self.rows)
 
     def multiplicity_at(self, value: float, alpha: AlphaLike) -> int:

@@ -73,7 +73,7 @@ class LoadStep(Sealed):
         self.__dict__.update(values)
 
     def on(self, problem: Problem, number: int) -> LoadStep:
-        """The same with arrays of the problem's shapes and with an alpha.
+        """Step with arrays of the problem's shapes and with an alpha.
 
         Raises
         ------
@@ -218,7 +218,7 @@ def _cell(value: Any, name: str) -> Any:
 
 
 def _friction_varies(problem: Problem) -> bool:
-    """Whether the coefficients change with alpha."""
+    """True if the coefficients change with alpha."""
     return bool(np.any(problem.friction_slope))
 
 

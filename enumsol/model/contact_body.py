@@ -191,7 +191,7 @@ class ContactBody(Immutable):
         raise NotImplementedError
 
     def check_held(self, what: str, why: str = "", instead: str = "") -> None:
-        """Nothing for a body that supports or springs hold; the arguments are words of the message.
+        """Refuse a body that neither supports nor springs hold; the arguments are words of the message.
 
         ``what`` was asked of it, ``why`` that needs supports, and ``instead`` is what else will do.
 
@@ -218,7 +218,7 @@ class ContactBody(Immutable):
 
     @cached_property
     def products(self) -> Products:
-        """What condensation and enclosure have in common."""
+        """Products that condensation and enclosure have in common."""
         self.check_held("condensation")
         if (origin := self._origin) is not None:
             mine, theirs = ((body.f, body.load_slope) for body in (self, origin))
@@ -245,7 +245,7 @@ class ContactBody(Immutable):
         return CondensedEnclosure.from_problem(self, self.products)
 
     def is_unloaded(self, alpha: AlphaLike) -> bool:
-        """Whether load, gap and slip offset are exactly zero at alpha: then only lambda = 0, w = 0 solves."""
+        """True if load, gap and slip offset are exactly zero at alpha: then only lambda = 0, w = 0 solves."""
         a = Fraction(alpha_value(alpha))
         if np.any(self.gap) or np.any(self.slip_offset) or self.offset_radius is not None:
             return False
@@ -255,11 +255,11 @@ class ContactBody(Immutable):
 
     @property
     def known_exactly(self) -> bool:
-        """Whether rationals hold all data: a slip offset may be known as a ball only."""
+        """True if rationals hold all data: a slip offset may be known as a ball only."""
         return self.offset_radius is None or self.exact_offset is not None
 
     def replace(self, **changes: Any) -> Self:
-        """The same problem with other data; what depends on A, Bn and Bt alone is not computed again.
+        """Copy of the problem with other data; what depends on A, Bn and Bt alone is not computed again.
 
         ``dataclasses.replace`` makes a problem that shares nothing with this one, and keeps ``friction_slope`` if only
         ``friction`` is named.
@@ -351,7 +351,7 @@ class ContactBody(Immutable):
         return digest.hexdigest()
 
     def _text(self, friction: str) -> str:
-        """What ``repr`` gives; ``friction`` are the coefficients in words."""
+        """Text that ``repr`` gives; ``friction`` are the coefficients in words."""
         load = "constant" if self.load_slope is None else "f + alpha load_slope"
         text = (
             f"{type(self).__name__} with {counted(self.p, 'contact node')}\n"
@@ -370,7 +370,7 @@ class ContactBody(Immutable):
 
 
 def _equal(one: Floats | None, other: Floats | None) -> bool:
-    """Of two loads or slopes of loads."""
+    """True if two loads, or two slopes of loads, are equal."""
     return one is other or (one is not None and other is not None and np.array_equal(one, other))
 
 

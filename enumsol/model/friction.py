@@ -28,7 +28,7 @@ class FrictionLaw(Protocol):
 
     @property
     def depends_on_slip(self) -> bool:
-        """Whether the coefficients depend on the solution."""
+        """True if the coefficients depend on the solution."""
 
     def at(self, slip: Floats) -> Floats:
         """Coefficients F1, F2 at slips (p,) [length], shape (p, 2) [-]."""
@@ -42,7 +42,7 @@ class ConstantFriction(Sealed):
     depends_on_slip = False
 
     def at(self, slip: Floats) -> Floats:
-        """The same coefficients for every slip."""
+        """Coefficients at a slip: the same for every slip."""
         return self.values
 
     def __str__(self) -> str:

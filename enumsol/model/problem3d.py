@@ -259,12 +259,12 @@ class ContactProblem3D(ContactBody):
 
     @property
     def depends_on_solution(self) -> bool:
-        """Whether the coefficients are functions of the slip: then only successive approximations are offered."""
+        """True if the coefficients are functions of the slip: then only successive approximations are offered."""
         return self.law.depends_on_slip
 
     @property
     def depends_on_alpha(self) -> bool:
-        """Whether friction or load change with alpha."""
+        """True if friction or load change with alpha."""
         return self.load_slope is not None or bool(np.any(self._slope))
 
     @cached_property

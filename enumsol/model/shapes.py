@@ -24,7 +24,7 @@ _LEAST_FORCE = 1e-9
 #: Displacements below this part of those without contact forces are what rounding leaves where forces cancel the load;
 #: larger, it would hide how a stiff body on very weak springs is deformed.
 _LEAST_MOVED = 1e-12
-#: Signs of loads, springs or supports along one side of a body.
+#: Number of signs of loads, springs or supports along one side of a body.
 SIGNS = 12
 #: Cosine of the angle by which the boundary turns at most within a side.
 _SIDE = float(np.cos(np.radians(30.0)))
@@ -63,7 +63,7 @@ class BodyShape:
         return float(np.max(np.ptp(self.points, axis=0)))
 
     def displacements(self, u: Floats) -> Floats:
-        """Of all nodes, (N, d) [length]."""
+        """Displacements of all nodes, (N, d) [length]."""
         return np.asarray(self.motion @ u).reshape(self.points.shape) + self.offset
 
     def moves(self, root: Any) -> Floats:
@@ -238,7 +238,7 @@ def _patches(links: dict[int, list[int]]) -> Iterator[list[int]]:
 
 
 def _along(line: Floats, places: Floats) -> list[int]:
-    """Which of some places on a line have a sign: the nearest to points at equal distances along it."""
+    """Rows of the places on a line that get a sign: the nearest to points at equal distances along it."""
     if len(places) < 1.3 * SIGNS:  # nearly as few
         return list(range(len(places)))
     lengths = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
@@ -250,7 +250,7 @@ def _along(line: Floats, places: Floats) -> list[int]:
 
 
 def _apart(places: Floats) -> list[int]:
-    """Which of some places have a sign: first the farthest from their middle, then always the farthest from these."""
+    """Rows of the places that get a sign: first the farthest from their middle, then always the farthest from these."""
     distance = np.linalg.norm(places - places.mean(axis=0), axis=1)
     chosen: list[int] = []
     while len(chosen) < min(SIGNS, len(places)):

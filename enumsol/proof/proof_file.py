@@ -65,7 +65,7 @@ def packed(rows: Indices, values: Floats) -> tuple[str, str]:
 
 
 def coarse(values: Floats) -> Floats:
-    """The same to 21 binary digits: the lower half of their bits is zero, which compresses well."""
+    """Values to 21 binary digits: the lower half of their bits is zero, which compresses well."""
     return ((values.view(np.uint64) + _HALF) & _UPPER).view(np.float64)
 
 

@@ -44,7 +44,7 @@ class RefusedError(Exception):
 
 
 def data_of(header: Any, problem: ContactProblem, kind: str | None) -> Data:
-    """What a header claims to certify, "problem" or "condensed", once it fits the problem and the kind of proof.
+    """Data that a header claims to certify, "problem" or "condensed", once it fits the problem and the kind of proof.
 
     Raises
     ------
@@ -63,7 +63,7 @@ def data_of(header: Any, problem: ContactProblem, kind: str | None) -> Data:
 
 
 def same(found: Any, expected: Any) -> bool:
-    """Whether a value of a proof is the one expected, of the same type throughout: neither ``true`` nor 1.0 is 1."""
+    """True if a value of a proof is the one expected, of the same type throughout: neither ``true`` nor 1.0 is 1."""
     if isinstance(expected, dict) and isinstance(found, dict):
         return found.keys() == expected.keys() and all(same(found[key], value) for key, value in expected.items())
     if isinstance(expected, list) and isinstance(found, list):
@@ -91,7 +91,7 @@ def rational_text(value: Fraction, name: str) -> str:
 
 
 def fits(value: Fraction) -> bool:
-    """Whether a proof can hold this fraction."""
+    """True if a proof can hold this fraction."""
     return max(abs(value.numerator), value.denominator) < _BEYOND
 
 
@@ -134,7 +134,7 @@ def exponents_from(value: Any, size: int) -> list[int]:
 
 
 def bytes_from(text: str) -> bytes:
-    """What a text in base64 stands for, if it is the one text that stands for it."""
+    """Bytes that a text in base64 stands for, if it is the one text that stands for them."""
     data = base64.b64decode(text, validate=True)
     if base64.b64encode(data).decode() != text:
         raise ValueError("a text in base64 has bits to spare that are not zero")

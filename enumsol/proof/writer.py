@@ -86,7 +86,7 @@ class Checksum:
         self._low = (self._low + low - 1) % _ADLER
 
     def end(self) -> bytes:
-        """How the stream ends."""
+        """Last bytes of the stream."""
         return _LAST + (self._high << 16 | self._low).to_bytes(4, "big")
 
 

@@ -53,7 +53,7 @@ class Shaving:
     tested: float = math.inf
 
     def copy(self) -> Shaving:
-        """What a child begins with."""
+        """Copy with which a child begins."""
         return Shaving(dict(self.tried), self.tested)
 
     def sectors(self, codes: Codes, violated: Sequence[bool]) -> list[int]:
@@ -76,7 +76,7 @@ class Shaving:
         self.tried[node, end] = (max(halvings - 1, FIRST) if excluded else halvings + 1), _size(codes)
 
     def leaf_is_due(self, codes: Codes) -> bool:
-        """Whether a leaf is to be tested now; if so, that is noted."""
+        """True if a leaf is to be tested now, which is then noted."""
         levels = [width_level(code - SECTORS) for code in codes if code > SECTORS]
         if not levels or min(levels) < NARROW or self.tested - _size(codes) < _NARROWER * len(levels):
             return False
@@ -407,7 +407,7 @@ class SpaceRelaxation:
         return children
 
     def violations(self, codes: Codes) -> Floats:
-        """How much complementarity is violated at every node that can be branched on; -inf at the others."""
+        """Violation of complementarity at every node that can be branched on; -inf at the others."""
         system, y, w = self._engine.system, self.forces, self.displacements
         array, p = np.array(codes), system.p
         slip = self._dissipation()

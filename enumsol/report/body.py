@@ -27,7 +27,7 @@ _ROUNDING = 1e-9
 
 
 def body_record(problem: AnyProblem, scene: Scene | None = None) -> tuple[dict[str, Any] | None, str]:
-    """What is drawn of a body of d dimensions and what moves it; and why it is not all of it, empty if it is.
+    """Drawing of a body of d dimensions and its motion; and the reason why a part is missing, else empty.
 
     Displacements of the nodes, d components in turn, are ``u0 + alpha u1 - sum_k f_k c[k]`` over the d p contact
     forces; a unit of force k acts on nodes as ``acts[k]``, each the node and d components. Of solids there are stresses
@@ -95,14 +95,14 @@ def surface_stresses(problem: AnyProblem, shape: BodyShape, columns: int) -> Cal
 
 
 def most_fields(nodes: int, d: int) -> int:
-    """How many fields of displacements of d components of so many nodes a page holds."""
+    """Number of fields of displacements, of d components at so many nodes, that a page holds."""
     return _MOST_NUMBERS // (d * nodes)
 
 
 def drawn_body(
     problem: AnyProblem, shape: BodyShape, columns: int, scene: Scene | None = None
 ) -> tuple[dict[str, Any], Integers]:
-    """What is drawn of a body whatever its solution, and which nodes of its mesh the drawn ones are.
+    """Drawing of a body apart from any solution, and the numbers of the drawn nodes in its mesh.
 
     ``points`` are the drawn nodes; contact row i stands at the mean of nodes ``rows[i]``, pairs (node, weight). Of a
     plane body there are cells, or the edges of its boundary if ``columns`` numbers for every component of every node
@@ -158,7 +158,7 @@ def _edges(faces: Integers) -> Integers:
 
 
 def bare_nodes(problem: AnyProblem) -> tuple[dict[str, Any] | None, str]:
-    """Of a problem without a mesh: in 3D the contact nodes at their coordinates, and what is not drawn."""
+    """Drawing of a problem without a mesh: in 3D contact nodes at their coordinates; and what is not drawn."""
     places = problem.coordinates
     if not hasattr(problem, "Bt2"):
         return None, "The problem has no mesh, so no body is drawn"

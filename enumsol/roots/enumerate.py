@@ -285,7 +285,7 @@ def _not_joined(codes: Codes, stop: Stop) -> UndecidedPart:
 
 
 def _alone(solution: SelectionSolution) -> bool:
-    """Whether no other selection's solution is connected with it, or it is distinguished from these in another way."""
+    """True if no other selection's solution is connected with it, or it is distinguished from these in another way."""
     return solution.possible is not None or (solution.strict and solution.det_sign != 0)
 
 

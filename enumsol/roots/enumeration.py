@@ -106,7 +106,7 @@ class Enumeration(ABC, Generic[_Solvers]):
         return self._result()
 
     def _at_least(self, known: int) -> int:
-        """What a number of roots is at least: a body that is proven stable has a solution (theory, section 12.6)."""
+        """Least number of roots that exist: a body that is proven stable has a solution (theory, section 12.6)."""
         return max(known, int(self.solvers.has_solution and self.solvers.undecidable is None))
 
     def _search(self, limits: SearchLimits, executor: Executor | None) -> None:
@@ -147,7 +147,7 @@ class Enumeration(ABC, Generic[_Solvers]):
 
     @abstractmethod
     def _result(self) -> RootSet:
-        """What was found, in the user's terms."""
+        """Root set of what was found, in the user's terms."""
 
     def _root_set(
         self,
@@ -201,7 +201,7 @@ class Enumeration(ABC, Generic[_Solvers]):
 def not_begun(
     problem: ContactBody, alpha: Alpha, arithmetic: str, method: str, seconds: float, stop: StopReason
 ) -> RootSet:
-    """What is known where the search was ended before the body was condensed: nothing."""
+    """Root set of a search that ended before the body was condensed: nothing is known."""
     what = {StopReason.INTERRUPTED: "it was interrupted", StopReason.OUT_OF_MEMORY: "the memory did not suffice"}
     reason = f"{what.get(stop, 'the time was over')} before the body was condensed to its contact nodes"
     return RootSet(

@@ -17,10 +17,10 @@ LARGEST_TURN = 10.0
 
 
 def far_notes(roots: Sequence[Any]) -> list[str]:
-    """What to say of roots whose contact nodes move farther than the contact is wide, or turn by several degrees.
+    """Notes on roots whose contact nodes move farther than the contact is wide, or turn by several degrees.
 
-    It is said of bodies of a material in a mesh, whose lengths mean something. A turn is the rotation that all contact
-    nodes have in common, of pairs that of one side relative to the other.
+    Only bodies of a material in a mesh have notes, for their lengths mean something. A turn is the rotation that all
+    contact nodes have in common; for pairs it is that of one side relative to the other.
     """
     problem = roots[0].problem if roots else None
     if problem is None or problem.coordinates is None or problem.mesh is None or problem.mesh.lame is None:

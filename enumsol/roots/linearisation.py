@@ -66,7 +66,7 @@ class SelectionTangent(Sealed):
         w: Floats,
         floats: FloatSelections | None = None,
     ) -> SelectionTangent:
-        """That of a problem at an alpha."""
+        """Tangent of a selection of a problem at an alpha."""
         F0, F1 = problem.affine_friction
         return cls(condensation_of(problem), (F0 + float(alpha) * F1, F1), codes, force, w, floats)
 
@@ -188,7 +188,7 @@ def slip_names(sign: int | None) -> frozenset[ContactStatus]:
 def named_statuses(
     active: ActiveSets, slip_sign: Callable[[int], int | None]
 ) -> tuple[tuple[ContactStatus, ...], tuple[frozenset[ContactStatus], ...]]:
-    """Of every node the first status that holds, and all; ``slip_sign`` gives the sign of u_t without friction."""
+    """First status that holds at every node, and all of them; ``slip_sign`` gives the sign of u_t without friction."""
     names = tuple(
         frozenset(
             name

@@ -203,7 +203,7 @@ def coherent_orientation(
 
 
 def _without_friction(codes: Set[int]) -> Set[int]:
-    """What holds at a node where F = 0."""
+    """Codes that hold at a node where F = 0."""
     return frozenset(OPEN if code == OPEN else FRICTIONLESS for code in codes)
 
 

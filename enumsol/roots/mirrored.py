@@ -89,7 +89,7 @@ class MirrorImages(Sealed):
         return tuple(k for k, image in enumerate(self.images) if image is None and k not in self.ambiguous)
 
     def words(self, k: int) -> str:
-        """What is said of a root."""
+        """Text about a root."""
         image = self.images[k]
         if image is None:
             return "mirror image not told apart" if k in self.ambiguous else "no mirror image"
@@ -115,7 +115,7 @@ class MirrorImages(Sealed):
 
 
 def problem_asymmetry(problem: Any, alpha: Alpha, mirror: Mirror, tolerance: float) -> Asymmetry:
-    """How far the condensed problem is from its mirror image.
+    """Distance of the condensed problem from its mirror image.
 
     Raises
     ------
@@ -215,7 +215,7 @@ def _scale(roots: Sequence[Root], forces: int) -> Floats:
 
 
 def _alike(root: Root, image: Sequence[frozenset[ContactStatus]], other: Root) -> bool:
-    """Whether statuses and index of a root may be those of the mirror image of another."""
+    """True if statuses and index of a root may be those of the mirror image of another."""
     indices = {root.index, other.index} - {None}
     return len(indices) < 2 and all(a & b for a, b in zip(image, other.active, strict=True))
 

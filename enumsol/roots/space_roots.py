@@ -140,7 +140,7 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
 
     @cached_property
     def _condensed(self) -> Condensation:
-        """What roots compute their displacements with."""
+        """Condensation with which roots compute their displacements."""
         found: Condensation = condensation_of(self.problem)
         return found
 
@@ -267,7 +267,7 @@ def _names(codes: Codes) -> tuple[ContactStatus | str | None, ...]:
 
 
 def _common(leaves: Sequence[tuple[ContactStatus | str | None, ...]]) -> tuple[ContactStatus | str | None, ...]:
-    """What is known of every node in all leaves."""
+    """Status of every node in all leaves; "contact" or None where they differ."""
     nodes = [set(names) for names in zip(*leaves, strict=True)]
     return tuple(node.pop() if len(node) == 1 else None if ContactStatus.OPEN in node else "contact" for node in nodes)
 
@@ -291,7 +291,7 @@ def _around(middle: float, radius: float) -> Floats:
 
 
 def solvers_in_space(problem: ContactProblem3D, alpha: Alpha, arithmetic: str) -> SpaceSolvers:
-    """Those of a body that is held, or that nothing holds."""
+    """Solvers for a body that is held, or that nothing holds."""
     if problem.modes is None:
         return SpaceSolvers(problem, alpha, arithmetic)
     from enumsol.search.space.space_floating import FloatingSpaceSolvers  # for such bodies only

@@ -157,7 +157,7 @@ class BoxSearch:
 
 
 def _longer(data: DataBox) -> bool:
-    """Whether the data change more with alpha than with the second parameter."""
+    """True if the data change more with alpha than with the second parameter."""
     size = float(np.linalg.norm(data.g.value.mid)) + np.finfo(float).tiny
     along, across = (
         float(np.linalg.norm(g.mid)) / size + float(np.max(np.abs(F.mid), initial=0.0))

@@ -79,7 +79,7 @@ class FloatingSolvers(HeldByNothing, Solvers):
         return None if self._enclosed[0] is None else Exclusions(self._enclosed[0], self._rests_on_reach)
 
     def _rests_on_reach(self, codes: Codes) -> bool:
-        """Whether a complete selection without a solution may have one beyond the bound."""
+        """True if a complete selection without a solution may have one beyond the bound."""
         return self.exact is None or self.exact.rests_on_reach(codes, None)
 
     @cached_property
@@ -235,7 +235,7 @@ class FloatingCertifier(VerifiedCertifier):
         self._exclusions, self._exactly = exclusions, exact
 
     def excluded(self, codes: Codes, relaxation: Bound) -> bool:
-        """Whether the relaxation's multipliers are proven to exclude the partial assignment."""
+        """True if the relaxation's multipliers are proven to exclude the partial assignment."""
         found = None if self._exclusions is None else self._exclusions.record(codes, relaxation, within=self.bounded)
         if found is None:
             self._escalations.refined += 1
@@ -287,7 +287,7 @@ class FloatingExactCertifier(ExactCertifier):
         self._exclusions = exclusions
 
     def excluded(self, codes: Codes, relaxation: Bound) -> bool:
-        """Whether the multipliers prove that the partial assignment holds no solution."""
+        """True if the multipliers prove that the partial assignment holds no solution."""
         found = None if self._exclusions is None else self._exclusions.record(codes, relaxation, within=self.bounded)
         self.bounded |= found is not None and found[1]
         return found is not None

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from enumsol.selections.solution import SelectionSolution
 
 
-#: What helps where nothing holds a body and its searches do not come to an end.
+#: Advice if nothing holds a body and its searches do not come to an end.
 HOLD = "hold the body by a spring or a fixed point, or give a smaller max_rigid_displacement"
 
 
@@ -63,7 +63,7 @@ class SearchLimits:
 
     @property
     def over(self) -> bool:
-        """Whether the deadline has passed."""
+        """True if the deadline has passed."""
         return self.deadline is not None and time.perf_counter() > self.deadline
 
     def remaining(self) -> float | None:
@@ -126,7 +126,7 @@ class StopReason(enum.Enum):
 
     @classmethod
     def of(cls, ending: type[BaseException]) -> StopReason:
-        """That of an error that ends a call anywhere, by Ctrl-C or a lack of memory."""
+        """Reason for the stop where an error ends a call anywhere, by Ctrl-C or a lack of memory."""
         return cls.OUT_OF_MEMORY if issubclass(ending, MemoryError) else cls.INTERRUPTED
 
 
@@ -155,17 +155,17 @@ class Stop:
 
     @property
     def interrupted(self) -> bool:
-        """Whether it ended anywhere, by Ctrl-C or a lack of memory: the rest of the search is unaccounted for."""
+        """True if it ended anywhere, by Ctrl-C or a lack of memory: the rest of the search is unaccounted for."""
         return self.reason in (StopReason.INTERRUPTED, StopReason.OUT_OF_MEMORY)
 
     @property
     def limited(self) -> bool:
-        """Whether a limit of nodes or time ended it."""
+        """True if a limit of nodes or time ended it."""
         return self.reason in (StopReason.NODE_LIMIT, StopReason.TIME_LIMIT)
 
     @property
     def remedy(self) -> str:
-        """What lets a search get to what this one left."""
+        """Advice on how a search gets to what this one left."""
         return {
             StopReason.NODE_LIMIT: f"raise the limit of {self.unit}s",
             StopReason.ENOUGH_ROOTS: "search without stop_after",

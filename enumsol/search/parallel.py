@@ -41,7 +41,7 @@ class Searchable(Protocol):
 
     @property
     def has_solution(self) -> bool:
-        """Whether there is a solution for certain, once something can be proven."""
+        """True if there is a solution for certain, once something can be proven."""
 
     @property
     def undecidable(self) -> str | None:
@@ -65,7 +65,7 @@ class Searchable(Protocol):
         """The same without anything that searches leave behind and others would depend on."""
 
     def unloaded(self) -> bool:
-        """Whether g = 0, so that only lambda = 0 solves."""
+        """True if g = 0, so that only lambda = 0 solves."""
 
     def reader(self) -> Reader:
         """Understands the records of an earlier proof."""

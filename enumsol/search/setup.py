@@ -113,7 +113,7 @@ class HeldByNothing:
         super().__init__(problem, alpha, arithmetic, *options)  # type: ignore[call-arg]
 
     def _suggested(self) -> list[Codes]:
-        """Those of the body on springs that become weaker and weaker, those on the weakest first."""
+        """Selections of the body on springs that become weaker and weaker, those on the weakest first."""
         suggested, near = list[Any](), None
         for stiffness in _SPRINGS:
             found = self._solved(self._on_springs(stiffness), near)

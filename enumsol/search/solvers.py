@@ -227,7 +227,7 @@ class Solvers(SearchSetup):
         return self
 
     def unloaded(self) -> bool:
-        """Whether g = 0, so that only lambda = 0 solves: in the data (verified, exact) or as computed (fast)."""
+        """True if g = 0, so that only lambda = 0 solves: in the data (verified, exact) or as computed (fast)."""
         if self.arithmetic == "fast":
             return not np.any(self.scaled.g)
         if self.arithmetic == "exact":

@@ -25,10 +25,10 @@ class Splitting(Protocol):
         """Codes that together cover the node's partial status, in the order in which they are examined."""
 
     def covers(self, node: int, code: int, children: Sequence[int]) -> bool:
-        """Whether codes, in any order, cover a partial status of a node."""
+        """True if codes, in any order, cover a partial status of a node."""
 
     def holds(self, code: int, final: int) -> bool:
-        """Whether a status allows a final one."""
+        """True if a status allows a final one."""
 
     def towards(self, codes: Codes, node: int, final: int) -> list[int]:
         """Codes that cover the node's status, which allows a final one."""
@@ -128,11 +128,11 @@ class PlaneSplitting:
         self._parts = [self._touching_or_not(i) for i in range(len(F))]
 
     def covers(self, node: int, code: int, children: Sequence[int]) -> bool:
-        """Whether codes, in any order, cover a partial status of a node."""
+        """True if codes, in any order, cover a partial status of a node."""
         return is_covering(code, children, friction=self.friction[node])
 
     def holds(self, code: int, final: int) -> bool:
-        """Whether a status allows a final one."""
+        """True if a status allows a final one."""
         return refines(final, code) or final in SLIDING.get(code, ())
 
     def towards(self, codes: Codes, node: int, final: int) -> list[int]:

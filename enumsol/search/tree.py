@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 #: Progress is reported and limits on time are looked at after this many nodes.
 _REPORT_EVERY = 64
-#: Contact nodes from which a root is sought before the tree, and otherwise where the tree is stopped, for so long [s].
+#: Number of contact nodes from which a root is sought before the tree; seconds to seek one when the tree is stopped.
 _MANY, _LATE = 24, 1.0
 
 
@@ -59,7 +59,7 @@ class TreeNode:
     forced: tuple[int, ...] | None = None
 
     def sent(self) -> TreeNode:
-        """The same as it is sent to a worker, where it begins without its parent."""
+        """Node as it is sent to a worker, where it begins without its parent."""
         return replace(self, parent=None, last=False)
 
 
@@ -131,7 +131,7 @@ class TreeSearch:
         self.forms = forms
         self._known_root = known_root
         self.outcome = SearchOutcome()
-        #: What helps where limits are reached, besides higher ones.
+        #: Advice if limits are reached, besides raising them.
         self.otherwise = ""
         self._fallback: InteriorPointEngine | None = None
         self.splitting: Splitting = splitting or PlaneSplitting(system.F)
@@ -169,7 +169,7 @@ class TreeSearch:
         return self.outcome
 
     def _one(self, item: TreeNode) -> bool:
-        """Whether one certificate proves that the problem has one solution."""
+        """True if one certificate proves that the problem has one solution."""
         if self.closer is None or self.limits.max_nodes == 0:
             return False
         try:
@@ -202,7 +202,7 @@ class TreeSearch:
         return stack
 
     def _pays(self, forms: Forms | SpaceForms) -> bool:
-        """Whether a form is found that is better than the energy, before the time is over."""
+        """True if a form is found that is better than the energy, before the time is over."""
         try:
             with within(self.limits):
                 return forms.pay(self.engine, self.first().codes, self._rows)
@@ -285,7 +285,7 @@ class TreeSearch:
 
     @staticmethod
     def _time_to(until: Callable[[], bool]) -> bool:
-        """Whether it is time to stop, as far as there is time to find out."""
+        """True if it is time to stop, as far as there is time to find out."""
         try:
             return until()
         except TimeOverError:
@@ -297,7 +297,7 @@ class TreeSearch:
         self.outcome.count_unexamined()
 
     def skip(self, codes: Codes) -> None:
-        """Leave a subtree undecided, because the search was stopped; but for the root in it that is known."""
+        """Leave a subtree undecided, except for the known root in it, because the search was stopped."""
         stopped, root = self.outcome.stopped, None
         if stopped is None or stopped.reason is not StopReason.ENOUGH_ROOTS:
             root = self.known(Deadline.after(time.perf_counter(), _LATE))
@@ -372,7 +372,7 @@ class TreeSearch:
         return waiting
 
     def excluded(self, item: TreeNode, bound: Bound) -> bool:
-        """Whether the subtree is proven to hold no solution."""
+        """True if the subtree is proven to hold no solution."""
         if not self.certifier.excluded(item.codes, bound):
             return False
         self.outcome.pruned += 1
@@ -380,7 +380,7 @@ class TreeSearch:
         return True
 
     def closed(self, item: TreeNode, relaxation: Relaxation | None, *, again: bool = False) -> bool:
-        """Whether the subtree is closed by its only possible solution; ``again``: it was, in an earlier search."""
+        """True if the subtree is closed by its only possible solution; ``again``: it was, in an earlier search."""
         if self.closer is None:
             return False
         found = (self.closer.again if again else self.closer.closed)(item.codes, relaxation)
@@ -390,7 +390,7 @@ class TreeSearch:
         return True
 
     def alone(self, item: TreeNode, proposal: LoneProposal, bound: Bound) -> bool:
-        """Whether the subtree is closed by a root that is proven to be the only one."""
+        """True if the subtree is closed by a root that is proven to be the only one."""
         found = None if self.closer is None else self.closer.alone(item.codes, proposal, bound)
         if found is None:
             return False
@@ -403,7 +403,7 @@ class TreeSearch:
         self.covered += item.weight
 
     def settled(self, item: TreeNode) -> bool:
-        """Whether the certifier decides a complete selection, or leaves it undecided for good."""
+        """True if the certifier decides a complete selection, or leaves it undecided for good."""
         return self._settle(item) < 0
 
     def _settle(self, item: TreeNode) -> int:

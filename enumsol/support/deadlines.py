@@ -95,7 +95,7 @@ def remaining() -> float | None:
 
 
 def over() -> bool:
-    """Whether the time is over."""
+    """True if the time is over."""
     deadline = current()
     return deadline is not None and time.perf_counter() > deadline
 
@@ -107,7 +107,7 @@ def look() -> None:
 
 
 def attended(work: Callable[[], _Result], size: int, name: str, given_up: threading.Event | None = None) -> _Result:
-    """What one long call into compiled code returns; Ctrl-C and the end of the time end the wait for it at once.
+    """Result of one long call into compiled code; Ctrl-C and the end of the time end the wait for it at once.
 
     Nothing can interrupt such a call, so it runs in a thread of its own (it must release the interpreter's lock, as
     factorizations do). Once nobody waits any longer, it runs to its end, and what it returns is dropped.

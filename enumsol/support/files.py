@@ -65,7 +65,7 @@ def writing(place: Path, name: str) -> Iterator[None]:
         ) from error
 
 
-#: What is written to a file, or what writes it there.
+#: Content of a file, or a function that writes it there.
 Content = bytes | str | Callable[[Path], object]
 
 
@@ -98,7 +98,7 @@ def write_file(place: Path, content: Content, name: str) -> None:
 
 
 def _is_written_in_place(place: Path, target: Path) -> bool:
-    """Whether a file cannot be replaced by another one; PermissionError where it may not be written at all."""
+    """True if a file cannot be replaced by another one; PermissionError where it may not be written at all."""
     try:
         status = place.stat()
     except FileNotFoundError:

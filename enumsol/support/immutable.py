@@ -153,7 +153,7 @@ class SealedMatrix(Sealed):
         return cls(again.format, again.data, again.indices, again.indptr, again.shape)
 
     def holds(self, matrix: sp.sparray) -> bool:
-        """Whether a matrix has the same entries."""
+        """True if a matrix has the same entries."""
         return bool(matrix.shape == self.shape and (self.matrix() != matrix).nnz == 0)
 
     def matrix(self) -> Any:

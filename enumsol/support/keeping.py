@@ -12,14 +12,15 @@ from enumsol.support.deadlines import Deadline, within
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    #: What ends a call from outside.
+    #: Types of the errors that end a call from outside.
     Ending = type[Interrupted] | type[OutOfMemoryError]
 
 _Result = TypeVar("_Result")
 
 #: Seconds in which a result is put together once somebody waits for it: what takes longer is left out.
 _MOMENT = 1.0
-#: How often that begins again if Ctrl-C comes meanwhile: somebody may press it twice, and `timeout` sends it twice.
+#: Number of times that this begins again if Ctrl-C comes meanwhile: somebody may press it twice, and `timeout` sends it
+#: twice.
 _TIMES = 8
 
 

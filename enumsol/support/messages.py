@@ -33,7 +33,7 @@ def counted(number: int, singular: str, plural: str | None = None) -> str:
 
 
 def found_of(found: str, least: int) -> str:
-    """What an incomplete search found beside the number that is proven to exist: "2 roots found, at least 3 exist"."""
+    """Text on what an incomplete search found and on the number proven to exist: "2 roots found, at least 3 exist"."""
     bound = f", at least {least} {'exists' if least == 1 else 'exist'}" if least else ""  # zero is no bound
     return f"{found} found{bound}"
 

@@ -70,7 +70,7 @@ class Crew:
 
     @property
     def room(self) -> int:
-        """How many more tasks should be handed out: enough to keep all workers busy."""
+        """Number of further tasks that should be handed out: enough to keep all workers busy."""
         workers = getattr(self._executor, "_max_workers", None)
         most = _AHEAD * workers if isinstance(workers, int) else _MANY
         return most - len(self._out) - len(self._here)
@@ -113,7 +113,7 @@ class Crew:
         self._here.clear()
 
     def _finished(self, job: Job, future: Future[Any], pool: int) -> bool:
-        """Whether there is a result; otherwise the task is handed out again."""
+        """True if there is a result; otherwise the task is handed out again."""
         try:
             job.result = _result_of(future)
         except _Lost as loss:
@@ -155,7 +155,7 @@ class Crew:
         self._told = True
 
     def _renewed(self) -> bool:
-        """Whether there are new workers in the place of a broken pool."""
+        """True if there are new workers in the place of a broken pool."""
         renew = getattr(self._executor, "renew", None)
         self._renewals += 1
         if renew is None or self._renewals > _RENEWALS:

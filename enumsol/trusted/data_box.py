@@ -38,7 +38,7 @@ class Expansion:
 
     @property
     def ball(self) -> Ball:
-        """One that holds all of them."""
+        """Ball that holds all of them."""
         return Ball(self.value.mid, (self.value.rad + self.along.size + self.across.size + self.rest) * SAFE + TINY)
 
     def __getitem__(self, item: Any) -> Expansion:
@@ -202,7 +202,7 @@ def solution_throughout(
 
 
 def only_throughout(box: DataBox, found: Throughout, numbers: PieceNumbers, margin: float = 0.0) -> bool:
-    """Whether a solution that is known for all data of a box is everywhere the only one.
+    """True if a solution that is known for all data of a box is everywhere the only one.
 
     Parameters
     ----------

@@ -103,7 +103,7 @@ class EnclosedPiece:
         return replace(held, ends=ends)
 
     def with_form(self, multipliers: Floats) -> EnclosedPiece:
-        """The same with a form for all alpha of the piece: with F_lo in place of F (theory, section 7.9).
+        """Piece with a form for all of its alpha: with F_lo in place of F (theory, section 7.9).
 
         Parameters
         ----------
@@ -119,7 +119,7 @@ class EnclosedPiece:
         return replace(self, forms=forms)
 
     def row_signs(self, codes: Indices) -> NDArray[np.int8]:
-        """What multipliers may be, (m, p, 9), for (partial) status codes (m, p)."""
+        """Signs that multipliers may have, (m, p, 9), for (partial) status codes (m, p)."""
         code = np.where((codes == UNDECIDED) & (self.high == 0), STILL, codes)
         return np.where((self.low == self.high)[:, None], _CONSTANT[code], _VARYING[code])
 
@@ -132,7 +132,7 @@ def as_computed(problem: ContactProblem) -> CondensedEnclosure:
 
 
 def interval_row_tables() -> NDArray[np.int8]:
-    """What the multipliers may be, shape (2, 10, 9), by status code as in rows.row_table; second: friction varies."""
+    """Signs that multipliers may have, shape (2, 10, 9), by code as in rows.row_table; second: friction varies."""
     return np.stack([_CONSTANT, _VARYING])
 
 
@@ -152,12 +152,12 @@ class PieceNumbers:
 
     @property
     def usable(self) -> bool:
-        """Whether they are numbers, and positive where they must be."""
+        """True if they are numbers, and positive where they must be."""
         finite = all(np.all(np.isfinite(part)) for part in (self.mu, self.kappa, self.nu))
         return bool(finite and np.all(self.mu > 0) and np.all(self.kappa > 0))
 
     def serve(self, largest: Floats) -> bool:
-        """Whether ``|nu| F <= mu`` for all coefficients up to these."""
+        """True if ``|nu| F <= mu`` for all coefficients up to these."""
         return not np.any(np.abs(self.nu) * largest * SAFE + TINY > self.mu)
 
     def form(self, S: Ball, theta: Ball) -> Ball:
@@ -185,7 +185,7 @@ class PieceNumbers:
 
 
 def definite(form: Ball, margin: float) -> bool:
-    """Whether the symmetric parts of all matrices in a ball are positive definite.
+    """True if the symmetric parts of all matrices in a ball are positive definite.
 
     ``margin``: their smallest eigenvalue has to be larger than this, relative to the largest entry of the diagonal.
     """

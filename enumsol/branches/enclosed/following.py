@@ -227,7 +227,7 @@ class Followed:
 
     @property
     def reasons(self) -> list[str]:
-        """What was left open or contradicts completeness."""
+        """Reasons against completeness: what was left open or contradicts it."""
         found = [(place.low, _undecided(place, self.problem), place.cause) for place in self.joined.open]
         ends = [(place.low, place.high) for place in self.joined.open if place.cause is OpenCause.END]
         for alpha in self.joined.unordered:
@@ -242,7 +242,7 @@ class Followed:
 
 
 def _undecided(place: EventPlace, problem: ContactProblem) -> str:
-    """What is not decided at a place, and why not."""
+    """Sentence on what is not decided at a place, and why not."""
     count = len(place.members)
     does = f"{counted(count, 'selection')} {'does' if count == 1 else 'do'}"
     where = f"[{float(place.low):.17g}, {float(place.high):.17g}]"
@@ -260,7 +260,7 @@ def _undecided(place: EventPlace, problem: ContactProblem) -> str:
 
 
 def _remedy(cause: OpenCause, problem: ContactProblem) -> str:
-    """What decides such a place."""
+    """Advice on what decides such a place."""
     if cause is OpenCause.END:
         return END_ELSEWHERE
     if problem.n <= EXACT_DOF_LIMIT:

@@ -196,7 +196,7 @@ class _Tracing:
 
 
 def _decides(box: AlphaBox, rest: list[Interval]) -> bool:
-    """Whether nothing stays open."""
+    """True if nothing stays open."""
     return not rest and all(part.kind is not ArcPartKind.OPEN for part in box.parts)
 
 

@@ -161,7 +161,7 @@ def _work_out(
     limits: Limited,
     ended: StopReason | None,
 ) -> Stop | None:
-    """Where the candidates hold; what lies beyond a bound or the deadline is left out, as if it had not been found."""
+    """Work out where the candidates hold, and leave out those beyond a bound or the deadline as if never found."""
     reason = ended if most == 0 else None
     for codes in (codes for codes in candidates if codes not in known.added):
         if most is not None and len(known.added) >= most:
@@ -316,7 +316,7 @@ def _edges(known: KnownSelections, vertices: list[GluedVertex]) -> list[GluedArc
 
 
 def _all_known(known: KnownSelections, component: RootComponent) -> bool:
-    """Whether all selections that hold on a component were found."""
+    """True if all selections that hold on a component were found."""
     return component.whole and all(solution.codes in known.arcs for solution in component.solutions)
 
 

@@ -155,7 +155,7 @@ class KnownSelections:
 
     @property
     def gaps(self) -> bool:
-        """Whether selections that hold may be missing."""
+        """True if selections that hold may be missing."""
         return self.cut_short or bool(self._refused)
 
     def complain(self, reason: str) -> None:

@@ -105,11 +105,11 @@ class SelectionArcs:
 
     @property
     def empty(self) -> bool:
-        """Whether the selection holds nowhere in the interval."""
+        """True if the selection holds nowhere in the interval."""
         return not any(event.holds for event in self.events)
 
     def beside(self, event: SelectionEvent) -> bool:
-        """Whether the selection holds in a cell beside the event."""
+        """True if the selection holds in a cell beside the event."""
         k = self.events.index(event)
         return any(self.cells[j].holds for j in (k - 1, k) if 0 <= j < len(self.cells))
 

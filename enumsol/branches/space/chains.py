@@ -117,7 +117,7 @@ def chain_through(
 
 
 def skeleton_through(problem: ContactProblem3D, x: Array, span: tuple[float, float]) -> Skeleton | None:
-    """What continuation finds, a little longer than the interval; None if it does not start."""
+    """Skeleton that continuation finds, a little longer than the interval; None if it does not start."""
     p = problem.p
     start = float(x[-1]), x[:p], x[p:-1].reshape(2, p).T
     try:
@@ -170,7 +170,7 @@ class ChainBuilder:
 
     @property
     def begun(self) -> CurveChain | None:
-        """What is proven so far of the chain that is being made, without links at its ends that run into others."""
+        """Part of the chain in the making that is proven so far, without links at its ends that run into others."""
         count = min(len(self._links), len(self._joints) - 1)
         for off in range(min(_TRIMMED, count)):
             for first, last in dict.fromkeys(((0, count - off), (off, count), (off, count - off))):
@@ -234,7 +234,7 @@ class ChainBuilder:
         self._links, self._joints = links, joints
 
     def _turned(self, curve: SolutionCurve) -> SolutionCurve | None:
-        """The same curve the other way."""
+        """Curve in the opposite direction."""
         box = curve.box
         return only_curve(self.problem, replace(box, direction=-box.direction, border=-box.border))
 

@@ -93,7 +93,7 @@ class SpaceCover:
         return [(max(begin, low), min(end, high)) for chain in self.chains for begin, end in chain.gaps]
 
     def unexplained(self, low: Fraction, high: Fraction) -> bool:
-        """Whether a solution was met over a gap through which no curve is known."""
+        """True if a solution was met over a gap through which no curve is known."""
         leaves = (leaf for leaf in self.records if isinstance(leaf, OpenLeaf) and leaf.forces is not None)
         return any(low <= leaf.low and leaf.high <= high for leaf in leaves)
 

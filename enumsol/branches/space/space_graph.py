@@ -131,8 +131,8 @@ class _Construction:
         )
 
     def _elements(self, progress: Callable[[str, float], object] | None, stop: Stop | None) -> _Elements:
-        """Those of all curves that were found; after an interruption while they were cut, of those that are cut."""
-        # what the tree left open is told by its gaps
+        """Vertices and arcs of all curves found; after an interruption while they were cut, of those cut by then."""
+        # the gaps tell what the tree left open
         cover, remedy = self.cover, None
         if stop is not None:
             remedy = MORE_NODES if stop.reason is StopReason.NODE_LIMIT else MORE_TIME
@@ -203,7 +203,7 @@ def _left_open(cover: SpaceCover, made: _Elements) -> tuple[tuple[Fraction, Frac
 
 
 def _gaps(cover: SpaceCover) -> list[str]:
-    """Where solutions may be missing, why, and what may decide it, in words."""
+    """Sentences on where solutions may be missing, why, and what may decide it."""
     found = []
     for low, high in cover.gaps[:_NAMED]:
         ends = sum(low <= begin and end <= high for begin, end in cover.ends)

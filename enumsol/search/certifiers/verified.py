@@ -95,7 +95,7 @@ class VerifiedCertifier(protocol.RecordingCertifier):
         self._known: list[Codes] = []
 
     def excluded(self, codes: Codes, relaxation: protocol.Bound) -> bool:
-        """Whether the relaxation's multipliers are proven to exclude the partial assignment."""
+        """True if the relaxation's multipliers are proven to exclude the partial assignment."""
         rows, values = relaxation.multipliers()
         if relaxation.form is not None:
             return self._excluded_by(relaxation.form, codes, rows, values)
@@ -245,7 +245,7 @@ class VerifiedCertifier(protocol.RecordingCertifier):
         return ball if ball is not None and (ball.is_root or ball.is_excluded) else None
 
     def _is_known(self, ball: ClosedSolution) -> bool:
-        """Whether it is a root that was found in rationals before."""
+        """True if it is a root that was found in rationals before."""
         return any(same_solution(ball.core, ball.possible, codes, _only(codes)) for codes in self._known)
 
     def _closed_by(self, proposal: Proposal, ball: ClosedSolution) -> list[SelectionSolution] | None:

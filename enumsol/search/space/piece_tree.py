@@ -149,7 +149,7 @@ def _is_excluded(relaxation: SpaceRelaxation) -> bool:
 
 
 def _only_turns(alpha: Array, piece: AlphaPiece) -> bool:
-    """Whether a run along a curve, given by alphas, passes some alphas of a piece twice, but none just once."""
+    """True if a run along a curve, given by alphas, passes some alphas of a piece twice, but none just once."""
     low, high = float(piece.low), float(piece.high)
     beyond = alpha > (low + (high - low) * _PASSED)[:, None]
     passed = np.sum(beyond[:, 1:] != beyond[:, :-1], axis=1)
@@ -238,9 +238,9 @@ class PieceTree:
         self._points: OrderedDict[Fraction, AlphaPoint] = OrderedDict()
         self.records: list[Any] = []
         self.nodes, self.covered = 0, 0.0
-        #: Parts of the tree are neither examined nor left open, nor do they wait here.
+        #: True if parts of the tree are neither examined nor left open nor waiting here.
         self.away = False
-        #: The records are those of the whole tree.
+        #: True if the records are those of the whole tree.
         self.settled = False
         #: Why the search ended early, if it did.
         self.stopped: StopReason | None = None
@@ -259,7 +259,7 @@ class PieceTree:
         return Known(self._problem, chains, self._sampled, self._sought, self.more is None)
 
     def _follow(self, x: Array) -> bool:
-        """Whether a new curve through a solution was followed; none is if a known curve seems to pass through it."""
+        """True if a new curve through a solution was followed; none is where a known one seems to pass through it."""
         chain = None if self.more is None or self._is_known(x) else self.more(x)
         if chain is not None:
             self._take(KnownCurve(self._given, chain))
@@ -283,7 +283,7 @@ class PieceTree:
         self._ends_of_curves = [(simplest(low, low + room / 2), simplest(high - room / 2, high)) for low, high in whole]
 
     def _is_known(self, x: Array) -> bool:
-        """Whether a solution seems to lie on a known curve; no claim."""
+        """True if a solution seems to lie on a known curve; no claim."""
         if not self._boxes:
             return False
         return bool(np.any(self._around(self._given.placed(x), np.zeros_like(x), slice(None))))
@@ -394,7 +394,7 @@ class PieceTree:
 
     @staticmethod
     def _is_due(codes: Codes) -> bool:
-        """Whether a leaf is to be tested: where sectors are wide that is of no use."""
+        """True if a leaf is to be tested: where sectors are wide that is of no use."""
         levels = [width_level(code - SECTORS) for code in codes if code > SECTORS]
         final = not {CONTACT, UNDECIDED} & set(codes)
         return final and (not levels or min(levels) >= _TRIED[len(levels) > 2])
@@ -464,7 +464,7 @@ class PieceTree:
         return nodes[k], [SECTORS + child for child in children]
 
     def _is_wide(self, piece: AlphaPiece, codes: Codes) -> bool:
-        """Whether a sector is to be halved rather than the piece: those of short pieces may be narrow."""
+        """True if a sector is to be halved rather than the piece: those of short pieces may be narrow."""
         share = float((piece.high - piece.low) / (self.interval[1] - self.interval[0]))
         level = max(_WIDE, -np.log2(share) - _NARROW)
         return any(code > SECTORS and width_level(code - SECTORS) < min(level, DEEPEST) for code in codes)
@@ -550,7 +550,7 @@ class PieceTree:
         return None
 
     def _sample(self) -> bool:
-        """Whether there are new curves through the solutions at some alphas."""
+        """True if there are new curves through the solutions at some alphas."""
         self._sampled, known = True, len(self.curves)
         low, high = self.interval
         for alpha in (low + share * (high - low) for share in _SAMPLED):
@@ -563,7 +563,7 @@ class PieceTree:
         return piece.high - piece.low > Fraction(share) * (self.interval[1] - self.interval[0])
 
     def _ends_within(self, at: _Examined, statuses: tuple[int, ...]) -> bool:
-        """Whether in one run along the known curves, and in no other, these statuses hold over a part of a piece.
+        """True if in one run along the known curves, and in no other, these statuses hold over a part of a piece.
 
         Not where that run turns back and passes no alpha just once: with two solutions at one no form is definite.
         """
@@ -587,7 +587,7 @@ class PieceTree:
         return self._passages(at, statuses) if self._seek(at) else []
 
     def _seek(self, at: _Examined) -> bool:
-        """Whether there is a new curve through a solution in the middle of a piece."""
+        """True if there is a new curve through a solution in the middle of a piece."""
         self._sought += 1
         forces = self._point(at.piece.middle).solution()
         return forces is not None and self._follow(np.append(forces, float(at.piece.middle)))
@@ -652,12 +652,12 @@ class PieceTree:
         return None
 
     def _runs_through(self, number: int, piece: AlphaPiece) -> bool:
-        """Whether the curve of a box has no end over a piece."""
+        """True if the curve of a box has no end over a piece."""
         return self.curves[self._owner[number]].chain.runs_through(piece.low, piece.high)
 
     @staticmethod
     def _has(piece: AlphaPiece, codes: Codes, found: SpaceRoot | Open | None, root: SpaceRoot, there: Codes) -> bool:
-        """Whether the arc of a leaf has the root of another one, as a checker has it: no wider than is needed.
+        """True if the arc of a leaf has the root of another one, as a checker has it: no wider than is needed.
 
         ``found`` is what the leaf holds.
         """

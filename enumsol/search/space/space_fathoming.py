@@ -295,7 +295,7 @@ class Point:
 
 
 def _allows(code: int, final: int) -> bool:
-    """Whether a node of a (partial) status, which is not a sector, may have a final one."""
+    """True if a node of a (partial) status, which is not a sector, may have a final one."""
     return code in (UNDECIDED, final) or (code == CONTACT and final != OPEN)
 
 

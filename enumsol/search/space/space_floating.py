@@ -126,7 +126,7 @@ class FloatingSpaceCertifier(SpaceCertifier):
         self._exclusions = exclusions
 
     def excluded(self, codes: Codes, relaxation: Bound) -> bool:
-        """Whether the relaxation's multipliers, or balance alone, are proven to exclude the partial assignment."""
+        """True if the relaxation's multipliers, or balance alone, are proven to exclude the partial assignment."""
         if self._exclusions is None or not relaxation.bound > PRUNE_MARGIN:
             return False
         numbers, values = relaxation.multipliers()

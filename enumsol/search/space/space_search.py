@@ -87,11 +87,11 @@ class SpaceSplitting:
         return sorted(children, key=lambda code: -_towards(code, towards) if code > SECTORS else -10.0)
 
     def covers(self, node: int, code: int, children: Sequence[int]) -> bool:
-        """Whether codes, in any order, cover a partial status of a node."""
+        """True if codes, in any order, cover a partial status of a node."""
         return is_sector_covering(code, children, self._engine.tangents[node])
 
     def holds(self, code: int, final: int) -> bool:
-        """Whether a status allows a final one."""
+        """True if a status allows a final one."""
         return code == UNDECIDED or refines((final,), (code,))
 
     def towards(self, codes: Codes, node: int, final: int) -> list[int]:
@@ -202,7 +202,7 @@ class SpaceCertifier(RecordingCertifier):
         self._ellipsoid: Ellipsoid | None = None
 
     def excluded(self, codes: Codes, relaxation: Bound) -> bool:
-        """Whether the relaxation's multipliers are proven to exclude the partial assignment."""
+        """True if the relaxation's multipliers are proven to exclude the partial assignment."""
         if not relaxation.bound > PRUNE_MARGIN:
             return False
         if isinstance(relaxation.form, Ellipsoid):
@@ -255,7 +255,7 @@ class SpaceCertifier(RecordingCertifier):
         return found
 
     def _missed(self, codes: Codes, ellipsoid: Ellipsoid) -> bool:
-        """Whether an ellipsoid leaves no solution of an assignment; if so, that is written."""
+        """True if an ellipsoid leaves no solution of an assignment, which is then written."""
         if not refines(codes, ellipsoid.codes) or not ellipsoid.misses(codes):
             return False
         self._declare(ellipsoid)
@@ -352,6 +352,6 @@ class SpaceCertifier(RecordingCertifier):
         return [found]
 
     def _ball(self, found: SpaceRoot | LooseSolution, wider: float = WIDEN) -> EnclosureRecord:
-        """Where a root is, in the problem's units."""
+        """Ball of a root, in the problem's units."""
         unit = self.enclosed.unit
         return EnclosureRecord(found.y.mid * unit, wider * found.y.rad * unit, found.index)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from enumsol.search.resume import Reader
     from enumsol.support.array_types import Alpha, Codes, Floats
 
-#: Level of the sectors in which a root is sought that floats suggest: they are three degrees wide.
+#: Level of the sectors in which a root that floats suggest is sought: they are three degrees wide.
 _WIDE = 7
 
 
@@ -58,7 +58,7 @@ class SpaceSolvers(SearchSetup):
 
     @property
     def relaxed(self) -> SpaceSystem:
-        """What the relaxations are about."""
+        """System that the relaxations are about."""
         return self.system
 
     @cached_property
@@ -96,7 +96,7 @@ class SpaceSolvers(SearchSetup):
     def _solved(self, system: SpaceSystem, near: Floats | None) -> tuple[list[Codes], Floats] | None:
         with np.errstate(all="ignore"):
             found = solved(system, near)
-        # directions of a body on springs are somewhat other ones
+        # a body on springs has slightly different directions
         return None if found is None else ([found[0].leaf(_WIDE), found[0].codes], found[1])
 
     def _splitting(self, certifier: Certifier) -> SpaceSplitting:
@@ -106,7 +106,7 @@ class SpaceSolvers(SearchSetup):
         return SpaceCloser(self.system, cast("SpaceClosing", certifier), regular=self.arithmetic == "fast")
 
     def _forms(self) -> SpaceForms | None:
-        """What a long search may bound with in place of the energy."""
+        """Forms with which a long search may bound in place of the energy."""
         return SpaceForms(self.enclosed)
 
     def remake(self) -> Callable[[], SpaceSolvers]:
@@ -114,13 +114,13 @@ class SpaceSolvers(SearchSetup):
         return partial(type(self), self.problem, self.alpha, self.arithmetic)
 
     def fresh(self) -> SpaceSolvers:
-        """The same with an engine of its own: which rows it has already changes what it finds."""
+        """Solvers with an engine of their own: which rows it has already changes what it finds."""
         other = copy.copy(self)
         other.__dict__.pop("_engine", None)
         return other
 
     def unloaded(self) -> bool:
-        """Whether g = 0 for the data as given, so that only lambda = 0 solves."""
+        """True if g = 0 for the data as given, so that only lambda = 0 solves."""
         return self.problem.is_unloaded(self.alpha)
 
     def reader(self) -> Reader:

@@ -395,7 +395,7 @@ class PreciseExpansion:
         return [] if found is None or not self.low < found < self.high else [found]
 
     def flat(self, condition: int) -> bool:
-        """Whether a condition cannot be distinguished from zero."""
+        """True if a condition cannot be distinguished from zero."""
         return self._small[condition] if condition < len(self._small) else False
 
     def zero_bounds(self, condition: int, slope: int, low: Number, high: Number) -> tuple[Fraction, Fraction]:

@@ -104,7 +104,7 @@ def box_around(system: EnclosedSpace, y: Floats) -> Box | None:
 
 
 def is_inside(y: Ball, w: Ball, box: Box, errors: float = 1.0) -> bool:
-    """Whether all solutions with such forces and displacements lie in a box (``errors``: see ``solution_in_box``)."""
+    """True if all solutions with such forces and displacements lie in a box (``errors``: see ``solution_in_box``)."""
     with np.errstate(all="ignore"):
         away = (y - Ball.exact(box.centre)) - Ball.exact(box.rho) * (w - box.w)
         share = 1.0 - (errors - 1.0) * MARGIN

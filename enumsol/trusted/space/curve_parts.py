@@ -244,7 +244,7 @@ class LinkParts:
         return self.place(point)
 
     def is_between(self, start: Place, place: Place, end: Place) -> bool:
-        """Whether a place is behind another one and before a third one."""
+        """True if a place is behind another one and before a third one."""
         t = [parameter_in(self.curve.box, one.point.at(0.0)) for one in (start, place, end)]
         steps = [two - one for one, two in pairwise(t)]
         return all(step.mid > step.rad * SAFE for step in steps)
@@ -258,7 +258,7 @@ class LinkParts:
 
     @staticmethod
     def has(curve: SolutionCurve, start: Place, end: Place) -> bool:
-        """Whether two places lie in the box of a curve."""
+        """True if two places lie in the box of a curve."""
         return all(lies_in(curve.box, place.point.at(0.0)) for place in (start, end))
 
     # -- parts -----------------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""Where a regular root in 3D leaves the contact nodes, by its leaf (theory, section 13.2)."""
+"""Places where a regular root in 3D leaves the contact nodes, by its leaf (theory, section 13.2)."""
 
 from __future__ import annotations
 

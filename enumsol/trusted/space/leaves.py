@@ -184,13 +184,13 @@ class Open:
     span: tuple[float, float] = (-1.0, 1.0)
 
     def tells_more(self, other: Open) -> bool:
-        """Whether this leaves less of a piece open than ``other``, or has bounds where that has none; no claim."""
+        """True if this leaves less of a piece open than ``other``, or has bounds where that has none; no claim."""
         shorter = self.span[1] - self.span[0] < other.span[1] - other.span[0]
         return self.y is not None and (other.y is None or shorter)
 
 
 def settle(system: EnclosedSpace, codes: Sequence[int]) -> SpaceRoot | Open | None:
-    """What a leaf holds: exactly one root in its box, no root (None), or it is not settled."""
+    """Contents of a leaf: exactly one root in its box, no root (None), or it is not settled."""
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         leaf = Leaf(system, codes)
         found = leaf.settle()
@@ -542,7 +542,7 @@ class Leaf:
         return low, after[1] if after is not None else -before[0] if before is not None else 0.0
 
     def _is_swept(self, angle: Floats, radius: Floats, state: State | None) -> bool:
-        """Whether dG/dpsi changes more along the piece than over the angles."""
+        """True if dG/dpsi changes more along the piece than over the angles."""
         if not np.all(np.isfinite(radius)):
             # whether a free unknown would be bounded in the middle of the piece
             cut = self._cut_free(angle, radius, still=True)
@@ -813,7 +813,7 @@ class Leaf:
         return np.array([product.mid for product in products]), np.array([product.rad for product in products])
 
     def _broken(self, y: Ball, w: Ball, angle: Floats, radius: Floats) -> bool:
-        """Whether some condition is broken at every zero of G in the box."""
+        """True if some condition is broken at every zero of G in the box."""
         mid, rad = self._conditions(y, w)
         forward, uncertain = self._forward(w, angle, radius)
         return bool(np.any(mid < -rad) or np.any(forward < -uncertain))

@@ -629,7 +629,7 @@ class Step:
         return np.asarray((out + upper_product(self.G.rad, self.xi(radius, shares, h, moved))) * SAFE)
 
     def contracts(self, radius: Floats, shares: Floats, errors: float, h: float = 0.0, moved: float = 1.0) -> bool:
-        """Whether the step maps all G s + b with |b| <= radius and |s| <= shares to such with less of both."""
+        """True if the step maps all G s + b with |b| <= radius and |s| <= shares to such with less of both."""
         more = SAFE * (1.0 + (errors - 1.0) * MARGIN)
         xi, left = self.xi(radius, shares, h, moved), self.left(radius, shares, h, moved)
         return bool(np.all(xi * more < shares) and np.all(left * SAFE * more < radius))

@@ -362,7 +362,7 @@ class SolutionCurve:
         return Ball(point.mid, (point.rad + self.spread) * SAFE)
 
     def holds(self, x: Ball, share: float = 1.0) -> bool:
-        """Whether all points of a ball lie in the set in which the curve has the only solution for every t.
+        """True if all points of a ball lie in the set in which the curve has the only solution for every t.
 
         It is larger than the box where nodes change their status: the curve bends there by more than the radius.
         ``share`` is of the size of that set; what a ball leaves of the box is bounded by every number of the ball once.
@@ -420,7 +420,7 @@ class SolutionCurve:
 
     @property
     def index(self) -> int:
-        """Of its roots; 0 where it is not known, or changes."""
+        """Index of its roots; 0 where it is not known, or changes."""
         return self.sign * self.rises
 
     @property
@@ -437,7 +437,7 @@ def parameter_in(box: CurveBox, x: Ball) -> Ball:
 
 
 def lies_in(box: CurveBox, x: Ball) -> bool:
-    """Whether all points of a ball lie in a box."""
+    """True if all points of a ball lie in a box."""
     t = parameter_in(box, x)
     beside = (x - Ball.exact(box.centre)) - t * Ball.exact(box.direction)
     return bool(t.size <= box.half and np.all(beside.size <= box.radius))

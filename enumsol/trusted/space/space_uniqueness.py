@@ -183,7 +183,7 @@ def equations(system: EnclosedSpace, codes: Sequence[int], weight: float) -> Bal
 
 
 def is_complete(system: EnclosedSpace, codes: Sequence[int]) -> bool:
-    """Whether every node has a final code that it can have."""
+    """True if every node has a final code that it can have."""
     tangents = np.sum(system.tau >= 0, axis=1).tolist()
     return len(codes) == len(tangents) and all(map(_is_final, codes, tangents))
 
@@ -338,7 +338,7 @@ class _Form:
         return change
 
     def _gap_serves(self, i: int, w: Ball) -> bool:
-        """Whether theta of a node without load serves for all w in a ball, by its gap (theory, (12.6))."""
+        """True if theta of a node without load serves for all w in a ball, by its gap (theory, (12.6))."""
         numbers, places = self.numbers, self.system.tau[i]
         t, theta = places[places >= 0], numbers.theta[i][places >= 0]
         gap = -float(w.mid[i] + w.rad[i]) / SAFE
@@ -366,7 +366,7 @@ class _Form:
     # -- uniqueness ------------------------------------------------------------------------------------------------
 
     def serves(self, y: Ball, w: Ball, errors: float) -> bool:
-        """Whether any solution within these balls is the only one, given that all lie there or that it exists."""
+        """True if any solution within these balls is the only one, given that all lie there or that it exists."""
         numbers, system = self.numbers, self.system
         off = np.array([self._off(i, y, w) for i in range(len(system.tau))])
         lost = numbers.kappa * off * slip_sizes(system)
