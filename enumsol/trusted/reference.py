@@ -1,0 +1,151 @@
+"""The trusted test that a strict root is the only one below assignments of a body that nothing holds (theory, 14.11)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+
+from enumsol.arithmetic.balls import SAFE, Ball
+from enumsol.trusted.at_alpha import VerifiedSelection, solve_selection
+from enumsol.trusted.root_forms import Body, Multipliers, RootForm, less, plus, times
+from enumsol.trusted.selection import PENETRATION, SLIP_BACKWARD, SLIP_FORWARD, Unknowns
+from enumsol.trusted.status_rows import FREE, NONNEGATIVE, OPEN, final_codes, refines, row_signs
+from enumsol.trusted.uniqueness_weights import Components, Weights
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from enumsol.condensation.floating import FloatingSystem
+    from enumsol.support.array_types import Codes, Floats
+    from enumsol.trusted.root_forms import Product
+
+#: Rows on displacements, and their signs in w.
+_SIGNS = {PENETRATION: -1.0, SLIP_FORWARD: 1.0, SLIP_BACKWARD: -1.0}
+_OPPOSITE = {SLIP_FORWARD: SLIP_BACKWARD, SLIP_BACKWARD: SLIP_FORWARD}
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A strict root of a selection, and its form.
+
+    Attributes
+    ----------
+    system : FloatingSystem
+    selection : final codes
+    root : VerifiedSelection
+    at : Unknowns
+        Which components d has: lambda_n of all nodes, lambda_t of those with friction.
+    form : RootForm
+    """
+
+    system: FloatingSystem
+    selection: Codes
+    root: VerifiedSelection
+    at: Unknowns
+    form: RootForm
+
+    @classmethod
+    def of(cls, system: FloatingSystem, selection: Codes, weights: Floats, balance: float, share: float) -> Self | None:
+        """None where the selection holds no strict root, or its form is not proven definite where G d = 0.
+
+        Parameters
+        ----------
+        system : FloatingSystem
+        selection : final codes
+        weights : mu of all nodes, then kappa, nu and theta / F of those with friction
+        balance : factor of |G d|^2
+        share : c of theory, (14.12)
+        """
+        friction = system.F > 0
+        if any(code not in final_codes(bool(F)) for code, F in zip(selection, friction, strict=True)):
+            return None
+        if not (0 <= balance < np.inf and abs(share) < np.inf):
+            return None
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            root = solve_selection(system, selection)
+            if root is None or not root.is_root:
+                return None
+            at = Unknowns(system.p, np.arange(system.p), friction, np.zeros(system.p, dtype=np.intp))
+            body = Body(Ball(system.S, system.S_rad)[np.ix_(at.places, at.places)], system.rows.G[:, at.places])
+            part = Components(system, tuple(selection), at, body.S)
+            numbers = Weights.of(part, np.concatenate([weights, np.zeros(len(at.normal))]))
+            if numbers is None:
+                return None
+            numbers = numbers.beside(root.force[at.places], at.tangential[at.normal])
+            multipliers = _multipliers(part, numbers, root, _cross(body.G, numbers, at, share))
+            form = RootForm.of(body, multipliers, balance) if np.all(np.isfinite(multipliers.lost)) else None
+            return None if form is None else cls(system, tuple(selection), root, at, form)
+
+    def lies_below(self, codes: Sequence[int]) -> bool:
+        """Whether the root has the statuses of an assignment."""
+        return all(refines(own, code) for own, code in zip(self.selection, codes, strict=True))
+
+    def is_only_root(
+        self, codes: Sequence[int], rows: Sequence[int], products: Sequence[Product], reach: Floats
+    ) -> bool:
+        """Whether every root below an assignment, with |q| within reach, is this one.
+
+        Parameters
+        ----------
+        codes : status codes
+        rows : rows on displacements that are equations below the assignment and at the root
+        products : pairs of rows that are nonnegative below the assignment and not positive at the root, and a factor
+        reach : (r,) array, bounds of q, may be infinite
+        """
+        tight = sorted({row for one, other, _ in products for row in (one, other)})
+        if not self._allow(codes, rows, tight) or not all(0 < factor < np.inf for *_, factor in products):
+            return False
+        numbered = [(tight.index(one), tight.index(other), factor) for one, other, factor in products]
+        return self.form.is_only_root(self._rows(rows), self._rows(tight), numbered, reach)
+
+    def _allow(self, codes: Sequence[int], rows: Sequence[int], tight: Sequence[int]) -> bool:
+        """Whether the first rows are equations, and the others nonnegative but not positive at the root."""
+        p, F = self.system.p, self.system.F
+        signs, own = (row_signs(np.array(given), F) for given in (codes, self.selection))
+        for row in (*rows, *tight):
+            kind, node = divmod(row, p)
+            if kind not in _SIGNS or (kind != PENETRATION and not F[node] > 0):
+                return False
+        for kind, node in (divmod(row, p) for row in rows):
+            if not signs[node, kind] == own[node, kind] == FREE:
+                return False
+        for kind, node in (divmod(row, p) for row in tight):
+            opposed = kind in _OPPOSITE and own[node, _OPPOSITE[kind]] == NONNEGATIVE
+            if signs[node, kind] < NONNEGATIVE or not (own[node, kind] == FREE or opposed):
+                return False
+        return True
+
+    def _rows(self, rows: Sequence[int]) -> Ball:
+        """Rows as coefficients of w."""
+        found = np.zeros((len(rows), len(self.at.places)))
+        for k, row in enumerate(rows):
+            kind, node = divmod(row, self.system.p)
+            found[k, node if kind == PENETRATION else self.at.tangential[node]] = _SIGNS[kind]
+        return Ball.exact(found)
+
+
+def _multipliers(part: Components, numbers: Weights, root: VerifiedSelection, cross: Ball) -> Multipliers:
+    at, p = part.at, part.system.p
+    x, w = root.force[at.places], root.w[at.places]
+    lost, cost = np.zeros(len(at.places)), np.zeros(len(at.places))
+    for k, n in enumerate(at.normal):
+        t = at.tangential[n]
+        lost[t] = numbers.kappa[k] * numbers.off(k, x[n], x[t], w[n], w[t]) * SAFE
+    nu = np.zeros(p)
+    nu[at.normal] = numbers.nu
+    price = Ball.exact(numbers.mu) * root.force[:p] + Ball.exact(nu) * root.force[p : 2 * p]
+    loaded = np.array(part.selection) != OPEN
+    cost[:p] = np.where(loaded, np.maximum(price.low / SAFE, 0.0), 0.0)
+    return Multipliers(part.form(numbers), cross, lost, cost)
+
+
+def _cross(G: Ball, numbers: Weights, at: Unknowns, share: float) -> Ball:
+    """C = -G (D - c), without radius where nothing is left of it."""
+    n, t, m = at.normal, at.tangential[at.normal], len(at.nodes)
+    C = Ball.exact(np.zeros(G.shape))
+    C[:, :m] = times(G[:, :m], less(share, numbers.mu))
+    C[:, n] = plus(C[:, n], times(times(G[:, t], numbers.slope), Ball.exact(numbers.kappa)))
+    C[:, t] = plus(times(G[:, n], Ball.exact(-numbers.nu)), times(G[:, t], less(share, numbers.kappa)))
+    return C
