@@ -56,7 +56,7 @@ class Reference:
         selection : final codes
         weights : mu of all nodes, then kappa, nu and theta / F of those with friction
         balance : factor of |G d|^2
-        share : c of theory, (14.12)
+        share : c of theory, (14.14)
         """
         friction = system.F > 0
         if any(code not in final_codes(bool(F)) for code, F in zip(selection, friction, strict=True)):

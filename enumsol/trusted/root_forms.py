@@ -127,7 +127,7 @@ class RootForm:
             return bounded and self._costs(equations, max(lacking, 0.0) + self.tilt, reach)
 
     def small_matrix(self, equations: Ball, tight: Ball, products: Sequence[Product]) -> Ball:
-        """The matrix M of theory, (14.14), in e and the changes of the tight rows."""
+        """The matrix M of theory, (14.15), in e and the changes of the tight rows."""
         r, k = len(self.idle), len(equations.mid)
         rows = Ball.joined(equations, tight)
         least = np.zeros((r + len(tight.mid),) * 2)
@@ -148,7 +148,7 @@ class RootForm:
         return M.symmetric
 
     def _costs(self, equations: Ball, lacking: float, reach: Floats) -> bool:
-        """Whether gaps of loaded nodes cost more than the form lacks (theory, (14.15))."""
+        """Whether gaps of loaded nodes cost more than the form lacks (theory, (14.17))."""
         loaded = np.flatnonzero(self.cost > 0)
         rows = Ball.joined(Ball.exact(np.diag(self.cost)[loaded]), equations)
         moved = rows @ self.body.G.T
@@ -191,7 +191,7 @@ def _used(rows: Ball) -> Mask:
 
 
 def _table(W: Ball, P: Ball, least: float) -> Ball | None:
-    """W P^-1 W' where P is at least so large (theory, (14.13))."""
+    """W P^-1 W' where P is at least so large (theory, (14.16))."""
     try:
         N = Ball.exact(W.mid @ np.linalg.inv(P.mid))
     except np.linalg.LinAlgError:
