@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,8 @@ from enumsol.trusted.at_alpha import holds_no_root, solve_selection
 from enumsol.trusted.confinement import without_bound
 from enumsol.trusted.exclusion import Leaves, exclusion_margins
 from enumsol.trusted.floating_bounds import is_unbalanced
+from enumsol.trusted.reference import Reference
+from enumsol.trusted.status_rows import UNDECIDED
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -66,6 +68,10 @@ class FloatingChecker(WithinReach, Checker):
 
     kinds = records.FLOATING_LEAVES
 
+    #: What was declared of roots, and their forms; None where these are not proven definite.
+    _declared: list[records.DeclaredReference] = field(default_factory=list)
+    _references: dict[int, Reference | None] = field(default_factory=dict)
+
     @cached_property
     def system(self) -> FloatingSystem:
         """Balls for S, g, F, G and h in the proof's units."""
@@ -87,10 +93,41 @@ class FloatingChecker(WithinReach, Checker):
         return FloatingRationalSystem(self.problem, self.alpha)
 
     def _limits(self, codes: Codes, kind: type[Record]) -> records.Limits:
-        return records.Limits(codes, self.friction, modes=self.problem.modes.r)
+        return records.Limits(codes, self.friction, self._declared, modes=self.problem.modes.r)
+
+    def _declare(self, record: list[Any]) -> None:
+        limits = records.Limits((UNDECIDED,) * self.problem.p, (self.system.F > 0).tolist())
+        try:
+            self._declared.append(records.DeclaredReference.read(record, limits))
+        except ValueError as error:
+            raise RefusedError(str(error)) from None
 
     def _tests(self) -> dict[type[Record], Test]:
-        return super()._tests() | {records.Unbalanced: self._unbalanced}
+        return super()._tests() | {
+            records.Unbalanced: self._unbalanced,
+            records.OnlyReference: self._only_reference,
+        }
+
+    def _reference(self, place: int) -> Reference | None:
+        if place not in self._references:
+            said = self._declared[place]
+            numbers = said.weights, said.balance, said.share
+            self._references[place] = Reference.of(self.system, said.selection, *numbers)
+        return self._references[place]
+
+    def _only_reference(self, codes: Codes, said: records.OnlyReference) -> str | None:
+        reference = self._reference(len(self._declared) - said.back)
+        if reference is None:
+            return "the form of its root is not proven definite"
+        if not reference.is_only_root(codes, said.rows, said.products, self.free.reach):
+            self.bounded = True
+            if not reference.is_only_root(codes, said.rows, said.products, self.system.reach):
+                return "its root is not proven to be the only one"
+        if not reference.lies_below(codes):
+            return None if said.enclosure is None else "its root does not lie below its assignment"
+        if said.enclosure is None:
+            return "it has no enclosure of the root that lies below its assignment"
+        return self._regular(reference.selection, reference.root, said.enclosure)
 
     def _check_exclusions(self, numbers: Indices, leaves: Leaves) -> None:
         free = exclusion_margins(self.free, leaves) > 0

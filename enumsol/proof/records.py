@@ -47,7 +47,7 @@ class Limits:
 
     codes: Codes
     friction: Sequence[bool] = ()
-    declared: Sequence[DeclaredForm] = ()
+    declared: Sequence[Any] = ()
     components: int = 0
     modes: int = 0
     boxes: int = 0
@@ -452,6 +452,73 @@ class Alone(Record):
         return self.selection, self.weights, self.strengths, *self.terms
 
 
+@dataclass(frozen=True, eq=False)
+class DeclaredReference(Record):
+    """A root of a body that nothing holds and the numbers of its form, to which leaves refer.
+
+    Attributes
+    ----------
+    selection : final codes
+    weights, balance, share : as ``trusted.reference.Reference.of`` takes them
+    """
+
+    kind, sizes, unfit = DeclaredForm.kind, (5,), "a form has {} entries; expected {}"
+
+    selection: Codes
+    weights: Floats
+    balance: float
+    share: float
+
+    @classmethod
+    def of(cls, entries: list[Any], limits: Limits) -> DeclaredReference:
+        """Codes and numbers, if they fit each other."""
+        selection = _selection(entries[0], limits.friction)
+        weights = numbers_from(entries[1], limits.p + 3 * sum(limits.friction))
+        return cls(selection, weights, *numbers_from(entries[2:], 2).tolist())
+
+
+@dataclass(frozen=True, eq=False)
+class OnlyReference(Record):
+    """No root but that of a form lies below the assignment; with an enclosure, this one does.
+
+    Attributes
+    ----------
+    back : int
+        So many forms were declared since, and this one.
+    rows : list of int
+        Rows on displacements that are equations.
+    products : list of (row, row, factor)
+    enclosure : EnclosureRecord or None
+    """
+
+    kind, sizes = Alone.kind, (4, 7)
+
+    back: int
+    rows: list[int]
+    products: list[tuple[int, int, float]]
+    enclosure: EnclosureRecord | None = None
+
+    @classmethod
+    def of(cls, entries: list[Any], limits: Limits) -> OnlyReference:
+        """Numbers that fit the problem."""
+        back, rows, products = entries[:3]
+        if type(back) is not int or not 0 < back <= len(limits.declared):
+            raise RecordError("its form is not declared")
+        if not all(isinstance(value, list) for value in (rows, products)):
+            raise RecordError("its rows are not a list")
+        factors = [float(numbers_from(product, 3)[2]) for product in products]
+        pairs = [product[:2] for product in products]
+        if any(type(row) is not int or not 0 <= row < ROW_KINDS * limits.p for row in sum(pairs, rows)):
+            raise RecordError("its rows are not numbers of rows")
+        said = [(one, other, factor) for (one, other), factor in zip(pairs, factors, strict=True)]
+        return cls(back, rows, said, EnclosureRecord(*entries[3:]) if entries[3:] else None)
+
+    def entries(self) -> Iterable[Any]:
+        """Without an enclosure where there is none."""
+        found = self.back, self.rows, [list(product) for product in self.products]
+        return (*found, *(self.enclosure or ()))
+
+
 #: All kinds of leaves in 2D.
 LEAVES = table_of(
     *(Excluded, ExcludedInRationals, ExcludedByForm, NoRoot, NoRootInRationals, RegularRoot, RootSetRecord),
@@ -459,7 +526,7 @@ LEAVES = table_of(
 )
 #: The same of a body that nothing holds; others rest on a stiffness that is positive definite.
 FLOATING_LEAVES = table_of(
-    *(Excluded, Unbalanced, NoRoot, NoRootInRationals, RegularRoot, RootSetRecord, UndecidedRecord)
+    *(Excluded, Unbalanced, NoRoot, NoRootInRationals, RegularRoot, RootSetRecord, OnlyReference, UndecidedRecord)
 )
 
 

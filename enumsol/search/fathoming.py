@@ -176,6 +176,9 @@ class Closer:
             found = self._alone(codes, self._regular, self.relaxed(codes), descent=True)
         return found
 
+    def led(self, codes: Codes) -> None:
+        """No node of the tree is decided, or split, before its relaxation is solved."""
+
     def begins_again(self, nodes: int) -> bool:
         """Whether so much has become known after some nodes that a search had better begin again."""
         if nodes >= _TALL and self._system.p >= _FEW:

@@ -19,6 +19,7 @@ from enumsol.proof import records
 from enumsol.search.certifiers.protocol import Bound, Certifier, UndecidedPart
 from enumsol.search.certifiers.rational_certifier import ExactCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier, proven
+from enumsol.search.reference_closer import ReferenceCloser, reference_numbers
 from enumsol.search.resume import PlaneReader, Reader, RecordedBound
 from enumsol.search.setup import HeldByNothing
 from enumsol.search.solvers import Solvers
@@ -27,6 +28,7 @@ from enumsol.trusted.at_alpha import holds_no_root, solve_selection
 from enumsol.trusted.confinement import motion_against, without_bound
 from enumsol.trusted.exclusion import Terms, exclusion_margin
 from enumsol.trusted.floating_bounds import is_unbalanced
+from enumsol.trusted.reference import Reference
 from enumsol.trusted.status_rows import CONDITIONS
 
 if TYPE_CHECKING:
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
 
     from enumsol.proof.writer import Recorder
     from enumsol.search.certifiers.protocol import Margin
+    from enumsol.search.reference_closer import OnlyRoot
     from enumsol.selections.rational_selections import ExactSelections
     from enumsol.selections.solution import SelectionSolution
     from enumsol.support.array_types import Codes, Floats
@@ -114,6 +117,9 @@ class FloatingSolvers(HeldByNothing, Solvers):
     def _splitting(self, certifier: Certifier) -> PlaneSplitting:
         return PlaneSplitting(self.scaled.F)
 
+    def _closer(self, certifier: Certifier) -> ReferenceCloser | None:
+        return ReferenceCloser(certifier, lambda: self.known_root) if hasattr(certifier, "only_root") else None
+
     def reader(self) -> FloatingReader:
         """Understands the records of an earlier proof."""
         held = PlaneReader((self.scaled.F > 0).tolist(), self.enclosed)
@@ -138,8 +144,7 @@ class FloatingReader:
         self._held, self._modes = held, modes
 
     def declare(self, record: list[Any]) -> None:
-        """Refuse a form: it is that of a body that is held."""
-        raise ValueError("there are no forms")
+        """Pass over the form of a root: it is made again."""
 
     def bound(self, codes: Codes, record: list[Any]) -> Bound:
         """What is said to exclude a partial assignment; ValueError where the record makes no sense."""
@@ -182,6 +187,9 @@ class Exclusions:
     def __init__(self, enclosed: FloatingSystem, rests_on_reach: Callable[[Codes], bool]) -> None:
         self.rests_on_reach = rests_on_reach
         self.system, self.free = enclosed, without_bound(enclosed)
+        self._references: dict[Codes, Reference | None] = {}
+        #: How the forms of roots are declared, by their selections.
+        self.declared: dict[Codes, records.DeclaredReference] = {}
         self._margins: tuple[Margin, Margin] = (
             partial(exclusion_margin, self.free, errors=2.0),
             partial(exclusion_margin, enclosed, errors=2.0),
@@ -204,6 +212,25 @@ class Exclusions:
         if kept is None or not (within or (all(code in CONDITIONS for code in codes) and self.rests_on_reach(codes))):
             return None
         return records.Excluded(Terms(rows, kept)), True
+
+    def reference(self, selection: Codes) -> Reference | None:
+        """The form of a root, if one is proven definite."""
+        if selection not in self._references:
+            self._references[selection] = None
+            for numbers in reference_numbers(self.system, selection):
+                found = Reference.of(self.system, selection, *numbers)
+                if found is not None:
+                    self.declared[selection] = records.DeclaredReference(selection, *numbers)
+                    self._references[selection] = found
+                    break
+        return self._references[selection]
+
+    def only_root(self, codes: Codes, reference: Reference, proposal: OnlyRoot, *, within: bool) -> bool | None:
+        """Whether the bound is needed for no other root to lie below an assignment; None if that is not proven."""
+        for system in (self.free, self.system)[: 2 if within else 1]:
+            if reference.is_only_root(codes, proposal.rows, proposal.products, system.reach):
+                return system is self.system
+        return None
 
     def unbalanced(self, codes: Codes) -> records.Unbalanced | None:
         """A record that no forces below a partial assignment are in balance with the load; or None."""
@@ -233,6 +260,8 @@ class FloatingCertifier(VerifiedCertifier):
     ) -> None:
         super().__init__(scaled, None, exact, recorder, node_ids)
         self._exclusions, self._exactly = exclusions, exact
+        #: Selections of roots whose forms were declared, in the order of their declarations.
+        self._declared: list[Codes] = []
 
     def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """True if the relaxation's multipliers are proven to exclude the partial assignment."""
@@ -242,6 +271,35 @@ class FloatingCertifier(VerifiedCertifier):
             return False
         self._excluded_by_record(found[0], bounded=found[1])
         return True
+
+    def reference(self, selection: Codes) -> Reference | None:
+        """The form of a root, if one is proven definite."""
+        return None if self._exclusions is None else self._exclusions.reference(selection)
+
+    def only_root(self, codes: Codes, reference: Reference, proposal: OnlyRoot) -> list[SelectionSolution] | None:
+        """The roots below an assignment, that of a form or none; None if that is not proven."""
+        exclusions = self._exclusions
+        within = self.bounded or self._exactly() is None
+        needs = None if exclusions is None else exclusions.only_root(codes, reference, proposal, within=within)
+        if needs is None or exclusions is None:
+            return None
+        self.bounded |= needs
+        self._escalations.balls += 1
+        selection = reference.selection
+        if selection not in self._declared:
+            self._declared.append(selection)
+            self.recorder.write(exclusions.declared[selection].write())
+        back = len(self._declared) - self._declared.index(selection)
+        leaf = partial(records.OnlyReference, back, proposal.rows, proposal.products)
+        if reference.lies_below(codes):
+            return [self._regular(selection, reference.root, leaf)]
+        self._leaf(leaf())
+        return []
+
+    def forget(self) -> None:
+        """Forget what was proven."""
+        super().forget()
+        self._declared.clear()
 
     def _excluded_by_record(self, record: records.Exclusion | records.NoRoot, *, bounded: bool) -> None:
         self.bounded |= bounded

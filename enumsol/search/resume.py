@@ -214,6 +214,8 @@ class Replay:
                 return search.alone(item, *self._reader.lone(item.codes, record))
             except ValueError:
                 return False
+        if issubclass(kind, records.OnlyReference):
+            return search.closed(item, None, again=True)
         if issubclass(kind, records.ClosingRecord):
             return search.closed(item, search.relaxed(item.codes), again=True)
         partial = any(code in (CONTACT, UNDECIDED, *SLIDING) for code in item.codes)

@@ -345,6 +345,12 @@ class TreeSearch:
         outcome = self.outcome
         outcome.nodes += 1
         codes = item.codes
+        led = None if self.closer is None else self.closer.led(codes)
+        if isinstance(led, list):
+            self._close(item, led)
+            return []
+        if led is not None:
+            return self._split(item, None, *led)
         relaxation: Relaxation | None
         relaxation = solved = self.relax(item)
         if solved.stalled:
@@ -364,6 +370,18 @@ class TreeSearch:
             return []
         children = self.splitting.children(codes, node, relaxation)
         outcome.presolved += forced is not None
+        return self._split(item, usable, node, children, forced)
+
+    def _split(
+        self,
+        item: TreeNode,
+        usable: Relaxation | None,
+        node: int,
+        children: list[int],
+        forced: tuple[int, ...] | None = None,
+    ) -> list[TreeNode]:
+        """The children of a node of the tree, the one that is examined first last."""
+        codes = item.codes
         self.certifier.branching(node, children)
         weight, before, after = item.weight / len(children), codes[:node], codes[node + 1 :]
         waiting = list[TreeNode]()

@@ -98,7 +98,7 @@ class Reference:
         if not self._allow(codes, rows, tight) or not all(0 < factor < np.inf for *_, factor in products):
             return False
         numbered = [(tight.index(one), tight.index(other), factor) for one, other, factor in products]
-        return self.form.is_only_root(self._rows(rows), self._rows(tight), numbered, reach)
+        return self.form.is_only_root(self.rows(rows), self.rows(tight), numbered, reach)
 
     def _allow(self, codes: Sequence[int], rows: Sequence[int], tight: Sequence[int]) -> bool:
         """Whether the first rows are equations, and the others nonnegative but not positive at the root."""
@@ -117,8 +117,8 @@ class Reference:
                 return False
         return True
 
-    def _rows(self, rows: Sequence[int]) -> Ball:
-        """Rows as coefficients of w."""
+    def rows(self, rows: Sequence[int]) -> Ball:
+        """Rows as coefficients of the components of w that d has."""
         found = np.zeros((len(rows), len(self.at.places)))
         for k, row in enumerate(rows):
             kind, node = divmod(row, self.system.p)

@@ -171,6 +171,9 @@ class SpaceCloser:
     def met(self, answer: object) -> None:
         """Nothing follows from what a leaf holds."""
 
+    def led(self, codes: Codes) -> None:
+        """No node of the tree is decided, or split, before its relaxation is solved."""
+
     def begins_again(self, nodes: int) -> bool:
         """A search in 3D does not begin again."""
         del nodes

@@ -1,0 +1,290 @@
+"""What a known root of a body that nothing holds makes of the tree (theory, section 14.11); nothing here is trusted.
+
+Where a certificate leaves no other root below an assignment, the tree ends there. And where certificates for single
+nodes that stick, and for pairs of nodes that slip in opposite directions, prove next to everything, the tree is led to
+such assignments first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+
+from enumsol.model.statuses import BACKWARD, FORWARD, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.trusted.at_alpha import solve_selection
+from enumsol.trusted.selection import PENETRATION
+from enumsol.trusted.selection import SLIP_BACKWARD as BACK
+from enumsol.trusted.selection import SLIP_FORWARD as FORTH
+from enumsol.trusted.status_rows import FREE, row_signs
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    from enumsol.condensation.floating import FloatingSystem
+    from enumsol.relaxation.engine import Relaxation
+    from enumsol.selections.solution import SelectionSolution
+    from enumsol.support.array_types import Codes, Floats
+    from enumsol.trusted.reference import Reference
+    from enumsol.trusted.root_forms import Product
+
+#: Factors of products that are tried, relative to the compliance.
+_FACTORS = np.geomspace(2.0**-8, 2.0**8, 17)
+#: Share of the certificates for single nodes and pairs from which the tree is led by them; so many are tried.
+_WORTH, _SAMPLE = 0.75, 24
+#: Of a row of G, what counts as none of it.
+_NOTHING = 1e-9
+
+
+@dataclass(frozen=True)
+class OnlyRoot:
+    """Why no other root lies below an assignment: rows that are equations, and products of rows."""
+
+    rows: list[int]
+    products: list[Product]
+
+
+class Referring(Protocol):
+    """A certifier that can say that a known root is the only one below an assignment."""
+
+    def reference(self, selection: Codes) -> Reference | None:
+        """The form of a root, if one is proven definite."""
+
+    def only_root(self, codes: Codes, reference: Reference, proposal: OnlyRoot) -> list[SelectionSolution] | None:
+        """The roots below an assignment, this one or none; None if that is not proven."""
+
+
+class ReferenceCloser:
+    """Ends the tree where only a known root is left, and leads it there.
+
+    Parameters
+    ----------
+    certifier : Referring
+    root : callable giving the selection of a strict root, or None
+
+    Attributes
+    ----------
+    known : tuple of selections of strict roots
+    """
+
+    #: As of other closers.
+    sliding: dict[int, int] = {}
+    relaxed: Callable[[Codes], Relaxation | None]
+
+    def __init__(self, certifier: Any, root: Callable[[], Codes | None]) -> None:
+        self._certifier: Referring = certifier
+        self._root = root
+        self.known: tuple[Codes, ...] | None = None
+        self._wait = self._pause = 0
+
+    @cached_property
+    def _references(self) -> list[tuple[Reference, Cover]]:
+        if self.known is None:
+            root = self._root()
+            self.known = () if root is None else (root,)
+        found = [self._certifier.reference(selection) for selection in self.known]
+        return [(reference, Cover(reference)) for reference in found if reference is not None]
+
+    def whole(self) -> list[SelectionSolution] | None:
+        """All solutions of the problem, if one certificate proves that there is one only."""
+        return next((self._only((UNDECIDED,) * reference.system.p, reference) for reference, _ in self._references), None)
+
+    def led(self, codes: Codes) -> tuple[int, list[int]] | list[SelectionSolution] | None:
+        """The roots below an assignment that certificates decide, or the node to split next and how; None if neither."""
+        for reference, cover in self._references:
+            if not cover.pays:
+                continue
+            found = self._only(codes, reference) if cover.is_due(codes) else None
+            if found is not None:
+                return found
+            split = cover.split(codes)
+            if split is not None:
+                return split
+        return None
+
+    def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
+        """The solutions of a subtree that can be closed, None where it has to be searched."""
+        del relaxation
+        for reference, cover in self._references:
+            if cover.pays and cover.is_due(codes):
+                continue
+            if self._wait > 0:
+                self._wait -= 1
+                continue
+            found = self._only(codes, reference)
+            self._pause = 0 if found is not None else 2 * self._pause + 1
+            self._wait = self._pause
+            if found is not None:
+                return found
+        return None
+
+    def again(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
+        """The solutions of a subtree that was closed in an earlier search."""
+        del relaxation
+        found = (self._only(codes, reference) for reference, _ in self._references)
+        return next((solutions for solutions in found if solutions is not None), None)
+
+    def _only(self, codes: Codes, reference: Reference) -> list[SelectionSolution] | None:
+        return self._certifier.only_root(codes, reference, proposed(reference, codes))
+
+    def begins_again(self, nodes: int) -> bool:
+        """Nothing that is met makes a search begin again."""
+        del nodes
+        return False
+
+    def met(self, answer: object) -> None:
+        """Nothing is made of complete selections."""
+
+    def alone(self, *_: object) -> None:
+        """Roots of bodies that are held are closed in this way."""
+
+
+#: mu of all nodes where kappa is one, and factors of |G d|^2, that are tried.
+_NUMBERS = tuple((mu, balance) for balance in (16.0, 1024.0) for mu in (1.0, 3.0, 10.0))
+#: Of the gap of an open node, what at first may serve for its slip.
+_SHARED = 0.5
+
+
+def reference_numbers(system: FloatingSystem, selection: Codes) -> Iterator[tuple[Floats, float, float]]:
+    """What the form of a root may be made of: weights, balance and share (see ``trusted.reference``)."""
+    root = solve_selection(system, selection)
+    if root is None or not root.is_root:
+        return
+    F, p, code = system.F, system.p, np.array(selection)
+    force, (w_n, w_t) = root.force.mid.reshape(2, -1), root.w.mid.reshape(2, -1)
+    own = F > 0
+    with np.errstate(divide="ignore", invalid="ignore"):
+        stuck = np.clip(force[1] / (F * force[0]), -1.0, 1.0)
+        needed = np.where(w_t != 0, -w_n / np.abs(F * w_t), 1.0)
+    for mu, balance in _NUMBERS:
+        apart = np.sign(w_t) * np.maximum(0.0, 1.0 - _SHARED * mu * needed)
+        choices = [code == SLIP_PLUS, code == SLIP_MINUS, code == STICK]
+        share = np.select(choices, [np.ones(p), -np.ones(p), stuck], apart)[own]
+        yield np.concatenate([np.full(p, mu), np.ones(len(share)), np.zeros(len(share)), share]), balance, mu
+
+
+def proposed(reference: Reference, codes: Codes) -> OnlyRoot:
+    """All equations of an assignment, and if need be a product of opposite slips with the factor that is best."""
+    rows, forward, backward = rows_of(reference, codes)
+    if not forward or not backward:
+        return OnlyRoot(rows, [])
+    pairs = [(one, other) for one in {forward[0], forward[-1]} for other in {backward[0], backward[-1]}]
+    found = [_factor(reference, rows, one, other) for one, other in pairs]
+    k = int(np.argmax([least for least, _ in found]))
+    return OnlyRoot(rows, [(*pairs[k], found[k][1])] if found[k][0] > 0 else [])
+
+
+def rows_of(reference: Reference, codes: Codes) -> tuple[list[int], list[int], list[int]]:
+    """Rows on displacements that are equations, and tight ones of nodes that slip forward, and backward."""
+    p, F = reference.system.p, reference.system.F
+    signs, own = (row_signs(np.array(given), F) for given in (codes, reference.selection))
+    equal = (signs == FREE) & (own == FREE)
+    rows = [int(kind * p + node) for kind in (PENETRATION, FORTH) for node in np.flatnonzero(equal[:, kind])]
+    tight = list[list[int]]()
+    for kind, other in ((FORTH, BACK), (BACK, FORTH)):
+        fits = (signs[:, kind] > 0) & ((own[:, kind] == FREE) | (own[:, other] > 0)) & (F > 0) & ~equal[:, kind]
+        tight.append([int(kind * p + node) for node in np.flatnonzero(fits)])
+    return rows, tight[0], tight[1]
+
+
+def _factor(reference: Reference, rows: list[int], one: int, other: int) -> tuple[float, float]:
+    """The least eigenvalue of the small matrix with a product of two tight rows, and the factor for which it is best."""
+    M = reference.form.small_matrix(reference.rows(rows), reference.rows([one, other]), []).mid
+    product = np.zeros_like(M)
+    product[-1, -2] = product[-2, -1] = 0.5
+    least = np.linalg.eigvalsh(M - _FACTORS[:, None, None] * product)[:, 0]
+    k = int(np.argmax(least))
+    return float(least[k]), float(_FACTORS[k])
+
+
+class Cover:
+    """Leads the tree to nodes that stick, and to pairs that slip in opposite directions.
+
+    Any other root has a node that sticks, or slips backward, unless all nodes are open or slip forward.
+
+    Parameters
+    ----------
+    reference : Reference
+    """
+
+    def __init__(self, reference: Reference) -> None:
+        self._reference, selection = reference, np.array(reference.selection)
+        forward = np.count_nonzero(selection == SLIP_PLUS) >= np.count_nonzero(selection == SLIP_MINUS)
+        #: Codes of slip with and against the direction in which most nodes slip; with these, open as well.
+        self._with, self._against = (SLIP_PLUS, SLIP_MINUS) if forward else (SLIP_MINUS, SLIP_PLUS)
+        self._along, self._back = (FORWARD, BACKWARD) if forward else (BACKWARD, FORWARD)
+        self._first = np.flatnonzero(np.isin(selection, (STICK, self._against))).tolist()
+        self._second = np.flatnonzero(np.isin(selection, (STICK, self._with))).tolist()
+        G, at = reference.system.rows.G.mid, reference.at
+        self._normal = G[:, : reference.system.p].T
+        self._tangential = np.where(at.tangential[:, None] >= 0, G[:, reference.system.p :].T, 0.0)
+
+    @cached_property
+    def pays(self) -> bool:
+        """Whether single nodes that stick, and pairs that slip in opposite directions, mostly leave no other root."""
+        p, stick = self._reference.system.p, [i for i in self._first if self._reference.selection[i] == STICK]
+        if not stick:
+            return False
+        tried = [{i: STICK} for i in _some(stick)]
+        tried += [{stick[0]: self._with, i: self._against} for i in _some(self._second) if i != stick[0]]
+        found = [self._closes(tuple(codes.get(i, UNDECIDED) for i in range(p))) for codes in tried]
+        return sum(found) >= _WORTH * len(found)
+
+    def _closes(self, codes: Codes) -> bool:
+        proposal, reach = proposed(self._reference, codes), self._reference.system.reach
+        return self._reference.is_only_root(codes, proposal.rows, proposal.products, reach)
+
+    def is_due(self, codes: Codes) -> bool:
+        """Whether an assignment may be one that leaves the root alone."""
+        rows, forward, backward = rows_of(self._reference, codes)
+        return bool(forward and backward) or any(row >= FORTH * len(codes) for row in rows)
+
+    def split(self, codes: Codes) -> tuple[int, list[int]] | None:
+        """The node to split next, and how; None where nothing is gained by it."""
+        rows, *tight = rows_of(self._reference, codes)
+        moved = tight[0 if self._with == SLIP_PLUS else 1]
+        modes = self._left(rows)
+        if not moved:
+            for i in self._first:
+                if codes[i] == UNDECIDED and np.any(self._moves(i, modes)):
+                    return i, [STICK, self._with, self._back]
+            return None
+        j = moved[0] % len(codes)
+        for i in self._second:
+            if i == j or not self._opposes(i, j, modes):
+                continue
+            if codes[i] == UNDECIDED:
+                return i, [STICK, self._against, self._along]
+            if codes[i] == self._back:
+                return i, [self._against, OPEN]
+        return None
+
+    def _left(self, rows: list[int]) -> Floats:
+        """Rigid modes along which no equation changes, as columns."""
+        G, p = self._reference.system.rows.G.mid, self._reference.system.p
+        fixed = np.array([self._normal[row % p] if row // p == PENETRATION else self._tangential[row % p] for row in rows])
+        if not len(fixed):
+            return np.eye(len(G))
+        _, sizes, V = np.linalg.svd(fixed)
+        return np.asarray(V[int(np.count_nonzero(sizes > _NOTHING)) :].T)
+
+    def _moves(self, i: int, modes: Floats) -> Any:
+        return np.abs(np.array([self._normal[i], self._tangential[i]]) @ modes) > _NOTHING
+
+    def _opposes(self, i: int, j: int, modes: Floats) -> bool:
+        """Whether two nodes in contact move in the same direction along what is left."""
+        if not modes.shape[1]:
+            return False
+        normal = self._normal[i] @ modes
+        size = float(normal @ normal)
+        along = [self._tangential[k] @ modes for k in (i, j)]
+        if size > _NOTHING**2:
+            along = [a - normal * float(a @ normal) / size for a in along]
+        return float(along[0] @ along[1]) > _NOTHING
+
+
+def _some(nodes: Sequence[int]) -> list[int]:
+    """Not too many of them."""
+    return [nodes[k] for k in np.unique(np.linspace(0, len(nodes) - 1, min(len(nodes), _SAMPLE)).astype(int))]
