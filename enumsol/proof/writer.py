@@ -101,18 +101,31 @@ class Recorder(Protocol):
 
 
 class KeptRecords:
-    """Keeps records: of a search that may begin again, or of a task whose records are sent as one part."""
+    """Keeps records: of a search that may begin again, or of a task whose records are sent as one part.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    packed : bool
+        There may be many: they are compressed as they come.
+    """
+
+    def __init__(self, *, packed: bool = False) -> None:
         self._records: list[Any] = []
+        self._packed, self._loose = packed, 0
 
     def write(self, record: Any) -> None:
         """Keep a record."""
         self._records.append(record)
+        self._loose += 1
+        if self._packed and self._loose == FLUSH_EVERY:
+            loose = self._records[-FLUSH_EVERY:]
+            del self._records[-FLUSH_EVERY:]
+            self.add(Part.of([encoded(record) for record in loose]))
 
     def add(self, part: Part) -> None:
         """Keep records that were encoded elsewhere."""
         self._records.append(part)
+        self._loose = 0
 
     def release(self, recorder: Recorder) -> None:
         """Hand the records on."""

@@ -345,15 +345,22 @@ class _Enumeration(Enumeration[Solvers]):
 
     def _joined(self) -> list[tuple[list[RootComponent], SelectionSolver]]:
         """Components of what was found, before the time is over; then of what belongs to no others in any case."""
+        outcome = self.outcome
         try:
-            return self._components()
+            if not outcome.late:
+                return self._components()
         except TimeOverError:
-            outcome, self.late = self.outcome, True
-            stop = outcome.stopped = outcome.stopped or Stop(StopReason.TIME_LIMIT)
-            left = [_not_joined(s.codes, stop) for s in outcome.solutions if not _alone(s)]
-            alone = list(filter(_alone, outcome.solutions))
-            outcome.undecided, outcome.solutions = [*outcome.undecided, *left], alone
-            return self._components()
+            outcome.late = True
+        stop = outcome.stopped = outcome.stopped or Stop(StopReason.TIME_LIMIT)
+        left = [_not_joined(s.codes, stop) for s in outcome.solutions if not _alone(s)]
+        alone = list(filter(_alone, outcome.solutions))
+        outcome.undecided, outcome.solutions = [*outcome.undecided, *left], alone
+        return self._components()
+
+    def _continua(self) -> list[Codes]:
+        """Complete selections that hold on the families of which solutions were found."""
+        families = (c for components, _ in self._components() for c in components if c.dimension > 0)
+        return [solution.codes for family in families for solution in family.solutions]
 
     def _components(self) -> list[tuple[list[RootComponent], SelectionSolver]]:
         """Components of the root set with the solver whose points they hold."""

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from enumsol.proof.proof_file import Proof
     from enumsol.roots.root import Root, RootFamily
     from enumsol.search.tree import TreeSearch
-    from enumsol.support.array_types import Alpha
+    from enumsol.support.array_types import Alpha, Codes
     from enumsol.support.keeping import Ending
 
 _Solvers = TypeVar("_Solvers", bound=Searchable)
@@ -67,8 +67,6 @@ class Enumeration(ABC, Generic[_Solvers]):
         self.solvers, self.progress, self.method = solvers, progress, method
         self.problem, self.alpha, self.arithmetic = solvers.problem, solvers.alpha, solvers.arithmetic
         self.started = time.perf_counter() if started is None else started
-        #: The time was over before it was known which roots the solutions form.
-        self.late = False
         self.outcome = SearchOutcome()
         self.unloaded = False
         self.tree: TreeSearch | None = None
@@ -116,6 +114,7 @@ class Enumeration(ABC, Generic[_Solvers]):
         earlier = () if self._begun is None or self.writer is None else (self._begun, self.writer.replace)
         self.outcome = search.outcome
         search.otherwise = "" if self.problem.modes is None else HOLD
+        search.continua = self._continua
         if solvers.unloaded():
             self.certifier.unloaded()
             self.unloaded = True
@@ -144,6 +143,10 @@ class Enumeration(ABC, Generic[_Solvers]):
     @abstractmethod
     def _enough(self, stop_after: int) -> Callable[[list[Any]], bool]:
         """Whether solutions of leaves are so many roots and families."""
+
+    def _continua(self) -> list[Codes]:
+        """Complete selections that hold on the families of which solutions were found; in 3D there are none."""
+        return []
 
     @abstractmethod
     def _result(self) -> RootSet:
@@ -190,7 +193,7 @@ class Enumeration(ABC, Generic[_Solvers]):
         if self.writer is None:
             return None
         outcome = self.outcome
-        whole = not self.late and (outcome.stopped is None or not outcome.stopped.interrupted)
+        whole = not outcome.late and (outcome.stopped is None or not outcome.stopped.interrupted)
         if whole:
             leaves = self.certifier.certified.leaves
             self.writer.write({**counts, "undecided": len(outcome.undecided), "leaves": leaves})

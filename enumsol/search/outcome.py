@@ -78,6 +78,8 @@ class SearchOutcome:
     solutions: list[SelectionSolution] = field(default_factory=list)
     undecided: list[UndecidedPart] = field(default_factory=list)
     stopped: Stop | None = None
+    #: The time was over before it was known which roots the solutions form.
+    late: bool = False
     nodes: int = 0
     pruned: int = 0
     selections: int = 0

@@ -190,7 +190,6 @@ class Spread:
                 continue
             for root in reversed(part.roots):
                 search.skip(root.codes)
-        search.outcome.count_unexamined()
         self.cancel()
 
 

@@ -130,13 +130,17 @@ def resume(search: TreeSearch, reader: Reader, begun: BegunProof, passed: Callab
         search.below(items, reader.form_over(items[-1].codes), trial=trial)
         mark = time.perf_counter()
 
-    rest = Replay(search, reader, below).run(begun, passed)
+    def through() -> None:
+        search.finish()  # the file that is replaced holds what was written after the subtrees that were skipped
+        passed()
+
+    rest = Replay(search, reader, below).run(begun, through)
     if len({reader.form_over(item.codes) for item in rest}) > 1:
         while rest:
             below(rest.pop())
     elif rest:
         below(*rest, trial=search.forms is not None and not search.forms.tried(search.outcome.resumed))
-    search.outcome.count_unexamined()
+    search.finish()
 
 
 class Replay:

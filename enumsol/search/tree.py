@@ -103,6 +103,12 @@ class TreeSearch:
     known_root : callable, optional
         Gives the codes of a complete selection that is known to hold a root, or None. Where the search is stopped
         before it came there, this root is proven by itself.
+
+    Attributes
+    ----------
+    continua : callable
+        Gives the codes of complete selections that hold on continua of which solutions were found. Where the search is
+        stopped before it came there, these are solved by themselves: a result lists whole families, its proof too.
     """
 
     def __init__(
@@ -130,6 +136,10 @@ class TreeSearch:
             closer.relaxed = self.relaxed
         self.forms = forms
         self._known_root = known_root
+        self.continua: Callable[[], Sequence[Codes]] = list
+        #: Subtrees that were left because the search was stopped, and the records that follow each of them.
+        self._left: list[tuple[Codes, KeptRecords]] = []
+        self._recorder = certifier.recorder
         self.outcome = SearchOutcome()
         #: Advice if limits are reached, besides raising them.
         self.otherwise = ""
@@ -155,17 +165,15 @@ class TreeSearch:
             return self.outcome
         if self.system.p >= _MANY:
             self.known(self.limits)
-        if self.forms is None:
-            self.loop(start, None)
-            return self.outcome
-        certifier, held = self.certifier, KeptRecords()
-        recorder, certifier.recorder = certifier.recorder, held
-        try:
-            stack = self._begin(start, held, self.forms)
-        finally:
-            certifier.recorder = recorder
-            held.release(recorder)
-        self.loop(stack, None)
+        if self.forms is not None:
+            held = self.certifier.recorder = KeptRecords()
+            try:
+                start = self._begin(start, held, self.forms)
+            finally:
+                self.certifier.recorder = self._recorder
+                held.release(self._recorder)
+        self.loop(start, None)
+        self.finish()
         return self.outcome
 
     def _one(self, item: TreeNode) -> bool:
@@ -294,27 +302,65 @@ class TreeSearch:
     def _leave(self, items: Sequence[TreeNode]) -> None:
         for item in reversed(items):
             self.skip(item.codes)
-        self.outcome.count_unexamined()
 
     def skip(self, codes: Codes) -> None:
-        """Leave a subtree undecided, except for the known root in it, because the search was stopped."""
+        """Leave a subtree to `finish`, because the search was stopped."""
+        # which continua reach into it is known once everything is found, also what comes after it
+        self._left.append((codes, KeptRecords(packed=True)))
+        self.certifier.recorder = self._left[-1][1]
+
+    def finish(self) -> None:
+        """Leave what was skipped undecided, except for the known root and the selections of continua in it."""
+        left, self._left = self._left, []
+        if not left:
+            return
+        self.certifier.recorder = self._recorder
+        with within(Deadline(self.limits.deadline).extended(self._start)):
+            wanted = self._wanted()
+            for codes, after in left:
+                self._leave_but(codes, wanted)
+                after.release(self._recorder)
+        self.outcome.count_unexamined()
+
+    def _wanted(self) -> list[Codes]:
+        """Complete selections that are decided although the search was stopped."""
         stopped, root = self.outcome.stopped, None
         if stopped is None or stopped.reason is not StopReason.ENOUGH_ROOTS:
             root = self.known(Deadline.after(time.perf_counter(), _LATE))
-        if root is None or not all(map(self.splitting.holds, codes, root)):
+        wanted = [] if root is None else [root]
+        try:
+            wanted += self.continua()
+        except TimeOverError:
+            self.outcome.late = True
+        return wanted
+
+    def _leave_but(self, codes: Codes, wanted: Sequence[Codes]) -> None:
+        """Leave a subtree undecided, except for complete selections."""
+        stack = [(codes, wanted)]
+        while stack:
+            codes, wanted = stack.pop()
+            wanted = [final for final in wanted if all(map(self.splitting.holds, codes, final))]
+            if not wanted:
+                self._skip(codes)
+                continue
+            node = next((i for i, code in enumerate(codes) if code != wanted[0][i]), -1)
+            if node < 0:
+                self._settle_late(codes)
+                continue
+            final, before, after = wanted[0][node], codes[:node], codes[node + 1 :]
+            # the one that holds the selection comes last: what is beside it is left behind at once
+            children = self.splitting.towards(codes, node, final)
+            children.sort(key=partial(self.splitting.holds, final=final))
+            self.certifier.branching(node, children)
+            stack += [((*before, code, *after), wanted) for code in reversed(children)]
+
+    def _settle_late(self, codes: Codes) -> None:
+        """Have the certifier decide a complete selection after the search was stopped, if there is time."""
+        try:
+            self._settle(TreeNode(None, codes, -1, last=False, weight=0.0))
+        except TimeOverError:
+            self.outcome.late = True
             self._skip(codes)
-            return
-        for node, final in enumerate(root):
-            while codes[node] != final:
-                before, after = codes[:node], codes[node + 1 :]
-                # the one that holds the root comes last: what is beside it is left behind at once
-                children = self.splitting.towards(codes, node, final)
-                children.sort(key=partial(self.splitting.holds, final=final))
-                self.certifier.branching(node, children)
-                for code in children[:-1]:
-                    self._skip((*before, code, *after))
-                codes = (*before, children[-1], *after)
-        self._settle(TreeNode(None, codes, -1, last=False, weight=0.0))
 
     def known(self, limits: Limited) -> Codes | None:
         """Codes of a selection that holds a root, if one is found within limits."""
