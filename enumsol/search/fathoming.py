@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.relaxation.engine import Relaxation
-    from enumsol.search.certifiers.protocol import Bound
+    from enumsol.search.certifiers.protocol import Bound, Led
     from enumsol.support.array_types import Codes, Floats
 
     #: lambda and w, (2p,) arrays each.
@@ -176,8 +176,12 @@ class Closer:
             found = self._alone(codes, self._regular, self.relaxed(codes), descent=True)
         return found
 
-    def led(self, codes: Codes) -> None:
+    leads = False
+
+    def led(self, codes: Codes) -> Led | None:
         """No node of the tree is decided, or split, before its relaxation is solved."""
+        del codes
+        return None
 
     def begins_again(self, nodes: int) -> bool:
         """Whether so much has become known after some nodes that a search had better begin again."""

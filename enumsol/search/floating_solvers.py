@@ -16,11 +16,11 @@ from enumsol.condensation.condensed import ScaledSystem
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.floating import FloatingSystem, RigidRows
 from enumsol.proof import records
-from enumsol.search.certifiers.protocol import Bound, Certifier, UndecidedPart
+from enumsol.search.certifiers.protocol import NO_BOUND, Bound, Certifier, UndecidedPart
 from enumsol.search.certifiers.rational_certifier import ExactCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier, proven
 from enumsol.search.reference_closer import ReferenceCloser, reference_numbers
-from enumsol.search.resume import PlaneReader, Reader, RecordedBound
+from enumsol.search.resume import PlaneReader, Reader
 from enumsol.search.setup import HeldByNothing
 from enumsol.search.solvers import Solvers
 from enumsol.search.splitting import PlaneSplitting
@@ -117,7 +117,7 @@ class FloatingSolvers(HeldByNothing, Solvers):
     def _splitting(self, certifier: Certifier) -> PlaneSplitting:
         return PlaneSplitting(self.scaled.F)
 
-    def _closer(self, certifier: Certifier) -> ReferenceCloser | None:
+    def _closer(self, certifier: Certifier) -> Any:
         return ReferenceCloser(certifier, lambda: self.known_root) if hasattr(certifier, "only_root") else None
 
     def reader(self) -> FloatingReader:
@@ -152,7 +152,7 @@ class FloatingReader:
             return self._held.bound(codes, record)
         records.Unbalanced.read(record, records.Limits(codes, modes=self._modes))
         # the certifier finds a direction of its own
-        return RecordedBound(np.zeros(0, dtype=np.intp), np.zeros(0))
+        return NO_BOUND
 
 
 def on_weak_springs(scaled: ScaledSystem, rows: RigidRows, stiffness: float = WEAK) -> ScaledSystem:

@@ -15,9 +15,7 @@ import numpy as np
 
 from enumsol.model.statuses import BACKWARD, FORWARD, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.trusted.at_alpha import solve_selection
-from enumsol.trusted.selection import PENETRATION
-from enumsol.trusted.selection import SLIP_BACKWARD as BACK
-from enumsol.trusted.selection import SLIP_FORWARD as FORTH
+from enumsol.trusted.selection import PENETRATION, SLIP_BACKWARD as BACK, SLIP_FORWARD as FORTH
 from enumsol.trusted.status_rows import FREE, row_signs
 
 if TYPE_CHECKING:
@@ -25,6 +23,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.floating import FloatingSystem
     from enumsol.relaxation.engine import Relaxation
+    from enumsol.search.certifiers.protocol import Led
     from enumsol.selections.solution import SelectionSolution
     from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.reference import Reference
@@ -70,7 +69,6 @@ class ReferenceCloser:
     """
 
     #: As of other closers.
-    sliding: dict[int, int] = {}
     relaxed: Callable[[Codes], Relaxation | None]
 
     def __init__(self, certifier: Any, root: Callable[[], Codes | None]) -> None:
@@ -78,6 +76,7 @@ class ReferenceCloser:
         self._root = root
         self.known: tuple[Codes, ...] | None = None
         self._wait = self._pause = 0
+        self.sliding = dict[int, int]()
 
     @cached_property
     def _references(self) -> list[tuple[Reference, Cover]]:
@@ -89,10 +88,17 @@ class ReferenceCloser:
 
     def whole(self) -> list[SelectionSolution] | None:
         """All solutions of the problem, if one certificate proves that there is one only."""
-        return next((self._only((UNDECIDED,) * reference.system.p, reference) for reference, _ in self._references), None)
+        return next(
+            (self._only((UNDECIDED,) * reference.system.p, reference) for reference, _ in self._references), None
+        )
 
-    def led(self, codes: Codes) -> tuple[int, list[int]] | list[SelectionSolution] | None:
-        """The roots below an assignment that certificates decide, or the node to split next and how; None if neither."""
+    @property
+    def leads(self) -> bool:
+        """Whether the tree is led."""
+        return any(cover.pays for _, cover in self._references)
+
+    def led(self, codes: Codes) -> Led | None:
+        """The roots below an assignment if certificates decide it, or else the node to split and how; or None."""
         for reference, cover in self._references:
             if not cover.pays:
                 continue
@@ -190,7 +196,7 @@ def rows_of(reference: Reference, codes: Codes) -> tuple[list[int], list[int], l
 
 
 def _factor(reference: Reference, rows: list[int], one: int, other: int) -> tuple[float, float]:
-    """The least eigenvalue of the small matrix with a product of two tight rows, and the factor for which it is best."""
+    """The largest least eigenvalue of the small matrix with a product of two tight rows, and its factor."""
     M = reference.form.small_matrix(reference.rows(rows), reference.rows([one, other]), []).mid
     product = np.zeros_like(M)
     product[-1, -2] = product[-2, -1] = 0.5
@@ -264,7 +270,9 @@ class Cover:
     def _left(self, rows: list[int]) -> Floats:
         """Rigid modes along which no equation changes, as columns."""
         G, p = self._reference.system.rows.G.mid, self._reference.system.p
-        fixed = np.array([self._normal[row % p] if row // p == PENETRATION else self._tangential[row % p] for row in rows])
+        fixed = np.array(
+            [self._normal[row % p] if row // p == PENETRATION else self._tangential[row % p] for row in rows]
+        )
         if not len(fixed):
             return np.eye(len(G))
         _, sizes, V = np.linalg.svd(fixed)

@@ -7,13 +7,13 @@ written to the new proof; what cannot be proven again, was left undecided, or is
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
 from enumsol.model.statuses import CONTACT, SLIDING, UNDECIDED
 from enumsol.proof import records
+from enumsol.search.certifiers.protocol import RecordedBound
 from enumsol.search.fathoming_in_contact import LoneProposal
 from enumsol.search.tree import TreeNode, TreeSearch
 from enumsol.trusted.quadratic_forms import EnclosedForm
@@ -24,24 +24,10 @@ if TYPE_CHECKING:
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.proof.begun import BegunProof
     from enumsol.search.certifiers.protocol import Bound
-    from enumsol.support.array_types import Codes, Floats, Indices
+    from enumsol.support.array_types import Codes
 
 #: Progress is reported after so many nodes.
 _REPORT_EVERY = 64
-
-
-@dataclass(frozen=True)
-class RecordedBound:
-    """Multipliers that are said to bound the energy, or a form, from below; in place of a relaxation's."""
-
-    rows: Indices
-    values: Floats
-    form: Any = None
-    bound: float = np.inf
-
-    def multipliers(self) -> tuple[Indices, Floats]:
-        """Rows and their multipliers."""
-        return self.rows, self.values
 
 
 class Reader(Protocol):

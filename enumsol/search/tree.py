@@ -24,7 +24,7 @@ from enumsol.proof.writer import KeptRecords
 from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.relaxation.engine import Engine, Relaxation, not_compiled
 from enumsol.relaxation.interior_point import InteriorPointEngine
-from enumsol.search.certifiers.protocol import Bound, Certifier, Refine, UndecidedPart
+from enumsol.search.certifiers.protocol import NO_BOUND, Bound, Certifier, Refine, UndecidedPart
 from enumsol.search.form_policy import Forms
 from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
 from enumsol.search.splitting import ImposedRows, PlaneSplitting, Splitting, branching_node
@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from enumsol.condensation.space_condensed import SpaceSystem
     from enumsol.search.fathoming import Closer
     from enumsol.search.fathoming_in_contact import LoneProposal
+    from enumsol.search.reference_closer import ReferenceCloser
     from enumsol.search.space.space_fathoming import SpaceCloser
     from enumsol.search.space.space_forms import SpaceForms
     from enumsol.support.array_types import Codes
@@ -96,7 +97,7 @@ class TreeSearch:
         How a status splits and which rows it imposes; by default those of the plane at one alpha.
     limits : SearchLimits
     progress : called with a SearchProgress now and then
-    closer : Closer, optional
+    closer : Closer, SpaceCloser or ReferenceCloser, optional
         Closes subtrees by their only possible solution.
     forms : Forms or SpaceForms, optional
         What a long search may bound with in place of the energy.
@@ -120,7 +121,7 @@ class TreeSearch:
         splitting: Splitting | None = None,
         limits: SearchLimits | None = None,
         progress: Callable[[SearchProgress], object] | None = None,
-        closer: Closer | SpaceCloser | None = None,
+        closer: Closer | SpaceCloser | ReferenceCloser | None = None,
         forms: Forms | SpaceForms | None = None,
         known_root: Callable[[], Codes | None] | None = None,
     ) -> None:
@@ -397,6 +398,8 @@ class TreeSearch:
             return []
         if led is not None:
             return self._split(item, None, *led)
+        if self.closer is not None and self.closer.leads and item.parent is None and self.excluded(item, NO_BOUND):
+            return []
         relaxation: Relaxation | None
         relaxation = solved = self.relax(item)
         if solved.stalled:
@@ -516,7 +519,18 @@ class TreeSearch:
         self.outcome.qps += 1
         if item.parent is not None:
             return item.parent.child(*self._rows.of(item.changed, codes[item.changed]), last=item.last)
-        return self._root(codes)
+        relaxation = self._root(codes)
+        return self._by_steps(codes) if relaxation.stalled and item.changed >= 0 else relaxation
+
+    def _by_steps(self, codes: Codes) -> Relaxation:
+        """The relaxation of a partial assignment, its nodes one after the other."""
+        relaxation = self._root(self.first().codes)
+        for node, code in enumerate(codes):
+            if relaxation.stalled or relaxation.pruned:
+                break
+            if code != UNDECIDED:
+                relaxation = relaxation.child(*self._rows.of(node, code), last=True)
+        return relaxation
 
     def _root(self, codes: Codes, engine: Any = None) -> Relaxation:
         """The relaxation of a partial assignment without a parent; by default with the form in use, if there is one."""

@@ -1,4 +1,4 @@
-"""The trusted test that a strict root is the only one below assignments of a body that nothing holds (theory, 14.11)."""
+"""Whether a strict root of a body that nothing holds is the only one below an assignment (theory, section 14.11)."""
 
 from __future__ import annotations
 

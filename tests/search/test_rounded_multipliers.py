@@ -6,7 +6,7 @@ from proof_tools import leaves_of, multipliers, proof_of, records_of
 
 from enumsol import enumerate_roots, verify
 from enumsol.proof.proof_file import coarse
-from enumsol.search.resume import RecordedBound
+from enumsol.search.certifiers.protocol import RecordedBound
 from enumsol.search.solvers import Solvers
 from enumsol.selections.float_selections import SIGN_TOLERANCE
 

@@ -9,6 +9,8 @@ from dataclasses import dataclass, field, fields
 from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
 
+import numpy as np
+
 from enumsol.proof.records import Branching, Record, UndecidedRecord, Unloaded
 from enumsol.trusted.exclusion import exclusion_margin
 from enumsol.trusted.over_interval import EnclosedPiece
@@ -20,6 +22,9 @@ if TYPE_CHECKING:
     from enumsol.proof.writer import Part, Recorder
     from enumsol.support.array_types import Codes, Floats, Indices
     from enumsol.trusted.quadratic_forms import EnclosedForm
+
+    #: All solutions below a partial assignment, or a node to split and the codes of its children.
+    Led = list[Any] | tuple[int, list[int]]
 
     #: A lower bound over a partial assignment, proven by the multipliers of its rows.
     Margin = Callable[[Codes, Indices, Floats], float]
@@ -115,6 +120,24 @@ class Bound(Protocol):
 
     def multipliers(self) -> tuple[Indices, Floats]:
         """Rows and their multipliers, which prove ``bound``."""
+
+
+@dataclass(frozen=True)
+class RecordedBound:
+    """Multipliers that are said to bound the energy, or a form, from below; in place of a relaxation's."""
+
+    rows: Indices
+    values: Floats
+    form: Any = None
+    bound: float = np.inf
+
+    def multipliers(self) -> tuple[Indices, Floats]:
+        """Rows and their multipliers."""
+        return self.rows, self.values
+
+
+#: No multipliers: a certifier may know of other reasons why an assignment holds no solution.
+NO_BOUND = RecordedBound(np.zeros(0, dtype=np.intp), np.zeros(0))
 
 
 class Certifier(Protocol):

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
     from enumsol.relaxation.engine import Relaxation
+    from enumsol.search.certifiers.protocol import Led
     from enumsol.search.fathoming_in_contact import KnownRoot
     from enumsol.search.space.product_search import Branched, Enclosed, Missed
     from enumsol.support.array_types import Codes, Floats, Mask
@@ -171,8 +172,12 @@ class SpaceCloser:
     def met(self, answer: object) -> None:
         """Nothing follows from what a leaf holds."""
 
-    def led(self, codes: Codes) -> None:
+    leads = False
+
+    def led(self, codes: Codes) -> Led | None:
         """No node of the tree is decided, or split, before its relaxation is solved."""
+        del codes
+        return None
 
     def begins_again(self, nodes: int) -> bool:
         """A search in 3D does not begin again."""

@@ -25,9 +25,16 @@ from enumsol.proof import space_records
 from enumsol.proof.records import EnclosureRecord, Limits, NoRoot, RegularRoot, UndecidedRecord
 from enumsol.relaxation.engine import PRUNE_MARGIN, Relaxation
 from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
-from enumsol.search.certifiers.protocol import WIDEN, Bound, Certified, RecordingCertifier, Refine, UndecidedPart
+from enumsol.search.certifiers.protocol import (
+    WIDEN,
+    Bound,
+    Certified,
+    RecordedBound,
+    RecordingCertifier,
+    Refine,
+    UndecidedPart,
+)
 from enumsol.search.outcome import HOLD
-from enumsol.search.resume import RecordedBound
 from enumsol.search.space.known_boxes import KnownBoxes
 from enumsol.search.space.product_search import Branched, Enclosed, Missed
 from enumsol.trusted.space.leaves import Cause, Open, SpaceRoot, settle
