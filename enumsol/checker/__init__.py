@@ -35,7 +35,8 @@ What checker and search share
     - ``trusted.uniqueness``, the test by which a subtree is closed by its only possible solution, and which of these
       solutions are the same, and the test that a root is alone below an assignment;
       ``trusted.uniqueness_weights``, the form of both; ``trusted.same_roots``, the list of roots without those that
-      several leaves hold;
+      several leaves hold; of a body that nothing holds ``trusted.reference`` and ``trusted.root_forms``, the test that
+      no other root than a known one lies below an assignment;
     - for the arcs of branch graphs: ``trusted.selection``, the numbers of unknowns and conditions;
       ``trusted.arcs.selection_balls``, ``trusted.arcs.series`` and ``trusted.arcs.over_parts``, a selection over an
       interval as a series with bounds of its error; ``trusted.arcs.precise``, ``trusted.arcs.bordered``,
