@@ -24,6 +24,7 @@ from enumsol.search.resume import PlaneReader, Reader
 from enumsol.search.setup import HeldByNothing
 from enumsol.search.solvers import Solvers
 from enumsol.search.splitting import PlaneSplitting
+from enumsol.selections.solution import SelectionSolution
 from enumsol.trusted.at_alpha import holds_no_root, solve_selection
 from enumsol.trusted.confinement import motion_against, without_bound
 from enumsol.trusted.exclusion import Terms, exclusion_margin
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
     from enumsol.search.certifiers.protocol import Margin
     from enumsol.search.reference_closer import OnlyRoot
     from enumsol.selections.rational_selections import ExactSelections
-    from enumsol.selections.solution import SelectionSolution
     from enumsol.support.array_types import Codes, Floats
 
 #: Stiffness of the springs of the relaxations, relative to that of the body (theory, section 14.5).
@@ -118,7 +118,7 @@ class FloatingSolvers(HeldByNothing, Solvers):
         return PlaneSplitting(self.scaled.F)
 
     def _closer(self, certifier: Certifier) -> Any:
-        return ReferenceCloser(certifier, lambda: self.known_root) if hasattr(certifier, "only_root") else None
+        return ReferenceCloser(certifier, lambda: self.known_root)
 
     def reader(self) -> FloatingReader:
         """Understands the records of an earlier proof."""
@@ -349,6 +349,21 @@ class FloatingExactCertifier(ExactCertifier):
         found = None if self._exclusions is None else self._exclusions.record(codes, relaxation, within=self.bounded)
         self.bounded |= found is not None and found[1]
         return found is not None
+
+    def reference(self, selection: Codes) -> Reference | None:
+        """The form of a root, if one is proven definite."""
+        return None if self._exclusions is None else self._exclusions.reference(selection)
+
+    def only_root(self, codes: Codes, reference: Reference, proposal: OnlyRoot) -> list[SelectionSolution] | None:
+        """The roots below an assignment, that of a form or none; None if that is not proven."""
+        exclusions = self._exclusions
+        needs = None if exclusions is None else exclusions.only_root(codes, reference, proposal, within=self.bounded)
+        if needs is None:
+            return None
+        if not reference.lies_below(codes):
+            return []
+        root = super().selection(reference.selection)
+        return [root] if isinstance(root, SelectionSolution) else None
 
     def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
         """All roots in the selection."""
