@@ -312,6 +312,7 @@ class FloatingPoint(Point):
     def __init__(self, problem, header):
         super().__init__(problem, header)
         self.same_bound(header)
+        self.forms.lengths = self.scale[0]
         self.references = References(self.forms, self.friction, self.scale)
 
     def leaf(self, codes, kind, *rest):
