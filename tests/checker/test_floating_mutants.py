@@ -1,5 +1,6 @@
 """Forged proofs about bodies that nothing holds, in 2D and 3D, are refused; nothing excludes what holds a solution."""
 
+import random
 from fractions import Fraction
 
 import numpy as np
@@ -9,16 +10,20 @@ from effort import some
 from helpers.floating_oracle import Oracle, block_on_table, random_body
 from helpers.floating_space import known_body
 from helpers.proof_tools import (
+    copied,
     leaves_of,
     multipliers,
     of_kind,
     proof_of,
     put,
     records_of,
+    refused,
     replaced,
     why_refused,
     with_multipliers,
 )
+from rational_checker import check_records
+from rational_forms import Refused
 from trusted.test_confinement import enclosed, final_codes
 
 import enumsol
@@ -72,8 +77,9 @@ def test_another_problem(body):
 
 
 @pytest.mark.slow
-def test_every_exclusion_is_needed_as_it_is(body):
-    problem, records = body
+@pytest.mark.parametrize("seed", [None, 0])
+def test_every_exclusion_is_needed_as_it_is(seed):
+    problem, records = proven(known_body(113).problem if seed is None else random_body(seed))
     exclusions = of_kind(records, "x")
     assert exclusions
     for place in exclusions[: some(4, of=len(exclusions))]:
@@ -89,7 +95,7 @@ def test_every_exclusion_is_needed_as_it_is(body):
 
 EMPTY = with_multipliers(["x", "", ""], [], [])[1:]
 ONE = [[0] * 3, [], [[], [], [], [], []], [0.0] * 6]
-HELD = [["z"], ["X", *EMPTY], ["m", *ONE], ["M", [0] * 3, [[]], 0], ["a", [0] * 3, [], [], *EMPTY, [], [], 1]]
+HELD = [["z"], ["X", *EMPTY], ["m", *ONE], ["M", [0] * 3, [[]], 0], ["f", 1, *EMPTY]]
 HELD_3D = [["z"], ["m", [], [], [], [], 1], ["l", [], [], [], [], [], 1], ["D", [], 0]]
 
 
@@ -97,6 +103,75 @@ def test_leaves_that_rest_on_a_body_that_is_held(body):
     problem, records = body
     for leaf in HELD if is_plane(problem) else HELD_3D:
         assert "unknown kind" in why_refused(problem, replaced(records, leaves_of(records)[0][0], leaf))
+    if is_plane(problem):
+        lone = ["a", [0] * 3, [], [], *EMPTY, [], [], 1]
+        assert "9 entries; expected 4 or 7" in why_refused(problem, replaced(records, leaves_of(records)[0][0], lone))
+
+
+#: Bodies whose proofs have leaves of all kinds that refer to a root, and a block that sticks and slips.
+REFERRED = {seed: lambda seed=seed: random_body(seed).replace(load_slope=None, friction_slope=0.0) for seed in (54, 8)}
+REFERRED |= {"block": lambda: block_on_table(cells=1, push=0.5, max_rigid_displacement=4.0)}
+
+
+def other_forms(record):
+    """Other declarations: of another root, or with other numbers of its form."""
+    _, selection, weights, balance, share = record
+    for i, code in enumerate(selection):
+        yield from (put(record, (1, i), other) for other in (0, 1, 2, 3, 4, 5, 6, True) if other != code)
+    for i, value in enumerate(weights):
+        others = -value, 0.0, value * (1 + 1e-9), value + 0.25, 0.5 * value, 4 * value, 1e3, 1e300
+        yield from (put(record, (2, i), other) for other in others if other != value)
+    yield from (put(record, (2,), other) for other in ([], weights[:-1], [*weights, 0.0]))
+    yield from (put(record, (3,), other) for other in (-balance, 0.0, 1e-3, 1e6, 1e300))
+    yield from (put(record, (4,), other) for other in (-share, 0.0, 0.5 * share, share * (1 + 1e-9), 1e6))
+
+
+def other_leaves(record, p, mid):
+    """Other leaves that refer to a root."""
+    _, back, rows, pairs, *claim = record
+    yield from (put(record, (1,), other) for other in (back - 1, back + 1, -back, True, float(back)))
+    yield from (put(record, (2,), rows[:k] + rows[k + 1 :]) for k in range(len(rows)))
+    yield from (put(record, (2,), [*rows, row]) for row in (-1, *range(7 * p), 7 * p))
+    yield from (put(record, (3,), other) for other in ([], [*pairs, *pairs]) if pairs)
+    yield from (put(record, (3,), [*pairs, [k, k, 1.0]]) for k in (*range(7 * p), 7 * p))
+    for place, (one, other, factor) in enumerate(pairs):
+        yield from (put(record, (3, place, side), row) for side in (0, 1) for row in range(4 * p, 7 * p))
+        yield put(record, (3, place), [other, one, factor])
+        yield put(record, (3, place), [one, other])
+        others = -factor, 0.0, factor / 16, factor * (1 + 1e-9), 16 * factor, 1e6, 1e300
+        yield from (put(record, (3, place, 2), value) for value in others)
+    yield record[:4] if claim else [*record, mid, [1.0] * 2 * p, 1]
+    if claim:
+        yield [*record[:4], [x + 1.0 for x in claim[0]], *claim[1:]]
+        yield [*record[:6], -claim[2]]
+
+
+@pytest.mark.few(0, 1)
+@pytest.mark.parametrize("name", REFERRED)
+@pytest.mark.usefixtures("enclosed_once")
+def test_what_is_accepted_of_a_declared_root_holds_in_rationals(name):
+    """Forms, leaves and their places; a few of them are proofs, too, and then the judge says so as well."""
+    problem, records = proven(REFERRED[name]())
+    declared, leaves = of_kind(records, "q")[0], of_kind(records, "a")
+    mutants = [replaced(records, declared, other) for other in other_forms(records[declared])]
+    for place in leaves:
+        mutants += [replaced(records, place, other) for other in other_leaves(records[place], problem.p, [0.0] * 6)]
+    for place, _ in leaves_of(records):
+        for other in leaves:
+            moved = copied(records)
+            moved[place], moved[other] = moved[other], moved[place]
+            mutants.append(moved)
+    mutants.append(replaced(records, declared))
+    assert len(mutants) > 100
+    mutants = random.Random(0).sample(mutants, some(60, of=len(mutants)))
+    accepted = [mutant for mutant in mutants if mutant != records and not refused(problem, mutant)]
+    assert 5 < len(accepted) < 0.5 * len(mutants)
+    for mutant in accepted:
+        try:
+            check_records(problem, mutant)
+        except Refused as error:
+            changed = [(own, other) for own, other in zip(records, mutant, strict=False) if own != other]
+            pytest.fail(f"{error}: {changed}")
 
 
 def test_a_root_cannot_be_left_out_or_moved(body):

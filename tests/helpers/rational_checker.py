@@ -32,6 +32,7 @@ from rational_forms import (
     need,
 )
 from rational_pieces import ClosedPiece
+from rational_references import References
 
 MAGIC = b"enumsol-proof 1\n"
 DIGEST = 32
@@ -311,17 +312,24 @@ class FloatingPoint(Point):
     def __init__(self, problem, header):
         super().__init__(problem, header)
         self.same_bound(header)
+        self.forms.lengths = self.scale[0]
+        self.references = References(self.forms, self.friction, self.scale)
 
     def leaf(self, codes, kind, *rest):
-        need(kind in ("x", "n", "r", "N", "D", "u", "i"), "an unknown leaf")
-        if kind != "i":
+        need(kind in ("x", "n", "r", "N", "D", "u", "i", "a"), "an unknown leaf")
+        if kind == "a":
+            back, rows, pairs, *claim = rest
+            selection = self.references.leaf(codes, back, rows, pairs, claimed=bool(claim))
+            if selection is not None:
+                self.root(selection, *claim)
+        elif kind == "i":
+            (z,) = rest
+            need(self.forms.unbalanced(codes, z, self.scale[0]), "forces of a leaf may be in balance with the load")
+        else:
             super().leaf(codes, kind, *rest)
-            return
-        (z,) = rest
-        need(self.forms.unbalanced(codes, z, self.scale[0]), "forces of a leaf may be in balance with the load")
 
     def declare(self, *record):
-        raise Refused("a form of a body that nothing holds")
+        self.references.declare(*record)
 
 
 class Graph(Proof):

@@ -70,6 +70,8 @@ class FloatingForms(Forms):
         bordered = [[*row, *column] for row, column in zip(S.tolist(), zip(*G, strict=True), strict=True)]
         super().__init__(fmpq_mat(bordered + [[*row, *none] for row in G]), [*g, *h], F, F_lo)
         self.own, self.G, self.h, self.reach = S, G, h, reach
+        #: Units of length of the nodes, by which multipliers are changed.
+        self.lengths = [fmpq(1)] * len(F)
 
     def equations(self, codes):
         return super().equations(codes) + [self.move(-1, 2 * self.p + j) for j in range(len(self.h))]
@@ -136,12 +138,14 @@ class FloatingForms(Forms):
         """Multipliers of the same signs with G y = h, or none."""
         y = self.sums(terms)
         G = fmpq_mat(self.G)
-        scaled = fmpq_mat([[x * abs(w) for x, w in zip(row, y, strict=True)] for row in self.G])
+        bent = [[x / length for x, length in zip(row, 2 * self.lengths, strict=True)] for row in self.G]
+        scaled = fmpq_mat([[x * abs(w) for x, w in zip(row, y, strict=True)] for row in bent])
         left = [a - b for a, b in zip(self.h, (G * column_of(y)).entries(), strict=True)]
         s = _solution(scaled * G.transpose(), left)
         if s is None:
             return []
-        share = [x * (1 if w > 0 else -1) for x, w in zip((G.transpose() * column_of(s)).entries(), y, strict=True)]
+        turned = (fmpq_mat(bent).transpose() * column_of(s)).entries()
+        share = [x * (1 if w > 0 else -1) for x, w in zip(turned, y, strict=True)]
         if any(abs(x) >= 1 for x in share):
             return []
         found = []
