@@ -138,8 +138,7 @@ class FloatingReader:
         self._held, self._modes = held, modes
 
     def declare(self, record: list[Any]) -> None:
-        """Refuse a form: it is that of a body that is held."""
-        raise ValueError("there are no forms")
+        """Pass over the form of a root: it is made again."""
 
     def bound(self, codes: Codes, record: list[Any]) -> Bound:
         """What is said to exclude a partial assignment; ValueError where the record makes no sense."""
