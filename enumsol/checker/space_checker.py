@@ -315,21 +315,22 @@ class FloatingSpaceChecker(WithinReach, SpaceChecker):
             said = space_records.DeclaredSpaceReference.read(record, limits)
             self.reference = SpaceReference.of(self.system, said.leaf, said.numbers, said.balance, said.share)
             if self.reference is None:
+                self.fail("the root that is declared is not proven to be one whose form is definite")
                 return
             root = self.reference.root
-            self.bounded |= not isinstance(settle(self.free, said.leaf), SpaceRoot)
-            self.roots.append((said.leaf, root))
-            self._locate(said.leaf, root, said.leaf)
             reason = self._placed(root, said.enclosure)
         except ValueError as error:
             raise RefusedError(str(error)) from None
         if reason is not None:
-            raise RefusedError(f"of a root that is declared, {reason}")
+            self.fail(f"the root that is declared: {reason}")
+        self.bounded |= not isinstance(settle(self.free, said.leaf), SpaceRoot)
+        self.roots.append((said.leaf, root))
+        self._locate(said.leaf, root, said.leaf)
 
     def _only_reference(self, codes: Codes, said: space_records.OnlySpaceReference) -> str | None:
         reference = self.reference
         if reference is None:
-            return "no root whose form is proven definite was declared"
+            return "no root was declared"
         if reference.is_only_root(codes, said.rows, said.products, self.free.reach):
             return None
         self.bounded = True

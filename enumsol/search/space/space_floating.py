@@ -9,6 +9,8 @@ from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from enumsol.condensation.space_condensed import EnclosedSpace, FloatingSpace, SpaceSystem
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.proof.records import Exclusion, NoRoot, Unbalanced
@@ -104,11 +106,13 @@ class SpaceExclusions:
         """The form of the root of a leaf, if one is proven definite."""
         if leaf not in self._references:
             self._references[leaf], root = None, settle(self.system, leaf)
-            for numbers in reference_numbers(system, self.system, root, leaf) if isinstance(root, SpaceRoot) else ():
-                found = SpaceReference.of(self.system, leaf, *numbers)
-                if found is not None:
-                    self.numbers[leaf], self._references[leaf] = numbers, found
-                    break
+            with np.errstate(all="ignore"):
+                tried = reference_numbers(system, self.system, root, leaf) if isinstance(root, SpaceRoot) else ()
+                for numbers in tried:
+                    found = SpaceReference.of(self.system, leaf, *numbers)
+                    if found is not None:
+                        self.numbers[leaf], self._references[leaf] = numbers, found
+                        break
         return self._references[leaf]
 
     def record(

@@ -34,6 +34,8 @@ _DEFINITE, _SHARED = 1e-9, 0.5
 _NONE, _NOTHING = 1e-9, 1e-8
 #: Factors of products that are tried, relative to the compliance.
 _FACTORS = np.geomspace(2.0**-8, 2.0**8, 9)
+#: Assignments that are tried in vain for one more that passes before the next try, and how many pass at most.
+_PATIENCE, _LONGEST = 16, 7
 
 
 class OnlyRoot(NamedTuple):
@@ -73,7 +75,7 @@ class SpaceReferenceCloser:
         self._certifier, self._root = certifier, root
         self.known: Codes | None = None
         self.sliding = dict[int, int]()
-        self._wait = self._pause = 0
+        self._wait = self._vain = 0
 
     @cached_property
     def _reference(self) -> SpaceReference | None:
@@ -94,8 +96,8 @@ class SpaceReferenceCloser:
             self._wait -= 1
             return None
         found = self.again(codes, relaxation)
-        self._pause = 0 if found is not None or self._reference is None else min(2 * self._pause + 1, 7)
-        self._wait = self._pause
+        self._vain = 0 if found is not None else self._vain + 1
+        self._wait = min(self._vain // _PATIENCE, _LONGEST)
         return found
 
     def again(self, codes: Codes, relaxation: object) -> list[Any] | None:

@@ -1,6 +1,6 @@
 """The trusted test in 3D that a strict root is the only one below assignments of a body that nothing holds.
 
-Theory, section 14.11. The multipliers are those of section 12.6.
+Theory, sections 14.6 and 14.11. The multipliers are those of section 12.6.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ class SpaceReference:
         leaf : final codes
         numbers : see ``SpaceWeights.of``; no node serves any theta
         balance : factor of |G d|^2
-        share : c of theory, (14.12)
+        share : c of theory, section 14.11
         """
         weights = SpaceWeights.of(system, numbers)
         if weights is None or np.any(weights.wide > 0) or not in_range(system) or not is_complete(system, leaf):
