@@ -59,7 +59,8 @@ What checker and search share
       derivatives of ``trusted.space.curve_events``;
       ``model.sectors``, the ends of sectors; ``condensation.space_condensed``, balls for S and g in the
       variables in which friction is isotropic; of bodies that nothing holds the same with G and h,
-      and ``trusted.space.resultants``, what multipliers and balance prove; ``model.problem3d``
+      ``trusted.space.resultants``, what multipliers and balance prove, and ``trusted.space.space_reference`` with
+      ``trusted.root_forms``, that no other root than a known one lies below an assignment; ``model.problem3d``
       and ``model.friction``, the data and their checks;
     - for histories: ``trusted.positions``, where a root leaves the contact nodes, in 3D by its leaf
       ``trusted.space.leaf_positions``; ``model.restart``, the problem of a step;

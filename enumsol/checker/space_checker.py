@@ -25,6 +25,7 @@ from enumsol.trusted.space.product_forms import Ellipsoid, refines
 from enumsol.trusted.space.resultants import floating_margin, is_unbalanced_in_space, unbounded
 from enumsol.trusted.space.sector_rows import OPEN, STICK, UNDECIDED, is_sector_covering, sector_margin
 from enumsol.trusted.space.slip_forms import SlipForm
+from enumsol.trusted.space.space_reference import SpaceReference
 from enumsol.trusted.space.space_uniqueness import LooseSolution, lone_root, only_root, only_solution_in_space
 
 if TYPE_CHECKING:
@@ -281,6 +282,9 @@ class FloatingSpaceChecker(WithinReach, SpaceChecker):
 
     kinds = space_records.FLOATING_LEAVES
 
+    #: The root that was declared last, with its form; None where it is not proven.
+    reference: SpaceReference | None = None
+
     @cached_property
     def system(self) -> FloatingSpace:
         """Balls for S, g, F, G and h in the proof's units."""
@@ -299,7 +303,39 @@ class FloatingSpaceChecker(WithinReach, SpaceChecker):
         return records.Limits(codes, modes=self.problem.modes.r)
 
     def _tests(self) -> dict[type[Record], Test]:
-        return super()._tests() | {records.Unbalanced: self._unbalanced}
+        return super()._tests() | {
+            records.Unbalanced: self._unbalanced,
+            space_records.OnlySpaceReference: self._only_reference,
+        }
+
+    def _declare(self, record: list[Any]) -> None:
+        """Take note of a root, which is one whatever leaves refer to it."""
+        limits = Limits((UNDECIDED,) * self.problem.p, components=len(self.system.g))
+        try:
+            said = space_records.DeclaredSpaceReference.read(record, limits)
+            self.reference = SpaceReference.of(self.system, said.leaf, said.numbers, said.balance, said.share)
+            if self.reference is None:
+                self.fail("the root that is declared is not proven to be one whose form is definite")
+                return
+            root = self.reference.root
+            reason = self._placed(root, said.enclosure)
+        except ValueError as error:
+            raise RefusedError(str(error)) from None
+        if reason is not None:
+            self.fail(f"the root that is declared: {reason}")
+        self.bounded |= not isinstance(settle(self.free, said.leaf), SpaceRoot)
+        self.roots.append((said.leaf, root))
+        self._locate(said.leaf, root, said.leaf)
+
+    def _only_reference(self, codes: Codes, said: space_records.OnlySpaceReference) -> str | None:
+        reference = self.reference
+        if reference is None:
+            return "no root was declared"
+        if reference.is_only_root(codes, said.rows, said.products, self.free.reach):
+            return None
+        self.bounded = True
+        proven = reference.is_only_root(codes, said.rows, said.products, self.system.reach)
+        return None if proven else "the root that was declared is not proven to be the only one in it"
 
     def _excluded(self, codes: Codes, said: space_records.ExcludedInSpace) -> str | None:
         if floating_margin(self.free, codes, said.rows, said.values) > 0:

@@ -12,6 +12,7 @@ import numpy as np
 from enumsol.model.sectors import DEEPEST, RUN, SECTORS, is_sector
 from enumsol.proof.reading import bytes_from, numbers_from, quoted, rational_from
 from enumsol.proof.records import (
+    Alone,
     ClosingRecord,
     DeclaredForm,
     EnclosureRecord,
@@ -126,6 +127,68 @@ class DeclaredProductForm(Record):
             return cls(tuple(codes), numbers_from(centre, limits.components), numbers_from(numbers, count))
         except ValueError as error:
             raise ValueError(f"a form cannot be read: {error}") from None
+
+
+@dataclass(frozen=True, eq=False)
+class DeclaredSpaceReference(Record):
+    """A root of a body that nothing holds and the numbers of its form, to which later leaves refer.
+
+    Attributes
+    ----------
+    leaf : codes of a leaf that holds the root
+    numbers, balance, share : as ``trusted.space.space_reference.SpaceReference.of`` takes them
+    enclosure : EnclosureRecord
+    """
+
+    kind, sizes, unfit = DeclaredForm.kind, (8,), "a form has {} entries; expected {}"
+
+    leaf: tuple[int, ...]
+    numbers: Floats
+    balance: float
+    share: float
+    enclosure: EnclosureRecord
+
+    @classmethod
+    def of(cls, entries: list[Any], limits: Limits) -> DeclaredSpaceReference:
+        """Codes and numbers; ValueError where they make no sense."""
+        leaf, numbers, balance, share, *enclosure = entries
+        if not isinstance(leaf, list) or len(leaf) != limits.p or not all(map(_is_final, leaf)):
+            raise ValueError("a form cannot be read: it is about no leaf")
+        try:
+            values = numbers_from(numbers, limits.p + 2 * limits.components)
+            balance, share = numbers_from([balance, share], 2).tolist()
+        except ValueError as error:
+            raise ValueError(f"a form cannot be read: {error}") from None
+        return cls(tuple(leaf), values, balance, share, EnclosureRecord(*enclosure))
+
+
+@dataclass(frozen=True, eq=False)
+class OnlySpaceReference(ClosingRecord):
+    """No root but that of the form that was declared last lies below the assignment.
+
+    Attributes
+    ----------
+    rows : rows on displacements that are equations
+    products : list of (row, row, factor)
+    """
+
+    kind, sizes = Alone.kind, (3,)
+
+    rows: list[Row]
+    products: list[tuple[Row, Row, float]]
+
+    @classmethod
+    def of(cls, entries: list[Any], limits: Limits) -> OnlySpaceReference:
+        """Rows and factors."""
+        if not all(isinstance(entry, list) for entry in entries):
+            raise RecordError("its rows are not a list")
+        rows, products = entries
+        if not all(isinstance(product, list) and len(product) == 3 for product in products):
+            raise RecordError("its products are not pairs of rows with a factor")
+        factors = numbers_from([factor for *_, factor in products], len(products)).tolist()
+        pairs = [tuple(_row(row, limits.p) for row in product[:2]) for product in products]
+        said = [(one, other, factor) for (one, other), factor in zip(pairs, factors, strict=True)]
+        return cls([_row(row, limits.p) for row in rows], said)
 
 
 @dataclass(frozen=True)
@@ -437,7 +500,7 @@ LEAVES = table_of(
     UndecidedRecord,
 )
 #: The same of a body that nothing holds; others rest on a stiffness that is positive definite.
-FLOATING_LEAVES = table_of(ExcludedInSpace, Unbalanced, NoRoot, RegularRoot, UndecidedRecord)
+FLOATING_LEAVES = table_of(ExcludedInSpace, Unbalanced, NoRoot, RegularRoot, OnlySpaceReference, UndecidedRecord)
 #: Of a tree over alpha, too.
 PIECE_LEAVES = table_of(ExcludedOverPiece, NoRoot, InCurveBoxes, ThroughCurveBox, OnlyOnCurve, UndecidedRecord)
 

@@ -25,7 +25,7 @@ CHECKERS = inside("checker", "verify", "plane_checker", "floating", "graph_check
 IN_SPACE = {
     *("enumsol.checker.space_checker", "enumsol.condensation.space_condensed", "enumsol.model.sectors"),
     *inside("trusted.space", "resultants", "sector_rows", "slip_forms", "leaves", "boxed_solution"),
-    *inside("trusted.space", "product_forms", "natural_map", "space_uniqueness", "turning"),
+    *inside("trusted.space", "product_forms", "natural_map", "space_reference", "space_uniqueness", "turning"),
 }
 #: The search: its rooms, and what it alone uses of rooms that it shares with the checkers.
 SEARCH = (
@@ -72,6 +72,7 @@ SHARED = {
     "trusted.space.leaf_arcs": {"LeafArc"},
     "trusted.space.leaves": None,
     "trusted.space.resultants": None,
+    "trusted.space.space_reference": {"SpaceProduct", "SpaceReference"},
     "trusted.space.turning": {"turned_by"},
     "trusted.space.boxed_solution": {
         *("Box", "BoxedSolution", "apart_in_boxes", "box_around", "is_inside", "proposed_rho", "solution_in_box")

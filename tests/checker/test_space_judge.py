@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import space_judge
-from floating_space import known_body
+from floating_space import known_body, lying_block
 from problems3d import OneNode, degenerate_integers, in_space, random_over_alpha, random_plane_over_alpha
 from proof_tools import bytes_of, of_kind, proof_of, put, records_of
 from space_graph_proofs import closed_branch
@@ -26,11 +26,14 @@ COARSE = (
     # the root lies beyond the sectors
     *("it holds a root", "it holds no root"),
     *("its multipliers do not exclude it", "its solution is not proven to be the only one"),
+    "its root is not proven to be the only one in it",
     *("is not proven to be one from end to end", "it is not proven that all its solutions lie on its curve"),
     *("its roots are not proven to lie in its boxes", "its roots are not proven to be an arc through its box"),
     *("it is not proven to hold no root", "its ellipsoid does not exclude it"),
     *("its box is not proven to hold one solution", "its roots are not proven to lie in its box"),
     *("a place is not proven to be on its curve", "the box of a part of a curve is not proven to hold it"),
+    "the root that was declared is not proven to be the only one in it",
+    *("the root that is declared is not proven to be one whose form is definite", "no root was declared"),
 )
 BLOCKS = [((1, 1, 1), (2, 1, 1), (2, 1, 2), (3, 2, 2)), (0.3, 0.5, 1.0, 2.0, 3.0)]
 WEDGES = [((1, 1, 2), (2, 1, 2)), (0.3, 0.5, 1.0, 1.5, 2.0, 3.0)]
@@ -51,7 +54,9 @@ ALL = [
     *(("rest", seed) for seed in range(30)),
     *(("wedge", *rest) for rest in product(*WEDGES)),
     *(("block", *rest) for rest in product(*BLOCKS)),
-    *(("held by nothing", seed) for seed in range(100, 150)),
+    *(("held by nothing", seed) for seed in range(100, 140)),
+    *(("lying", cells, True, F) for cells in (1, 2) for F in (0.1, 0.2, 0.5, 0.8)),
+    *(("lying", 1, False, 0.5, push) for push in (0.0, 0.1)),
     *GRAPHS,
 ]
 
@@ -81,6 +86,8 @@ def roots_of(kind, *rest):
         problem, alpha = gallery.wedge3d(*rest[0], friction=rest[1]), 1.0
     elif kind == "block":
         problem, alpha = gallery.block3d(*rest[0]), rest[1]
+    elif kind == "lying":
+        problem = lying_block(*rest)
     else:
         problem, options = known_body(*rest).problem, {"max_nodes": 200}
     return problem, enumerate_roots(problem, alpha, **options).proof
@@ -110,6 +117,7 @@ QUICK = [
     *(("random", 2, 3), ("random", 3, 4), ("random", 4, 4), ("cut short", 2, 4)),
     *(("degenerate", 1), ("degenerate", 6), ("degenerate", 18), ("rest", 9), ("rest", 11)),
     *(("wedge", (1, 1, 2), 1.0), ("block", (2, 1, 2), 1.0), ("held by nothing", 102), ("held by nothing", 113)),
+    *(("lying", 1, False, 0.5, 0.1), ("lying", 2, True, 0.2)),
     *(("plane", 1, 5), ("one node", 5, True), ("curves cut short", 2, 100)),
 ]
 
@@ -127,7 +135,9 @@ def compare(problem, proof):
         return "accepted, and not decided by the judge"
     if not counts:
         return "refused, and not decided by the judge" if reason.startswith("undecided") else "both refuse"
-    coarse = [text for text in reasons.split("; ") if text.startswith(("leaf", "curve", "a place", "the box"))]
+    coarse = [
+        text for text in reasons.split("; ") if text.startswith(("leaf", "curve", "a place", "the box", "the root"))
+    ]
     assert coarse, (reasons, "refused by the checker for its form")
     assert all(text.endswith(COARSE) for text in coarse), reasons
     return "refused, and true"

@@ -6,6 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 import enumsol
+from enumsol import fem
 
 OPEN, STICK, SLIP = "open", "stick", "slip"
 
@@ -72,3 +73,61 @@ def on_weak_springs(problem, stiffness):
     N = problem.rigid_modes
     A = problem.A.toarray() + stiffness * N @ N.T
     return problem.replace(A=sp.csc_array(0.5 * (A + A.T)), rigid_modes=None, max_rigid_displacement=None)
+
+
+def lying_block(cells, guided, friction, push=0.0):
+    """A cube of so many cells along its edges, pressed onto a floor; ``guided``: its roof moves upwards only."""
+    held = {"displacement": {"top": (0, 0, "free")}} if guided else {}
+    load = {"load": {"right": (-push, 0.2 * push, 0.0)}} if push else {}
+    return fem.mesh_problem(
+        fem.box(cells, cells, 2), young=1000.0, poisson=0.3, contact="bottom", pressure={"top": 1.0},
+        friction=friction, max_rigid_displacement="auto", **held, **load,
+    )  # fmt: skip
+
+
+def newton_solutions(problem, starts, seed):
+    """Solutions (u, lambda_n, tau) at alpha = 0 that Newton's method finds from random starts; tau is lambda_t / F."""
+    rng, A, p, n = np.random.default_rng(seed), problem.A.toarray(), problem.p, problem.n
+    B = np.stack([M.toarray() for M in (problem.Bn, problem.Bt1, problem.Bt2)], axis=1)
+    F = np.column_stack([np.ones(p), *problem.friction])
+    B, offset = B * F[:, :, None], np.column_stack([problem.gap, problem.slip_offset]) * F
+    found = []
+
+    def residual(x):
+        u, y = x[:n], x[n:].reshape(p, 3)
+        w = B @ u - offset
+        at, D = y + w, np.zeros((p, 3, 3))
+        most = np.maximum(at[:, 0], 0.0)
+        projected = np.column_stack([most, at[:, 1:]])
+        D[:, 0, 0] = at[:, 0] > 0
+        for i, z in enumerate(at[:, 1:]):
+            length = np.linalg.norm(z)
+            D[i, 1:, 1:] = np.eye(2)
+            if length > most[i]:
+                d = z / length
+                projected[i, 1:] = most[i] * d
+                D[i, 1:, 1:] = most[i] / length * (np.eye(2) - np.outer(d, d))
+                D[i, 1:, 0] = d * D[i, 0, 0]
+        J = np.zeros((n + 3 * p,) * 2)
+        J[:n, :n], J[:n, n:] = A, B.reshape(3 * p, n).T
+        J[n:, :n] = -np.einsum("iab,ibn->ian", D, B).reshape(3 * p, n)
+        J[n:, n:] = np.eye(3 * p)
+        for i in range(p):
+            J[n + 3 * i : n + 3 * i + 3, n + 3 * i : n + 3 * i + 3] -= D[i]
+        return np.append(A @ u + B.reshape(3 * p, n).T @ y.ravel() - problem.f, (y - projected).ravel()), J
+
+    for _ in range(starts):
+        x = np.append(3.0 * rng.normal(size=n), rng.normal(size=3 * p))
+        for _ in range(25):
+            R, J = residual(x)
+            size = np.linalg.norm(R)
+            if size < 1e-12 * (1 + np.linalg.norm(x)):
+                if not any(np.linalg.norm(x - other) < 1e-6 for other in found):
+                    found.append(x)
+                break
+            step = np.linalg.lstsq(J, -R, rcond=None)[0]
+            size = next(
+                (s for s in 0.5 ** np.arange(8) if np.linalg.norm(residual(x + s * step)[0]) < np.linalg.norm(R)), 1.0
+            )
+            x = x + size * step
+    return [(x[:n], x[n:].reshape(p, 3)[:, 0], x[n:].reshape(p, 3)[:, 1:], B @ x[:n] - offset) for x in found]

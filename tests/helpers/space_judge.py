@@ -32,6 +32,7 @@ from space_judge_data import (
 from space_judge_graph import Graph
 from space_judge_leaves import angles_of
 from space_judge_products import ProductForm
+from space_judge_references import RootForm, weights_of_balance
 from space_judge_zeros import explore, root_near, roots_of
 
 DIGITS = 320
@@ -90,7 +91,7 @@ class Point:
         self.full = self.system.bordered
         self.unit = [force[i] for i in self.system.node_of]
         self.tangents = [len(places) for places in self.system.tau]
-        self.form = self.products = None
+        self.form = self.products = self.reference = None
         self.roots, self.undecided, self.leaves = [], 0, 0
 
     def run(self, records):
@@ -106,7 +107,7 @@ class Point:
                 due.append(codes)
             else:
                 self.leaves += 1
-                need(record[0] in ("xinru" if self.system.rigid else "xfenrljmzu"), "no such leaf")
+                need(record[0] in ("xinrau" if self.system.rigid else "xfenrljmzu"), "no such leaf")
                 getattr(self, f"leaf_{record[0]}")(codes, *record[1:])
         counts = {"roots": len(self.roots), "undecided": self.undecided, "leaves": self.leaves}
         need(are(records[position:], [counts]), f"the counts are {counts}")
@@ -150,10 +151,46 @@ class Point:
 
     def declare(self, *numbers):
         """[7.5] Forms, and forms of products."""
-        if len(numbers) == 1:
+        if self.system.rigid:
+            self.reference = self.declared_root(*numbers)
+        elif len(numbers) == 1:
             self.form = self.plain_form(floats(*numbers, self.system.m + self.p))
         else:
             self.products = self.product_form(*numbers)
+
+    def declared_root(self, leaf, numbers, balance, share, mid, rad, index):
+        """[7.7] The root of a leaf, which counts, and its form."""
+        numbers = floats(numbers, self.p + 2 * self.system.m)
+        balance, share = floats([balance, share], 2)
+        need(balance >= 0, "a factor of a square is negative")
+        need(isinstance(leaf, list) and len(leaf) == self.p and all(map(is_code, leaf, self.tangents)), "no such leaf")
+        need(is_complete(leaf), "the leaf is still open")
+        root = self.root_at(tuple(leaf), mid, rad, index)
+        self.count(root)
+        balance = weights_of_balance(self.data, self.scale, balance)
+        return RootForm(self.system, Weights(self.system, numbers), root, leaf, balance, share)
+
+    def leaf_a(self, codes, rows, products):
+        """[7.7] No other root than the one that was declared last."""
+        form, (length, force) = self.reference, self.scale
+        need(form is not None, "no root is declared")
+        need(isinstance(rows, list) and isinstance(products, list), "no lists of rows and products")
+        places, factors = [], []
+        for *pair, z in products:
+            pair_of = [self.place(row) for row in pair]
+            (_, one, _), (_, other, _) = pair_of
+            factor = floats([z], 1)[0] * arb(2) ** (length[0] + force[0] - length[one] - length[other])
+            need(factor > 0, "a factor is not positive")
+            places += [place for place in pair_of if place not in places]
+            factors.append(([places.index(place) for place in pair_of], factor))
+        tight = [form.tight(codes, *place) for place in places]
+        form.alone([form.equation(codes, *self.place(row)) for row in rows], tight, factors)
+
+    def place(self, row):
+        """Kind, node and number of a row."""
+        kind, node, number = map(integer, row)
+        need(0 <= kind <= 9 and 0 <= node < self.p, "there is no such row")
+        return kind, node, number
 
     def plain_form(self, numbers):
         """H and h of (7.4)."""

@@ -38,6 +38,36 @@ def _named(rng, records):
             record[-1] = int(_pick(rng, (-record[-1], 0, 2)))
 
 
+def _referred(rng, records):
+    """What is said of the root of a body that nothing holds: rows, products, their factors, and its form."""
+    places = of_kind(records, "a", "q")
+    record = records[_pick(rng, places)]
+    if record[0] == "q":
+        part = int(rng.integers(1, 5))
+        if part > 2:
+            record[part] = float(_pick(rng, (0.0, -record[part], 2 * record[part], 1e-3 * record[part])))
+        else:
+            j = int(rng.integers(len(record[part])))
+            record[part][j] = _pick(rng, (record[part][int(rng.integers(len(record[part])))], -record[part][j]))
+        return
+    rows, products = record[1:]
+    how = int(rng.integers(6))
+    if how == 0:
+        del rows[int(rng.integers(len(rows)))]
+    elif how == 1:
+        row = _pick(rng, rows)
+        row[int(rng.integers(3))] += int(_pick(rng, (-1, 1, 3)))
+    elif how == 2:
+        _pick(rng, products)[2] *= float(_pick(rng, (-1.0, 0.0, 1e-3, 0.5, 2.0, 1e3)))
+    elif how == 3:
+        products.append([copied(_pick(rng, rows)), copied(_pick(rng, rows)), 1.0])
+    elif how == 4:
+        row = _pick(rng, products)[int(rng.integers(2))]
+        row[int(rng.integers(3))] += int(_pick(rng, (-1, 1, 2)))
+    else:
+        products.clear()
+
+
 def _moved(rng, records):
     """A record left out, written twice, or in the place of another one."""
     j, k = (int(i) for i in rng.integers(1, len(records) - 1, 2))
@@ -62,7 +92,7 @@ def _cut_short(rng, records):
             record = records[end]
             waiting += len(record[2]) - 1 if record[0] == "b" else -1 if record[0] != "q" else 0
             end += 1
-        donors = [records[j] for j in range(k, end) if records[j][0] in ("x", "f", "n", "m")] + [["n"], ["u", ""]]
+        donors = [records[j] for j in range(k, end) if records[j][0] in ("x", "f", "n", "m", "a")] + [["n"], ["u", ""]]
         records[k:end] = [copied(_pick(rng, donors))]
         _counted(records)
 
@@ -75,7 +105,7 @@ def _counted(records):
 
 def _recounted(rng, records):
     """A claim changed with counts that fit, the number of roots as well."""
-    places = of_kind(records, "x", "f", "n", "r", "m", "l", "u", "z")
+    places = of_kind(records, "x", "f", "n", "r", "m", "l", "u", "z", "a")
     k = _pick(rng, places)
     before = records[k][0]
     records[k] = _pick(rng, (["n"], ["u", ""], copied(records[_pick(rng, places)])))
@@ -84,7 +114,15 @@ def _recounted(rng, records):
     _counted(records)
 
 
-_OWN = [*space_proofs._OWN.values(), *[_number] * 3, _named, *[_moved] * 2, *[_cut_short] * 2, *[_recounted] * 2]
+_OWN = [
+    *space_proofs._OWN.values(),
+    *[_number] * 3,
+    _named,
+    *[_referred] * 4,
+    *[_moved] * 2,
+    *[_cut_short] * 2,
+    *[_recounted] * 2,
+]
 
 
 def mutant(rng, records, data, general=0.1):

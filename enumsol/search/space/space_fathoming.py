@@ -405,7 +405,10 @@ class DefiniteForm:
                 break
             options = {"maxfun": min(_ROUND, left), "maxiter": _ROUND}
             given = columns, hardness
-            found = minimize(self._value, x, given, method="L-BFGS-B", jac=True, bounds=bounds, options=options)
+            try:
+                found = minimize(self._value, x, given, method="L-BFGS-B", jac=True, bounds=bounds, options=options)
+            except np.linalg.LinAlgError:  # a step beyond all bounds
+                break
             left -= max(int(found.nfev), 1)
             x, least = found.x, self.least(*self._split(found.x))
         return *self._split(x), least

@@ -9,19 +9,28 @@ from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from enumsol.condensation.space_condensed import EnclosedSpace, FloatingSpace, SpaceSystem
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.proof.records import Exclusion, NoRoot, Unbalanced
-from enumsol.proof.space_records import FLOATING_LEAVES, ExcludedInSpace
+from enumsol.proof.space_records import (
+    FLOATING_LEAVES,
+    DeclaredSpaceReference,
+    ExcludedInSpace,
+    OnlySpaceReference,
+)
 from enumsol.relaxation.engine import PRUNE_MARGIN
-from enumsol.search.certifiers.protocol import Bound, Refine, UndecidedPart, Unrecorded
+from enumsol.search.certifiers.protocol import Bound, Certified, Certifier, Refine, UndecidedPart, Unrecorded
 from enumsol.search.floating_solvers import WEAK, FloatingReader, weakly_held
 from enumsol.search.setup import HeldByNothing
+from enumsol.search.space.space_references import SpaceReferenceCloser, reference_numbers
 from enumsol.search.space.space_search import SpaceCertifier
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.confinement import motion_beside
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
 from enumsol.trusted.space.resultants import floating_margin, is_unbalanced_in_space, resultants, unbounded
+from enumsol.trusted.space.space_reference import SpaceReference
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -29,6 +38,7 @@ if TYPE_CHECKING:
 
     from enumsol.proof.writer import Recorder
     from enumsol.relaxation.space_relaxation import SpaceEngine
+    from enumsol.search.space.space_references import OnlyRoot
     from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.space.boxed_solution import BoxedSolution
     from enumsol.trusted.space.sector_rows import Row
@@ -62,6 +72,11 @@ class FloatingSpaceSolvers(HeldByNothing, SpaceSolvers):
         """The certifier of this arithmetic."""
         return FloatingSpaceCertifier(self._engine, self.enclosed, self.exclusions, recorder or Unrecorded())
 
+    def _closer(self, certifier: Certifier) -> SpaceReferenceCloser | None:  # type: ignore[override]
+        if self.exclusions is None or not isinstance(certifier, FloatingSpaceCertifier):
+            return None
+        return SpaceReferenceCloser(certifier, lambda: self.known_root)
+
     def reader(self) -> FloatingReader:
         """Understands the records of an earlier proof."""
         modes = len(self.problem.modes.held) if self.problem.modes else 0
@@ -83,6 +98,22 @@ class SpaceExclusions:
 
     def __init__(self, enclosed: FloatingSpace) -> None:
         self.system, self.free = enclosed, unbounded(enclosed)
+        self._references: dict[Codes, SpaceReference | None] = {}
+        #: How the forms of roots are declared, but for enclosures, by their leaves.
+        self.numbers: dict[Codes, tuple[Floats, float, float]] = {}
+
+    def reference(self, system: SpaceSystem, leaf: Codes) -> SpaceReference | None:
+        """The form of the root of a leaf, if one is proven definite."""
+        if leaf not in self._references:
+            self._references[leaf], root = None, settle(self.system, leaf)
+            with np.errstate(all="ignore"):
+                tried = reference_numbers(system, self.system, root, leaf) if isinstance(root, SpaceRoot) else ()
+                for numbers in tried:
+                    found = SpaceReference.of(self.system, leaf, *numbers)
+                    if found is not None:
+                        self.numbers[leaf], self._references[leaf] = numbers, found
+                        break
+        return self._references[leaf]
 
     def record(
         self, codes: Codes, rows: Sequence[Row], values: Floats, *, within: bool
@@ -124,6 +155,41 @@ class FloatingSpaceCertifier(SpaceCertifier):
     ) -> None:
         super().__init__(engine, enclosed, recorder)
         self._exclusions = exclusions
+        #: The root that was declared last.
+        self._declared: SpaceReference | None = None
+
+    def reference(self, leaf: Codes) -> SpaceReference | None:
+        """The form of the root of a leaf, if one is proven definite."""
+        return None if self._exclusions is None else self._exclusions.reference(self._engine.system, leaf)
+
+    def only_root(self, codes: Codes, reference: SpaceReference, proposal: OnlyRoot) -> list[SpaceRoot] | None:
+        """The root, as a list, unless it was declared before; None if it is not proven that no other one lies below."""
+        exclusions, leaf, found = self._exclusions, reference.leaf, list[SpaceRoot]()
+        if exclusions is None:
+            return None
+        if not reference.is_only_root(codes, *proposal, exclusions.free.reach):
+            if not reference.is_only_root(codes, *proposal, exclusions.system.reach):
+                return None
+            self.bounded = True
+        if self._declared is not reference:
+            self._declared = reference
+            self.bounded |= not isinstance(settle(exclusions.free, leaf), SpaceRoot)
+            enclosure = self._ball(reference.root)
+            self.recorder.write(DeclaredSpaceReference(leaf, *exclusions.numbers[leaf], enclosure).write())
+            found = [self._placed(leaf, reference.root)]
+            self._verified[leaf] = found[0]
+        self._leaf(OnlySpaceReference(*proposal))
+        return found
+
+    def add(self, part: Certified) -> None:
+        """Take over what the certifier of a subtree has proven, which may have declared a root."""
+        super().add(part)
+        self._declared = None
+
+    def forget(self) -> None:
+        """Forget what was proven, and what was declared."""
+        super().forget()
+        self._declared = None
 
     def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """True if the relaxation's multipliers, or balance alone, are proven to exclude the partial assignment."""

@@ -240,6 +240,66 @@ class SpaceWeights:
         off = np.where(whole, (np.abs(square - 1.0) + 8 * UNIT) * SAFE, 0.0)
         return None if np.any(wrong) else cls(mu, kappa, wide, nu, theta, off, whole)
 
+    def turn(self, system: EnclosedSpace) -> Ball:
+        """theta over the units of the tau, of shape (p, 2), with that of length one for which it stands."""
+        # units are powers of two: what is rounded is less than TINY
+        unit = np.where(system.tau >= 0, system.unit[system.tau], 1.0)
+        turn = Ball(self.theta / unit, self.off[:, None] / unit * SAFE + TINY)
+        known = (system.tau < 0) | ((self.theta == 0) & (self.off == 0)[:, None])
+        return Ball(turn.mid, np.where(known, 0.0, turn.rad))
+
+    def push(self, system: EnclosedSpace) -> Floats:
+        """nu times the units of the tau, of shape (p, 2)."""
+        return np.asarray(self.nu * np.where(system.tau >= 0, system.unit[system.tau], 1.0))
+
+    def gap_serves(self, system: EnclosedSpace, i: int, w: Ball) -> bool:
+        """True if theta of a node without load serves for all w in a ball, by its gap (theory, (12.6))."""
+        places = system.tau[i]
+        t, theta = places[places >= 0], self.theta[i][places >= 0]
+        gap = -float(w.mid[i] + w.rad[i]) / SAFE
+        if not gap > 0:
+            return False
+        unit = system.unit[t]
+        v = Ball(w.mid[t] / unit, w.rad[t] / unit * SAFE + TINY)
+        slip = float(upper_norm(v.size)) - float(theta @ v.mid) + float(np.abs(theta) @ v.rad)
+        slip += 32 * UNIT * float(np.sum(v.size)) + float(self.off[i] * np.sum(v.size))
+        room = (self.mu[i] - float(upper_norm(self.nu[i])) * SAFE) / SAFE
+        return bool(room * gap / SAFE >= self.kappa[i] * slip * SAFE * SAFE + TINY)
+
+    def off_at(self, system: EnclosedSpace, i: int, y: Ball, w: Ball) -> float:
+        """How far theta is at most from one that serves a solution within a node's balls; infinite if that is open."""
+        places = system.tau[i]
+        t, theta = places[places >= 0], self.theta[i][places >= 0]
+        if not len(t) or self.wide[i] > 0:
+            return 0.0
+        if w.mid[i] + w.rad[i] < 0 and self.gap_serves(system, i, w):
+            return 0.0
+        off, unit = np.inf, system.unit[t]
+        scale = system.slip_scale[i] / unit
+        v, v_rad = w.mid[t] * scale, float(upper_norm(w.rad[t] * scale * SAFE + TINY))
+        length = float(np.linalg.norm(v))
+        if length * (1.0 - 32 * UNIT) > v_rad * SAFE:
+            # it slides, in a direction that is off by 2 v_rad / length at most
+            apart = np.linalg.norm(v / length - theta) + (2.0 * v_rad / length if len(t) > 1 else 0.0)
+            off = float(apart * SAFE + 32 * UNIT)
+        low = float(y.mid[i] - y.rad[i]) / SAFE
+        if low > 0:
+            # |tau / lambda_n - theta| = |tau - theta lambda_n| / lambda_n
+            scale, most = unit * system.disc_scale[i], system.disc_scale[i]
+            tau, n = Ball(y.mid[t] * scale, y.rad[t] * scale * SAFE + TINY), Ball(y.mid[i] * most, y.rad[i] * most)
+            apart = upper_norm((tau - Ball.exact(theta) * n).size + TINY) / (low * most)
+            off = min(off, float(apart * SAFE * SAFE))
+        return off
+
+
+def in_range(system: EnclosedSpace) -> bool:
+    """Whether nothing underflows with units of tau, and the discs have the radius one."""
+    discs = system.discs
+    return bool(
+        np.max(np.maximum(system.unit, 1.0 / system.unit)) <= LARGEST_UNIT
+        and np.all((discs.mid == 1.0) & (discs.rad == 0))
+    )
+
 
 @dataclass(frozen=True)
 class _Form:
@@ -269,17 +329,10 @@ class _Form:
         numbers = SpaceWeights.of(system, values)
         if numbers is None or not system.smallest_eigenvalue > 0:
             return None
-        if np.max(np.maximum(system.unit, 1.0 / system.unit)) > LARGEST_UNIT:
+        if not in_range(system):
             return None
-        # what follows is about discs of the radius one
-        if np.any((system.discs.mid != 1.0) | (system.discs.rad > 0)):
-            return None
-        unit = np.where(system.tau >= 0, system.unit[system.tau], 1.0)
-        # units are powers of two: what is rounded is less than TINY
-        turn = Ball(numbers.theta / unit, numbers.off[:, None] / unit * SAFE + TINY)
-        turn = Ball(turn.mid, np.where(system.tau >= 0, turn.rad, 0.0))
-        form = cls(system, numbers, turn, numbers.nu * unit, held, 0.0)
-        least = form.smallest(np.zeros(len(unit)), np.zeros(len(unit)))
+        form = cls(system, numbers, numbers.turn(system), numbers.push(system), held, 0.0)
+        least = form.smallest(np.zeros(len(system.tau)), np.zeros(len(system.tau)))
         return replace(form, least=least) if least > 0 else None
 
     def smallest(self, off: Floats, lost: Floats) -> float:
@@ -333,23 +386,9 @@ class _Form:
                 unit, theta = system.unit[t], self.turn[i][places >= 0]
                 along = max(float(numbers.theta[i][places >= 0] @ (w.mid[t] / unit)), 0.0)
                 change[t] = (w[t] - theta * Ball.exact(along * unit * unit)).size
-            elif apart[i] and self._gap_serves(i, w):
+            elif apart[i] and numbers.gap_serves(system, i, w):
                 change[t] = 0.0
         return change
-
-    def _gap_serves(self, i: int, w: Ball) -> bool:
-        """True if theta of a node without load serves for all w in a ball, by its gap (theory, (12.6))."""
-        numbers, places = self.numbers, self.system.tau[i]
-        t, theta = places[places >= 0], numbers.theta[i][places >= 0]
-        gap = -float(w.mid[i] + w.rad[i]) / SAFE
-        if not gap > 0:
-            return False
-        unit = self.system.unit[t]
-        v = Ball(w.mid[t] / unit, w.rad[t] / unit * SAFE + TINY)
-        slip = float(upper_norm(v.size)) - float(theta @ v.mid) + float(np.abs(theta) @ v.rad)
-        slip += 32 * UNIT * float(np.sum(v.size)) + float(numbers.off[i] * np.sum(v.size))
-        room = (numbers.mu[i] - float(upper_norm(numbers.nu[i])) * SAFE) / SAFE
-        return bool(room * gap / SAFE >= numbers.kappa[i] * slip * SAFE * SAFE + TINY)
 
     def _moved(self, change: Floats) -> float:
         """Upper bound of ||D'delta||, |delta| <= change."""
@@ -368,7 +407,7 @@ class _Form:
     def serves(self, y: Ball, w: Ball, errors: float) -> bool:
         """True if any solution within these balls is the only one, given that all lie there or that it exists."""
         numbers, system = self.numbers, self.system
-        off = np.array([self._off(i, y, w) for i in range(len(system.tau))])
+        off = np.array([numbers.off_at(system, i, y, w) for i in range(len(system.tau))])
         lost = numbers.kappa * off * slip_sizes(system)
         if not np.all(np.isfinite(lost)):
             return False
@@ -377,31 +416,6 @@ class _Form:
         # node by node
         apart = off > 0
         return self.smallest(np.where(apart, errors * off * SAFE, 0.0), np.where(apart, lost + TINY, 0.0)) > 0
-
-    def _off(self, i: int, y: Ball, w: Ball) -> float:
-        """How far theta is at most from one that serves a solution within a node's balls; infinite if that is open."""
-        system, numbers, places = self.system, self.numbers, self.system.tau[i]
-        t, theta = places[places >= 0], numbers.theta[i][places >= 0]
-        if not len(t) or numbers.wide[i] > 0:
-            return 0.0
-        if w.mid[i] + w.rad[i] < 0 and self._gap_serves(i, w):
-            return 0.0
-        off, unit = np.inf, system.unit[t]
-        scale = system.slip_scale[i] / unit
-        v, v_rad = w.mid[t] * scale, float(upper_norm(w.rad[t] * scale * SAFE + TINY))
-        length = float(np.linalg.norm(v))
-        if length * (1.0 - 32 * UNIT) > v_rad * SAFE:
-            # it slides, in a direction that is off by 2 v_rad / length at most
-            apart = np.linalg.norm(v / length - theta) + (2.0 * v_rad / length if len(t) > 1 else 0.0)
-            off = float(apart * SAFE + 32 * UNIT)
-        low = float(y.mid[i] - y.rad[i]) / SAFE
-        if low > 0:
-            # |tau / lambda_n - theta| = |tau - theta lambda_n| / lambda_n
-            scale, most = unit * system.disc_scale[i], system.disc_scale[i]
-            tau, n = Ball(y.mid[t] * scale, y.rad[t] * scale * SAFE + TINY), Ball(y.mid[i] * most, y.rad[i] * most)
-            apart = upper_norm((tau - Ball.exact(theta) * n).size + TINY) / (low * most)
-            off = min(off, float(apart * SAFE * SAFE))
-        return off
 
 
 def slip_sizes(system: EnclosedSpace) -> Floats:
@@ -440,18 +454,11 @@ def least_eigenvalue(
     """
     tau, p, (mu, kappas), (off, wide) = system.tau, len(system.tau), factors, rest
     unit = np.where(tau >= 0, system.unit[tau], 1.0)
-    S = Ball(system.S, system.S_rad)
-    form = Ball(S.mid.copy(), S.rad.copy())
-    along = S[:p] * Ball.exact(mu[:, None])
-    form.mid[:p], form.rad[:p] = along.mid, along.rad
+    S, form = Ball(system.S, system.S_rad), weighted(system, mu, kappas, turn, push)
     spread = Ball.exact(np.zeros_like(S.mid))
     for k in range(2):
         has = np.flatnonzero(tau[:, k] >= 0)
         t, kappa = tau[has, k], kappas[has]
-        turned = form[has] - S[t] * (turn[has, k] * Ball.exact(kappa))[:, None]
-        pushed = S[t] * Ball.exact(kappa[:, None]) + S[has] * Ball(push[has, k], np.full(len(has), TINY))[:, None]
-        for rows, part in ((has, turned), (t, pushed)):
-            form.mid[rows], form.rad[rows] = part.mid, part.rad
         used = np.flatnonzero(wide[has] > 0)
         # weights at least kappa off / sqrt(s), for any rounding
         weight = kappa[used] * off[has[used]] / np.sqrt(wide[has[used]]) / unit[has[used], k]
@@ -469,3 +476,19 @@ def least_eigenvalue(
     if not (np.all(np.isfinite(mid)) and np.all(np.isfinite(rad))):
         return 0.0
     return float((dense_eigenvalue_bound(mid) - float(upper_norm(rad))) / SAFE)
+
+
+def weighted(system: EnclosedSpace, mu: Floats, kappa: Floats, turn: Ball, push: Floats) -> Ball:
+    """D'S, (m, m), for multipliers as of ``least_eigenvalue``."""
+    tau, p, S = system.tau, len(system.tau), Ball(system.S, system.S_rad)
+    form = Ball(S.mid.copy(), S.rad.copy())
+    along = S[:p] * Ball.exact(mu[:, None])
+    form.mid[:p], form.rad[:p] = along.mid, along.rad
+    for k in range(2):
+        has = np.flatnonzero(tau[:, k] >= 0)
+        t, factor = tau[has, k], kappa[has]
+        turned = form[has] - S[t] * (turn[has, k] * Ball.exact(factor))[:, None]
+        pushed = S[t] * Ball.exact(factor[:, None]) + S[has] * Ball(push[has, k], np.full(len(has), TINY))[:, None]
+        for rows, part in ((has, turned), (t, pushed)):
+            form.mid[rows], form.rad[rows] = part.mid, part.rad
+    return form

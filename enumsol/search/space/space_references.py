@@ -1,0 +1,214 @@
+"""Where a known root of a body in 3D that nothing holds is the only one (theory, section 14.11).
+
+Nothing here is trusted: the certifier proves what is proposed, or the tree is searched.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+import numpy as np
+from scipy.optimize import nnls
+
+from enumsol.model.sectors import SECTORS
+from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.search.space.space_fathoming import DefiniteForm
+from enumsol.trusted.space.sector_rows import ALONG, GAP, LEFT, RIGHT, SLIP
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator
+
+    from enumsol.condensation.space_condensed import FloatingSpace, SpaceSystem
+    from enumsol.support.array_types import Codes, Floats
+    from enumsol.trusted.space.leaves import SpaceRoot
+    from enumsol.trusted.space.sector_rows import Row
+    from enumsol.trusted.space.space_reference import SpaceProduct, SpaceReference
+
+#: Weights of |G d|^2 that are tried, by the largest entry of S.
+_BALANCE = 1.0, 1024.0
+#: Smallest eigenvalue relative to S from which a form counts as definite; the share of a gap that serves for a slip.
+_DEFINITE, _SHARED = 1e-9, 0.5
+#: Eigenvalues of the small matrix, relative to its largest one, that count as none; what of rows counts as none.
+_NONE, _NOTHING = 1e-9, 1e-8
+#: Factors of products that are tried, relative to the compliance.
+_FACTORS = np.geomspace(2.0**-8, 2.0**8, 9)
+#: Assignments that are tried in vain for one more that passes before the next try, and how many pass at most.
+_PATIENCE, _LONGEST = 16, 7
+
+
+class OnlyRoot(NamedTuple):
+    """Why no other root lies below an assignment: rows that are equations, and products of rows."""
+
+    rows: list[Row]
+    products: list[SpaceProduct]
+
+
+class Referring(Protocol):
+    """A certifier that can say that a known root is the only one below an assignment."""
+
+    def reference(self, leaf: Codes) -> SpaceReference | None:
+        """The form of a root, if one is proven definite."""
+
+    def only_root(self, codes: Codes, reference: SpaceReference, proposal: OnlyRoot) -> list[Any] | None:
+        """The root, if it was not told before, as a list; None if it is not proven that no other one lies below."""
+
+
+class SpaceReferenceCloser:
+    """Tries the whole problem, and then every assignment, unless not even the root's own statuses leave it alone.
+
+    Parameters
+    ----------
+    certifier : Referring
+    root : callable giving the codes of a leaf with a strict root, or None
+
+    Attributes
+    ----------
+    known : codes of that leaf, none if there is none, and None if that is not known
+    """
+
+    relaxed: object = None
+    leads = False
+
+    def __init__(self, certifier: Referring, root: Callable[[], Codes | None]) -> None:
+        self._certifier, self._root = certifier, root
+        self.known: Codes | None = None
+        self.sliding = dict[int, int]()
+        self._wait = self._vain = 0
+
+    @cached_property
+    def _reference(self) -> SpaceReference | None:
+        if self.known is None:
+            self.known = self._root() or ()
+        found = self._certifier.reference(self.known) if self.known else None
+        if found is None or not found.is_only_root(self.known, *proposed(found, self.known), found.system.reach):
+            return None
+        return found
+
+    def whole(self) -> list[Any] | None:
+        """The only root, as a list, if one certificate proves that the problem has no other one."""
+        return None if self._reference is None else self.again((UNDECIDED,) * len(self._reference.leaf), None)
+
+    def closed(self, codes: Codes, relaxation: object) -> list[Any] | None:
+        """The root, if it was not told before, below an assignment that holds no other one; None if not proven."""
+        if self._wait > 0:
+            self._wait -= 1
+            return None
+        found = self.again(codes, relaxation)
+        self._vain = 0 if found is not None else self._vain + 1
+        self._wait = min(self._vain // _PATIENCE, _LONGEST)
+        return found
+
+    def again(self, codes: Codes, relaxation: object) -> list[Any] | None:
+        """The same, whether or not other assignments were tried in vain."""
+        del relaxation
+        if self._reference is None:
+            return None
+        with np.errstate(all="ignore"):
+            proposal = proposed(self._reference, codes)
+        return self._certifier.only_root(codes, self._reference, proposal)
+
+    def led(self, codes: Codes) -> None:
+        """No node of the tree is decided, or split, before its relaxation is solved."""
+
+    def alone(self, *_: object) -> None:
+        """Roots of bodies that are held are closed in this way."""
+
+    def met(self, answer: object) -> None:
+        """Nothing is made of leaves."""
+
+    def begins_again(self, nodes: int) -> bool:
+        """Nothing that is met makes a search begin again."""
+        del nodes
+        return False
+
+
+def proposed(reference: SpaceReference, codes: Codes) -> OnlyRoot:
+    """All equations of an assignment, and products of rows of its sectors where they are needed."""
+    kinds = [(GAP, 0), (SLIP, 0), (SLIP, 1)]
+    has = reference.system.tau >= 0
+    rows = [
+        (kind, i, k)
+        for kind, k in kinds
+        for i in range(len(codes))
+        if (kind == GAP or has[i, k]) and reference.is_equation(codes, (kind, i, k))
+    ]
+    M = reference.form.small_matrix(reference.rows(rows), reference.rows([]), []).mid
+    sizes, modes = np.linalg.eigh(M)
+    left = modes[:, sizes <= _NONE * np.max(np.abs(sizes), initial=0.0)]
+    tight = _tight(reference, codes) if left.shape[1] else []
+    if not tight:
+        return OnlyRoot(rows, [])
+    coefficients = reference.rows(tight).mid
+    coefficients = coefficients / np.linalg.norm(coefficients, axis=1, keepdims=True)
+    factors = _balanced(coefficients @ reference.system.rows.G.mid.T @ left)
+    if factors is None:
+        return OnlyRoot(rows, [])
+    used = np.flatnonzero(factors > 0)
+    chosen = [tight[k] for k in used]
+    return OnlyRoot(rows, _products(reference, rows, chosen, factors[used]))
+
+
+def _tight(reference: SpaceReference, codes: Codes) -> list[Row]:
+    """Rows of the slips of an assignment that are nonnegative below it and not positive at the root."""
+    rows = [(kind, i, code - SECTORS) for i, code in enumerate(codes) if code > SECTORS for kind in (LEFT, RIGHT)]
+    signs = {SLIP_PLUS: 1, SLIP_MINUS: -1}
+    rows += [(ALONG, i, signs[code]) for i, code in enumerate(codes) if code in signs]
+    return [row for row in rows if reference.is_tight(codes, row)]
+
+
+def _balanced(R: Floats) -> Floats | None:
+    """y >= 0 with R'y = 0, (k,), where the rows that y uses leave no mode free; None where none was found."""
+    size = np.linalg.norm(R, axis=0)
+    if not np.all(size > _NOTHING):
+        return None
+    R = R / size
+    y, _ = nnls(np.vstack([R.T, np.ones(len(R))]), np.append(np.zeros(R.shape[1]), 1.0))
+    y = np.where(y > _NOTHING, y, 0.0)
+    used = R[y > 0]
+    if not np.any(y > 0) or np.linalg.norm(R.T @ y) > _NOTHING * np.sum(y):
+        return None
+    return y / np.linalg.norm(used, 2) if np.linalg.matrix_rank(used, tol=_NOTHING) == R.shape[1] else None
+
+
+def _products(reference: SpaceReference, rows: list[Row], tight: list[Row], y: Floats) -> list[SpaceProduct]:
+    """The products of tight rows with the factors z y_k y_l, z being best; none where it does not help."""
+    coefficients = reference.rows(tight)
+    y = y / np.linalg.norm(coefficients.mid, axis=1)
+    M = reference.form.small_matrix(reference.rows(rows), coefficients, []).mid
+    Z, k = np.zeros_like(M), len(M) - len(y)
+    Z[k:, k:] = 0.5 * (np.outer(y, y) - np.diag(y * y))
+    least = np.linalg.eigvalsh(M - _FACTORS[:, None, None] * Z)[:, 0]
+    z = float(_FACTORS[np.argmax(least)])
+    if not np.max(least) > _NONE * np.max(np.abs(M)):
+        return []
+    return [(tight[a], tight[b], float(z * y[a] * y[b])) for a in range(len(y)) for b in range(a)]
+
+
+def reference_numbers(
+    system: SpaceSystem, enclosed: FloatingSpace, root: SpaceRoot, leaf: Codes
+) -> Iterator[tuple[Floats, float, float]]:
+    """Numbers, balance and share of forms that may be definite, as ``SpaceReference.of`` takes them."""
+    tau, p, unit = enclosed.tau, len(enclosed.tau), enclosed.unit
+    y, w, code = root.y.mid, root.w.mid, np.array(leaf)
+    force, slip = (np.where(tau >= 0, part, 0.0) for part in (y[tau] * unit[tau], w[tau] / unit[tau]))
+    apart, size = code == OPEN, np.linalg.norm(slip, axis=1)
+    # of open nodes as much of the slip as their gap does not serve for
+    need = np.maximum(1.0 + _SHARED * w[:p] / np.where(size > 0, size, np.inf), 0.0)
+    length = np.where(code == STICK, y[:p], np.linalg.norm(force, axis=1))
+    divisor = np.where(length > 0, length, np.inf)
+    theta = np.where(
+        apart[:, None], slip * (need / np.where(size > 0, size, np.inf))[:, None], force / divisor[:, None]
+    )
+    scale, found = float(np.max(np.abs(enclosed.S))), None
+    for balance in (scale * factor for factor in _BALANCE):
+        held = np.sqrt(balance) * enclosed.rows.G.mid
+        form = DefiniteForm(replace(system, S=enclosed.S, g=enclosed.g), [theta], apart, np.zeros(p), held=held)
+        for better in (False, True):
+            found = form.best(_DEFINITE, better=better)
+            if found is not None:
+                mu, kappa, nu = found
+                numbers = np.concatenate([mu, kappa, np.zeros(p), nu[tau >= 0], theta[tau >= 0]])
+                yield numbers, balance, float(np.mean(mu))
+                break
