@@ -120,6 +120,13 @@ class FloatingChecker(WithinReach, Checker):
             self.bounded |= self._rests_on_reach(codes, found[-1][1])
         return reason
 
+    def _slips(self, point: list[Fraction]) -> list[Any]:
+        from enumsol.arithmetic.rationals import rational  # python-flint, as above
+
+        numbers = [rational(x) for x in point]
+        rows = (self.rational.row(5, node) for node in range(self.problem.p))
+        return [sum((a * x for a, x in zip(form, numbers, strict=True)), constant) for form, constant in rows]
+
     def _rests_on_reach(self, codes: Codes, points: Sequence[Sequence[Fraction]]) -> bool:
         """Whether what a selection holds may be other without the bounds of the rigid displacement."""
         return self.rational.rests_on_reach(codes, points)  # type: ignore[attr-defined, no-any-return]

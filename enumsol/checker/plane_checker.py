@@ -276,12 +276,15 @@ class Checker(TreeChecker):
             p = self.problem.p
             mid, rad = ball.force.mid, ball.force.rad
             rad = np.where((mid == 0) & (rad == 0), 0.0, rad * self.force + TINY)
-            self._locate_by(name, Ball(mid * self.force, rad), ball.w[p:])
+            rigid = ball.rigid if isinstance(ball, VerifiedSelection) else None
+            if rigid is not None:
+                rigid = rigid * Ball.exact(self.system.rigid_unit)
+            self._locate_by(name, Ball(mid * self.force, rad), ball.w[p:], rigid)
 
-    def _locate_by(self, name: Codes, forces: Ball, slips: Ball) -> None:
-        """Take note of a root by its forces in the problem's units, and by its slips in any unit."""
+    def _locate_by(self, name: Codes, forces: Ball, slips: Ball, rigid: Ball | None) -> None:
+        """Take note of a root by its forces and rigid displacement in the problem's units, its slips in any unit."""
         still = (slips.mid == 0) & (slips.rad == 0)
-        self.locate(name, Located(forces, still, certain_statuses(forces, slips)))
+        self.locate(name, Located(forces, still, certain_statuses(forces, slips), rigid))
 
     def locate_rational_roots(self) -> None:
         """Add the isolated roots that rationals have found to ``located``."""
@@ -290,11 +293,12 @@ class Checker(TreeChecker):
             if dimension:
                 continue
             exact = [Fraction(x) for x in points[0]]
-            forces = np.array([float(x) for x in exact])
+            near = np.array([float(x) for x in exact])
             w = [Fraction(0)] * p if not any(exact) and self.problem.is_unloaded(self.alpha) else self._slips(exact)
             signs = np.array([float(x > 0) - float(x < 0) for x in w])
-            rad = np.where([x == 0 for x in exact], 0.0, np.abs(forces) * 2 * UNIT + TINY)
-            self._locate_by(codes, Ball(forces, rad), Ball(signs, np.zeros(p)))
+            known = Ball(near, np.where([x == 0 for x in exact], 0.0, np.abs(near) * 2 * UNIT + TINY))
+            rigid = -known[2 * p :] if len(exact) > 2 * p else None
+            self._locate_by(codes, known[: 2 * p], Ball(signs, np.zeros(p)), rigid)
 
     def _slips(self, point: list[Fraction]) -> list[Any]:
         """w_t at a point, exactly."""

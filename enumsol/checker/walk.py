@@ -44,11 +44,14 @@ class Located:
         Tangential components with u_t = 0 for certain.
     codes : p status codes, or None
         Where they are certain; in 3D any one but open and stick means slip.
+    rigid : Ball or None
+        Of a body that nothing holds, the coordinates of its rigid displacement, in the problem's units.
     """
 
     forces: Ball
     still: Mask
     codes: tuple[int, ...] | None = None
+    rigid: Ball | None = None
 
 
 @dataclass

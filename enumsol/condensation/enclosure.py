@@ -306,6 +306,11 @@ class EnclosedSystem:
         return np.zeros(0)
 
     @property
+    def rigid_unit(self) -> Floats:
+        """Units of the coordinates of a rigid displacement; none of a body that is held."""
+        return np.zeros(0)
+
+    @property
     def largest_work(self) -> float:
         """A bound of the work of the load on a rigid displacement; none of a body that is held."""
         return 0.0

@@ -124,15 +124,16 @@ def _enclosed_positions(stage: Stage, root: Root) -> Ball | None:
     if np.all(still):
         return before
     try:
-        enclosure = stage.problem.enclosure
-        forces = _forces(root)
+        forces, moves = _forces(root), root.enclosure.rigid_coordinates
+        rigid = None if moves is None else _middle(*moves.T)
         plane = root.u_t.ndim == 1
         codes = (
             certain_statuses(forces, _middle(low, high))
             if plane
             else _certain(root, stage.problem.friction_at(root.alpha))
         )
-        moved = tangential_positions(enclosure, Fraction(root.alpha), forces, still, before, codes)
+        alpha = Fraction(root.alpha)
+        moved = tangential_positions(stage.problem, alpha, forces, still, before, codes, rigid=rigid)
     except NotEnclosedError:
         return None
     return moved if np.all(np.isfinite(moved.rad)) else None
@@ -331,7 +332,8 @@ class HistoryData:
         bounds = [stage.roots.rigid_bound for stage in self.stages if stage.roots.rigid_bound is not None]
         if not bounds:
             return ""
-        return f", {next((bound for bound in bounds if bound.needed), bounds[0]).words()}"
+        # all histories within the least of those that are needed
+        return f", {min(bounds, key=lambda bound: (not bound.needed, bound.largest)).words()}"
 
 
 def history_proof(data: HistoryData) -> Proof | None:

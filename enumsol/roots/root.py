@@ -37,6 +37,8 @@ class Enclosure(Sealed):
         Lower and upper bounds [force]; in 3D those of lambda_t have the shape (p, 2, 2), the bounds last.
     u_n, u_t : arrays of the same shapes
         Lower and upper bounds of u_n = Bn u - gap and u_t = Bt u - slip_offset [length].
+    rigid_coordinates : (r, 2) array or None
+        Of a body that nothing holds, those of the coordinates q of its rigid displacement.
 
     Examples
     --------
@@ -51,6 +53,7 @@ class Enclosure(Sealed):
     lambda_t: Floats
     u_n: Floats
     u_t: Floats
+    rigid_coordinates: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -66,7 +66,7 @@ class PointValues(Protocol):
         """w_t at the point, p rationals; None in an arithmetic without them."""
 
     def bounds(self, point: Any) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]] | None:
-        """Proven bounds of (lambda, w) at the point, two arrays of shape (4p,); None in an arithmetic without any."""
+        """Proven bounds of (lambda, w, q) at the point, two (4p + r,) arrays; None in an arithmetic without any."""
 
 
 class SelectionSolver(PointValues, Protocol):

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, Ball, smaller
+from enumsol.condensation.floating import moved_by_modes
 from enumsol.trusted.status_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from fractions import Fraction
 
-    from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.model.problem import ContactProblem
     from enumsol.support.array_types import Mask
 
@@ -48,13 +48,14 @@ def certain_statuses(forces: Ball, slips: Ball) -> tuple[int, ...] | None:
 
 
 def tangential_positions(
-    enclosure: CondensedEnclosure,
+    problem: Any,
     alpha: Fraction,
     forces: Ball,
     still: Mask,
     before: Ball,
     codes: Sequence[int] | None = None,
     *,
+    rigid: Ball | None = None,
     share: float = 1.0,
 ) -> Ball:
     """Bt u at a root whose forces lie in a ball, for every slip offset in a ball.
@@ -65,8 +66,8 @@ def tangential_positions(
 
     Parameters
     ----------
-    enclosure : CondensedEnclosure
-        Of the step's problem.
+    problem : ContactProblem or ContactProblem3D
+        That of the step.
     alpha : Fraction
     forces : Ball of shape (2p,) or (3p,)
         lambda: normal components first, of which those that are not negative count [force].
@@ -76,19 +77,31 @@ def tangential_positions(
         The slip offset [length].
     codes : p status codes or None
         Those of the root, if they are certain; in 3D any one that is neither open nor stick means slip.
+    rigid : Ball of shape (r,), or None
+        Of a body that nothing holds, the coordinates q of its rigid displacement; without them it may be anywhere.
     share : float
         Of the radius from which on more digits are asked for.
+
+    Raises
+    ------
+    NotEnclosedError
+        The step's data cannot be enclosed.
     """
-    p = len(enclosure.problem.gap)
+    enclosure, p = problem.on_springs.enclosure, problem.p
     S = Ball(enclosure.S, enclosure.S_rad)
     forces = _pressing(forces, p)
     with np.errstate(over="ignore", invalid="ignore"):
         moved = (enclosure.moved_freely(alpha) - (S @ forces[:, None])[:, 0])[p:]
+        if rigid is not None:
+            moved = moved + (moved_by_modes(problem)[p:] @ rigid[:, None])[:, 0]
+        elif problem.modes is not None:
+            moved = Ball(moved.mid, np.full_like(moved.rad, np.inf))
     if codes is not None and not np.max(moved.rad) <= share * _WELL_KNOWN * np.max(np.abs(moved.mid)):
-        if len(moved.mid) == p:
-            moved = _by_many_digits(enclosure.problem, alpha, codes, before) or moved
-        elif (found := _by_leaf(enclosure, alpha, forces, codes)) is not None:
-            moved = smaller(found, moved)
+        if len(moved.mid) > p:
+            found = _by_leaf(problem, alpha, forces, codes)
+            moved = moved if found is None else smaller(found, moved)
+        elif problem.modes is None:
+            moved = _by_many_digits(problem, alpha, codes, before) or moved
     return Ball(np.where(still, before.mid, moved.mid), np.where(still, before.rad, moved.rad))
 
 
@@ -99,10 +112,10 @@ def _pressing(forces: Ball, p: int) -> Ball:
     return Ball(np.where(cut, half, forces.mid), np.where(cut, half * SAFE, forces.rad))
 
 
-def _by_leaf(enclosure: CondensedEnclosure, alpha: Fraction, forces: Ball, codes: Sequence[int]) -> Ball | None:
+def _by_leaf(problem: Any, alpha: Fraction, forces: Ball, codes: Sequence[int]) -> Ball | None:
     from enumsol.trusted.space.leaf_positions import leaf_positions
 
-    return leaf_positions(enclosure, alpha, forces, codes)
+    return leaf_positions(problem, alpha, forces, codes)
 
 
 def _by_many_digits(problem: ContactProblem, alpha: Fraction, codes: Sequence[int], before: Ball) -> Ball | None:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.arithmetic.balls import Ball, upper_norm
-from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
+from enumsol.condensation.space_condensed import EnclosedSpace, FloatingSpace, SpaceSystem
 from enumsol.model.sectors import DEEPEST, SECTORS, places
 from enumsol.trusted.space.leaves import ROUNDED_ANGLE, Leaf, SpaceRoot, turned
 from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
@@ -28,22 +28,23 @@ _LEVEL, _SHARE = 17, 64.0
 _ANY = 4.0
 
 
-def leaf_positions(enclosure: CondensedEnclosure, alpha: Fraction, forces: Ball, codes: Sequence[int]) -> Ball | None:
+def leaf_positions(problem: Any, alpha: Fraction, forces: Ball, codes: Sequence[int]) -> Ball | None:
     """Bt u of the components with friction that move, (2p,) [length]; all others are unbounded.
 
     None where no leaf is proven to hold the root.
 
     Parameters
     ----------
-    enclosure : CondensedEnclosure
-        Of a problem in 3D, whose slip offset may be a ball.
+    problem : ContactProblem3D
+        Its slip offset may be a ball.
     alpha : Fraction
     forces : Ball of shape (3p,)
         lambda at the root, normal components first [force].
     codes : p status codes
         Statuses that hold for certain: open, stick, any other one for slip.
     """
-    enclosed, length = _scaled(enclosure, alpha)
+    enclosure = problem.on_springs.enclosure
+    enclosed, length = _scaled(problem, enclosure, alpha)
     p = enclosed.p
     pairs = forces[p:].mid.reshape(2, p).T, forces[p:].rad.reshape(2, p).T
     tau = Ball(*pairs) * enclosed.inverse_friction * Ball.exact(enclosed.tau_scale)
@@ -68,7 +69,7 @@ def leaf_positions(enclosure: CondensedEnclosure, alpha: Fraction, forces: Ball,
     assert enclosure.free is not None
     own = np.concatenate([np.zeros_like(moves), moves, moves])
     g0, g0_rad = (np.where(own, *pair) for pair in zip(enclosure.free, (enclosure.g0, enclosure.g0_rad), strict=True))
-    w = Leaf(_scaled(replace(enclosure, g0=g0, g0_rad=g0_rad), alpha)[0], codes).displacements(root)
+    w = Leaf(_scaled(problem, replace(enclosure, g0=g0, g0_rad=g0_rad), alpha)[0], codes).displacements(root)
     if w is None:
         return None
     found = Ball(np.zeros(2 * p), np.full(2 * p, np.inf))
@@ -79,10 +80,13 @@ def leaf_positions(enclosure: CondensedEnclosure, alpha: Fraction, forces: Ball,
     return found
 
 
-def _scaled(enclosure: CondensedEnclosure, alpha: Fraction) -> tuple[EnclosedSpace, Floats]:
+def _scaled(problem: Any, enclosure: CondensedEnclosure, alpha: Fraction) -> tuple[EnclosedSpace, Floats]:
     """The problem as balls, in units of forces and displacements of its own; the latter, (p,)."""
-    system = SpaceSystem.scaled(enclosure.S, enclosure.moved_freely(alpha).mid, enclosure.problem.friction_at(alpha))
-    return EnclosedSpace.of_problem(enclosure, alpha, system.force, system.length), system.length
+    system = SpaceSystem.scaled(enclosure.S, enclosure.moved_freely(alpha).mid, problem.friction_at(alpha))
+    units = alpha, system.force, system.length
+    if problem.modes is None:
+        return EnclosedSpace.of_problem(enclosure, *units), system.length
+    return FloatingSpace.of(problem, *units, enclosure), system.length
 
 
 def _code(code: int, tau: Sequence[int], force: Sequence[float], angle: float) -> int:
