@@ -236,7 +236,7 @@ class HistoryChecker:
         All leaves that hold a root have its end in their balls, so that any of these balls shows it.
         """
         starts = [self.stages[k].start for k in stage.following]
-        return bool(stage.ends) and all(
+        return len(stage.ends) >= stage.roots and all(
             any(start.holds(ball) for start in starts for ball in balls) for balls in stage.ends
         )
 
