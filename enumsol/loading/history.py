@@ -229,12 +229,17 @@ def _read_root(record: dict[str, Any], alpha: Any, problem: Any) -> Root:
         active=tuple(frozenset(_statuses(names)) for names in record["active"]),
         **arrays,
         **{name: record[name] for name in _OF_ROOT},
-        enclosure=None if bounds is None else Enclosure(*(_array(bounds[name]) for name in _BOUNDS)),
+        enclosure=None if bounds is None else _enclosure(bounds),
         slip_angle=None if angles is None else np.array([[float.fromhex(a) for a in pair] for pair in angles]),
         _condensed=condensation_of(problem),
         _rigid=_array(record["rigid"]),
         _exact_slips=None if slips is None else tuple(map(Fraction, slips)),
     )
+
+
+def _enclosure(record: dict[str, Any]) -> Enclosure:
+    arrays: dict[str, Any] = {name: _array(record[name]) for name in _BOUNDS}
+    return Enclosure(**arrays)
 
 
 def _family(family: RootFamily) -> dict[str, Any]:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, Ball, smaller
-from enumsol.condensation.floating import moved_by_modes
+from enumsol.condensation.floating import FloatingSystem, RigidRows, moved_by_modes
+from enumsol.trusted.at_alpha import displacements
 from enumsol.trusted.status_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
@@ -61,8 +62,9 @@ def tangential_positions(
     """Bt u at a root whose forces lie in a ball, for every slip offset in a ball.
 
     A node with u_t = 0 for certain stays where it was: its ball is carried over unchanged. Any other is where the load
-    and the forces move it, theory, (13.2), whatever its own offset was. Where this says little because the body is
-    held by weak springs, and the statuses of all nodes are certain, balls of many digits say it, in 3D a leaf.
+    and the forces move it, theory, (13.2), whatever its own offset was. If the statuses of all nodes are certain,
+    their equations say more: in 2D where nothing holds the body, and in balls of many digits where it is held by
+    springs that are so weak that (13.2) says little; in 3D then by a leaf.
 
     Parameters
     ----------
@@ -96,12 +98,13 @@ def tangential_positions(
             moved = moved + (moved_by_modes(problem)[p:] @ rigid[:, None])[:, 0]
         elif problem.modes is not None:
             moved = Ball(moved.mid, np.full_like(moved.rad, np.inf))
-    if codes is not None and not np.max(moved.rad) <= share * _WELL_KNOWN * np.max(np.abs(moved.mid)):
-        if len(moved.mid) > p:
-            found = _by_leaf(problem, alpha, forces, codes)
-            moved = moved if found is None else smaller(found, moved)
-        elif problem.modes is None:
-            moved = _by_many_digits(problem, alpha, codes, before) or moved
+    well_known, found = np.max(moved.rad) <= share * _WELL_KNOWN * np.max(np.abs(moved.mid)), None
+    if codes is not None and len(moved.mid) == p and problem.modes is not None:
+        found = _by_selection(problem, alpha, codes)
+    elif codes is not None and not well_known:
+        plane = len(moved.mid) == p
+        found = _by_many_digits(problem, alpha, codes, before) if plane else _by_leaf(problem, alpha, forces, codes)
+    moved = moved if found is None else smaller(found, moved)
     return Ball(np.where(still, before.mid, moved.mid), np.where(still, before.rad, moved.rad))
 
 
@@ -110,6 +113,16 @@ def _pressing(forces: Ball, p: int) -> Ball:
     half = 0.5 * (forces.mid + forces.rad)
     cut = (np.arange(len(half)) < p) & (forces.mid < forces.rad) & (half > 0)
     return Ball(np.where(cut, half, forces.mid), np.where(cut, half * SAFE, forces.rad))
+
+
+def _by_selection(problem: Any, alpha: Fraction, codes: Sequence[int]) -> Ball | None:
+    """Where nodes are at the regular root of a selection of a body that nothing holds, but for those that stick."""
+    units = problem.on_springs.condensed.at(alpha).proposals
+    beside = problem.on_springs.enclosure.without_offsets(np.array(codes) != STICK)
+    held = beside.at(alpha, units.force, units.length)
+    w = displacements(FloatingSystem.on(held, RigidRows.of(problem, alpha, units.force, units.length)), codes)
+    p = problem.p
+    return w and Ball(w.mid[p:] * units.length[p:], w.rad[p:] * units.length[p:])
 
 
 def _by_leaf(problem: Any, alpha: Fraction, forces: Ball, codes: Sequence[int]) -> Ball | None:

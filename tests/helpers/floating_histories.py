@@ -19,7 +19,8 @@ def random_steps(problem, rng, count):
         friction = float(rng.choice([0.25, 0.5, 1.0])) if rng.random() < 0.2 else None
         F = problem.friction_at(0) if friction is None else friction
         pressed = rng.integers(0, 9, p) / 2
-        load = problem.Bn.T @ pressed + problem.Bt.T @ (F * pressed * rng.choice([-1, -0.75, -0.5, 0, 0.25, 0.75, 1], p))
+        share = rng.choice([-1, -0.75, -0.5, 0, 0.25, 0.75, 1], p)
+        load = problem.Bn.T @ pressed + problem.Bt.T @ (F * pressed * share)
         load += problem.A @ (rng.integers(-4, 5, problem.n) / 8)
         chance = rng.random()
         if steps and chance < 0.1:
@@ -43,7 +44,7 @@ def case(seed, count=3):
         load = np.zeros(problem.n)
         load[upper] = -rng.integers(1, 9, upper.sum()) / 8
         most = -problem.friction[0] * load.sum()
-        load[low] = most * rng.integers(-8, 9) / 8 * rng.dirichlet(np.ones(low.sum())).round(2)
+        load[low] = most * rng.integers(-8, 9) / 8 * rng.multinomial(8, np.ones(low.sum()) / low.sum()) / 8
         if steps and rng.random() < 0.1:
             load = steps[-1].load
         steps.append(enumsol.LoadStep(0, load=load))
@@ -92,7 +93,7 @@ def holds(root, oracle, point):
     return len(numbers) == n + 2 * p
 
 
-def compared(problem, steps, **options):
+def agreed(problem, steps, **options):
     """The verified history, after every search was compared with rationals and its proof was accepted."""
     expected, _ = oracles(problem, steps)
     history = enumsol.histories(problem, steps, **options)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -66,10 +65,8 @@ def leaf_positions(problem: Any, alpha: Fraction, forces: Ball, codes: Sequence[
         return None
     # no force and no direction depends on the offsets of components that move: without these w is where they move to
     moves = np.array([code != STICK for code in codes])
-    assert enclosure.free is not None
-    own = np.concatenate([np.zeros_like(moves), moves, moves])
-    g0, g0_rad = (np.where(own, *pair) for pair in zip(enclosure.free, (enclosure.g0, enclosure.g0_rad), strict=True))
-    w = Leaf(_scaled(problem, replace(enclosure, g0=g0, g0_rad=g0_rad), alpha)[0], codes).displacements(root)
+    beside = enclosure.without_offsets(np.concatenate([moves, moves]))
+    w = Leaf(_scaled(problem, beside, alpha)[0], codes).displacements(root)
     if w is None:
         return None
     found = Ball(np.zeros(2 * p), np.full(2 * p, np.inf))
