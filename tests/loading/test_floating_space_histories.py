@@ -110,7 +110,7 @@ def test_a_block_is_pushed_to_and_fro_and_then_away(tmp_path):
     assert report.unique_until == 4
     assert report.within is None or f"rigid displacements of {report.within:g}" in history.closing_line
     radii = [stage.largest_radius for stage in history.data.stages]
-    assert 0 < radii[-1] < 1e-8
+    assert 0 < radii[-1] < 1e-9
     again = read_back(history, tmp_path / "h.json", block)
     assert repr(again) == repr(history)
     assert complete_report(block, again.proof)
@@ -126,7 +126,7 @@ def test_a_load_that_is_held_is_not_decided():
 
 @pytest.mark.slow
 def test_every_offset_in_a_ball_leads_into_the_ball_of_positions():
-    """Three of four nodes slip about the one that sticks, a mode that the equations of the statuses leave free."""
+    """All four nodes slip: the equations of the statuses leave three modes free, which directions determine."""
     block, loads = pushed_to_and_fro([0.3, 0.95])
     problem, radius, rng = block.replace(f=loads[1]), 1e-9, np.random.default_rng(1)
     first = enumsol.enumerate_roots(block.replace(f=loads[0]), 0)[0]
@@ -134,7 +134,7 @@ def test_every_offset_in_a_ball_leads_into_the_ball_of_positions():
     (root,) = enumsol.enumerate_roots(problem.replace(slip_offset=offset), 0)
     named = {"open": OPEN, "stick": STICK, "slip": SECTORS + 1}
     codes = [named[str(status)] for status in root.statuses]
-    assert codes.count(SECTORS + 1) == 3
+    assert codes.count(SECTORS + 1) == 4
     still = np.tile(np.array(codes) == STICK, 2)
     start = SlipStart(offset, np.full_like(offset, radius))
     wide = restarted(problem, start)
@@ -143,7 +143,7 @@ def test_every_offset_in_a_ball_leads_into_the_ball_of_positions():
     by_leaf = leaf_positions(wide, Fraction(0), known[0], codes)
     assert by_leaf is not None
     by_forces = tangential_positions(wide, Fraction(0), known[0], still, start.ball, rigid=known[1])
-    assert np.all(by_leaf.rad[~still] < 0.1 * by_forces.rad[~still])
+    assert np.all(by_leaf.rad < np.minimum(20 * radius, 0.01 * by_forces.rad))
     for _ in range(4):
         other = offset + radius * rng.choice([-0.999, 0.999], offset.shape)
         (one,) = enumsol.enumerate_roots(problem.replace(slip_offset=other), 0)

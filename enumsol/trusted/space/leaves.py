@@ -362,16 +362,6 @@ class Leaf:
                 rough = True
         return self._left_open(angle, radius, state)
 
-    def displacements(self, root: SpaceRoot) -> Ball | None:
-        """w, (m,), with the directions of a root and the load of this leaf; None where that is not proven regular."""
-        angle, radius, m = root.angle, root.angle_rad, len(self.system.g)
-        if root.rigid is not None:
-            # coordinates of modes that are left free are unknowns beside the directions, of the other sign
-            free = -root.rigid[np.array(self.free, dtype=np.intp) - m]
-            angle, radius = np.r_[angle, free.mid], np.r_[radius, free.rad]
-        state = self._state(angle, radius)
-        return None if state is None else state.w[:m]
-
     def _cut_free(self, angle: Floats, radius: Floats, *, still: bool = False) -> tuple[Floats, Floats] | None:
         """The box with the free unknowns that its angles leave; None if there are none.
 
