@@ -32,7 +32,7 @@ def random_steps(problem, rng, count):
 
 
 def case(seed, count=3):
-    """A random body, or for every second seed a block on a table that is pressed and pushed, and steps."""
+    """A random truss, or for every second seed a block on a table that is pressed and pushed, and steps."""
     rng = np.random.default_rng([seed, 1])
     if seed % 2 == 0:
         problem = random_body(seed)
