@@ -14,6 +14,7 @@ from floating_histories import agreed, case
 from floating_oracle import Oracle, random_body, rational
 from helpers.floating_bodies import held_by_springs, pushed_block
 from interruptions import CtrlC, interrupted
+from proof_tools import of_kind, proof_of, records_of
 from refusals import bad_argument
 
 import enumsol
@@ -260,3 +261,39 @@ def test_two_weights_on_a_spring(tangents, count):
     moved += np.linalg.norm(known[0][1])
     assert moved > 0.1
     assert np.isclose(history.dissipated[count, 0][0], FRICTION * PRESSED * moved, atol=1e-8)
+
+
+def narrow(records, start):
+    """The checker may be closer than the search by a little; not by so much."""
+    records[start][3] = [x / 8 for x in records[start][3]]
+
+
+def moved(records, start):
+    records[start][2] = [x + 1e-9 * (r > 0) for x, r in zip(*records[start][2:4], strict=True)]
+
+
+def unmoved(records, start):
+    """As if the rigid displacement had been left out: from where the load and the forces alone move the nodes."""
+    records[start][2:4] = [0.0] * len(records[start][2]), [1e-9] * len(records[start][2])
+
+
+def bounded(records, start):
+    records[start + 1]["max_rigid_displacement"] = 4.0
+
+
+def without_follower(records, start):
+    before = next(record for record in records[1:start] if record[0] == "s" and record[4])
+    before[4] = []
+
+
+@pytest.mark.parametrize("change", [narrow, moved, unmoved, bounded, without_follower])
+def test_a_changed_proof_is_not_complete(change):
+    problem = two_weights(1)
+    loads = [problem.f + pull * np.eye(4)[1] for pull in (1.5, -0.5)]
+    history = proven(problem, loads)
+    records = records_of(history.proof)
+    start = of_kind(records, "s")[1]
+    change(records, start)
+    report = enumsol.verify(problem, proof_of(records))
+    assert not report.complete
+    assert report.unique_until < 2
