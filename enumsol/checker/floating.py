@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +15,7 @@ from enumsol.trusted.at_alpha import holds_no_root, solve_selection
 from enumsol.trusted.confinement import without_bound
 from enumsol.trusted.exclusion import Leaves, exclusion_margins
 from enumsol.trusted.floating_bounds import is_unbalanced
+from enumsol.trusted.joint_roots import JointRoot, joint_root
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -66,6 +67,9 @@ class FloatingChecker(WithinReach, Checker):
 
     kinds = records.FLOATING_LEAVES
 
+    #: Roots that selections share, by the one in which all their nodes stick, and by how these slip.
+    shared: dict[tuple[Codes, tuple[tuple[int, int], ...]], JointRoot | None] = field(default_factory=dict)
+
     @cached_property
     def system(self) -> FloatingSystem:
         """Balls for S, g, F, G and h in the proof's units."""
@@ -90,7 +94,7 @@ class FloatingChecker(WithinReach, Checker):
         return records.Limits(codes, self.friction, modes=self.problem.modes.r)
 
     def _tests(self) -> dict[type[Record], Test]:
-        return super()._tests() | {records.Unbalanced: self._unbalanced}
+        return super()._tests() | {records.Unbalanced: self._unbalanced, records.SharedRoot: self._shared}
 
     def _check_exclusions(self, numbers: Indices, leaves: Leaves) -> None:
         free = exclusion_margins(self.free, leaves) > 0
@@ -109,6 +113,18 @@ class FloatingChecker(WithinReach, Checker):
             return None
         self.bounded = True
         return super()._no_root(codes, said)
+
+    def _shared(self, codes: Codes, said: records.SharedRoot) -> str | None:
+        core = said.core(codes)
+        if (core, said.slips) not in self.shared:
+            self.shared[core, said.slips] = joint_root(self.system, core, dict(said.slips))
+        found = self.shared[core, said.slips]
+        if found is None:
+            return "its selections are not proven to share one root"
+        if self.closed.setdefault(core, found) is not found:
+            return "its selections overlap with others that share a root"
+        self._locate(core, found)
+        return self._placed(found, said.enclosure)
 
     def _no_rational_root(self, codes: Codes, said: records.NoRootInRationals) -> str | None:
         self.bounded |= self._rests_on_reach(codes, [])

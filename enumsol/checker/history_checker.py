@@ -170,7 +170,7 @@ class HistoryChecker:
 
         def end(leaf: Located) -> Ball:
             about = problem, step.alpha, leaf.forces, leaf.still, stage.start.ball, leaf.codes
-            return tangential_positions(*about, rigid=leaf.rigid, share=0.5)
+            return tangential_positions(*about, rigid=leaf.rigid, among=leaf.among, share=0.5)
 
         stage.ends = [[end(leaf) for leaf in leaves] for leaves in checker.located_roots()]
 

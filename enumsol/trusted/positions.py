@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, Ball, smaller
+from enumsol.arithmetic.balls import SAFE, Ball, hull, smaller
 from enumsol.condensation.floating import FloatingSystem, RigidRows, moved_by_modes
 from enumsol.trusted.at_alpha import displacements
 from enumsol.trusted.status_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
     from fractions import Fraction
 
     from enumsol.model.problem import ContactProblem
     from enumsol.support.array_types import Mask
+
+    #: The codes that every node may have.
+    Among = Sequence[frozenset[int]]
 
 #: Positions known to within this share of the largest of them are known well enough.
 _WELL_KNOWN = 2.0**-30
@@ -57,6 +61,7 @@ def tangential_positions(
     codes: Sequence[int] | None = None,
     *,
     rigid: Ball | None = None,
+    among: Among | None = None,
     share: float = 1.0,
 ) -> Ball:
     """Bt u at a root whose forces lie in a ball, for every slip offset in a ball.
@@ -81,6 +86,8 @@ def tangential_positions(
         Those of the root, if they are certain; in 3D any one that is neither open nor stick means slip.
     rigid : Ball of shape (r,), or None
         Of a body that nothing holds, the coordinates q of its rigid displacement; without them it may be anywhere.
+    among : per node the codes that it may have, or None
+        Of a root of such a body that is in one of these selections for certain, where its statuses are not.
     share : float
         Of the radius from which on more digits are asked for.
 
@@ -99,8 +106,9 @@ def tangential_positions(
         elif problem.modes is not None:
             moved = Ball(moved.mid, np.full_like(moved.rad, np.inf))
     well_known, found = np.max(moved.rad) <= share * _WELL_KNOWN * np.max(np.abs(moved.mid)), None
-    if codes is not None and len(moved.mid) == p and problem.modes is not None:
-        found = _by_selection(problem, alpha, codes)
+    if len(moved.mid) == p and problem.modes is not None:
+        selections = [codes] if codes is not None else product(*among) if among is not None else ()
+        found = _by_selections(problem, alpha, selections, before)
     elif codes is not None and not well_known:
         plane = len(moved.mid) == p
         found = _by_many_digits(problem, alpha, codes, before) if plane else _by_leaf(problem, alpha, forces, codes)
@@ -115,14 +123,29 @@ def _pressing(forces: Ball, p: int) -> Ball:
     return Ball(np.where(cut, half, forces.mid), np.where(cut, half * SAFE, forces.rad))
 
 
-def _by_selection(problem: Any, alpha: Fraction, codes: Sequence[int]) -> Ball | None:
-    """Where nodes are at the regular root of a selection of a body that nothing holds, but for those that stick."""
-    units = problem.on_springs.condensed.at(alpha).proposals
-    beside = problem.on_springs.enclosure.without_offsets(np.array(codes) != STICK)
-    held = beside.at(alpha, units.force, units.length)
-    w = displacements(FloatingSystem.on(held, RigidRows.of(problem, alpha, units.force, units.length)), codes)
-    p = problem.p
-    return w and Ball(w.mid[p:] * units.length[p:], w.rad[p:] * units.length[p:])
+def _by_selections(problem: Any, alpha: Fraction, selections: Iterable[Sequence[int]], before: Ball) -> Ball | None:
+    """Where nodes are at the root of a body that nothing holds which is that of one of these selections.
+
+    None where there are none, or one may be singular.
+    """
+    units, p, found = problem.on_springs.condensed.at(alpha).proposals, problem.p, list[Ball]()
+    rows, length = RigidRows.of(problem, alpha, units.force, units.length), units.length[p:]
+    for codes in selections:
+        moves = np.array(codes) != STICK
+        held = problem.on_springs.enclosure.without_offsets(moves).at(alpha, units.force, units.length)
+        w = displacements(FloatingSystem.on(held, rows), codes)
+        if w is None:
+            return None
+        there = w[p:]
+        found.append(
+            Ball(
+                *(
+                    np.where(moves, *pair)
+                    for pair in ((there.mid * length, before.mid), (there.rad * length, before.rad))
+                )
+            )
+        )
+    return hull(found) if found else None
 
 
 def _by_leaf(problem: Any, alpha: Fraction, forces: Ball, codes: Sequence[int]) -> Ball | None:

@@ -50,6 +50,7 @@ SHARED = {
     "trusted.arcs.selection_balls": None,
     "trusted.exclusion": {"Terms", "exclusion_margin"},
     "trusted.floating_bounds": {"is_unbalanced"},
+    "trusted.joint_roots": {"JointRoot", "joint_root"},
     "trusted.confinement": {"motion_against", "motion_beside", "without_bound"},
     "trusted.arcs.many_digits": {"affordable"},
     "trusted.arcs.over_parts": None,

@@ -1,6 +1,7 @@
 """Histories of bodies that nothing holds: rationals step by step, held bodies, weak springs, closed forms, Newton."""
 
 import dataclasses
+from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction
 from itertools import pairwise
 from types import SimpleNamespace
@@ -297,3 +298,100 @@ def test_a_changed_proof_is_not_complete(change):
     report = enumsol.verify(problem, proof_of(records))
     assert not report.complete
     assert report.unique_until < 2
+
+
+# -- loads that are held or reached again ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("cells", "alphas"),
+    [
+        (2, [0.9, 0.9, 0.9]),
+        (1, [0.5, 0.9, 0.0, 0.9]),
+        pytest.param(2, [0.5, 0.9, 0, 0.9, 0.95], marks=pytest.mark.slow),
+    ],
+)
+def test_a_load_that_is_held_or_reached_again_is_decided_in_balls(cells, alphas):
+    """Several selections share its root, whose index and statuses are those that rationals find."""
+    problem = pushed_block(cells)
+    history, exact = proven(problem, alphas), enumsol.histories(problem, alphas, arithmetic="exact")
+    assert (history.complete, history.unique_until) == (True, len(alphas))
+    shared = 0
+    for stage, other in zip(history.data.stages, exact.data.stages, strict=True):
+        (root,), (known,) = stage.roots, other.roots
+        assert (root.index, root.regular, root.active) == (known.index, known.regular, known.active)
+        shared += not root.regular
+        assert root.enclosure.lambda_t[:, 0] @ root.enclosure.lambda_t[:, 1] > 0
+        pairs = zip(other.start.rationals, stage.start.ball.low, stage.start.ball.high, strict=True)
+        assert all(Fraction(low) <= value <= Fraction(high) for value, low, high in pairs)
+    assert shared
+    assert history.data.stages[-1].largest_radius < 1e-13
+
+
+def test_other_limits_are_counted_in_the_same_way(tmp_path):
+    """A search of a start in a ball is resumed and shared among workers; what selections share is one root."""
+    problem = pushed_block(2)
+    stage = enumsol.histories(problem, [0.9, 0.9]).stages(2)[0]
+    whole = stage.roots
+    assert (len(whole), whole.complete) == (1, True)
+    file = tmp_path / "p.zst"
+    enumsol.enumerate_roots(stage.problem, 0.9, proof_path=file, max_nodes=2)
+    again = enumsol.enumerate_roots(stage.problem, 0.9, proof_path=file, resume=True)
+    with ThreadPoolExecutor(2) as pool:
+        shared = enumsol.enumerate_roots(stage.problem, 0.9, executor=pool)
+    for other in (again, shared):
+        assert (len(other), other.complete, other[0].active) == (1, True, whole[0].active)
+        assert complete_report(stage.problem, other.proof).roots == 1
+
+
+def one_less(record):
+    record[1] = record[1][1:]
+
+
+def other_way(record):
+    record[1][0][1] = 5 - record[1][0][1]
+
+
+def no_slip(record):
+    record[1][0][1] = 1
+
+
+def elsewhere(record):
+    record[2][0] += 1.0
+
+
+def narrower(record):
+    record[3] = [0.0] * len(record[3])
+
+
+def other_index(record):
+    record[4] = -record[4]
+
+
+def twice(record):
+    record[1] = [record[1][0], *record[1]]
+
+
+def excluded(record):
+    record[:] = ["n"]
+
+
+def regular(record):
+    record[:] = ["r", *record[2:]]
+
+
+FORGED = [one_less, other_way, no_slip, elsewhere, narrower, other_index, twice, excluded, regular]
+
+
+@pytest.mark.parametrize("change", FORGED)
+def test_a_changed_record_of_a_root_that_selections_share_is_refused(change):
+    problem = pushed_block(2)
+    stage = enumsol.histories(problem, [0.9, 0.9]).stages(2)[0]
+    records = records_of(stage.roots.proof)
+    leaves = of_kind(records, "g")
+    assert len(leaves) == 4
+    for place in leaves:
+        forged = records_of(stage.roots.proof)
+        change(forged[place])
+        report = enumsol.verify(stage.problem, proof_of(forged))
+        assert not report.ok
