@@ -251,9 +251,10 @@ def apart(solutions: Iterable[SelectionSolution]) -> Apart:
         if solution.possible is None:
             single.append(solution)
         else:
-            # parts of a search may have come to others of the same name
-            known = closed.setdefault(solution.codes, solution)
-            doubtful += [solution.codes] * (known.possible != solution.possible)
+            known = closed.get(solution.codes, solution)
+            # shared by other selections in another part of the search
+            doubtful += [solution.codes] * (solution.det_sign != 0 and known.possible != solution.possible)
+            closed[solution.codes] = solution
     # a strict solution may have closed several subtrees, decided by balls in one of them and by rationals in another
     strict = {s.codes: s for s in single if s.strict and not s.exact}
     single = [*strict.values(), *(s for s in single if s.codes not in strict)]

@@ -294,8 +294,8 @@ class FloatingCertifier(VerifiedCertifier):
             self._verified[core] = root
         self._escalations.balls += 1
         self._leaf(records.SharedRoot(root.slips, self._ball(root, root.det_sign)))
-        point = (root.force.mid,)
-        return SelectionSolution(root.core, point, 0, 0, strict=False, index=root.det_sign, possible=root.possible)
+        point, sign = (root.force.mid,), root.det_sign
+        return SelectionSolution(root.core, point, 0, sign, strict=False, index=sign, possible=root.possible)
 
 
 def _between(codes: Codes, ball: VerifiedSelection) -> dict[int, int] | None:

@@ -136,15 +136,8 @@ def _by_selections(problem: Any, alpha: Fraction, selections: Iterable[Sequence[
         w = displacements(FloatingSystem.on(held, rows), codes)
         if w is None:
             return None
-        there = w[p:]
-        found.append(
-            Ball(
-                *(
-                    np.where(moves, *pair)
-                    for pair in ((there.mid * length, before.mid), (there.rad * length, before.rad))
-                )
-            )
-        )
+        mid, rad = w.mid[p:] * length, w.rad[p:] * length
+        found.append(Ball(np.where(moves, mid, before.mid), np.where(moves, rad, before.rad)))
     return hull(found) if found else None
 
 
