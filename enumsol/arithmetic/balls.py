@@ -15,7 +15,7 @@ import scipy.sparse.linalg as spla
 from scipy.linalg.lapack import dgetrf, dtrtri
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
@@ -316,6 +316,15 @@ def smaller(one: Ball, other: Ball) -> Ball:
     """Entry by entry the ball with the smaller radius, of two that hold the same values."""
     first = one.rad <= other.rad
     return Ball(np.where(first, one.mid, other.mid), np.where(first, one.rad, other.rad))
+
+
+def hull(balls: Sequence[Ball]) -> Ball:
+    """The ball that holds all; equal entries are kept as they are."""
+    first = balls[0]
+    same = np.all([(ball.mid == first.mid) & (ball.rad == first.rad) for ball in balls], axis=0)
+    mid = 0.5 * np.min([ball.mid for ball in balls], axis=0) + 0.5 * np.max([ball.mid for ball in balls], axis=0)
+    rad = np.max([np.abs(ball.mid - mid) * (1 + 4 * UNIT) + ball.rad for ball in balls], axis=0) * SAFE + TINY
+    return Ball(np.where(same, first.mid, mid), np.where(same, first.rad, rad))
 
 
 @dataclass(frozen=True)

@@ -14,12 +14,13 @@ from enumsol.trusted.status_rows import BACKWARD, CONTACT, FORWARD, OPEN
 from enumsol.trusted.uniqueness import ClosedSolution, closed_solution, only_solution, same_solution
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from enumsol.checker.rational import RationalBody
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.proof.records import Closed, ClosedInRationals
     from enumsol.support.array_types import Codes, Floats
+    from enumsol.trusted.joint_roots import JointRoot
     from enumsol.trusted.same_roots import Apart
 
     #: The core of a solution, and per node the codes that may hold there.
@@ -76,7 +77,7 @@ def closed_in_rationals(
     return None, [tuple(to_fraction(x) for x in point)] if holds else []
 
 
-def closed_apart(closed: dict[Codes, ClosedSolution], others: list[Codes]) -> Apart[Known]:
+def closed_apart(closed: Mapping[Codes, ClosedSolution | JointRoot], others: list[Codes]) -> Apart[Known]:
     """Closed roots, each once, without those that are roots of complete selections."""
     known: list[Known] = [(codes, tuple(frozenset((code,)) for code in codes)) for codes in others]
     found: list[Known] = [(core, ball.possible) for core, ball in sorted(closed.items())]

@@ -15,6 +15,7 @@ from enumsol.trusted.at_alpha import holds_no_root, solve_selection
 from enumsol.trusted.confinement import without_bound
 from enumsol.trusted.exclusion import Leaves, exclusion_margins
 from enumsol.trusted.floating_bounds import is_unbalanced
+from enumsol.trusted.joint_roots import JointRoot, joint_root
 from enumsol.trusted.reference import Reference
 from enumsol.trusted.status_rows import UNDECIDED
 
@@ -71,6 +72,8 @@ class FloatingChecker(WithinReach, Checker):
     #: What was declared of roots, and their forms; None where these are not proven definite.
     _declared: list[records.DeclaredReference] = field(default_factory=list)
     _references: dict[int, Reference | None] = field(default_factory=dict)
+    #: Roots that selections share, by the one in which all their nodes stick, and by how these slip.
+    shared: dict[tuple[Codes, tuple[tuple[int, int], ...]], JointRoot | None] = field(default_factory=dict)
 
     @cached_property
     def system(self) -> FloatingSystem:
@@ -106,6 +109,7 @@ class FloatingChecker(WithinReach, Checker):
         return super()._tests() | {
             records.Unbalanced: self._unbalanced,
             records.OnlyReference: self._only_reference,
+            records.SharedRoot: self._shared,
         }
 
     def _reference(self, place: int) -> Reference | None:
@@ -147,6 +151,18 @@ class FloatingChecker(WithinReach, Checker):
         self.bounded = True
         return super()._no_root(codes, said)
 
+    def _shared(self, codes: Codes, said: records.SharedRoot) -> str | None:
+        core = said.core(codes)
+        if (core, said.slips) not in self.shared:
+            self.shared[core, said.slips] = joint_root(self.system, core, dict(said.slips))
+        found = self.shared[core, said.slips]
+        if found is None:
+            return "its selections are not proven to share one root"
+        if self.closed.setdefault(core, found) is not found:
+            return "its selections overlap with others that share a root"
+        self._locate(core, found)
+        return self._placed(found, said.enclosure)
+
     def _no_rational_root(self, codes: Codes, said: records.NoRootInRationals) -> str | None:
         self.bounded |= self._rests_on_reach(codes, [])
         return super()._no_rational_root(codes, said)
@@ -156,6 +172,13 @@ class FloatingChecker(WithinReach, Checker):
         if reason is None:
             self.bounded |= self._rests_on_reach(codes, found[-1][1])
         return reason
+
+    def _slips(self, point: list[Fraction]) -> list[Any]:
+        from enumsol.arithmetic.rationals import rational  # python-flint, as above
+
+        numbers = [rational(x) for x in point]
+        rows = (self.rational.row(5, node) for node in range(self.problem.p))
+        return [sum((a * x for a, x in zip(form, numbers, strict=True)), constant) for form, constant in rows]
 
     def _rests_on_reach(self, codes: Codes, points: Sequence[Sequence[Fraction]]) -> bool:
         """Whether what a selection holds may be other without the bounds of the rigid displacement."""

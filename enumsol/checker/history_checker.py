@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.checker.reports import MAX_FAILURES, HistoryVerificationReport
-from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
+from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.model.restart import SlipStart, afresh, restarted
 from enumsol.proof.reading import RefusedError, numbers_from, quoted, rational_from, same
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
     from enumsol.arithmetic.balls import Ball
+    from enumsol.checker.walk import Located
     from enumsol.support.array_types import Floats
 
 _HEADER = {"format", "version", "kind", "problem", "p", "steps", "stages"}
@@ -44,6 +45,8 @@ class _Stage:
     following: list[int]
     roots: int = 0
     complete: bool = False
+    #: The bound of rigid displacements that it rests on.
+    within: float | None = None
     #: Balls in which every root leaves the nodes, one for each of the leaves that hold it.
     ends: list[list[Ball]] = field(default_factory=list)
 
@@ -87,14 +90,14 @@ class HistoryChecker:
         ProofFormatError
             The content is not a sequence of records.
         """
-        complete, unique = False, 0
+        complete, unique, within = False, 0, None
         try:
             count = self._read_header()
-            self.enclosure = CondensedEnclosure.from_problem(self.problem)
+            _ = self.problem.on_springs.enclosure  # made once, for all searches
             for number in range(count):
                 self._stage(number, count, records)
             self._end(count, records)
-            complete, unique = self._conclusions()
+            complete, unique, within = self._conclusions()
         except RefusedError as refusal:
             self.failures.append(str(refusal))
         except (NotEnclosedError, InvalidProblemError, InvalidArgumentError) as error:
@@ -105,7 +108,7 @@ class HistoryChecker:
         roots = tuple(sum(stage.roots for stage in self.stages if stage.step == k) for k in numbers)
         failures = tuple(self.failures)
         return HistoryVerificationReport(
-            ok, failures, len(self.steps), stages, roots, ok and complete, unique if ok else 0
+            ok, failures, len(self.steps), stages, roots, ok and complete, unique if ok else 0, within if ok else None
         )
 
     # -- records ---------------------------------------------------------------------------------------------------
@@ -146,9 +149,8 @@ class HistoryChecker:
         self.stages.append(stage)
         step = self.steps[stage.step - 1]
         problem = restarted(self._base(stage.step), stage.start)
-        enclosure = self.enclosure.restarted(problem, problem.products)
         checker = self.checker(problem, self.progress)
-        checker.enclosure, checker.located = enclosure, {}
+        checker.enclosure, checker.located = problem.on_springs.enclosure, {}
         tell("searches", number, count)
         with heard_by(tell_part(f"of search {number + 1}")):
             report = checker.run(_Part(_search(records)))
@@ -164,14 +166,13 @@ class HistoryChecker:
             return  # nothing is known of where its roots are
         checker.locate_rational_roots()
         stage.roots, stage.complete = report.roots, report.complete and not report.families
-        before = stage.start.ball
-        stage.ends = [
-            [
-                tangential_positions(enclosure, step.alpha, leaf.forces, leaf.still, before, leaf.codes, share=0.5)
-                for leaf in leaves
-            ]
-            for leaves in checker.located_roots()
-        ]
+        stage.within = report.within
+
+        def end(leaf: Located) -> Ball:
+            about = problem, step.alpha, leaf.forces, leaf.still, stage.start.ball, leaf.codes
+            return tangential_positions(*about, rigid=leaf.rigid, among=leaf.among, share=0.5)
+
+        stage.ends = [[end(leaf) for leaf in leaves] for leaves in checker.located_roots()]
 
     def _said(self, number: int, count: int, record: Any) -> _Stage:
         """Stage that a record describes."""
@@ -199,25 +200,25 @@ class HistoryChecker:
 
     # -- what follows ----------------------------------------------------------------------------------------------
 
-    def _conclusions(self) -> tuple[bool, int]:
-        """Whether these are all histories, and up to which step there is one only."""
+    def _conclusions(self) -> tuple[bool, int, float | None]:
+        """Whether these are all histories, up to which step there is one only, and within which rigid displacements."""
         first = [stage for stage in self.stages if stage.step == 1]
         if len(first) != 1 or first[0].start.key != SlipStart.of(self.problem).key:
             raise RefusedError("the first step does not start from the problem's own slip offset")
         for number, stage in enumerate(self.stages):
             if any(self.stages[k].step != stage.step + 1 for k in stage.following):
                 raise RefusedError(f"search {number} is followed by one of another step than the next")
-        last = len(self.steps)
-        complete = all(
-            stage.complete and (stage.step == last or self._all_followed(stage)) for stage in self._reached(first[0])
-        )
+        last, reached = len(self.steps), list(self._reached(first[0]))
+        complete = all(stage.complete and (stage.step == last or self._all_followed(stage)) for stage in reached)
+        # the least of the bounds: within it no step lacks a root
+        within = min((stage.within for stage in reached if stage.within is not None), default=None)
         unique, stage = 0, first[0]
         while stage.complete and stage.roots == 1:
             unique += 1
             if stage.step == last or len(stage.following) != 1 or not self._all_followed(stage):
                 break
             stage = self.stages[stage.following[0]]
-        return complete, unique
+        return complete, unique, within
 
     def _reached(self, first: _Stage) -> Iterator[_Stage]:
         """The stages that histories come to."""
@@ -235,7 +236,7 @@ class HistoryChecker:
         All leaves that hold a root have its end in their balls, so that any of these balls shows it.
         """
         starts = [self.stages[k].start for k in stage.following]
-        return bool(stage.ends) and all(
+        return len(stage.ends) >= stage.roots and all(
             any(start.holds(ball) for start in starts for ball in balls) for balls in stage.ends
         )
 

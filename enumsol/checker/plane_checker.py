@@ -22,6 +22,7 @@ from enumsol.proof.proof_file import fraction_text
 from enumsol.proof.reading import RefusedError, data_of, friction_at, rational_from, same, units_from
 from enumsol.trusted.at_alpha import VerifiedSelection, holds_no_root, solve_selection
 from enumsol.trusted.exclusion import Leaves, Terms, exclusion_margins
+from enumsol.trusted.joint_roots import JointRoot
 from enumsol.trusted.positions import certain_statuses
 from enumsol.trusted.quadratic_forms import EnclosedForm
 from enumsol.trusted.status_rows import ROW_KINDS, UNDECIDED, is_covering, row_signs
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from enumsol.checker.walk import Test
     from enumsol.proof.records import EnclosureRecord, Record
     from enumsol.support.array_types import Codes, Indices
+    from enumsol.trusted.positions import Among
     from enumsol.trusted.precise_at_alpha import PreciseAtAlpha
 
     #: codes of a selection, the vertices of its root set, and its dimension
@@ -82,7 +84,7 @@ class Checker(TreeChecker):
     kinds = records.LEAVES
 
     polytopes: list[Polytope] = field(default_factory=list)
-    closed: dict[tuple[int, ...], ClosedSolution] = field(default_factory=dict)
+    closed: dict[tuple[int, ...], ClosedSolution | JointRoot] = field(default_factory=dict)
     #: Codes of the strict roots of complete selections.
     strict: list[tuple[int, ...]] = field(default_factory=list)
     _waiting: list[tuple[int, tuple[int, ...], Terms]] = field(default_factory=list)
@@ -256,6 +258,10 @@ class Checker(TreeChecker):
         self.regular += 1
         self.strict.append(codes)
         self._locate(codes, ball)
+        return self._placed(ball, said)
+
+    def _placed(self, ball: VerifiedSelection | JointRoot, said: EnclosureRecord) -> str | None:
+        """Why the ball and the index that are said to be those of a root are not, or None."""
         centre, radius = said.numbers(2 * self.problem.p)
         with np.errstate(over="ignore", invalid="ignore"):
             reach = np.abs(centre - ball.force.mid * self.force) + ball.force.rad * self.force
@@ -271,17 +277,23 @@ class Checker(TreeChecker):
             self.closed[ball.core] = ball
         return reason
 
-    def _locate(self, name: Codes, ball: VerifiedSelection | ClosedSolution) -> None:
+    def _locate(self, name: Codes, ball: VerifiedSelection | ClosedSolution | JointRoot) -> None:
         if self.located is not None:
             p = self.problem.p
             mid, rad = ball.force.mid, ball.force.rad
             rad = np.where((mid == 0) & (rad == 0), 0.0, rad * self.force + TINY)
-            self._locate_by(name, Ball(mid * self.force, rad), ball.w[p:])
+            rigid = None if isinstance(ball, ClosedSolution) else ball.rigid
+            if rigid is not None:
+                rigid = rigid * Ball.exact(self.system.rigid_unit)
+            among = ball.possible if isinstance(ball, JointRoot) else None
+            self._locate_by(name, Ball(mid * self.force, rad), ball.w[p:], rigid, among)
 
-    def _locate_by(self, name: Codes, forces: Ball, slips: Ball) -> None:
-        """Take note of a root by its forces in the problem's units, and by its slips in any unit."""
-        still = (slips.mid == 0) & (slips.rad == 0)
-        self.locate(name, Located(forces, still, certain_statuses(forces, slips)))
+    def _locate_by(
+        self, name: Codes, forces: Ball, slips: Ball, rigid: Ball | None, among: Among | None = None
+    ) -> None:
+        """Take note of a root by its forces and rigid displacement in the problem's units, its slips in any unit."""
+        still, codes = (slips.mid == 0) & (slips.rad == 0), certain_statuses(forces, slips)
+        self.locate(name, Located(forces, still, codes, rigid, among))
 
     def locate_rational_roots(self) -> None:
         """Add the isolated roots that rationals have found to ``located``."""
@@ -290,11 +302,12 @@ class Checker(TreeChecker):
             if dimension:
                 continue
             exact = [Fraction(x) for x in points[0]]
-            forces = np.array([float(x) for x in exact])
+            near = np.array([float(x) for x in exact])
             w = [Fraction(0)] * p if not any(exact) and self.problem.is_unloaded(self.alpha) else self._slips(exact)
             signs = np.array([float(x > 0) - float(x < 0) for x in w])
-            rad = np.where([x == 0 for x in exact], 0.0, np.abs(forces) * 2 * UNIT + TINY)
-            self._locate_by(codes, Ball(forces, rad), Ball(signs, np.zeros(p)))
+            known = Ball(near, np.where([x == 0 for x in exact], 0.0, np.abs(near) * 2 * UNIT + TINY))
+            rigid = -known[2 * p :] if len(exact) > 2 * p else None
+            self._locate_by(codes, known[: 2 * p], Ball(signs, np.zeros(p)), rigid)
 
     def _slips(self, point: list[Fraction]) -> list[Any]:
         """w_t at a point, exactly."""

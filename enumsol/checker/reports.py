@@ -72,12 +72,9 @@ class VerificationReport:
                 "undecided",
                 f"  {counted(self.roots, 'isolated root')}, {counted(self.families, 'family', 'families')}",
                 f"  certified data: {_DATA[self.data]}",
-                f"  complete: {'yes' if self.complete else 'no'}{self._bound()}",
+                f"  complete: {'yes' if self.complete else 'no'}{_bound(self.within) if self.complete else ''}",
             )
         )
-
-    def _bound(self) -> str:
-        return "" if self.within is None or not self.complete else f", within rigid displacements of {self.within:g}"
 
 
 @dataclass(frozen=True)
@@ -187,6 +184,9 @@ class HistoryVerificationReport:
         Every step is complete from every start, and every root is followed to the last step.
     unique_until : int
         The last step up to which it is proven that there is one history only.
+    within : float or None
+        Of a body that nothing holds: the bound of its rigid displacement [length], if a leaf of some search rests on
+        it, the least of those of all searches.
 
     Examples
     --------
@@ -207,6 +207,7 @@ class HistoryVerificationReport:
     roots: tuple[int, ...]
     complete: bool
     unique_until: int
+    within: float | None = None
 
     def _repr_html_(self) -> str:
         return html_lines(repr(self).splitlines())
@@ -224,12 +225,16 @@ class HistoryVerificationReport:
             (
                 f"proof: verified for a history of {counted(self.steps, 'step')}",
                 *shown,
-                f"  complete: {'yes' if self.complete else 'no'}, {unique}",
+                f"  complete: {'yes' if self.complete else 'no'}, {unique}{_bound(self.within)}",
             )
         )
 
 
 _DATA = {"problem": "A, Bn, Bt, f as given", "condensed": "S and g as computed"}
+
+
+def _bound(within: float | None) -> str:
+    return "" if within is None else f", within rigid displacements of {within:g}"
 
 
 def _refusal(where: str, failures: tuple[str, ...], read: str) -> str:

@@ -257,7 +257,9 @@ class SpaceChecker(TreeChecker):
             still = np.array(codes) == STICK
         # where a coefficient is 0 a sticking node may move all the same
         still = np.concatenate([still & (system.tau[:, k] >= 0) for k in (0, 1)])
-        self.locate(_name(name, found), Located(forces, still, certain))
+        rigid = found.rigid if isinstance(found, SpaceRoot) else None
+        rigid = None if rigid is None else rigid * Ball.exact(system.rigid_unit)
+        self.locate(_name(name, found), Located(forces, still, certain, rigid))
 
     def _claim(self, isolated: int, families: int) -> dict[str, int]:
         return {"roots": self.regular + isolated, "undecided": self.undecided, "leaves": self.leaves}

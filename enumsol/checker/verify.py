@@ -75,7 +75,6 @@ def verify(
     if isinstance(header, dict) and header.get("kind") == "history":
         from enumsol.checker.history_checker import HistoryChecker  # not for other proofs
 
-        problem.check_held("a history")
         return HistoryChecker(problem, header, checker, progress).run(lines)
     if isinstance(header, dict) and header.get("kind") == "graph" and not in_space:
         graphs = GraphChecker if problem.modes is None else FloatingGraphChecker

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from enumsol.proof.proof_file import Proof
     from enumsol.proof.records import Record
     from enumsol.support.array_types import Codes, Mask
+    from enumsol.trusted.positions import Among
 
     #: Checks what a leaf of one kind says; the reason when it proves nothing.
     Test = Callable[[Codes, Any], str | None]
@@ -44,11 +45,17 @@ class Located:
         Tangential components with u_t = 0 for certain.
     codes : p status codes, or None
         Where they are certain; in 3D any one but open and stick means slip.
+    rigid : Ball or None
+        Of a body that nothing holds, the coordinates of its rigid displacement, in the problem's units.
+    among : per node the codes that it may have, or None
+        Of a root that is in one of these selections for certain.
     """
 
     forces: Ball
     still: Mask
     codes: tuple[int, ...] | None = None
+    rigid: Ball | None = None
+    among: Among | None = None
 
 
 @dataclass

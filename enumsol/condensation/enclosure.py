@@ -94,13 +94,28 @@ class CondensedEnclosure(Sealed):
     def moved_freely(self, alpha: Fraction) -> Ball:
         """B A^-1 f(alpha), where the contact nodes would be without contact, shape (2p,) [length]."""
         if self.free is None:
-            raise AssertionError("these balls are not those of a whole problem")
+            raise AssertionError(_PART)
         value, slack = float_at(alpha)
         with np.errstate(over="ignore", invalid="ignore"):
             moved = Ball(np.array(value), np.array(slack)) * Ball(self.g1, self.g1_rad) + Ball(*self.free)
         if not np.all(np.isfinite(moved.mid)) or not np.all(np.isfinite(moved.rad)):
             raise NotEnclosedError(_OVERFLOW)
         return moved
+
+    def without_offsets(self, moves: Mask) -> CondensedEnclosure:
+        """The same with a load that lacks the slip offsets of components that move, on which no force depends.
+
+        Their w is then where they move to (theory, (13.2a)).
+
+        Parameters
+        ----------
+        moves : (p,) or, in 3D, (2p,) bool array
+        """
+        if self.free is None:
+            raise AssertionError(_PART)
+        own = np.concatenate([np.zeros(len(self.g0) - len(moves), dtype=bool), moves])
+        free, rad = self.free
+        return replace(self, g0=np.where(own, free, self.g0), g0_rad=np.where(own, rad, self.g0_rad))
 
     def _finite(self) -> CondensedEnclosure:
         balls = (self.S, self.S_rad, self.g0, self.g0_rad, self.g1, self.g1_rad)
@@ -190,6 +205,7 @@ class CondensedEnclosure(Sealed):
 #: Smallest quotient of units, far above underflow.
 _LEAST_PAIR = 2.0**-1000
 _OVERFLOW = "the condensed problem over- or underflows float64; expected data in other units"
+_PART = "these balls are not those of a whole problem"
 _POWERS = "units of force and length must be powers of two"
 
 
@@ -303,6 +319,11 @@ class EnclosedSystem:
     @property
     def reach(self) -> Floats:
         """Bounds of the coordinates of a rigid displacement; none of a body that is held."""
+        return np.zeros(0)
+
+    @property
+    def rigid_unit(self) -> Floats:
+        """Units of the coordinates of a rigid displacement; none of a body that is held."""
         return np.zeros(0)
 
     @property

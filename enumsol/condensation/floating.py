@@ -50,10 +50,9 @@ class RigidRows:
         NotEnclosedError
             Something overflows.
         """
-        N, slope = problem.modes.N, problem.load_slope
+        load, slope = problem.modes.N.T, problem.load_slope
         with np.errstate(over="ignore", invalid="ignore"):
-            G = _product(problem.contact_rows, N).T
-            load = N.T
+            G = moved_by_modes(problem).T
             h = _product(load, problem.f[:, None])[:, 0]
             if slope is not None:
                 value, slack = float_at(alpha)
@@ -70,6 +69,11 @@ class RigidRows:
         if not (rows.finite and loads.finite and np.all(np.isfinite(reach)) and np.all(reach * unit == most)):
             raise NotEnclosedError("the rows of the rigid modes overflow float64; expected data in other units")
         return cls(rows, loads, unit, reach)
+
+
+def moved_by_modes(problem: Any) -> Ball:
+    """B N, by what each rigid mode moves the contact nodes, (2p, r) or (3p, r)."""
+    return _product(problem.contact_rows, problem.modes.N)
 
 
 def _product(left: Any, right: Floats) -> Ball:
@@ -101,6 +105,11 @@ class FloatingSystem(EnclosedSystem):
     def reach(self) -> Floats:
         """Bounds of the coordinates of a rigid displacement, (r,)."""
         return self.rows.reach
+
+    @property
+    def rigid_unit(self) -> Floats:
+        """Units of the coordinates of a rigid displacement, (r,)."""
+        return self.rows.unit
 
     @cached_property
     def balls(self) -> tuple[Ball, Ball, Ball]:

@@ -536,15 +536,17 @@ class FloatingSpace(FloatingSystem, EnclosedSpace):
     """
 
     @classmethod
-    def of(cls, problem: Any, alpha: Fraction, force: Floats, length: Floats) -> Self:
-        """That of a problem, in units of the nodes given by powers of two.
+    def of(
+        cls, problem: Any, alpha: Fraction, force: Floats, length: Floats, enclosure: CondensedEnclosure | None = None
+    ) -> Self:
+        """That of a problem, in units of the nodes given by powers of two; ``enclosure`` in place of that on springs.
 
         Raises
         ------
         NotEnclosedError
             Something over- or underflows.
         """
-        held = EnclosedSpace.of_problem(problem.on_springs.enclosure, alpha, force, length)
+        held = EnclosedSpace.of_problem(enclosure or problem.on_springs.enclosure, alpha, force, length)
         rows = RigidRows.of(problem, alpha, np.tile(force, 3), np.tile(length, 3))
         _, own, node, axis = places(held.F > 0)
         none = np.zeros(held.p)

@@ -17,7 +17,7 @@ import networkx as nx
 import numpy as np
 
 from enumsol.condensation.enclosure import NotEnclosedError
-from enumsol.errors import InvalidArgumentError, NotHeldError
+from enumsol.errors import InvalidArgumentError
 from enumsol.loading.history import History
 from enumsol.loading.history_data import (
     HistoryData,
@@ -29,7 +29,7 @@ from enumsol.loading.history_data import (
     start_after,
 )
 from enumsol.loading.steps import LoadStep, steps_of, way_to
-from enumsol.model.problem import ContactProblem, check_is_problem
+from enumsol.model.problem import check_is_problem
 from enumsol.model.restart import SlipStart, restarted
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.roots.root import Root
@@ -179,8 +179,8 @@ def histories(
         replace the problem's).
     arithmetic : {"verified", "fast", "exact"}
         Of `enumerate_roots`. "verified": starts are known as balls, and a step is complete only if it is so for every
-        start in its ball. "exact": starts are rationals (2D only). "fast" proves nothing. A body that nothing holds
-        needs "exact".
+        start in its ball. "exact": starts are rationals (2D only). "fast" proves nothing, and a body that nothing
+        holds does not have it.
     follow : {"all", "nearest"} or callable
         Which roots start the next step. "nearest": the one whose contact nodes are nearest to where the step began. A
         callable gets the root before (None in the first step) and the RootSet, and returns roots or their numbers.
@@ -218,8 +218,6 @@ def histories(
     ------
     InvalidArgumentError
         An argument cannot be used; of a step its number is named.
-    NotHeldError
-        Nothing holds the body, and arithmetic is not "exact" or the problem is one in 3D.
     Interrupted, OutOfMemoryError
         On Ctrl-C, or where the memory does not suffice; ``partial`` is the history as far as it was found.
 
@@ -246,11 +244,6 @@ def histories(
     given: Any = problem
     check_is_problem(given)
     arguments.one_of(arithmetic, "arithmetic", ("fast", "verified", "exact"))
-    if problem.modes is not None and (arithmetic != "exact" or not isinstance(given, ContactProblem)):
-        raise NotHeldError(
-            "histories cannot take a body that nothing holds (rigid_modes is given) but in 2D and in exact arithmetic; "
-            'expected arithmetic="exact", or a body held by supports or springs'
-        )
     if not callable(follow):
         arguments.one_of(follow, "follow", ("all", "nearest"))
     tolerance = None if merge is None else arguments.nonnegative_number(merge, "merge")

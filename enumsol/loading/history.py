@@ -36,9 +36,11 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from enumsol.model.problem3d import AnyProblem
+    from enumsol.support.array_types import Floats
 
-FORMAT, VERSION = "enumsol-history", 2
+FORMAT, VERSION = "enumsol-history", 3
 _ARRAYS = ("lambda_n", "lambda_t", "u_n", "u_t")
+_BOUNDS = (*_ARRAYS, "rigid_coordinates")
 #: What the file holds as it is: of a root, and of the roots of a stage.
 _OF_ROOT, _OF_ROOTS = ("index", "regular", "margin"), ("stopped", "at_least", "certified_data")
 
@@ -102,7 +104,7 @@ def _kind(problem: AnyProblem, steps: Any) -> dict[str, Any]:
     known = {status.value for status in ContactStatus}
     statuses, slips = (known,) * p, Array(*shape)
     vectors = dict(zip(_ARRAYS, (Array(p), slips) * 2, strict=True))
-    bounds = dict(zip(_ARRAYS, (Array(p, 2), Array(*shape, 2)) * 2, strict=True))
+    bounds = dict(zip(_BOUNDS, (*(Array(p, 2), Array(*shape, 2)) * 2, Maybe(Array(modes, 2))), strict=True))
     root = {
         **{"statuses": statuses, "active": ([known],) * p, **vectors},
         **{"index": Maybe(int), "regular": bool, "margin": is_number, "bounds": Maybe(bounds)},
@@ -211,10 +213,10 @@ def _root(root: Root) -> dict[str, Any]:
         "active": [sorted(_names(held)) for held in root.active],
         **{name: getattr(root, name).tolist() for name in _ARRAYS},
         **{name: getattr(root, name) for name in _OF_ROOT},
-        "bounds": None if bounds is None else {name: getattr(bounds, name).tolist() for name in _ARRAYS},
+        "bounds": None if bounds is None else {name: _listed(getattr(bounds, name)) for name in _BOUNDS},
         "slips": None if root.exact_slips is None else [str(value) for value in root.exact_slips],
         "angles": None if root.slip_angle is None else [[float(a).hex() for a in pair] for pair in root.slip_angle],
-        "rigid": None if root.rigid_coordinates is None else root.rigid_coordinates.tolist(),
+        "rigid": _listed(root.rigid_coordinates),
     }
 
 
@@ -227,26 +229,38 @@ def _read_root(record: dict[str, Any], alpha: Any, problem: Any) -> Root:
         active=tuple(frozenset(_statuses(names)) for names in record["active"]),
         **arrays,
         **{name: record[name] for name in _OF_ROOT},
-        enclosure=None if bounds is None else Enclosure(*(np.array(bounds[name]) for name in _ARRAYS)),
+        enclosure=None if bounds is None else _enclosure(bounds),
         slip_angle=None if angles is None else np.array([[float.fromhex(a) for a in pair] for pair in angles]),
         _condensed=condensation_of(problem),
-        _rigid=None if record["rigid"] is None else np.array(record["rigid"]),
+        _rigid=_array(record["rigid"]),
         _exact_slips=None if slips is None else tuple(map(Fraction, slips)),
     )
 
 
+def _enclosure(record: dict[str, Any]) -> Enclosure:
+    arrays: dict[str, Any] = {name: _array(record[name]) for name in _BOUNDS}
+    return Enclosure(**arrays)
+
+
 def _family(family: RootFamily) -> dict[str, Any]:
-    parts = [[_names(part.statuses), part.vertices.tolist(), part.dimension, _list(part)] for part in family.polytopes]
+    parts = [
+        [_names(part.statuses), part.vertices.tolist(), part.dimension, _listed(part.rigid_coordinates)]
+        for part in family.polytopes
+    ]
     return {"polytopes": parts, "index": family.index, "proven": family.vertices_proven}
 
 
-def _list(part: Polytope) -> list[Any] | None:
-    return None if part.rigid_coordinates is None else part.rigid_coordinates.tolist()
+def _listed(values: Floats | None) -> list[Any] | None:
+    return None if values is None else values.tolist()
+
+
+def _array(values: Any) -> Floats | None:
+    return None if values is None else np.array(values, dtype=np.float64)
 
 
 def _read_family(record: dict[str, Any], alpha: Any) -> RootFamily:
     parts = tuple(
-        Polytope(_statuses(names), np.array(vertices), dimension, None if rigid is None else np.array(rigid))
+        Polytope(_statuses(names), np.array(vertices), dimension, _array(rigid))
         for names, vertices, dimension, rigid in record["polytopes"]
     )
     return RootFamily(alpha, parts, record["index"], vertices_proven=record["proven"])

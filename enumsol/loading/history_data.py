@@ -18,7 +18,7 @@ import numpy as np
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.model.restart import SlipStart
-from enumsol.model.statuses import ContactStatus
+from enumsol.model.statuses import FRICTIONLESS, ContactStatus
 from enumsol.proof.reading import rational_text
 from enumsol.proof.writer import ProofWriter
 from enumsol.roots.root import Root, summary
@@ -124,18 +124,30 @@ def _enclosed_positions(stage: Stage, root: Root) -> Ball | None:
     if np.all(still):
         return before
     try:
-        enclosure = stage.problem.enclosure
-        forces = _forces(root)
+        forces, moves = _forces(root), root.enclosure.rigid_coordinates
+        rigid = None if moves is None else _middle(*moves.T)
         plane = root.u_t.ndim == 1
         codes = (
             certain_statuses(forces, _middle(low, high))
             if plane
             else _certain(root, stage.problem.friction_at(root.alpha))
         )
-        moved = tangential_positions(enclosure, Fraction(root.alpha), forces, still, before, codes)
+        alpha = Fraction(root.alpha)
+        shared = plane and not root.regular and root.exact_slips is None
+        among = _among(root, stage.problem.friction_at(root.alpha)) if shared else None
+        moved = tangential_positions(stage.problem, alpha, forces, still, before, codes, rigid=rigid, among=among)
     except NotEnclosedError:
         return None
     return moved if np.all(np.isfinite(moved.rad)) else None
+
+
+def _among(root: Root, friction: Floats) -> list[frozenset[int]]:
+    """The codes that the nodes may have at a root in 2D that several selections share."""
+    rubs = (friction > 0).tolist()
+    pairs = zip(root.active, rubs, strict=True)
+    return [
+        frozenset(_PLANE.index(s) if F or s is ContactStatus.OPEN else FRICTIONLESS for s in held) for held, F in pairs
+    ]
 
 
 def _certain(root: Root, friction: Floats) -> tuple[int, ...] | None:
@@ -177,6 +189,7 @@ def contact_displacements(problem: Any, root: Root) -> Floats:
 
 
 _CODES = ContactStatus.OPEN, ContactStatus.STICK, ContactStatus.SLIP
+_PLANE = ContactStatus.OPEN, ContactStatus.STICK, ContactStatus.SLIP_PLUS, ContactStatus.SLIP_MINUS
 #: The number of a step, and of a root in it.
 Node = tuple[int, int]
 #: Before the first step.
@@ -331,7 +344,8 @@ class HistoryData:
         bounds = [stage.roots.rigid_bound for stage in self.stages if stage.roots.rigid_bound is not None]
         if not bounds:
             return ""
-        return f", {next((bound for bound in bounds if bound.needed), bounds[0]).words()}"
+        # all histories within the least of those that are needed
+        return f", {min(bounds, key=lambda bound: (not bound.needed, bound.largest)).words()}"
 
 
 def history_proof(data: HistoryData) -> Proof | None:

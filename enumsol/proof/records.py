@@ -19,7 +19,18 @@ from enumsol.proof.proof_file import packed
 from enumsol.proof.reading import codes_from, multipliers_from, numbers_from, quoted
 from enumsol.support.array_types import Codes, Floats
 from enumsol.trusted.exclusion import Terms
-from enumsol.trusted.status_rows import BACKWARD, CONTACT, FORWARD, ROW_KINDS, UNDECIDED, final_codes, refines
+from enumsol.trusted.status_rows import (
+    BACKWARD,
+    CONTACT,
+    FORWARD,
+    ROW_KINDS,
+    SLIP_MINUS,
+    SLIP_PLUS,
+    STICK,
+    UNDECIDED,
+    final_codes,
+    refines,
+)
 from enumsol.trusted.uniqueness import numbers_of
 
 _SLIDING = FORWARD, BACKWARD
@@ -326,6 +337,42 @@ class Unbalanced(Exclusion):
         return cls(numbers_from(entries[0], limits.modes))
 
 
+@dataclass(frozen=True, eq=False)
+class SharedRoot(Solved):
+    """Of a body that nothing holds: selections share one root, in which some nodes of this one stick or slip.
+
+    Attributes
+    ----------
+    slips : pairs of a node and SLIP_PLUS or SLIP_MINUS
+    enclosure : EnclosureRecord
+    """
+
+    kind, sizes = "g", (5,)
+
+    slips: tuple[tuple[int, int], ...]
+    enclosure: EnclosureRecord
+
+    @classmethod
+    def of(cls, entries: list[Any], limits: Limits) -> SharedRoot:
+        """The nodes, ascending, which stick or slip so in the assignment, and the enclosure."""
+        pairs = entries[0]
+        if not isinstance(pairs, list) or not all(isinstance(pair, list) and len(pair) == 2 for pair in pairs):
+            raise ValueError("its nodes are not a list of pairs")
+        nodes = _nodes([node for node, _ in pairs], limits.p)
+        for node, (_, code) in zip(nodes, pairs, strict=True):
+            if type(code) is not int or code not in (SLIP_PLUS, SLIP_MINUS) or not limits.friction[node]:
+                raise RecordError(f"node {node} cannot slip so")
+            if limits.codes[node] not in (STICK, code):
+                raise RecordError(f"node {node} has another status in its assignment")
+        slips = tuple((node, code) for node, (_, code) in zip(nodes, pairs, strict=True))
+        return cls(slips, EnclosureRecord(*entries[1:]))
+
+    def core(self, codes: Codes) -> Codes:
+        """The codes of the selection in which all of these nodes stick."""
+        between = dict(self.slips)
+        return tuple(STICK if i in between else code for i, code in enumerate(codes))
+
+
 class NoRootInRationals(NoRoot):
     """A selection holds no root, to be checked in rational arithmetic."""
 
@@ -526,7 +573,8 @@ LEAVES = table_of(
 )
 #: The same of a body that nothing holds; others rest on a stiffness that is positive definite.
 FLOATING_LEAVES = table_of(
-    *(Excluded, Unbalanced, NoRoot, NoRootInRationals, RegularRoot, RootSetRecord, OnlyReference, UndecidedRecord)
+    *(Excluded, Unbalanced, NoRoot, NoRootInRationals, RegularRoot, SharedRoot, RootSetRecord, OnlyReference),
+    UndecidedRecord,
 )
 
 

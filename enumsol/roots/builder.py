@@ -117,6 +117,9 @@ class RootBuilder:
         if ball is not None:
             mid = np.concatenate([ball.force.mid * system.force, ball.w.mid * system.length])
             rad = np.concatenate([ball.force.rad * system.force, ball.w.rad * system.length])
+            if self.rigid_unit is not None and ball.rigid is not None:
+                mid = np.append(mid, ball.rigid.mid * self.rigid_unit)
+                rad = np.append(rad, ball.rigid.rad * self.rigid_unit)
             low = np.where(rad > 0, np.nextafter(mid - rad, -np.inf), mid)
             high = np.where(rad > 0, np.nextafter(mid + rad, np.inf), mid)
         elif (around := self.points.bounds(solution.vertices[0])) is not None:
@@ -124,7 +127,8 @@ class RootBuilder:
         else:
             return None
         bounds = np.stack([low, high], axis=1)
-        return Enclosure(bounds[:p], bounds[p : 2 * p], bounds[2 * p : 3 * p], bounds[3 * p :])
+        rigid = None if self.rigid_unit is None else bounds[4 * p :]
+        return Enclosure(bounds[:p], bounds[p : 2 * p], bounds[2 * p : 3 * p], bounds[3 * p : 4 * p], rigid)
 
     def _values(self, codes: Codes, solution: SelectionSolution) -> tuple[Floats, Floats]:
         """Forces and displacements with the zeros that the statuses impose set exactly."""

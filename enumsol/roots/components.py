@@ -246,17 +246,19 @@ def apart(solutions: Iterable[SelectionSolution]) -> Apart:
     The results do not depend on the order of the solutions. A root that closed a subtree and is a degenerate solution
     of a selection gives that solution its index. A root in doubt may be the same as another one (theory, section 6.11).
     """
-    single, closed = [], {}
+    single, closed, doubtful = [], dict[Any, Any](), list[Any]()
     for solution in solutions:
         if solution.possible is None:
             single.append(solution)
         else:
+            known = closed.get(solution.codes, solution)
+            # shared by other selections in another part of the search
+            doubtful += [solution.codes] * (solution.det_sign != 0 and known.possible != solution.possible)
             closed[solution.codes] = solution
     # a strict solution may have closed several subtrees, decided by balls in one of them and by rationals in another
     strict = {s.codes: s for s in single if s.strict and not s.exact}
     single = [*strict.values(), *(s for s in single if s.codes not in strict)]
     kept: list[SelectionSolution] = []
-    doubtful = []
     for core, solution in sorted(closed.items()):
         same = [_same(solution, other) for other in single]
         for k in (k for k, answer in enumerate(same) if answer and not single[k].strict):

@@ -37,6 +37,8 @@ class Enclosure(Sealed):
         Lower and upper bounds [force]; in 3D those of lambda_t have the shape (p, 2, 2), the bounds last.
     u_n, u_t : arrays of the same shapes
         Lower and upper bounds of u_n = Bn u - gap and u_t = Bt u - slip_offset [length].
+    rigid_coordinates : (r, 2) array or None
+        Of a body that nothing holds, those of the coordinates q of its rigid displacement.
 
     Examples
     --------
@@ -51,6 +53,7 @@ class Enclosure(Sealed):
     lambda_t: Floats
     u_n: Floats
     u_t: Floats
+    rigid_coordinates: Floats | None = None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -88,9 +91,9 @@ class Root(ContactState):
     rationals, n > 250, the enclosure of u_t may hold zero and leave the sign open).
 
     A root at which more than one status may hold, of a body too large for rationals or where they do not apply, may be
-    known by its enclosure only (theory, section 6.11): it exists and is the only one there, and ``active`` holds all
-    statuses that its enclosure does not exclude. In 3D a root that is not regular is known as the only solution
-    (theory, section 12.6), and a node in contact whose coefficients are both 0 slips wherever u_t is not 0.
+    known by its enclosure only (theory, sections 6.11 and 14.9): it exists and is the only one there, and ``active``
+    holds all statuses that its enclosure does not exclude. In 3D a root that is not regular is known as the only
+    solution (theory, section 12.6), and a node in contact whose coefficients are both 0 slips wherever u_t is not 0.
 
     Attributes
     ----------

@@ -145,7 +145,8 @@ class RigidBound:
         Bound of the components of the rigid displacement [length].
     needed : bool
         Whether anything rests on it. Otherwise there are no other solutions at all. Of a complete search of the tree
-        in 2D, up to 250 degrees of freedom, True says that there are solutions at the bound or beyond it.
+        in 2D, up to 250 degrees of freedom and from a slip offset that is known exactly, True says that there are
+        solutions at the bound or beyond it.
 
     Examples
     --------

@@ -12,7 +12,7 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, Ball
 from enumsol.condensation.condensed import Condensation, condensation_of
-from enumsol.condensation.floating import RigidRows
+from enumsol.condensation.floating import moved_by_modes
 from enumsol.condensation.space_condensed import FloatingSpace
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, STICK, UNDECIDED, ContactStatus, space_status
@@ -156,9 +156,7 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
     @cached_property
     def _moved(self) -> Ball:
         """B N in the problem's units, (3p, r), of a body that nothing holds."""
-        ones = np.ones(3 * self.problem.p)
-        rows = RigidRows.of(self.problem, Fraction(self.alpha), ones, ones)
-        return Ball(rows.G.mid / rows.unit[:, None], rows.G.rad / rows.unit[:, None]).T
+        return moved_by_modes(self.problem)
 
     @cached_property
     def _in_balls(self) -> tuple[Ball, Ball]:
@@ -202,16 +200,17 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
                 zero = (scaled.mid[part] == 0) & (scaled.rad[part] == 0)
                 ball.mid[k * p + occurs] = product.mid * unit[occurs]
                 ball.rad[k * p + occurs] = np.where(zero, 0.0, product.rad * unit[occurs])
-        computed = g - (S @ forces[:, None])[:, 0]
+        computed, moves = g - (S @ forces[:, None])[:, 0], None
         if isinstance(exact, FloatingSpace):
             rigid = self._in_units(Ball(0.0 * exact.reach, exact.reach) if rigid is None else rigid)
             computed = computed + (self._moved @ rigid[:, None])[:, 0]
+            moves = np.stack([rigid.mid - rigid.rad * SAFE, rigid.mid + rigid.rad * SAFE], axis=1)
         bounds = [(b.mid - b.rad * SAFE, b.mid + b.rad * SAFE) for b in (forces, known, computed)]
         low, high = np.maximum(bounds[1][0], bounds[2][0]), np.minimum(bounds[1][1], bounds[2][1])
         bounds[0][0][:p], high[:p] = np.maximum(bounds[0][0][:p], 0.0), np.minimum(high[:p], 0.0)
         pairs = [np.stack(pair, axis=-1) for pair in (bounds[0], (low, high))]
         parts = [(b[:p], np.stack([b[p : 2 * p], b[2 * p :]], axis=1)) for b in pairs]
-        return Enclosure(*parts[0], *parts[1])
+        return Enclosure(*parts[0], *parts[1], moves)
 
     def _root_enclosure(self, codes: Codes, found: SpaceRoot) -> Enclosure | None:
         if self.arithmetic != "verified":

@@ -29,8 +29,9 @@ from enumsol.trusted.at_alpha import holds_no_root, solve_selection
 from enumsol.trusted.confinement import motion_against, without_bound
 from enumsol.trusted.exclusion import Terms, exclusion_margin
 from enumsol.trusted.floating_bounds import is_unbalanced
+from enumsol.trusted.joint_roots import JointRoot, joint_root
 from enumsol.trusted.reference import Reference
-from enumsol.trusted.status_rows import CONDITIONS
+from enumsol.trusted.status_rows import CONDITIONS, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,7 +41,10 @@ if TYPE_CHECKING:
     from enumsol.search.reference_closer import OnlyRoot
     from enumsol.selections.rational_selections import ExactSelections
     from enumsol.support.array_types import Codes, Floats
+    from enumsol.trusted.at_alpha import VerifiedSelection
 
+#: How a node slips, or is about to, where one of these kinds of rows is zero.
+_SLIPS = {2: SLIP_PLUS, 5: SLIP_PLUS, 3: SLIP_MINUS, 6: SLIP_MINUS}
 #: Stiffness of the springs of the relaxations, relative to that of the body (theory, section 14.5).
 WEAK = 2.0**-20
 
@@ -327,10 +331,41 @@ class FloatingCertifier(VerifiedCertifier):
                 return None
         certifier = self._exactly()
         if certifier is None:
-            return self._open(codes, ball)
+            return self._shared(codes, ball) or self._open(codes, ball)
         solution = certifier.selection(codes)
         self.bounded |= certifier.bounded
         return self._in_rationals(codes, solution)
+
+    def _shared(self, codes: Codes, ball: VerifiedSelection | None) -> SelectionSolution | None:
+        """The root that a selection may share with others, some nodes being between stick and slip."""
+        shared = [known for known in self._verified.values() if isinstance(known, JointRoot)]
+        root = next((known for known in shared if known.has(codes)), None)
+        if root is None:
+            slips = None if ball is None else _between(codes, ball)
+            if not slips or self._exclusions is None:
+                return None
+            core = tuple(STICK if i in slips else code for i, code in enumerate(codes))
+            root = joint_root(self._exclusions.system, core, slips)
+            # one that is known has other nodes between stick and slip
+            if root is None or any(known.core == core for known in shared):
+                return None
+            self._verified[core] = root
+        self._escalations.balls += 1
+        self._leaf(records.SharedRoot(root.slips, self._ball(root, root.det_sign)))
+        point, sign = (root.force.mid,), root.det_sign
+        return SelectionSolution(root.core, point, 0, sign, strict=False, index=sign, possible=root.possible)
+
+
+def _between(codes: Codes, ball: VerifiedSelection) -> dict[int, int] | None:
+    """Nodes whose slip bound or slip is open, and how they slip or may slip; None if another condition is open."""
+    slips = {}
+    rows = [(kind, i) for i, code in enumerate(codes) for kind in CONDITIONS[code][1]]
+    for number in np.flatnonzero(~(ball.slack.mid > ball.slack.rad)).tolist():
+        kind, node = rows[number] if number < len(rows) else (None, 0)
+        if kind not in _SLIPS:
+            return None
+        slips[node] = _SLIPS[kind]
+    return slips
 
 
 def _holds_none(system: FloatingSystem, codes: Codes) -> bool:

@@ -283,9 +283,10 @@ class ExactSelections:
         return tuple(map(to_fraction, self.moved(point)[self.p : 2 * self.p]))
 
     def bounds(self, point: Point) -> tuple[Floats, Floats]:
-        """Floats below and above (lambda, w), two arrays of shape (4p,), equal where a value is a float."""
+        """Floats below and above (lambda, w, q), two arrays of shape (4p + r,), equal where a value is a float."""
         forces = 2 * self.p
-        pairs = [_outward(v) for v in (*point[:forces], *self.moved(point)[:forces])]
+        rigid = [-v for v in point[forces:]]
+        pairs = [_outward(v) for v in (*point[:forces], *self.moved(point)[:forces], *rigid)]
         return np.array([low for low, _ in pairs]), np.array([high for _, high in pairs])
 
 

@@ -37,7 +37,8 @@ class SelectionSolution:
         Local degree of the point, where it is proven by other means than its selections' determinants.
     possible : tuple of p frozensets of codes, or None
         Of a point known by its enclosure, which need not hold in any one selection for certain: the codes that may hold
-        there. ``codes`` is then UNDECIDED where they are several (theory, section 6.11).
+        there. ``codes`` is then UNDECIDED where they are several (theory, section 6.11), or those of one of the
+        selections that share the point (theory, section 14.9).
     """
 
     codes: Codes
@@ -66,7 +67,7 @@ class PointValues(Protocol):
         """w_t at the point, p rationals; None in an arithmetic without them."""
 
     def bounds(self, point: Any) -> tuple[np.ndarray[Any, Any], np.ndarray[Any, Any]] | None:
-        """Proven bounds of (lambda, w) at the point, two arrays of shape (4p,); None in an arithmetic without any."""
+        """Proven bounds of (lambda, w, q) at the point, two (4p + r,) arrays; None in an arithmetic without any."""
 
 
 class SelectionSolver(PointValues, Protocol):

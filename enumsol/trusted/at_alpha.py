@@ -8,7 +8,7 @@ in the search and in the checker alike. Codes and row kinds are plain integers w
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -79,6 +79,15 @@ class VerifiedSelection(EnclosedSolution):
     rigid: Ball | None = None
 
 
+class _Solved(NamedTuple):
+    """The solution of a selection's equations in scaled unknowns, the scale, lambda, and w with its zeros exact."""
+
+    equations: VerifiedSolution
+    scale: Floats
+    force: Ball
+    w: Ball
+
+
 def solve_selection(system: EnclosedSystem, codes: Sequence[int]) -> VerifiedSelection | None:
     """The verified solution of a complete selection, or None when its matrix is not proven regular."""
     with np.errstate(over="ignore", invalid="ignore"):
@@ -122,10 +131,34 @@ def contradicts(system: EnclosedSystem, codes: Sequence[int]) -> bool:
 
 
 def _solve_selection(system: EnclosedSystem, codes: Sequence[int]) -> VerifiedSelection | None:
-    selection, (S, g, F) = Selection(codes, len(system.reach)), system.balls
-    rows = selection.unknown
-    if not len(rows):
-        return _conditions(system, codes, Ball.exact(np.zeros(2 * system.p)), g, 1)
+    selection = Selection(codes, len(system.reach))
+    if not len(selection.unknown):
+        return _conditions(system, codes, Ball.exact(np.zeros(2 * system.p)), system.balls[1], 1)
+    solved = _solved(system, selection)
+    if solved is None:
+        return None
+    equations, _, force, w = solved
+    found = _conditions(system, codes, force, w, equations.sign)
+    if found.is_root or found.is_excluded:
+        return found
+    return _conditions(system, codes, force, _closer(system, selection, solved), equations.sign)
+
+
+def displacements(system: EnclosedSystem, codes: Sequence[int]) -> Ball | None:
+    """w of the one solution of a selection's equations, (2p,), as close as its data allow; None if it may be singular.
+
+    Whether the solution satisfies the selection's conditions does not matter.
+    """
+    selection = Selection(codes, len(system.reach))
+    with np.errstate(over="ignore", invalid="ignore"):
+        solved = _solved(system, selection) if len(selection.unknown) else None
+        w = system.balls[1] if not len(selection.unknown) else solved and _closer(system, selection, solved)
+    return w and w[: 2 * system.p]
+
+
+def _solved(system: EnclosedSystem, selection: Selection) -> _Solved | None:
+    """The solution of a selection's equations, of which there are some; None if they are not proven regular."""
+    (S, g, F), rows = system.balls, selection.unknown
     # scale the columns by powers of two, so that the unknowns are comparable in the contraction
     M = selection.matrix(S, F)
     scale = column_scale(M)
@@ -136,21 +169,15 @@ def _solve_selection(system: EnclosedSystem, codes: Sequence[int]) -> VerifiedSe
     force = selection.forces(Ball(solved.y * scale, solved.radius * scale + TINY), F)
     w = g - S @ force
     w[rows] = 0.0
-    found = _conditions(system, codes, force, w, solved.sign)
-    if found.is_root or found.is_excluded:
-        return found
-    w = Ball(w.mid, np.fmin(w.rad, _closer(system, selection, solved, scale, force)))
-    w.rad[rows] = 0.0
-    return _conditions(system, codes, force, w, solved.sign)
+    return _Solved(solved, scale, force, w)
 
 
-def _closer(
-    system: EnclosedSystem, selection: Selection, solved: VerifiedSolution, scale: Floats, force: Ball
-) -> Floats:
-    """Radii of g - S lambda in which errors of lambda cancel: those of a solution of ill-conditioned equations do.
+def _closer(system: EnclosedSystem, selection: Selection, found: _Solved) -> Ball:
+    """w with radii in which errors of lambda cancel: those of a solution of ill-conditioned equations do.
 
     With lambda = E (y + e), e = R rest + (I - R M) e: S E R is not large where S E and R are.
     """
+    solved, scale, force, w = found
     (S_ball, g, _), size, slipping = system.balls, gamma(selection.size + 2), selection.slip
     S = S_ball.mid
     moved = selection.columns(S, system.F) * scale
@@ -164,7 +191,9 @@ def _closer(
     turned = np.zeros_like(most)
     turned[system.p + slipping] = (system.F_rad + 4 * UNIT * system.F)[slipping] * most[slipping]
     error += g.rad + S_ball.rad @ most + np.abs(S) @ (turned + size * most)
-    return np.asarray((error * (1 + size) + size * np.abs(g.mid)) * SAFE * SAFE + TINY)
+    radius = np.fmin(w.rad, (error * (1 + size) + size * np.abs(g.mid)) * SAFE * SAFE + TINY)
+    radius[selection.unknown] = 0.0
+    return Ball(w.mid, radius)
 
 
 def _conditions(system: EnclosedSystem, codes: Sequence[int], force: Ball, w: Ball, sign: int) -> VerifiedSelection:

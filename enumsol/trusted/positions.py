@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from itertools import product
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, Ball, smaller
+from enumsol.arithmetic.balls import SAFE, Ball, hull, smaller
+from enumsol.condensation.floating import FloatingSystem, RigidRows, moved_by_modes
+from enumsol.trusted.at_alpha import displacements
 from enumsol.trusted.status_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
     from fractions import Fraction
 
-    from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.model.problem import ContactProblem
     from enumsol.support.array_types import Mask
+
+    #: The codes that every node may have.
+    Among = Sequence[frozenset[int]]
 
 #: Positions known to within this share of the largest of them are known well enough.
 _WELL_KNOWN = 2.0**-30
@@ -48,25 +53,28 @@ def certain_statuses(forces: Ball, slips: Ball) -> tuple[int, ...] | None:
 
 
 def tangential_positions(
-    enclosure: CondensedEnclosure,
+    problem: Any,
     alpha: Fraction,
     forces: Ball,
     still: Mask,
     before: Ball,
     codes: Sequence[int] | None = None,
     *,
+    rigid: Ball | None = None,
+    among: Among | None = None,
     share: float = 1.0,
 ) -> Ball:
     """Bt u at a root whose forces lie in a ball, for every slip offset in a ball.
 
     A node with u_t = 0 for certain stays where it was: its ball is carried over unchanged. Any other is where the load
-    and the forces move it, theory, (13.2), whatever its own offset was. Where this says little because the body is
-    held by weak springs, and the statuses of all nodes are certain, balls of many digits say it, in 3D a leaf.
+    and the forces move it, theory, (13.2), whatever its own offset was. If the statuses of all nodes are certain,
+    their equations say more: in 2D where nothing holds the body, and in balls of many digits where it is held by
+    springs that are so weak that (13.2) says little; in 3D then by a leaf.
 
     Parameters
     ----------
-    enclosure : CondensedEnclosure
-        Of the step's problem.
+    problem : ContactProblem or ContactProblem3D
+        That of the step.
     alpha : Fraction
     forces : Ball of shape (2p,) or (3p,)
         lambda: normal components first, of which those that are not negative count [force].
@@ -76,19 +84,35 @@ def tangential_positions(
         The slip offset [length].
     codes : p status codes or None
         Those of the root, if they are certain; in 3D any one that is neither open nor stick means slip.
+    rigid : Ball of shape (r,), or None
+        Of a body that nothing holds, the coordinates q of its rigid displacement; without them it may be anywhere.
+    among : per node the codes that it may have, or None
+        Of a root of such a body that is in one of these selections for certain, where its statuses are not.
     share : float
         Of the radius from which on more digits are asked for.
+
+    Raises
+    ------
+    NotEnclosedError
+        The step's data cannot be enclosed.
     """
-    p = len(enclosure.problem.gap)
+    enclosure, p = problem.on_springs.enclosure, problem.p
     S = Ball(enclosure.S, enclosure.S_rad)
     forces = _pressing(forces, p)
     with np.errstate(over="ignore", invalid="ignore"):
         moved = (enclosure.moved_freely(alpha) - (S @ forces[:, None])[:, 0])[p:]
-    if codes is not None and not np.max(moved.rad) <= share * _WELL_KNOWN * np.max(np.abs(moved.mid)):
-        if len(moved.mid) == p:
-            moved = _by_many_digits(enclosure.problem, alpha, codes, before) or moved
-        elif (found := _by_leaf(enclosure, alpha, forces, codes)) is not None:
-            moved = smaller(found, moved)
+        if rigid is not None:
+            moved = moved + (moved_by_modes(problem)[p:] @ rigid[:, None])[:, 0]
+        elif problem.modes is not None:
+            moved = Ball(moved.mid, np.full_like(moved.rad, np.inf))
+    well_known, found = np.max(moved.rad) <= share * _WELL_KNOWN * np.max(np.abs(moved.mid)), None
+    if len(moved.mid) == p and problem.modes is not None:
+        selections = [codes] if codes is not None else product(*among) if among is not None else ()
+        found = _by_selections(problem, alpha, selections, before)
+    elif codes is not None and not well_known:
+        plane = len(moved.mid) == p
+        found = _by_many_digits(problem, alpha, codes, before) if plane else _by_leaf(problem, alpha, forces, codes)
+    moved = moved if found is None else smaller(found, moved)
     return Ball(np.where(still, before.mid, moved.mid), np.where(still, before.rad, moved.rad))
 
 
@@ -99,10 +123,28 @@ def _pressing(forces: Ball, p: int) -> Ball:
     return Ball(np.where(cut, half, forces.mid), np.where(cut, half * SAFE, forces.rad))
 
 
-def _by_leaf(enclosure: CondensedEnclosure, alpha: Fraction, forces: Ball, codes: Sequence[int]) -> Ball | None:
+def _by_selections(problem: Any, alpha: Fraction, selections: Iterable[Sequence[int]], before: Ball) -> Ball | None:
+    """Where nodes are at the root of a body that nothing holds which is that of one of these selections.
+
+    None where there are none, or one may be singular.
+    """
+    units, p, found = problem.on_springs.condensed.at(alpha).proposals, problem.p, list[Ball]()
+    rows, length = RigidRows.of(problem, alpha, units.force, units.length), units.length[p:]
+    for codes in selections:
+        moves = np.array(codes) != STICK
+        held = problem.on_springs.enclosure.without_offsets(moves).at(alpha, units.force, units.length)
+        w = displacements(FloatingSystem.on(held, rows), codes)
+        if w is None:
+            return None
+        mid, rad = w.mid[p:] * length, w.rad[p:] * length
+        found.append(Ball(np.where(moves, mid, before.mid), np.where(moves, rad, before.rad)))
+    return hull(found) if found else None
+
+
+def _by_leaf(problem: Any, alpha: Fraction, forces: Ball, codes: Sequence[int]) -> Ball | None:
     from enumsol.trusted.space.leaf_positions import leaf_positions
 
-    return leaf_positions(enclosure, alpha, forces, codes)
+    return leaf_positions(problem, alpha, forces, codes)
 
 
 def _by_many_digits(problem: ContactProblem, alpha: Fraction, codes: Sequence[int], before: Ball) -> Ball | None:

@@ -140,8 +140,8 @@ def test_every_offset_in_a_ball_leads_into_the_ball_of_positions(spring, frictio
     (root,) = enumsol.enumerate_roots(driven.replace(slip_offset=offset), 0)
     lam, _ = ManyDigits(driven).root(root, offset)
     forces = Ball(np.array([float(x.mid()) for x in lam]), np.full(12, 5e-5))
-    found = leaf_positions(problem.enclosure, Fraction(0), forces, certain(root))
-    by_forces = tangential_positions(problem.enclosure, Fraction(0), forces, np.zeros(8, dtype=bool), start.ball)
+    found = leaf_positions(problem, Fraction(0), forces, certain(root))
+    by_forces = tangential_positions(problem, Fraction(0), forces, np.zeros(8, dtype=bool), start.ball)
     slipping = np.tile([str(status) == "slip" for status in root.statuses], 2)
     assert slipping.any()
     assert np.all(np.isinf(found.rad[~slipping]))
@@ -158,12 +158,12 @@ def test_no_leaf_says_where_nodes_are_whose_directions_it_may_not_hold():
     problem = cube(1.0, 1e-3)
     (root,) = enumsol.enumerate_roots(problem, 0)
     forces = np.concatenate([root.lambda_n, root.lambda_t.T.ravel()])
-    assert leaf_positions(problem.enclosure, Fraction(0), Ball(forces, np.zeros(12)), certain(root)) is not None
+    assert leaf_positions(problem, Fraction(0), Ball(forces, np.zeros(12)), certain(root)) is not None
     turned = np.concatenate([root.lambda_n, -root.lambda_t.T.ravel()])
-    assert leaf_positions(problem.enclosure, Fraction(0), Ball(turned, np.zeros(12)), certain(root)) is None
+    assert leaf_positions(problem, Fraction(0), Ball(turned, np.zeros(12)), certain(root)) is None
     wide = Ball(forces, np.abs(forces))  # any direction
-    assert leaf_positions(problem.enclosure, Fraction(0), wide, certain(root)) is None
-    sticking = leaf_positions(problem.enclosure, Fraction(0), Ball(forces, np.zeros(12)), [STICK] * 4)
+    assert leaf_positions(problem, Fraction(0), wide, certain(root)) is None
+    sticking = leaf_positions(problem, Fraction(0), Ball(forces, np.zeros(12)), [STICK] * 4)
     assert sticking is None
 
 
@@ -177,9 +177,7 @@ def test_a_force_of_open_sign_does_not_choose_between_slips_along_one_axis():
     assert one[3] * other[3] < 0
     middle = 0.25 * one + 0.75 * other  # the sign is that of the other one
     both = Ball(middle, np.abs(middle - one) * (1 + 1e-9))
-    found = [
-        leaf_positions(problem.enclosure, Fraction(0), ball, certain(slipping[0])) for ball in (both, as_known(one))
-    ]
+    found = [leaf_positions(problem, Fraction(0), ball, certain(slipping[0])) for ball in (both, as_known(one))]
     assert found[0] is None
     assert np.all(np.abs(found[1].mid - slipping[0].u_t.T.ravel())[:2] < 1e-6)
 

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from enumsol.search.fathoming import Point
     from enumsol.search.fathoming_in_contact import LoneProposal
     from enumsol.support.array_types import Codes, Floats, Indices
+    from enumsol.trusted.joint_roots import JointRoot
     from enumsol.trusted.quadratic_forms import EnclosedForm
 
 
@@ -308,7 +309,7 @@ class VerifiedCertifier(protocol.RecordingCertifier):
         self._leaf(records.UndecidedRecord(reason))
         return protocol.UndecidedPart(codes, reason, hint, examined=True)
 
-    def _ball(self, found: VerifiedSelection | ClosedSolution, index: int | None) -> EnclosureRecord:
+    def _ball(self, found: VerifiedSelection | ClosedSolution | JointRoot, index: int | None) -> EnclosureRecord:
         """Where a root is, in the problem's units."""
         force = self._scaled.force
         return records.EnclosureRecord(found.force.mid * force, found.force.rad * force * protocol.WIDEN, index)

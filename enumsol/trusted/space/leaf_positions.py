@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.arithmetic.balls import Ball, upper_norm
-from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
+from enumsol.arithmetic.balls import SAFE, TINY, Ball, upper_norm, upper_sum
+from enumsol.condensation.space_condensed import EnclosedSpace, FloatingSpace, SpaceSystem
+from enumsol.model.restart import SlipStart, restarted
 from enumsol.model.sectors import DEEPEST, SECTORS, places
-from enumsol.trusted.space.leaves import ROUNDED_ANGLE, Leaf, SpaceRoot, turned
+from enumsol.trusted.space.leaves import ROUNDED_ANGLE, Leaf, SpaceRoot, State, turned
 from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.trusted.space.turning import held_by
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from fractions import Fraction
 
     from enumsol.condensation.enclosure import CondensedEnclosure
-    from enumsol.support.array_types import Floats
+    from enumsol.support.array_types import Floats, Indices
 
 #: The level of the sectors around directions of slip, or that at which they are so many times as wide as these are
 #: uncertain: narrow, so that the leaf contracts at once, and wide enough to hold the directions for certain.
@@ -28,22 +29,23 @@ _LEVEL, _SHARE = 17, 64.0
 _ANY = 4.0
 
 
-def leaf_positions(enclosure: CondensedEnclosure, alpha: Fraction, forces: Ball, codes: Sequence[int]) -> Ball | None:
+def leaf_positions(problem: Any, alpha: Fraction, forces: Ball, codes: Sequence[int]) -> Ball | None:
     """Bt u of the components with friction that move, (2p,) [length]; all others are unbounded.
 
     None where no leaf is proven to hold the root.
 
     Parameters
     ----------
-    enclosure : CondensedEnclosure
-        Of a problem in 3D, whose slip offset may be a ball.
+    problem : ContactProblem3D
+        Its slip offset may be a ball.
     alpha : Fraction
     forces : Ball of shape (3p,)
         lambda at the root, normal components first [force].
     codes : p status codes
         Statuses that hold for certain: open, stick, any other one for slip.
     """
-    enclosed, length = _scaled(enclosure, alpha)
+    enclosure = problem.on_springs.enclosure
+    enclosed, length = _scaled(problem, enclosure, alpha)
     p = enclosed.p
     pairs = forces[p:].mid.reshape(2, p).T, forces[p:].rad.reshape(2, p).T
     tau = Ball(*pairs) * enclosed.inverse_friction * Ball.exact(enclosed.tau_scale)
@@ -55,7 +57,7 @@ def leaf_positions(enclosure: CondensedEnclosure, alpha: Fraction, forces: Ball,
     # along one axis the force's sign is known where its angle is
     if np.any(angle[along] >= _ANY):
         return None
-    leaf = Leaf(enclosed, codes)
+    leaf = _StartedLeaf(enclosed, codes)
     root = leaf.settle()
     if not isinstance(root, SpaceRoot):
         return None
@@ -65,10 +67,11 @@ def leaf_positions(enclosure: CondensedEnclosure, alpha: Fraction, forces: Ball,
         return None
     # no force and no direction depends on the offsets of components that move: without these w is where they move to
     moves = np.array([code != STICK for code in codes])
-    assert enclosure.free is not None
-    own = np.concatenate([np.zeros_like(moves), moves, moves])
-    g0, g0_rad = (np.where(own, *pair) for pair in zip(enclosure.free, (enclosure.g0, enclosure.g0_rad), strict=True))
-    w = Leaf(_scaled(replace(enclosure, g0=g0, g0_rad=g0_rad), alpha)[0], codes).displacements(root)
+    middle = problem if problem.offset_radius is None else restarted(problem, SlipStart(problem.slip_offset))
+    known = middle.on_springs.enclosure
+    without = known.without_offsets(np.concatenate([moves, moves]))
+    near, beside = (Leaf(_scaled(problem, balls, alpha)[0], codes) for balls in (known, without))
+    w = leaf.moved(root, near, beside, _spread(problem, enclosed, length))
     if w is None:
         return None
     found = Ball(np.zeros(2 * p), np.full(2 * p, np.inf))
@@ -79,10 +82,81 @@ def leaf_positions(enclosure: CondensedEnclosure, alpha: Fraction, forces: Ball,
     return found
 
 
-def _scaled(enclosure: CondensedEnclosure, alpha: Fraction) -> tuple[EnclosedSpace, Floats]:
+def _spread(problem: Any, enclosed: EnclosedSpace, length: Floats) -> Floats:
+    """How far the slip offset may be from its middle, scaled, (m,)."""
+    spread = np.zeros(len(enclosed.g))
+    for k in range(2 if problem.offset_radius is not None else 0):
+        nodes = np.flatnonzero(enclosed.tau[:, k] >= 0)
+        far = (enclosed.F + enclosed.F_rad)[nodes, k] * problem.offset_radius[nodes, k] / length[nodes]
+        spread[enclosed.tau[nodes, k]] = np.where(far > 0, far * SAFE + TINY, 0.0)
+    return spread
+
+
+class _StartedLeaf(Leaf):
+    """A leaf for all slip offsets in a ball."""
+
+    def moved(self, root: SpaceRoot, middle: Leaf, beside: Leaf, spread: Floats) -> Ball | None:
+        """w of ``beside`` at the root, for every offset that is in the ball (theory, (13.2b)); None if it is not known.
+
+        Parameters
+        ----------
+        root : SpaceRoot
+            Of this leaf.
+        middle, beside : Leaf
+            The same for the middle of the ball, and without the offsets of components that move.
+        spread : (m,) array
+            How far offsets are from there at most.
+        """
+        angle, reach, m = root.angle, root.angle_rad, len(self.system.g)
+        if root.rigid is not None:
+            # coordinates of modes that are left free are unknowns beside the directions, of the other sign
+            free = -root.rigid[np.array(self.free, dtype=np.intp) - m]
+            angle, reach = np.r_[angle, free.mid], np.r_[reach, free.rad]
+        over, states = self._state(angle, reach), [leaf._state(angle, 0.0 * reach) for leaf in (middle, beside)]
+        by_load = self._by_load(angle, load := np.flatnonzero(spread))
+        if over is None or by_load is None or states[0] is None or states[1] is None or not over.J.finite:
+            return None
+        point, start = states[0], states[1]
+        try:
+            Y = Ball.exact(_slopes(point).mid @ np.linalg.inv(point.J.mid))
+        except np.linalg.LinAlgError:
+            return None
+        (w, G), own = by_load, ~np.isin(load, self.rows)
+        w[:, own] = 0.0
+        found = start.w + (_slopes(over) - Y @ over.J) @ Ball(0.0 * reach, reach) - Y @ point.G
+        wide = upper_sum((w - Y @ G).size * spread[load], axis=1)
+        return Ball(found.mid, (found.rad + wide) * SAFE)[:m]
+
+    def _by_load(self, angle: Floats, load: Indices) -> tuple[Ball, Ball] | None:
+        """What one unit more of some rows of the load adds to w and to G, (m, k) and (q, k), directions held."""
+        turning, q = self._turning(angle), len(self.turning)
+        if turning is None:
+            return None
+        E, columns = Ball.exact(self.E.copy()), np.zeros((len(self.E), len(load)))
+        columns[load, np.arange(len(load))] = 1.0
+        at = self.t, np.array(self.column, dtype=np.intp)[:, None]
+        E.mid[at], E.rad[at] = turning.d, turning.off[:, None]
+        SE = self.system.balls[0] @ E
+        found = held_by(SE[self.rows], SE, Ball.exact(columns), self.rows)
+        if found is None:
+            return None
+        w, (d, _) = found[1], self._directions(angle, np.zeros(q))
+        v1, v2 = self._slips(w)
+        return w, Ball.joined(v1 * d[:, 1][:, None] - v2 * d[:, 0][:, None], w[self.free])
+
+
+def _slopes(state: State) -> Ball:
+    """Derivatives of w by all unknowns beside x."""
+    return Ball.beside(state.box.dw, state.box.ds)
+
+
+def _scaled(problem: Any, enclosure: CondensedEnclosure, alpha: Fraction) -> tuple[EnclosedSpace, Floats]:
     """The problem as balls, in units of forces and displacements of its own; the latter, (p,)."""
-    system = SpaceSystem.scaled(enclosure.S, enclosure.moved_freely(alpha).mid, enclosure.problem.friction_at(alpha))
-    return EnclosedSpace.of_problem(enclosure, alpha, system.force, system.length), system.length
+    system = SpaceSystem.scaled(enclosure.S, enclosure.moved_freely(alpha).mid, problem.friction_at(alpha))
+    units = alpha, system.force, system.length
+    if problem.modes is None:
+        return EnclosedSpace.of_problem(enclosure, *units), system.length
+    return FloatingSpace.of(problem, *units, enclosure), system.length
 
 
 def _code(code: int, tau: Sequence[int], force: Sequence[float], angle: float) -> int:

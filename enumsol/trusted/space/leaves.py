@@ -362,11 +362,6 @@ class Leaf:
                 rough = True
         return self._left_open(angle, radius, state)
 
-    def displacements(self, root: SpaceRoot) -> Ball | None:
-        """w, (m,), with the directions of a root and the load of this leaf; None where that is not proven regular."""
-        state = self._state(root.angle, root.angle_rad)
-        return None if state is None else state.w[: len(self.system.g)]
-
     def _cut_free(self, angle: Floats, radius: Floats, *, still: bool = False) -> tuple[Floats, Floats] | None:
         """The box with the free unknowns that its angles leave; None if there are none.
 

@@ -260,7 +260,7 @@ class Turning:
         columns, SE = [*loads, pushed], S @ sparse
         load = Ball(*(np.column_stack([getattr(part, name) for part in columns]) for name in ("mid", "rad")))
         matrix = SE[rows]
-        found = _held(matrix, SE, load, rows)
+        found = held_by(matrix, SE, load, rows)
         if found is None:
             return None
         all_x, w = found
@@ -374,7 +374,7 @@ class Turning:
         return Box(value[:m], w, slope, lone, x, pushed, led, lag, self.share)
 
 
-def _held(matrix: Ball, SE: Ball, load: Ball, rows: Sequence[int]) -> tuple[Ball, Ball] | None:
+def held_by(matrix: Ball, SE: Ball, load: Ball, rows: Sequence[int]) -> tuple[Ball, Ball] | None:
     """x and w of P (load - S E0 x) = 0, with ``matrix`` P S E0; None where that is not proven regular."""
     if not len(rows):
         return Ball.exact(np.zeros((0, len(load.mid[0])))), load
