@@ -45,8 +45,8 @@ if TYPE_CHECKING:
 _REPORT_EVERY = 64
 #: Number of contact nodes from which a root is sought before the tree; seconds to seek one when the tree is stopped.
 _MANY, _LATE = 24, 1.0
-#: Nodes in 3D at the limit of what contact can hold, if nothing else ends the search: with 4 contact nodes some 1,000
-#: were enough, with 6 there was no end in sight after 8,000.
+#: Nodes at the limit of what contact can hold, if nothing else is to end the search: blocks in 3D with 4 contact nodes
+#: take some 1,000 and in 2D with 21 some 1,600; others had not come to an end after 8,000 and 18,000.
 _AT_LIMIT = 2000
 
 
@@ -447,7 +447,7 @@ class TreeSearch:
         """Whether a load at the limit leaves no hope of a complete search."""
         if self.at_limit is None:
             return False
-        endless = self.at_limit.codes is None and self.limits.max_nodes is None and self.limits.deadline is None
+        endless = self.limits.max_nodes is None and self.limits.deadline is None
         return bool(self.outcome.undecided) or (endless and self.outcome.nodes >= _AT_LIMIT)
 
     def report(self, covered: float) -> None:

@@ -91,13 +91,16 @@ def test_a_search_without_hope_ends(workers):
     assert not report.complete
 
 
-def test_a_search_in_space_ends_too(monkeypatch):
+@pytest.mark.parametrize("space", [False, True])
+def test_a_search_that_might_not_end_does(space, monkeypatch):
     monkeypatch.setattr("enumsol.search.tree._AT_LIMIT", 30)
-    problem = enumsol.gallery.block_on_table3d(2, push=(0.6, 0.8))
+    flat = block_on_table(cells=20, push=1.0)
+    problem = enumsol.gallery.block_on_table3d(2, push=(0.6, 0.8)) if space else flat
     roots = enumsol.enumerate_roots(problem, 0)
     assert 30 <= roots.stats.nodes < 100
     assert "at the limit" in roots.stopped
     assert NAMED in repr(roots)
+    assert len(roots.families) == (not space)
     # a limit that is given is kept
     longer = enumsol.enumerate_roots(problem, 0, max_nodes=64)
     assert longer.stats.nodes == 64
