@@ -53,6 +53,11 @@ def test_a_body_that_nothing_holds(seen):
     assert errors[0] < 1e-3
 
 
+def test_a_load_at_the_limit(seen):
+    (note,) = seen["notes"]
+    assert "the load is at the limit of what contact can hold" in note
+
+
 def test_two_bodies_on_each_other(seen):
     """Pressed at their right by forces on one of them alone; a rigid foundation would yield less."""
     (root,) = enumsol.enumerate_roots(seen["two_bodies"], 0)

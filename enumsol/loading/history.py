@@ -117,7 +117,7 @@ def _kind(problem: AnyProblem, steps: Any) -> dict[str, Any]:
         "families": [{"polytopes": [part], "index": Maybe(int), "proven": bool}],
         "undecided": [((Maybe(str),) * p, str, str, int)],
         **{"stopped": Maybe(str), "at_least": int, "certified_data": {"problem", "condensed"}},
-        "bound_needed": Maybe(bool),
+        **{"bound_needed": Maybe(bool), "beyond_limit": Maybe(is_number)},
         **{"stats": {"nodes": int, "closed": int, "seconds": float}, "proof": Maybe(str)},
     }
     node = (int, int)
@@ -175,6 +175,7 @@ def _stage(stage: history_data.Stage) -> dict[str, Any]:
         "undecided": [[_names(part.statuses), part.reason, part.hint, part.leaves] for part in roots.undecided],
         **{name: getattr(roots, name) for name in _OF_ROOTS},
         "bound_needed": None if roots.rigid_bound is None else roots.rigid_bound.needed,
+        "beyond_limit": None if roots.rigid_bound is None else roots.rigid_bound.beyond_limit,
         "stats": {"nodes": roots.stats.nodes, "closed": roots.stats.closed, "seconds": roots.stats.seconds},
         "proof": None if roots.proof is None else base64.b64encode(roots.proof.content()).decode(),
     }
@@ -201,9 +202,14 @@ def _read_stage(
         stats=SearchStats(**record["stats"]),
         node_ids=problem.node_ids,
         proof=proof,
-        rigid_bound=None if record["bound_needed"] is None else RigidBound(body.rigid_reach, record["bound_needed"]),
+        rigid_bound=_read_bound(record, body),
     )
     return history_data.Stage(number, record["step"], start, roots, body, tuple(record["reasons"]))
+
+
+def _read_bound(record: dict[str, Any], body: Any) -> RigidBound | None:
+    needed = record["bound_needed"]
+    return None if needed is None else RigidBound(body.rigid_reach, needed, record["beyond_limit"])
 
 
 def _root(root: Root) -> dict[str, Any]:

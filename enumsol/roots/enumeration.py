@@ -13,7 +13,7 @@ from enumsol.proof.begun import BegunProof, begun_proof
 from enumsol.proof.writer import ProofWriter
 from enumsol.roots.root_set import RigidBound, RootSet, SearchStats, Undecided
 from enumsol.search.certifiers.protocol import UndecidedPart
-from enumsol.search.outcome import HOLD, SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
+from enumsol.search.outcome import AWAY, HOLD, SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
 from enumsol.search.parallel import Searchable, Spread
 from enumsol.search.resume import resume
 from enumsol.support.deadlines import Deadline, within
@@ -113,7 +113,8 @@ class Enumeration(ABC, Generic[_Solvers]):
         self.tree = search = solvers.search(self.certifier, limits, self.progress)
         earlier = () if self._begun is None or self.writer is None else (self._begun, self.writer.replace)
         self.outcome = search.outcome
-        search.otherwise = "" if self.problem.modes is None else HOLD
+        search.at_limit = solvers.at_limit
+        search.otherwise = AWAY if search.at_limit is not None else "" if self.problem.modes is None else HOLD
         search.continua = self._continua
         if solvers.unloaded():
             self.certifier.unloaded()
@@ -162,6 +163,7 @@ class Enumeration(ABC, Generic[_Solvers]):
     ) -> RootSet:
         """The result; ``at_least`` is None where nothing is known to be missing, ``families`` in 3D, which has none."""
         modes, stopped = self.problem.modes, self.outcome.stopped
+        beyond = None if (limit := self.solvers.at_limit) is None else limit.beyond
         needed = self.certifier.certified.bounded or self.method != "tree"
         counts = {"roots": len(roots)} | ({} if families is None else {"families": len(families)})
         return RootSet(
@@ -177,7 +179,7 @@ class Enumeration(ABC, Generic[_Solvers]):
             at_least=at_least,
             certified_data=certified_data,
             proof=self._proof(**counts),
-            rigid_bound=None if modes is None else RigidBound(self.problem.rigid_reach, needed),
+            rigid_bound=None if modes is None else RigidBound(self.problem.rigid_reach, needed, beyond),
         )
 
     def _stats(self) -> SearchStats:

@@ -146,17 +146,34 @@ class RigidBound:
     needed : bool
         Whether anything rests on it. Otherwise there are no other solutions at all. Of a complete search of the tree
         in 2D, up to 250 degrees of freedom and from a slip offset that is known exactly, True says that there are
-        solutions at the bound or beyond it.
+        solutions at the bound or beyond it; above 24 it says nothing more than that the bound was used where
+        ``beyond_limit`` is not None.
+    beyond_limit : float or None
+        By how much the load exceeds what contact can hold, as a share of itself, as far as floats tell; negative where
+        it is held. None unless it is so near to that limit that rounding may decide what solutions there are.
 
     Examples
     --------
     >>> import enumsol
     >>> enumsol.enumerate_roots(enumsol.gallery.block_on_table(), alpha=0).rigid_bound
-    RigidBound(largest=20.0, needed=False)
+    RigidBound(largest=20.0, needed=False, beyond_limit=None)
     """
 
     largest: float
     needed: bool
+    beyond_limit: float | None = None
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """A sentence where the load is at the limit of what contact can hold."""
+        if self.beyond_limit is None:
+            return ()
+        return (
+            "as far as floats tell, the load is at the limit of what contact can hold, within "
+            f"{max(abs(self.beyond_limit), 1e-16):.0e} of itself: there the body may be free to slide or tilt, and "
+            "rounding may decide which solutions there are; change the load or the friction coefficients by more than "
+            "that, or hold the body by a spring or a fixed point",
+        )
 
     def words(self) -> str:
         """The end of the line that says whether the list is complete."""
@@ -278,11 +295,11 @@ class RootSet(Sequence[Root], Immutable):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What may mislead about roots of a body in a mesh, each in a sentence: displacements that are not small.
+        """What may mislead about the roots, each in a sentence: a load at the limit, displacements that are not small.
 
         They are also printed, and shown in reports.
         """
-        return tuple(far_notes(self._roots))
+        return (*(() if self.rigid_bound is None else self.rigid_bound.notes), *far_notes(self._roots))
 
     def __len__(self) -> int:
         return len(self._roots)

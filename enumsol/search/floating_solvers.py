@@ -83,11 +83,20 @@ class FloatingSolvers(HeldByNothing, Solvers):
     @cached_property
     def exclusions(self) -> Exclusions | None:
         """What excludes assignments, for the certifiers of both arithmetics; None without balls."""
-        return None if self._enclosed[0] is None else Exclusions(self._enclosed[0], self._rests_on_reach)
+        if self._enclosed[0] is None:
+            return None
+        return Exclusions(self._enclosed[0], self._rests_on_reach, within=self._rounding_decides)
+
+    @cached_property
+    def _rounding_decides(self) -> bool:
+        """True if what a bound is needed for is not worth being found in rationals (theory, section 14.12)."""
+        from enumsol.condensation.exact import FAST_EXACT_DOF  # python-flint
+
+        return self.problem.n > FAST_EXACT_DOF and self.at_limit is not None
 
     def _rests_on_reach(self, codes: Codes) -> bool:
         """True if a complete selection without a solution may have one beyond the bound."""
-        return self.exact is None or self.exact.rests_on_reach(codes, None)
+        return self._rounding_decides or self.exact is None or self.exact.rests_on_reach(codes, None)
 
     @cached_property
     def _enclosed(self) -> tuple[FloatingSystem | None, str]:
@@ -181,6 +190,7 @@ class Exclusions:
     ----------
     enclosed : FloatingSystem
     rests_on_reach : of a complete selection without a solution, whether it may have one beyond the bound
+    within : whether exclusions may use the bound from the beginning
 
     Attributes
     ----------
@@ -188,8 +198,10 @@ class Exclusions:
         With its bound, and with one beyond which there are no solutions.
     """
 
-    def __init__(self, enclosed: FloatingSystem, rests_on_reach: Callable[[Codes], bool]) -> None:
-        self.rests_on_reach = rests_on_reach
+    def __init__(
+        self, enclosed: FloatingSystem, rests_on_reach: Callable[[Codes], bool], *, within: bool = False
+    ) -> None:
+        self.rests_on_reach, self._within = rests_on_reach, within
         self.system, self.free = enclosed, without_bound(enclosed)
         self._references: dict[Codes, Reference | None] = {}
         #: How the forms of roots are declared, by their selections.
@@ -213,6 +225,7 @@ class Exclusions:
         if (unbalanced := self.unbalanced(codes)) is not None:
             return unbalanced, False
         kept = proven(self._margins[1], codes, rows, values) if usable else None
+        within = within or self._within
         if kept is None or not (within or (all(code in CONDITIONS for code in codes) and self.rests_on_reach(codes))):
             return None
         return records.Excluded(Terms(rows, kept)), True
@@ -403,6 +416,6 @@ class FloatingExactCertifier(ExactCertifier):
     def selection(self, codes: Codes) -> SelectionSolution | UndecidedPart | None:
         """All roots in the selection."""
         found = super().selection(codes)
-        if not isinstance(found, UndecidedPart):
-            self.bounded |= self._selections.rests_on_reach(codes, found)
+        if not isinstance(found, UndecidedPart) and not self.bounded:
+            self.bounded = self._selections.rests_on_reach(codes, found)
         return found

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 #: Advice if nothing holds a body and its searches do not come to an end.
 HOLD = "hold the body by a spring or a fixed point, or give a smaller max_rigid_displacement"
+#: Advice if its load is at the limit of what contact can hold.
+AWAY = "change the load or the friction coefficients a little, or hold the body by a spring or a fixed point"
 
 
 @dataclass(frozen=True)
@@ -125,6 +127,7 @@ class StopReason(enum.Enum):
     INTERRUPTED = enum.auto()
     OUT_OF_MEMORY = enum.auto()
     GRAPH_INCOMPLETE = enum.auto()
+    AT_LIMIT = enum.auto()
 
     @classmethod
     def of(cls, ending: type[BaseException]) -> StopReason:
@@ -175,6 +178,7 @@ class Stop:
             StopReason.INTERRUPTED: "let it run to its end",
             StopReason.OUT_OF_MEMORY: "use more memory or a smaller problem",
             StopReason.GRAPH_INCOMPLETE: "use enumerate_roots",
+            StopReason.AT_LIMIT: AWAY,
         }[self.reason]
 
     def __str__(self) -> str:
@@ -189,5 +193,6 @@ class Stop:
             StopReason.INTERRUPTED: f"interrupted{after}",
             StopReason.OUT_OF_MEMORY: f"out of memory{after}",
             StopReason.GRAPH_INCOMPLETE: "the branch graph is not complete",
+            StopReason.AT_LIMIT: f"stopped{after} at the limit of what contact can hold, where rounding decides",
         }[self.reason]
         return text if self.unexamined is None else f"{text}, {counted(self.unexamined, 'subtree')} not examined"

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from concurrent.futures import Executor
 
     from enumsol.search.certifiers.protocol import Certified, Certifier
+    from enumsol.search.load_limit import LoadLimit
     from enumsol.search.resume import Reader
     from enumsol.support.array_types import Alpha
 
@@ -42,6 +43,10 @@ class Searchable(Protocol):
     @property
     def has_solution(self) -> bool:
         """True if there is a solution for certain, once something can be proven."""
+
+    @property
+    def at_limit(self) -> LoadLimit | None:
+        """The limit of what contact can hold, if the load of a body that nothing holds is there."""
 
     @property
     def undecidable(self) -> str | None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.search.certifiers.protocol import Refine, UndecidedPart, Unrecorded
+from enumsol.search.load_limit import LoadLimit, load_limit
 from enumsol.search.tree import TreeSearch
 
 if TYPE_CHECKING:
@@ -54,18 +55,25 @@ class SearchSetup(ABC):
             known_root=lambda: self.known_root,
         )
 
+    @property
+    def at_limit(self) -> LoadLimit | None:
+        """The limit of what contact can hold, if the load of a body that nothing holds is there."""
+        return None
+
     @abstractmethod
     def certifier(self, recorder: Any) -> Certifier:
         """The certifier of this arithmetic, which writes to a recorder."""
 
     @cached_property
     def known_root(self) -> Codes | None:
-        """A complete selection that is proven to hold a strict root, found without the tree; None where that failed."""
+        """A complete selection proven to hold a strict root or a family, found without the tree; None where none is."""
         certifier = self.certifier(Unrecorded())
         for codes in self._suggested():
             answer = certifier.selection(codes)
-            # a degenerate one may belong to others, which only a search tells
-            if not isinstance(answer, UndecidedPart | Refine | None) and getattr(answer, "strict", True):
+            # a degenerate one may belong to others, which only a search tells; those of a family do in any case
+            if not isinstance(answer, UndecidedPart | Refine | None) and (
+                getattr(answer, "strict", True) or getattr(answer, "dimension", 0)
+            ):
                 return codes
         return None
 
@@ -101,6 +109,7 @@ class HeldByNothing:
     """
 
     has_solution = False
+    alpha: Any
     offered = '"verified" or "exact"'
     problem: Any
     #: The system on springs, relative to the body's own stiffness; and as of the solvers of a body that is held.
@@ -112,15 +121,23 @@ class HeldByNothing:
             raise InvalidArgumentError(f'arithmetic is "fast" for a body that nothing holds; expected {self.offered}')
         super().__init__(problem, alpha, arithmetic, *options)  # type: ignore[call-arg]
 
+    @cached_property
+    def at_limit(self) -> LoadLimit | None:
+        """The limit of what contact can hold, if the load is there."""
+        return load_limit(self.problem, self.alpha)
+
     def _suggested(self) -> list[Codes]:
-        """Selections of the body on springs that become weaker and weaker, those on the weakest first."""
+        """Selections of the body on springs that become weaker and weaker, those on the weakest first.
+
+        The one of a family at the limit comes before them.
+        """
         suggested, near = list[Any](), None
         for stiffness in _SPRINGS:
             found = self._solved(self._on_springs(stiffness), near)
             if found is not None:
                 codes, near = found
                 suggested = codes + [other for other in suggested if other not in codes]
-        return suggested
+        return suggested if self.at_limit is None or self.at_limit.codes is None else [self.at_limit.codes, *suggested]
 
     def _closer(self, certifier: Certifier) -> Any:
         """There may be no solution: what takes the place of the tree is a root that is known."""
