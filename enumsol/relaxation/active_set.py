@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -26,6 +27,16 @@ if TYPE_CHECKING:
 _SLOW = 0.04
 #: Rows that become equations when a node is open, or in contact.
 _APART = (int(RowKind.NORMAL_FORCE), int(RowKind.PENETRATION))
+
+
+def feasibility_tolerance(data: QPData) -> float:
+    """Largest violation that the QP ignores, where its data are larger than those of a body that is held.
+
+    On weak springs the load gives a body an energy that is as large as the springs are weak.
+    """
+    from enumsol.relaxation._active_set import QPState  # compiled: whoever made the data has it
+
+    return FEASIBILITY_TOLERANCE * max(1.0, math.sqrt(-QPState(data).bound))
 
 
 class CompiledEngine:
@@ -56,6 +67,7 @@ class CompiledEngine:
         self.data, self._rule, self.size, self.offset, self.always = data, rule, size, offset, always
         #: Most changes of the active set; a program that needs more has stalled.
         self.limit = 200 + 10 * size
+        self.tolerance = feasibility_tolerance(data)
 
     #: The form that is minimised in place of the energy, if any.
     form: EnclosedForm | None = None
@@ -159,7 +171,7 @@ class ActiveSetRelaxation:
         self, engine: CompiledEngine, state: QPState, rows: list[int], modes: list[int], *, last: bool
     ) -> None:
         self._engine, offset = engine, engine.offset
-        self._state, status = state.child(rows, modes, last, PRUNE_MARGIN + offset, FEASIBILITY_TOLERANCE, engine.limit)
+        self._state, status = state.child(rows, modes, last, PRUNE_MARGIN + offset, engine.tolerance, engine.limit)
         self.bound: float = self._state.bound - offset
         self.pruned = status == 1
         self.stalled = status == 2

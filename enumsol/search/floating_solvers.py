@@ -16,6 +16,7 @@ from enumsol.condensation.condensed import ScaledSystem
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.floating import FloatingSystem, RigidRows
 from enumsol.proof import records
+from enumsol.search.balance import in_balance
 from enumsol.search.certifiers.protocol import NO_BOUND, Bound, Certifier, UndecidedPart
 from enumsol.search.certifiers.rational_certifier import ExactCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier, proven
@@ -220,6 +221,8 @@ class Exclusions:
         """
         rows, values = bound.multipliers()
         usable = bound.form is None and len(rows)
+        if usable:
+            rows, values = in_balance(self.system, codes, rows, values)
         if usable and (kept := proven(self._margins[0], codes, rows, values)) is not None:
             return records.Excluded(Terms(rows, kept)), False
         if (unbalanced := self.unbalanced(codes)) is not None:
