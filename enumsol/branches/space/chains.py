@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -60,8 +60,8 @@ class Skeleton:
 
     Attributes
     ----------
-    points : (N, 3p + 1) array
-        Forces and alpha.
+    points : (N, m + 1) array
+        Forces and alpha; of a body that nothing holds its rigid displacement is between both.
     corners : sequence of int
         Points at which a status changes.
     closed : bool
@@ -99,7 +99,7 @@ def chain_through(
     interval: tuple[Fraction, Fraction],
     begun: Callable[[CurveChain], object] | None = None,
 ) -> CurveChain | None:
-    """The curve through a regular root x, (3p + 1,), until it leaves the interval on both sides or is closed.
+    """The curve through a regular root x, (m + 1,), until it leaves the interval on both sides or is closed.
 
     As much of it as is proven, with x if possible; None where that is nothing. ``begun`` is called with what there is
     of it when the time is over or somebody interrupts.
@@ -119,7 +119,7 @@ def chain_through(
 def skeleton_through(problem: ContactProblem3D, x: Array, span: tuple[float, float]) -> Skeleton | None:
     """Skeleton that continuation finds, a little longer than the interval; None if it does not start."""
     p = problem.p
-    start = float(x[-1]), x[:p], x[p:-1].reshape(2, p).T
+    start = float(x[-1]), x[:p], x[p : 3 * p].reshape(2, p).T, *([] if problem.modes is None else [x[3 * p : -1]])
     try:
         ahead = _path(problem, start, 1, span)
         closed = ahead.status == PathStatus.CLOSED
@@ -128,9 +128,7 @@ def skeleton_through(problem: ContactProblem3D, x: Array, span: tuple[float, flo
         raise
     except EnumsolError:
         return None
-    lines = [
-        np.column_stack([path.lambda_n, path.lambda_t[:, :, 0], path.lambda_t[:, :, 1], path.alpha]) for path in paths
-    ]
+    lines = [_line(path) for path in paths]
     corners = [sorted(item.point for item in path.transitions if item.nodes) for path in paths]
     if closed:
         return Skeleton(lines[0], corners[0], closed=True)
@@ -144,7 +142,13 @@ def skeleton_through(problem: ContactProblem3D, x: Array, span: tuple[float, flo
     return Skeleton(points, sorted(places), closed=False, start=last) if len(points) > 1 else None
 
 
-def _path(problem: ContactProblem3D, start: tuple[float, Array, Array], way: int, span: tuple[float, float]) -> Path:
+def _line(path: Path) -> Array:
+    """The points of a path, as those of a skeleton."""
+    rigid = np.zeros((len(path.alpha), 0)) if path.rigid_coordinates is None else path.rigid_coordinates
+    return np.column_stack([path.lambda_n, path.lambda_t[:, :, 0], path.lambda_t[:, :, 1], rigid, path.alpha])
+
+
+def _path(problem: ContactProblem3D, start: tuple[Any, ...], way: int, span: tuple[float, float]) -> Path:
     """A path that may take shorter steps where it stalls: near a fold of a short interval it has to."""
     path = follow(problem, start, way, span)
     if path.status == PathStatus.STALLED:

@@ -39,9 +39,10 @@ class CurvedArcValues(ArcValues):
     given : AlphaProblem
     problem : ContactProblem3D
     codes : statuses
-    knots : (K + 1, 3p + 1) array
-        Points (lambda_n, both lambda_t, alpha) in the order of alpha.
-    borders : (K, 3p + 1) array
+    knots : (K + 1, m + 1) array
+        Points (lambda_n, both lambda_t, alpha) in the order of alpha, m = 3p; of a body that nothing holds its rigid
+        displacement is before alpha, m = 3p + r.
+    borders : (K, m + 1) array
         Rows of the parameter between two of them, by forces and alpha.
     """
 
@@ -86,8 +87,11 @@ class CurvedArcValues(ArcValues):
 
 def state_of(problem: ContactProblem3D, x: Floats, active: Sequence[Set[int]]) -> Pair:
     """Forces and displacements of forces and alpha x, with the zeros of the statuses that hold at every node."""
-    forces, condensed = x[:-1], problem.condensed
+    m, condensed = 3 * problem.p, problem.on_springs.condensed
+    forces = x[:m]
     w = condensed.free_displacements(float(x[-1])) - condensed.S @ forces
+    if problem.modes is not None:
+        w = w + problem.contact_rows @ (problem.modes.N @ x[m:-1])
     return with_exact_zeros((forces + 0.0, w), active)
 
 

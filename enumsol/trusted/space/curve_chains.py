@@ -39,13 +39,25 @@ class CurveLink:
 
 
 def link_between(curve: SolutionCurve, start: SolutionCurve, end: SolutionCurve) -> CurveLink | None:
-    """The part of a curve between two of its points, if both lie in its box and in this order."""
+    """The part of a curve between two of its points, if both lie in its box and in this order.
+
+    Of a body that nothing holds, if its rigid displacement is within its bounds there (theory, section 14.11).
+    """
     ends = start.at(0.0), end.at(0.0)
     if not all(lies_in(curve.box, x) for x in ends):
         return None
     low, high = (parameter_in(curve.box, x) for x in ends)
     between = high - low
-    return CurveLink(curve, low, high) if between.mid > between.rad * SAFE else None
+    if not between.mid > between.rad * SAFE or not curve.problem.within(curve.at(_hull(low, high))):
+        return None
+    return CurveLink(curve, low, high)
+
+
+def _hull(low: Ball, high: Ball) -> Ball:
+    """A ball of all numbers between two others, which is a little wider."""
+    middle = 0.5 * (low.mid + high.mid)
+    rad = 0.5 * np.abs(high.mid - low.mid) + low.rad + high.rad + 4 * UNIT * (np.abs(low.mid) + np.abs(high.mid))
+    return Ball(middle, rad * SAFE)
 
 
 def goes_on(before: CurveLink, after: CurveLink, joint: SolutionCurve) -> bool:

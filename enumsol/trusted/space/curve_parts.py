@@ -78,9 +78,9 @@ class Run:
     rises : int
     index : int
         Of the roots on it.
-    knots : sequence of (3p + 1,) arrays
+    knots : sequence of (m + 1,) arrays
         Points on it, in floats, in the order of the curve.
-    borders : sequence of (3p + 1,) arrays
+    borders : sequence of (m + 1,) arrays
         Rows of the parameter between two of them.
     start, end : pairs of Fraction
         Bounds of alpha at its first and last point that is known.
@@ -108,7 +108,7 @@ class Turn:
     ----------
     alphas : pair of Fraction
         Between them is all alpha of it.
-    x : (3p + 1,) array
+    x : (m + 1,) array
         A point of it, in floats.
     selections : statuses on both sides, one or two
     settled : bool

@@ -169,6 +169,8 @@ class Open:
         Whether rather the piece of alpha stands in the way than the widths of sectors, as computed; no claim.
     span : pair of floats
         Over a piece of alpha, bounds of s, from -1 to 1, at all solutions in it.
+    rigid : Ball of shape (r,), or None
+        As in SpaceRoot; None where y is.
     """
 
     node: int | None
@@ -182,6 +184,7 @@ class Open:
     drift: Drift | None = None
     swept: bool = False
     span: tuple[float, float] = (-1.0, 1.0)
+    rigid: Ball | None = None
 
     def tells_more(self, other: Open) -> bool:
         """True if this leaves less of a piece open than ``other``, or has bounds where that has none; no claim."""
@@ -499,7 +502,7 @@ class Leaf:
         sweep, turns = self._swept(angle, radius, by_alpha=True) if self.piece else None, self.system.turn
         if sweep is None or turns is None:
             return -1.0, 1.0
-        m, tau, unit, (middle, turn) = len(self.system.g), self.system.tau, self.system.unit, sweep[:2]
+        m, tau, unit, (middle, turn) = len(self.E), self.system.tau, self.system.unit, sweep[:2]
         pairs = [(middle[i], turn[i]) for i in self.closed] + [(-middle[m + i], -turn[m + i]) for i in self.open]
         for i in self.stick:
             t = [int(k) for k in tau[i] if k >= 0]
@@ -594,6 +597,7 @@ class Leaf:
             node = self.turning[int(np.argmax(worth))] if np.any(worth) else None
         m = len(self.system.g)
         y, w = (None, None) if state is None else (state.y[:m], state.w[:m])
+        rigid = None if state is None or not len(self.system.reach) else -state.y[m:]
         cause = self._cause(angle, state)
         mode = self._free_mode(angle) if cause is Cause.RIGID else None
         span = self._span(angle, radius)
@@ -603,7 +607,7 @@ class Leaf:
         angle, radius = angle[:q], radius[:q]
         low, high = np.maximum(angle - radius, -self.half), np.minimum(angle + radius, self.half)
         box = 0.5 * (low + high), 0.5 * np.abs(high - low) * SAFE + 4 * UNIT
-        return Open(node, y, w, self.centre, *box, cause, mode, drift, swept, span)
+        return Open(node, y, w, self.centre, *box, cause, mode, drift, swept, span, rigid)
 
     def _free_mode(self, angle: Floats) -> int:
         """The rigid mode that moves most along what the equations in the middle leave free; no claim."""
