@@ -105,6 +105,7 @@ class _Place:
     border: bool
     settled: bool
     missing: bool = False
+    bounded: bool = False
 
 
 @dataclass
@@ -249,7 +250,8 @@ class CurvedGraph:
                 f"{END_ELSEWHERE}",
                 turn.alphas,
             )
-        self._places.append(_Place(alphas, self.given.unplaced(turn.x), turn.selections, border=False, settled=settled))
+        x, bounded = self.given.unplaced(turn.x), turn.bounded
+        self._places.append(_Place(alphas, x, turn.selections, border=False, settled=settled, bounded=bounded))
         return len(self._places) - 1
 
     def _values(self, run: Run) -> CurvedArcValues:
@@ -316,6 +318,7 @@ class CurvedGraph:
             place.selections,
             border=place.border,
             settled=place.settled,
+            bounded=place.bounded,
         )
 
 

@@ -57,7 +57,7 @@ _CUTS = 2
 #: than those of a level; a sector is cut so if no more than this share of it is left.
 _ROOM, _NARROWEST, _LEFT = 0.5, 9, 0.5
 #: Boxes of a curve in a row in which a leaf may lie, and how many such rows are tried.
-_LONGEST, _RUNS = 9, 4
+_LONGEST, _RUNS = 64, 4
 #: From the ends of curves inside the interval so far, as a share of it, nothing is searched.
 _AROUND_ENDS = 2.0**-14
 #: Longer pieces are cut where statuses occur along one curve over a part of them.

@@ -199,7 +199,12 @@ class AlphaProblem:
 
         Its coordinates are components of zeta at solutions.
         """
-        return bool(np.all(x.size[3 * self.p : -1] * SAFE < self.reach))
+        return bool(np.all(x[self.rigid].size * SAFE < self.reach))
+
+    @property
+    def rigid(self) -> slice:
+        """Where the coordinates of the rigid displacement are in (zeta, alpha)."""
+        return slice(3 * self.p, self.m)
 
     @property
     def steps(self) -> Array:
