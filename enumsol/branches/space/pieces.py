@@ -41,7 +41,9 @@ _BESIDE_FOLD = 2.0**-24
 _LONGER, _ROUNDED = 1.05, 16.0
 #: After so many parts of a link that stay open none is halved: along a continuum of solutions all would.
 _MOST_OPEN = 16
-#: Along which alpha does not change is left open where its bounds are as close as this.
+#: A link is cut into so many parts at most: near the limit of sliding alpha hardly changes along a curve.
+_MOST_PARTS = 256
+#: A part along which alpha does not change is left open where its bounds are as close as this.
 _STILL = 2.0**-32
 #: Where a part is cut: at the first of these shares where the solution is regular.
 _CUTS = (0.5, 0.4375, 0.59375)
@@ -108,6 +110,7 @@ class LinkCutter(LinkParts):
     ) -> None:
         super().__init__(problem, link)
         self.nearness, self._open, self._records = nearness, 0, [] if records is None else records
+        self._last = len(self._records) + _MOST_PARTS
 
     def parts(self, start: SolutionCurve, end: SolutionCurve) -> list[Run | Turn]:
         """From one joint to another one."""
@@ -149,7 +152,8 @@ class LinkCutter(LinkParts):
         own = self._between(start, end) if still and own is None else own
         done = still and own is not None and own.alphas[1] - own.alphas[0] <= Fraction(_STILL)
         left = times > 0 or (still and times > -_HALVINGS)
-        middle = self._middle(start, end) if not done and left and self._open < _MOST_OPEN else None
+        left &= not done and self._open < _MOST_OPEN and len(self._records) < self._last
+        middle = self._middle(start, end) if left else None
         if middle is None:
             self._open += not done
             self._told("u", own)

@@ -159,9 +159,10 @@ def up_to_bound(link: CurveLink, parts: Sequence[Run | Turn]) -> Sequence[Run | 
     for part in parts:
         alphas += (*part.start, *part.end) if isinstance(part, Run) else part.alphas
         selections += (part.codes,) if isinstance(part, Run) else part.selections
-    first = parts[0]
-    x, whole = (first.knots[0], len(parts) == 1) if isinstance(first, Run) else (first.x, False)
-    return [Turn((min(alphas), max(alphas)), x, tuple(dict.fromkeys(selections)), settled=whole, bounded=True)]
+    joined: list[Run | Turn] = []
+    first, whole = parts[0], put_behind(joined, parts) and len(joined) == 1
+    x, settled = (first.knots[0], whole) if isinstance(first, Run) else (first.x, False)
+    return [Turn((min(alphas), max(alphas)), x, tuple(dict.fromkeys(selections)), settled, bounded=True)]
 
 
 def arcs_over(parts: Sequence[Run | Turn], interval: Range, *, closed: bool) -> tuple[int, list[Range]]:

@@ -37,7 +37,7 @@ _MARGIN = 2.0**-10
 #: How often a piece is narrowed for a leaf, to which multiples of its half, and where that is too little.
 _NARROWINGS, _GRID, _NARROWER = 8, 1 << 12, Fraction(3, 2)
 #: Halvings of the way through a box.
-_STEPS = 8
+_STEPS = 16
 
 
 @dataclass(frozen=True, eq=False)
