@@ -221,7 +221,7 @@ class LinkCutter(LinkParts):
 
     def _middle(self, start: Place, end: Place) -> Place | None:
         found = (self._at(start, end, share) for share in _CUTS)
-        return next((place for place in found if place is not None), None)
+        return next((place for place in found if place is not None and self.is_between(start, place, end)), None)
 
     def _passage(self, start: Place, end: Place, value: Callable[[CurvePoint], float], close: float) -> float | None:
         """The share of the way at which a number that is positive before and negative behind is 0, in floats."""
