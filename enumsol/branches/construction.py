@@ -56,7 +56,7 @@ def branch_graph(
     Parameters
     ----------
     problem : ContactProblem or ContactProblem3D
-        In 3D the coefficients of a node must have the same ratio for all alpha, and something must hold the body.
+        In 3D the coefficients of a node must have the same ratio for all alpha.
     interval : pair of alphas
         First and last alpha, in increasing order: float, Fraction or whatever enumerate_roots accepts as alpha.
     arithmetic : {"verified", "fast", "exact"}
@@ -223,7 +223,6 @@ def _in_space(
     """The graph of a problem in 3D."""
     from enumsol.branches.space.space_graph import space_graph  # continuation, and what only 3D needs
 
-    problem.check_held("branch_graph in 3D", instead=_AT_SINGLE_ALPHAS)
     if arithmetic != "verified":
         raise InvalidArgumentError(f'arithmetic is "{arithmetic}" for a problem in 3D; expected "verified"')
     for end in interval:

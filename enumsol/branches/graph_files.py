@@ -22,6 +22,7 @@ from enumsol.branches.enclosed.make_traced import TracedArcValues
 from enumsol.branches.exact.make_elements import ExactArcValues
 from enumsol.branches.graph_data import GraphData, GraphStats
 from enumsol.condensation.exact import ExactCondensed, exact_condensed
+from enumsol.condensation.floating import enclosed_over_alpha
 from enumsol.condensation.unloaded import vanishing_alpha
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.mesh import BodyMesh
@@ -148,13 +149,18 @@ def _graph_kind(problem: AnyProblem, vertices: Any) -> dict[str, Any]:
         **{"statuses": statuses, "selections": selections, "sample": is_fraction, "from?": is_fraction},
         **{"to?": is_fraction, "tail": ends, "head": ends, "index": Maybe(int), "grazing": bool},
         **{"dimension": range(3 * p + 7)},
-        **dict.fromkeys(("knots?", "borders?"), Array(None, 3 * p + 1)),
+        **dict.fromkeys(("knots?", "borders?"), Array(None, _unknowns(problem) + 1)),
     }
     return {
         **{"interval": pair, "left_open?": [pair], "arithmetic": {"verified", "exact", "fast"}, "reasons": [str]},
         **{"arcs_by?": {"exact", "balls"}, "condensed_exactly": bool, "vertices": [vertex], "arcs": [arc]},
         "stats": dict.fromkeys((f"{item.name}?" for item in fields(GraphStats)), is_number),
     }
+
+
+def _unknowns(problem: AnyProblem) -> int:
+    """Number of forces in 3D, and of coordinates of a rigid displacement."""
+    return 3 * problem.p + (0 if problem.modes is None else problem.modes.r)
 
 
 def _is_whole(value: Any) -> bool:
@@ -172,12 +178,12 @@ def _values(
         @cache
         def given() -> AlphaProblem:
             """Made for the first arc: a graph without any may be one of a problem that has no such form."""
-            return AlphaProblem.of(problem.enclosure)
+            return AlphaProblem.of(enclosed_over_alpha(problem))
 
         def along(item: dict[str, Any]) -> ArcValues:
             codes, knots = tuple(item["selections"][0]), np.array(item["knots"], dtype=np.float64)
             borders = np.array(item["borders"], dtype=np.float64)
-            size = 3 * problem.p + 1
+            size = _unknowns(problem) + 1
             if knots.shape != (len(borders) + 1, size) or borders.shape[1:] != (size,):
                 raise ValueError("knots of an arc")
             return CurvedArcValues(given(), problem, codes, knots, borders)

@@ -16,7 +16,7 @@ from enumsol.proof.reading import RefusedError
 from enumsol.proof.records import Limits, RecordError
 from enumsol.proof.space_records import CurvePart
 from enumsol.trusted.space.curve_events import CurveMotion
-from enumsol.trusted.space.curve_parts import LinkParts, in_order
+from enumsol.trusted.space.curve_parts import LinkParts, in_order, up_to_bound
 from enumsol.trusted.space.solution_curve import only_curve
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def parts_of(problem: AlphaProblem, chain: CurveChain, records: Iterator[Any], l
         A record is no part, or does not prove what it says.
     """
     joined = zip(chain.links, chain.joints[:-1], chain.joints[1:], strict=True)
-    links = (LinkCuts(problem, link, records, limits).parts(*ends) for link, *ends in joined)
+    links = (up_to_bound(link, LinkCuts(problem, link, records, limits).parts(*ends)) for link, *ends in joined)
     found = in_order(links, closed=chain.closed)
     if found is None:
         raise RefusedError("a curve changes its statuses where two of its boxes meet")

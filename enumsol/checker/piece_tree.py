@@ -5,7 +5,8 @@ A tree is given by its records in the order of a walk: ``["a", alpha]`` (the pie
 a leaf), ``["k", first, last]`` (all solutions of a leaf lie in boxes of one curve), ``["r", box, low, high, alpha,
 codes]`` (the roots of a leaf lie on one arc over another piece, and one of its points is in the box), ``["m", numbers,
 first, last]`` (all solutions with the statuses of the assignment lie on the curve between two boxes, by one
-certificate) and ``["u", reason]`` (open: a gap).
+certificate) and ``["u", reason]`` (open: a gap). Of a body that nothing holds there is no "m", but ``["i", z]`` (no
+forces are in balance with the load).
 """
 
 from __future__ import annotations
@@ -18,8 +19,9 @@ import numpy as np
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.proof.reading import RefusedError, quoted
-from enumsol.proof.records import Branching, Limits, NoRoot, RecordError, UndecidedRecord, kind_of
+from enumsol.proof.records import Branching, Limits, NoRoot, RecordError, Unbalanced, UndecidedRecord, kind_of
 from enumsol.proof.space_records import (
+    FLOATING_PIECE_LEAVES,
     PIECE_LEAVES,
     CutPiece,
     ExcludedOverPiece,
@@ -111,11 +113,12 @@ class PieceTreeChecker:
         if kind == Branching.kind:
             split = Branching.covering(record, codes, self._covers)
             return [(piece.low, piece.high, below) for below in split.below(codes)]
-        known = kind_of(record, PIECE_LEAVES)
+        modes = self.enclosure.problem.modes
+        known = kind_of(record, PIECE_LEAVES if modes is None else FLOATING_PIECE_LEAVES)
         if known is None:
             raise RecordError(f"unknown kind of record {quoted(kind)}")
-        components = len(codes) + sum(self._tangents)
-        leaf = known.read(record, Limits(codes, boxes=len(self._boxes), components=components))
+        components, r = len(codes) + sum(self._tangents), 0 if modes is None else modes.r
+        leaf = known.read(record, Limits(codes, boxes=len(self._boxes), components=components, modes=r))
         self.leaves += 1
         if isinstance(leaf, UndecidedRecord):
             self.gaps.append((piece.low, piece.high))
@@ -131,6 +134,8 @@ class PieceTreeChecker:
         if isinstance(leaf, ExcludedOverPiece):
             excluded = piece.margin(codes, leaf.rows, (leaf.low, leaf.high)) > 0
             return None if excluded else "its multipliers do not exclude it"
+        if isinstance(leaf, Unbalanced):
+            return None if piece.is_unbalanced(codes, leaf.direction) else "forces may be in balance"
         if isinstance(leaf, OnlyOnCurve):
             (known, first), (other, last) = self._boxes[leaf.first], self._boxes[leaf.last]
             alone = known is other and piece.lies_on(known, Run(first, last), codes, leaf.numbers)

@@ -6,7 +6,8 @@ for every curve ``{"curve": n}`` with n boxes, and these as ``["w", centre, dire
 between n + 1 boxes without length around the points that they share (see ``trusted.space.curve_chains``), and perhaps
 how it is cut into arcs (see ``checker.curve_cuts``);
 ``{"tree": true}`` and the records of a tree (see ``checker.piece_tree``), whose boxes are numbered in the order of the
-curves, points left out; at the end ``{"curves", "arcs", "leaves", "gaps"}``, arcs null where not all curves are cut.
+curves, points left out; at the end ``{"curves", "arcs", "leaves", "gaps"}``, arcs null where not all curves are cut. Of
+a body that nothing holds the header has ``max_rigid_displacement``, too, and boxes have its rigid displacement.
 
 What is checked: every curve is one, from end to end; no two have a point in common; the leaves of the tree cover all
 solutions, and those of a leaf lie on one of the curves. An end inside the interval is a gap, as an open leaf is.
@@ -14,11 +15,13 @@ solutions, and those of a leaf lie on one of the curves. An end inside the inter
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from enumsol.checker.curve_cuts import parts_of
+from enumsol.checker.floating import check_bound
 from enumsol.checker.piece_tree import PieceTreeChecker
 from enumsol.checker.reports import MAX_FAILURES, GraphVerificationReport
 from enumsol.condensation.data import exactly_at
@@ -89,6 +92,7 @@ class SpaceGraphChecker:
             arcs=self.arcs,
             open=len(self.gaps),
             curves=len(self.curves),
+            within=None if self.problem.modes is None else self.problem.rigid_reach,
         )
 
     def _fail(self, message: str) -> None:
@@ -98,7 +102,8 @@ class SpaceGraphChecker:
 
     def _check(self, records: Iterator[Any]) -> None:
         units, steps = self._read_header()
-        enclosure = CondensedEnclosure.from_problem(self.problem)
+        # of a body that nothing holds that of the body on springs
+        enclosure = replace(CondensedEnclosure.from_problem(self.problem.on_springs), problem=self.problem)
         given = AlphaProblem.of(enclosure, steps)
         record = next(records, None)
         while isinstance(record, dict) and record.keys() == {"curve"}:
@@ -129,14 +134,20 @@ class SpaceGraphChecker:
             self.interval, units, steps = _read(self.header, self.problem)
         except ValueError as error:
             raise RefusedError(f"the header cannot be read: {error}") from None
+        if self.problem.modes is not None:
+            check_bound(self.header, self.problem)
         return units, steps
+
+    @property
+    def _limits(self) -> Limits:
+        """Of boxes around curves."""
+        return Limits((UNDECIDED,) * self.problem.p, modes=modes_of(self.problem))
 
     def _curve(self, given: AlphaProblem, count: Any, records: Iterator[Any]) -> None:
         number = len(self.curves) + 1
         if type(count) is not int or not 0 < count <= _MOST_BOXES:
             raise RefusedError(f"curve {number} has {quoted(count)} boxes")
-        limits = Limits((UNDECIDED,) * self.problem.p)
-        found = []
+        limits, found = self._limits, []
         for _ in range(2 * count + 1):
             try:
                 said = box_from(next(records, None), limits)
@@ -155,8 +166,8 @@ class SpaceGraphChecker:
             self.arcs = None
             return record
         assert self.interval is not None
-        chain, limits = self.curves[-1], Limits((UNDECIDED,) * self.problem.p)
-        parts = parts_of(given, chain, records, limits)
+        chain = self.curves[-1]
+        parts = parts_of(given, chain, records, self._limits)
         arcs, gaps = arcs_over(parts, self.interval, closed=chain.closed)
         self.arcs = None if self.arcs is None else self.arcs + arcs
         self.gaps += gaps
@@ -168,6 +179,11 @@ class SpaceGraphChecker:
             for other in self.curves[:k]:
                 if not apart(one, other):
                     self._fail("two curves may be the same")
+
+
+def modes_of(problem: ContactProblem3D) -> int:
+    """Number of rigid modes."""
+    return 0 if problem.modes is None else problem.modes.r
 
 
 def _read(
@@ -186,7 +202,7 @@ def _read(
     for pair in zip(problem.friction, problem.friction_slope, strict=True):
         if min(min(exactly_at(end, *pair)) for end in (low, high)) < 0:
             raise ValueError("friction is negative in the interval")
-    steps = numbers_from(header.get("steps"), 3 * problem.p)
+    steps = numbers_from(header.get("steps"), 3 * problem.p + modes_of(problem))
     if not np.all(steps > 0):
         raise ValueError("a step is not positive")
     return (low, high), (np.ldexp(1.0, np.array(force)), np.ldexp(1.0, np.array(length))), steps

@@ -82,7 +82,6 @@ def verify(
     if isinstance(header, dict) and header.get("kind") == "graph":
         from enumsol.checker.space_graph import SpaceGraphChecker  # for graphs in 3D only
 
-        problem.check_held("a graph")
         return SpaceGraphChecker(cast("ContactProblem3D", problem), header, progress).run(lines)
     return checker(problem, progress).run(proof)
 

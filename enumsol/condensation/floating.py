@@ -18,7 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.arithmetic.balls import SAFE, TINY, Ball, gamma, upper_norm
-from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, float_at
+from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem, NotEnclosedError, float_at
 from enumsol.support.array_types import Floats
 
 
@@ -29,7 +29,8 @@ class RigidRows:
     Attributes
     ----------
     G : Ball (r, 2p)
-    h : Ball (r,)
+    h, slope : Ball (r,)
+        At one alpha, and by how much h grows with alpha.
     unit : (r,) array
         Units of the coordinates q of the rigid displacement.
     reach : (r,) array
@@ -38,6 +39,7 @@ class RigidRows:
 
     G: Ball
     h: Ball
+    slope: Ball
     unit: Floats
     reach: Floats
 
@@ -50,25 +52,46 @@ class RigidRows:
         NotEnclosedError
             Something overflows.
         """
-        load, slope = problem.modes.N.T, problem.load_slope
+        load = problem.modes.N.T
         with np.errstate(over="ignore", invalid="ignore"):
             G = moved_by_modes(problem).T
-            h = _product(load, problem.f[:, None])[:, 0]
-            if slope is not None:
+            h, turn = _product(load, problem.f[:, None])[:, 0], Ball.exact(np.zeros(len(load)))
+            if problem.load_slope is not None:
                 value, slack = float_at(alpha)
-                h = h + Ball(np.array(value), np.array(slack)) * _product(load, slope[:, None])[:, 0]
+                turn = _product(load, problem.load_slope[:, None])[:, 0]
+                h = h + Ball(np.array(value), np.array(slack)) * turn
             # the rows of G near one
             size = np.max(np.abs(G.mid) / length, axis=1)
             unit = np.exp2(-np.round(np.log2(np.where(size > 0, size, 1.0))))
             pair = unit[:, None] / length
             rows = Ball(G.mid * pair, np.where(G.rad > 0, G.rad * pair + TINY, 0.0))
             work = float(force[0] * length[0])
-            loads = Ball(h.mid * unit / work, np.where(h.rad > 0, h.rad * unit / work + TINY, 0.0))
+            loads, slopes = (
+                Ball(part.mid * unit / work, np.where(part.rad > 0, part.rad * unit / work + TINY, 0.0))
+                for part in (h, turn)
+            )
             most = problem.modes.reach(problem.rigid_reach)
             reach = most / unit
-        if not (rows.finite and loads.finite and np.all(np.isfinite(reach)) and np.all(reach * unit == most)):
+        if not (
+            rows.finite
+            and loads.finite
+            and slopes.finite
+            and np.all(np.isfinite(reach))
+            and np.all(reach * unit == most)
+        ):
             raise NotEnclosedError("the rows of the rigid modes overflow float64; expected data in other units")
-        return cls(rows, loads, unit, reach)
+        return cls(rows, loads, slopes, unit, reach)
+
+
+def enclosed_over_alpha(problem: Any) -> CondensedEnclosure:
+    """Balls of a problem for all alpha: of a body that nothing holds those of the body on springs, with its own data.
+
+    Raises
+    ------
+    NotEnclosedError
+        See CondensedEnclosure.
+    """
+    return replace(problem.on_springs.enclosure, problem=problem)
 
 
 def moved_by_modes(problem: Any) -> Ball:

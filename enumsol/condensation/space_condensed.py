@@ -358,6 +358,15 @@ class PieceSpace(EnclosedSpace):
         return self.fixed.product_error
 
 
+@dataclass(frozen=True)
+class FloatingPiece(FloatingSystem, PieceSpace):
+    """The problem of a body that nothing holds over a piece of alpha, or at a point (theory, section 14.14).
+
+    S, g and discs are those of a PieceSpace of the body on springs, h and G are those of the whole piece. In ``turn``
+    g is bordered by h.
+    """
+
+
 @dataclass(frozen=True, eq=False)
 class AlphaSpace:
     """A problem over an interval of alpha, in variables that do not depend on alpha (theory, section 12.9).
@@ -367,6 +376,7 @@ class AlphaSpace:
     Attributes
     ----------
     enclosure : CondensedEnclosure of a problem whose nodes have coefficients of constant ratios
+        See ``enclosed_over_alpha``.
     reference : Fraction
         An alpha at which every node with friction somewhere on the interval has it.
     units : force and length, (p,) arrays of powers of two (see SpaceSystem)
@@ -480,8 +490,35 @@ class AlphaSpace:
         if not whole.finite:
             raise NotEnclosedError(_OVERFLOW)
         rad = (disc.rad + disc_turn.size) * SAFE
-        data = held.S, held.S_rad, whole.mid, whole.rad, held.F, held.F_rad, held.tau, held.unit
-        return PieceSpace(*data, disc.mid, rad, along, held)
+        data = held.S, held.S_rad, whole.mid, whole.rad, held.F, held.F_rad, held.tau, held.unit, disc.mid, rad
+        if not self.floats:
+            return PieceSpace(*data, along, held)
+        rigid = self._rigid(middle)
+        if along is not None:
+            turn = rigid.slope * Ball(np.array(float(half)), np.array(2 * UNIT * float(half)))
+            turn = Ball(turn.mid, np.where(rigid.slope.size > 0, turn.rad, 0.0))
+            along = replace(along, g=Ball.joined(along.g, rigid.h), g_turn=Ball.joined(along.g_turn, turn))
+            rigid = replace(rigid, h=Ball(rigid.h.mid, (rigid.h.rad + turn.size) * SAFE))
+        return FloatingPiece(*data, along, held, rows=rigid)
+
+    @property
+    def floats(self) -> bool:
+        """Whether nothing holds the body."""
+        return self.enclosure.problem.modes is not None
+
+    @cached_property
+    def moved(self) -> Ball:
+        """What a rigid displacement of size one moves the contact nodes by in the problem's units, (3p, r)."""
+        ones = np.ones(len(self.enclosure.g0))
+        rows = RigidRows.of(self.enclosure.problem, self.reference, ones, ones)
+        return Ball(*(part.T / rows.unit for part in (rows.G.mid, rows.G.rad)))
+
+    def _rigid(self, alpha: Fraction) -> RigidRows:
+        """Equilibrium of the body as a whole at alpha, on (lambda_n, tau)."""
+        force, length = self.units
+        rows = RigidRows.of(self.enclosure.problem, alpha, np.tile(force, 3), np.tile(length, 3))
+        weight, own = self._rows
+        return _on_tau(rows, own, weight)
 
 
 def _nearest(exact: Sequence[Fraction]) -> Ball:
@@ -551,9 +588,13 @@ class FloatingSpace(FloatingSystem, EnclosedSpace):
         _, own, node, axis = places(held.F > 0)
         none = np.zeros(held.p)
         weight = Ball(np.r_[none + 1.0, held.F[node, axis]], np.r_[none, held.F_rad[node, axis]])
-        G = rows.G[:, own]
-        product = G * weight
-        # zeros are exact
-        rows = replace(rows, G=Ball(product.mid, np.where(G.size > 0, product.rad, 0.0)))
         data = held.S, held.S_rad, held.g, held.g_rad, held.F, held.F_rad, held.tau, held.unit
-        return cls(*data, rows=rows)
+        return cls(*data, rows=_on_tau(rows, own, weight))
+
+
+def _on_tau(rows: RigidRows, own: Indices, weight: Ball) -> RigidRows:
+    """Those that act on (lambda_n, tau): some columns of G, each times its weight."""
+    G = rows.G[:, own]
+    product = G * weight
+    # zeros are exact
+    return replace(rows, G=Ball(product.mid, np.where(G.size > 0, product.rad, 0.0)))

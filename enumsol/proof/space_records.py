@@ -290,8 +290,8 @@ class CurveBoxRecord(Record):
 
     Attributes
     ----------
-    centre, direction, border, radius : (3p + 1,) arrays
-    rho : (3p,) array
+    centre, direction, border, radius : (m + 1,) arrays, m = 3p, with rigid modes 3p + r
+    rho : (m,) array
     half : float
     """
 
@@ -308,8 +308,9 @@ class CurveBoxRecord(Record):
     def of(cls, entries: list[Any], limits: Limits) -> CurveBoxRecord:
         """The numbers; RecordError where there are not as many as there must be."""
         try:
-            c, d, e, radius = (numbers_from(part, 3 * limits.p + 1) for part in entries[:4])
-            rho = numbers_from(entries[4], 3 * limits.p)
+            m = 3 * limits.p + limits.modes
+            c, d, e, radius = (numbers_from(part, m + 1) for part in entries[:4])
+            rho = numbers_from(entries[4], m)
             (half,) = numbers_from([entries[5]], 1)
         except ValueError as error:
             raise RecordError(f"a box around a curve cannot be read: {error}") from None
@@ -503,6 +504,8 @@ LEAVES = table_of(
 FLOATING_LEAVES = table_of(ExcludedInSpace, Unbalanced, NoRoot, RegularRoot, OnlySpaceReference, UndecidedRecord)
 #: Of a tree over alpha, too.
 PIECE_LEAVES = table_of(ExcludedOverPiece, NoRoot, InCurveBoxes, ThroughCurveBox, OnlyOnCurve, UndecidedRecord)
+#: The same of a body that nothing holds.
+FLOATING_PIECE_LEAVES = table_of(ExcludedOverPiece, Unbalanced, NoRoot, InCurveBoxes, ThroughCurveBox, UndecidedRecord)
 
 
 def _multiplied(entries: list[Any], limits: Limits) -> Iterable[Any]:

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.optimize import brentq
 
 from enumsol.continuation.continuation_options import ContinuationOptions
 from enumsol.continuation.follow import follow
@@ -50,8 +52,12 @@ _INSIDE = 2.0**-10
 _LEAST_STEP = 1e-8
 #: So many links less one, at most, are left out at an end of a curve that run into others of it.
 _TRIMMED = 4
-#: How far a skeleton is prolonged beyond the interval, relative to its last step.
-_BEYOND = 0.05
+#: How far a skeleton is prolonged beyond the interval, or beyond the bounds of the rigid displacement, relative to its
+#: last step.
+_BEYOND = {PathStatus.INTERVAL_LEFT: 0.05, PathStatus.RIGID_BOUND: 2.0**-10}
+#: How near to a bound of the rigid displacement the joints beside it are put at best, relative to the way between two
+#: joints; by what factor farther others are, and how many.
+_CLOSE, _FARTHER, _TRIALS = 2.0**-36, 16.0, 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +66,8 @@ class Skeleton:
 
     Attributes
     ----------
-    points : (N, 3p + 1) array
-        Forces and alpha.
+    points : (N, m + 1) array
+        Forces and alpha; of a body that nothing holds its rigid displacement is between both.
     corners : sequence of int
         Points at which a status changes.
     closed : bool
@@ -99,7 +105,7 @@ def chain_through(
     interval: tuple[Fraction, Fraction],
     begun: Callable[[CurveChain], object] | None = None,
 ) -> CurveChain | None:
-    """The curve through a regular root x, (3p + 1,), until it leaves the interval on both sides or is closed.
+    """The curve through a regular root x, (m + 1,), until it leaves the interval on both sides or is closed.
 
     As much of it as is proven, with x if possible; None where that is nothing. ``begun`` is called with what there is
     of it when the time is over or somebody interrupts.
@@ -119,7 +125,7 @@ def chain_through(
 def skeleton_through(problem: ContactProblem3D, x: Array, span: tuple[float, float]) -> Skeleton | None:
     """Skeleton that continuation finds, a little longer than the interval; None if it does not start."""
     p = problem.p
-    start = float(x[-1]), x[:p], x[p:-1].reshape(2, p).T
+    start = float(x[-1]), x[:p], x[p : 3 * p].reshape(2, p).T, *([] if problem.modes is None else [x[3 * p : -1]])
     try:
         ahead = _path(problem, start, 1, span)
         closed = ahead.status == PathStatus.CLOSED
@@ -128,15 +134,14 @@ def skeleton_through(problem: ContactProblem3D, x: Array, span: tuple[float, flo
         raise
     except EnumsolError:
         return None
-    lines = [
-        np.column_stack([path.lambda_n, path.lambda_t[:, :, 0], path.lambda_t[:, :, 1], path.alpha]) for path in paths
-    ]
+    lines = [_line(path) for path in paths]
     corners = [sorted(item.point for item in path.transitions if item.nodes) for path in paths]
     if closed:
         return Skeleton(lines[0], corners[0], closed=True)
     for k, (line, path) in enumerate(zip(lines, paths, strict=True)):
-        if path.status == PathStatus.INTERVAL_LEFT:
-            lines[k] = np.vstack([line, line[-1] + _BEYOND * (line[-1] - line[-2])])
+        beyond = _BEYOND.get(PathStatus(path.status))
+        if beyond is not None:
+            lines[k] = np.vstack([line, line[-1] + beyond * (line[-1] - line[-2])])
     back, last = lines[0][::-1], len(lines[0]) - 1
     places = {last - k for k in corners[0]} | {last + k for k in corners[1]}
     points = np.vstack([back, lines[1][1:]])
@@ -144,7 +149,13 @@ def skeleton_through(problem: ContactProblem3D, x: Array, span: tuple[float, flo
     return Skeleton(points, sorted(places), closed=False, start=last) if len(points) > 1 else None
 
 
-def _path(problem: ContactProblem3D, start: tuple[float, Array, Array], way: int, span: tuple[float, float]) -> Path:
+def _line(path: Path) -> Array:
+    """The points of a path, as those of a skeleton."""
+    rigid = np.zeros((len(path.alpha), 0)) if path.rigid_coordinates is None else path.rigid_coordinates
+    return np.column_stack([path.lambda_n, path.lambda_t[:, :, 0], path.lambda_t[:, :, 1], rigid, path.alpha])
+
+
+def _path(problem: ContactProblem3D, start: tuple[Any, ...], way: int, span: tuple[float, float]) -> Path:
     """A path that may take shorter steps where it stalls: near a fold of a short interval it has to."""
     path = follow(problem, start, way, span)
     if path.status == PathStatus.STALLED:
@@ -300,18 +311,57 @@ class ChainBuilder:
             found = self._link(line, place, further, joints[-1], links[-1] if links else None, end)
             # that what a box at an end holds is beyond the interval is seen where alpha goes one way
             outer = not closed and (not links or further == len(line) - 1.0)
-            if found is None or (outer and not found[0].curve.rises):
+            if found is None or (outer and not (found[0].curve.rises or found[0].leaves)):
                 way = (_SHRINK if failed else _FAILED) * (further - place)
                 failed = True
                 if way < _SHORTEST:
                     return place
                 continue
-            links.append(found[0])
-            joints.append(found[1])
+            if found[0].leaves:
+                parts, ends = self._up_to_bound(found[0], joints[-1], found[1])
+                links += parts
+                joints[-1:] = ends
+                if found[0].leaves > 0:
+                    return last
+            else:
+                links.append(found[0])
+                joints.append(found[1])
             trust = _LESS * trust if failed else min(_MORE * trust, _TRUST)
             way = (further - place) * min(max(trust * found[0].curve.stretch, _SHRINK), _GROWTH)
             place, failed = further, False
         return place
+
+    def _up_to_bound(
+        self, link: CurveLink, start: SolutionCurve, end: SolutionCurve
+    ) -> tuple[list[CurveLink], list[SolutionCurve]]:
+        """A link that leaves the bounds of the rigid displacement in two, the outer one short, and their joints."""
+        box, (rigid, reach) = link.curve.box, (self.problem.rigid, self.problem.reach)
+        inner, outer = (float(t.mid) for t in (link.start, link.end)[:: link.leaves])
+
+        def near(t: float) -> CurvePoint | None:
+            return curve_point(self.problem, box.centre + t * box.direction, box.border)
+
+        def beyond(t: float) -> float:
+            point = near(t)
+            return np.nan if point is None else float(np.max(np.abs(point.x[rigid]) / reach)) - 1.0
+
+        for k in range(_TRIALS):
+            away = _CLOSE * _FARTHER**k * (outer - inner)
+            try:
+                middle = float(brentq(beyond, inner, outer, xtol=0.1 * abs(away)))
+            except ValueError:
+                break
+            points = [near(t) for t in (middle - away, middle + away)]
+            sides = [None if point is None else self._proven(point, box.border) for point in points]
+            joints = [side for side in sides if side is not None][:: link.leaves]
+            if len(joints) < len(sides):
+                continue
+            joints = [start, *joints] if link.leaves > 0 else [*joints, end]
+            links = [link_between(link.curve, *pair) for pair in pairwise(joints)]
+            kept = [part for part in links if part is not None]
+            if len(kept) == len(links) and sum(abs(part.leaves) for part in kept) == 1:
+                return kept, joints
+        return [link], [start, end]
 
     def joint(self, x: Array, direction: Array) -> SolutionCurve | None:
         """The solution near a point, in a box without length across a direction."""

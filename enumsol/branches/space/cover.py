@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.branches.space.chains import chain_through
+from enumsol.condensation.floating import enclosed_over_alpha
 from enumsol.proof.proof_file import Proof
 from enumsol.proof.records import UndecidedRecord
 from enumsol.proof.space_records import CurveBoxRecord
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.proof.space_records import CurvePart
     from enumsol.search.outcome import StopReason
@@ -97,6 +99,11 @@ class SpaceCover:
         leaves = (leaf for leaf in self.records if isinstance(leaf, OpenLeaf) and leaf.forces is not None)
         return any(low <= leaf.low and leaf.high <= high for leaf in leaves)
 
+    @cached_property
+    def enclosure(self) -> CondensedEnclosure:
+        """Balls for all alpha; NotEnclosedError where there are none."""
+        return enclosed_over_alpha(self.problem)
+
     def _units(self) -> tuple[Array, Array]:
         system = SpaceSolvers(self.problem, sum(self.interval) / 2, "verified").system
         return system.force, system.length
@@ -114,7 +121,7 @@ class SpaceCover:
         NotEnclosedError
             The data cannot be enclosed.
         """
-        given = AlphaProblem.of(self.problem.enclosure)
+        given = AlphaProblem.of(self.enclosure)
         tick = None if progress is None else lambda share: progress("search", share)
 
         def more(x: Array) -> CurveChain | None:
@@ -126,9 +133,7 @@ class SpaceCover:
             tree.more = more if self.failed < _FAILURES else None
             return chain
 
-        tree = PieceTree(
-            self.problem.enclosure, self.interval, self._units(), more, max_nodes, tick, solutions=self._solutions
-        )
+        tree = PieceTree(self.enclosure, self.interval, self._units(), more, max_nodes, tick, solutions=self._solutions)
         tree.more = more if self.failed < _FAILURES else None
         try:
             tree.run(None if executor is None else partial(spread_over, executor))
@@ -148,12 +153,13 @@ class SpaceCover:
         return new
 
     def _solutions(self, alpha: Fraction) -> list[Array]:
-        """Forces of solutions at an alpha, as many as a short search finds."""
+        """Forces of solutions at an alpha, as many as a short search finds, with rigid displacements if any."""
         look()
         seconds = remaining()
         left = None if seconds is None else max(seconds, _LEAST_TIME)
         roots = enumerate_roots(self.problem, alpha, max_nodes=_SAMPLED, time_limit=left)
-        return [np.concatenate([root.lambda_n, *root.lambda_t.T]) for root in roots]
+        rigid = [np.zeros(0) if root.rigid_coordinates is None else root.rigid_coordinates for root in roots]
+        return [np.concatenate([root.lambda_n, *root.lambda_t.T, q]) for root, q in zip(roots, rigid, strict=True)]
 
     def proof(self, cuts: Sequence[tuple[Sequence[Run | Turn], Sequence[CurvePart]]] | None = None) -> Proof:
         """Curves and tree for ``enumsol.verify``.
@@ -170,8 +176,9 @@ class SpaceCover:
                 "interval": [str(end) for end in self.interval],
                 "p": self.problem.p,
                 "data": "problem",
+                **({} if self.problem.modes is None else {"max_rigid_displacement": self.problem.rigid_reach}),
                 **unit_exponents(*self._units()),
-                "steps": AlphaProblem.of(self.problem.enclosure).steps.tolist(),
+                "steps": AlphaProblem.of(self.enclosure).steps.tolist(),
             }
         )
         arcs, open_parts = None if cuts is None else 0, 0

@@ -39,9 +39,10 @@ class CurvedArcValues(ArcValues):
     given : AlphaProblem
     problem : ContactProblem3D
     codes : statuses
-    knots : (K + 1, 3p + 1) array
-        Points (lambda_n, both lambda_t, alpha) in the order of alpha.
-    borders : (K, 3p + 1) array
+    knots : (K + 1, m + 1) array
+        Points (lambda_n, both lambda_t, alpha) in the order of alpha, m = 3p; of a body that nothing holds its rigid
+        displacement is before alpha, m = 3p + r.
+    borders : (K, m + 1) array
         Rows of the parameter between two of them, by forces and alpha.
     """
 
@@ -86,8 +87,11 @@ class CurvedArcValues(ArcValues):
 
 def state_of(problem: ContactProblem3D, x: Floats, active: Sequence[Set[int]]) -> Pair:
     """Forces and displacements of forces and alpha x, with the zeros of the statuses that hold at every node."""
-    forces, condensed = x[:-1], problem.condensed
+    m, condensed = 3 * problem.p, problem.on_springs.condensed
+    forces = x[:m]
     w = condensed.free_displacements(float(x[-1])) - condensed.S @ forces
+    if problem.modes is not None:
+        w = w + problem.contact_rows @ (problem.modes.N @ x[m:-1])
     return with_exact_zeros((forces + 0.0, w), active)
 
 
@@ -101,6 +105,7 @@ class _Place:
     border: bool
     settled: bool
     missing: bool = False
+    bounded: bool = False
 
 
 @dataclass
@@ -245,7 +250,8 @@ class CurvedGraph:
                 f"{END_ELSEWHERE}",
                 turn.alphas,
             )
-        self._places.append(_Place(alphas, self.given.unplaced(turn.x), turn.selections, border=False, settled=settled))
+        x, bounded = self.given.unplaced(turn.x), turn.bounded
+        self._places.append(_Place(alphas, x, turn.selections, border=False, settled=settled, bounded=bounded))
         return len(self._places) - 1
 
     def _values(self, run: Run) -> CurvedArcValues:
@@ -312,6 +318,7 @@ class CurvedGraph:
             place.selections,
             border=place.border,
             settled=place.settled,
+            bounded=place.bounded,
         )
 
 

@@ -7,6 +7,7 @@ Where to cut is found in floats; what holds of the parts is shown in ``trusted.s
 from __future__ import annotations
 
 from dataclasses import replace
+from fractions import Fraction
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -15,7 +16,7 @@ from scipy.optimize import brentq
 from enumsol.proof.space_records import CurveBoxRecord, CurvePart
 from enumsol.support.deadlines import look, tell
 from enumsol.trusted.space.curve_events import CurveMotion
-from enumsol.trusted.space.curve_parts import LinkParts, Place, Run, Turn, in_order, put_behind
+from enumsol.trusted.space.curve_parts import LinkParts, Place, Run, Turn, in_order, put_behind, up_to_bound
 from enumsol.trusted.space.sector_rows import OPEN, STICK
 from enumsol.trusted.space.solution_curve import SLIP, curve_around, curve_point
 
@@ -40,6 +41,10 @@ _BESIDE_FOLD = 2.0**-24
 _LONGER, _ROUNDED = 1.05, 16.0
 #: After so many parts of a link that stay open none is halved: along a continuum of solutions all would.
 _MOST_OPEN = 16
+#: A link is cut into so many parts at most: near the limit of sliding alpha hardly changes along a curve.
+_MOST_PARTS = 256
+#: A part along which alpha does not change is left open where its bounds are as close as this.
+_STILL = 2.0**-32
 #: Where a part is cut: at the first of these shares where the solution is regular.
 _CUTS = (0.5, 0.4375, 0.59375)
 
@@ -60,7 +65,7 @@ def runs_and_turns(
         look()
         tell("boxes of a curve cut into arcs", k, len(chain.links))
         cutter = LinkCutter(problem, link, nearness, records)
-        _put(found, cutter.parts(start, end))
+        _put(found, up_to_bound(link, cutter.parts(start, end)))
         nearness = cutter.nearness
     whole = in_order([found], closed=chain.closed)
     assert whole is not None
@@ -105,6 +110,7 @@ class LinkCutter(LinkParts):
     ) -> None:
         super().__init__(problem, link)
         self.nearness, self._open, self._records = nearness, 0, [] if records is None else records
+        self._last = len(self._records) + _MOST_PARTS
 
     def parts(self, start: SolutionCurve, end: SolutionCurve) -> list[Run | Turn]:
         """From one joint to another one."""
@@ -141,11 +147,17 @@ class LinkCutter(LinkParts):
                 found = self._smooth(own, motion, start, end, codes)
             if found is not None:
                 return found
-        middle = self._middle(start, end) if times > 0 and self._open < _MOST_OPEN else None
+        # as where a body slides at one alpha
+        still = codes is not None and not start.rises and not end.rises
+        own = self._between(start, end) if still and own is None else own
+        done = still and own is not None and own.alphas[1] - own.alphas[0] <= Fraction(_STILL)
+        left = times > 0 or (still and times > -_HALVINGS)
+        left &= not done and self._open < _MOST_OPEN and len(self._records) < self._last
+        middle = self._middle(start, end) if left else None
         if middle is None:
-            self._open += 1
+            self._open += not done
             self._told("u", own)
-            return [self.left_open(curve, start, end)]
+            return [self.left_open(curve if own is None else own, start, end)]
         self._told("h", own, middle)
         found = []
         for one, other in ((start, middle), (middle, end)):
@@ -209,7 +221,7 @@ class LinkCutter(LinkParts):
 
     def _middle(self, start: Place, end: Place) -> Place | None:
         found = (self._at(start, end, share) for share in _CUTS)
-        return next((place for place in found if place is not None), None)
+        return next((place for place in found if place is not None and self.is_between(start, place, end)), None)
 
     def _passage(self, start: Place, end: Place, value: Callable[[CurvePoint], float], close: float) -> float | None:
         """The share of the way at which a number that is positive before and negative behind is 0, in floats."""

@@ -10,9 +10,10 @@ import numpy as np
 
 from enumsol.model.sectors import SECTORS, is_sector, nearest, run_of
 from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
-from enumsol.roots.root_set import RootSet, SearchStats, Undecided
+from enumsol.roots.root_set import RigidBound, RootSet, SearchStats, Undecided
 from enumsol.roots.space_roots import SpaceEnumeration
 from enumsol.search.outcome import Stop, StopReason
+from enumsol.search.space.space_floating import FloatingSpaceSolvers
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space.leaves import SpaceRoot, distinct_roots, settle
 
@@ -44,7 +45,8 @@ def roots_on_arcs(
     """
     numbers = {v.number for v in vertices}
     arcs = [*arcs, *(arc for arc in data.arcs if numbers & {arc.tail, arc.head})]
-    solvers = SpaceSolvers(data.problem, alpha, "verified")
+    made = SpaceSolvers if data.problem.modes is None else FloatingSpaceSolvers
+    solvers = made(data.problem, alpha, "verified")
     enumeration = SpaceEnumeration(solvers, None, None)
     leaves: list[tuple[Codes, SpaceRoot]] = []
     undecided: list[Undecided] = []
@@ -74,6 +76,8 @@ def roots_on_arcs(
         stopped=None if known else str(Stop(StopReason.GRAPH_INCOMPLETE)),
         stats=SearchStats(selections=len(arcs)),
         node_ids=data.problem.node_ids,
+        # others beyond it were not looked for
+        rigid_bound=None if data.problem.modes is None else RigidBound(data.problem.rigid_reach, needed=True),
         at_least=None if whole else max(len(roots) - len(doubtful), data.claims.multiplicity(data.inside(alpha)).count),
     )
 

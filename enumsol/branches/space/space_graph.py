@@ -139,7 +139,7 @@ class _Construction:
         curves = cover.chains
         if not curves:
             return _Elements()
-        given = AlphaProblem.of(cover.problem.enclosure)
+        given = AlphaProblem.of(cover.enclosure)
         made = CurvedGraph(cover.problem, given, self.interval)
         over = stop is not None and stop.interrupted and self.searched is not None
         for k, chain in enumerate(curves):
@@ -210,7 +210,9 @@ def _gaps(cover: SpaceCover) -> list[str]:
         why, remedy = "pieces of alpha as short as are tried left statuses undecided", SHORT_INTERVAL
         if ends:
             curves = counted(ends, "end of a curve", "ends of curves")
-            why, remedy = f"nothing is proven beyond {curves} there, as where branches meet", ANOTHER_INTERVAL
+            floats = cover.problem.modes is not None
+            where = "branches meet" + (" or a rigid displacement reaches its bound" if floats else "")
+            why, remedy = f"nothing is proven beyond {curves} there, as where {where}", ANOTHER_INTERVAL
         elif cover.unexplained(low, high):
             why, remedy = "no curve through a solution there was proven", ANOTHER_INTERVAL
         found.append(f"solutions may be missing for alpha in [{float(low):.8g}, {float(high):.8g}]: {why}; {remedy}")

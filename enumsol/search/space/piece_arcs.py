@@ -61,7 +61,7 @@ def points_on(arc: LeafArc, known: KnownCurve, parts: CurveParts, codes: Codes) 
 def _narrow(problem: AlphaProblem, x: Floats, codes: Codes, nodes: Sequence[int]) -> Codes:
     """A leaf of narrow sectors around a solution, (zeta, alpha)."""
     leaf, p = list(codes), len(codes)
-    y = (problem.unplaced(x)[:-1] / problem.ratio.mid)[p:].reshape(2, p)
+    y = (problem.unplaced(x)[:-1] / problem.ratio.mid)[p : 3 * p].reshape(2, p)
     for i in nodes:
         up = DEEPEST + 2 - max(_POINTED, level_of(codes[i] - SECTORS))
         leaf[i] = SECTORS + (1 << (DEEPEST + 2 - up)) + (int(places(y[:, i])) >> up)

@@ -6,18 +6,23 @@ together with that of others. What is proposed here proves nothing.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.optimize import nnls
 
-from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
+from enumsol.condensation.space_condensed import EnclosedSpace, FloatingPiece, FloatingSpace, SpaceSystem
+from enumsol.proof.records import Unbalanced
 from enumsol.proof.space_records import ExcludedOverPiece
 from enumsol.relaxation.space_relaxation import SpaceEngine
+from enumsol.search.floating_solvers import weakly_held
 from enumsol.search.space.space_newton import Isotropic
 from enumsol.search.space.space_search import SpaceSplitting
 from enumsol.search.splitting import ImposedRows
+from enumsol.trusted.confinement import motion_beside
+from enumsol.trusted.space.resultants import resultants
 from enumsol.trusted.space.sector_rows import FORCE, FREE, GAP, OF_DISCS, TAU, Row, row_sign, sector_row_terms
 
 if TYPE_CHECKING:
@@ -51,8 +56,7 @@ class AlphaPoint:
 
     def __init__(self, space: AlphaSpace, alpha: Fraction) -> None:
         self.alpha = alpha
-        enclosed = EnclosedSpace.of_problem(space.enclosure, alpha, *space.units)
-        self.system = SpaceSystem.in_middle(enclosed, space.units)
+        self.system, self._floats = _relaxed(space, alpha), space.floats
         self.engine = SpaceEngine(self.system, _ROWS)
         self.splitting = SpaceSplitting(self.engine)
         self.rows = ImposedRows(self.splitting, self.system.p)
@@ -78,14 +82,40 @@ class AlphaPoint:
         return [self.engine.rows[number] for number in self.rows.over(codes, range(self.system.p))[0]]
 
     def solution(self) -> Floats | None:
-        """Forces of a solution in the units of the problem, (3p,), by Newton's method; no claim."""
+        """Forces of a solution in the units of the problem, (3p,), by Newton's method; no claim.
+
+        None of a body that nothing holds.
+        """
         system = self.system
+        if self._floats:
+            return None
         with np.errstate(all="ignore"):
             y = Isotropic.of(system).solution()
         if y is None:
             return None
         F = system.F / np.where(system.tau >= 0, system.unit[system.tau], 1.0)
         return np.concatenate([y[:, 0], *(F * y[:, 1:]).T]) * np.tile(system.force, 3)
+
+
+def _relaxed(space: AlphaSpace, alpha: Fraction) -> SpaceSystem:
+    """The problem at one alpha, of a body that nothing holds on weak springs (theory, section 14.5)."""
+    if not space.floats:
+        return SpaceSystem.in_middle(EnclosedSpace.of_problem(space.enclosure, alpha, *space.units), space.units)
+    enclosed = FloatingSpace.of(space.enclosure.problem, alpha, *space.units)
+    S, g = weakly_held(enclosed.S, enclosed.g, enclosed.rows)
+    return replace(SpaceSystem.in_middle(enclosed, space.units), S=S, g=g)
+
+
+def unbalanced(piece: AlphaPiece, codes: Codes) -> Unbalanced | None:
+    """A record that no forces below an assignment are in balance with the load over a piece; or None."""
+    if not piece.space.floats:
+        return None
+    for end in (*piece.ends, piece.whole):
+        if isinstance(end, FloatingPiece):
+            z = motion_beside(end, resultants(end, codes))
+            if piece.is_unbalanced(codes, z):
+                return Unbalanced(z)
+    return None
 
 
 class PieceBounds:
@@ -106,10 +136,11 @@ class PieceBounds:
         held, normals, slips = _columns(low, rows)
         discs = [np.r_[end.discs.mid, np.zeros(len(low.g) - len(low.tau))] for end in (low, high)]
         both = [held + disc[:, None] * normals for disc in discs]
-        lower = np.linalg.cholesky(low.S)
-        scaled = solve_triangular(lower, np.column_stack([low.g, high.g, *both]), lower=True, check_finite=False)
+        (S, g_low), (_, g_high) = map(_held, (low, high))
+        lower = np.linalg.cholesky(S)
+        scaled = solve_triangular(lower, np.column_stack([g_low, g_high, *both]), lower=True, check_finite=False)
         g, A = scaled.T[:2], (scaled[:, 2 : 2 + n], scaled[:, 2 + n :])
-        own = [-end.g @ slips for end in (low, high)]
+        own = [-load @ slips for load in (g_low, g_high)]
         none = np.zeros_like(A[0])
         self._v = np.stack([g[0], g[1], 0.5 * (g[0] + g[1])])
         self._B = np.stack([np.hstack([A[0], none]), np.hstack([none, A[1]]), 0.5 * np.hstack([A[1], A[0]])])
@@ -175,4 +206,12 @@ def _columns(system: EnclosedSpace, rows: Sequence[Row]) -> tuple[Floats, Floats
         for i, coefficient in zip(*sector_row_terms(row, system.tau, size), strict=True):
             of_disc = i == row[1] and row[0] in OF_DISCS
             (normals if of_disc else columns)[i, k] += coefficient * units[i]
-    return columns[:size] - system.S @ columns[size:], normals, columns[size:]
+    return columns[:size] - _held(system)[0] @ columns[size:], normals, columns[size:]
+
+
+def _held(system: EnclosedSpace) -> tuple[Floats, Floats]:
+    """S and g, of a body that nothing holds on weak springs."""
+    if not isinstance(system, FloatingPiece):
+        return system.S, system.g
+    S, g = weakly_held(system.S, system.g, system.rows)
+    return S, g

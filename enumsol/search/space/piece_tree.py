@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.arithmetic.balls import Ball
 from enumsol.arithmetic.rationals import simplest
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of, parts_around, places, span, width_level, width_of
@@ -22,7 +23,7 @@ from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.outcome import StopReason
 from enumsol.search.space.piece_arcs import beside, points_on, slides
 from enumsol.search.space.piece_certificates import ERRORS, Passage, PieceProposals, runs_over
-from enumsol.search.space.piece_multipliers import COUNTED, AlphaPoint, exclusion
+from enumsol.search.space.piece_multipliers import COUNTED, AlphaPoint, exclusion, unbalanced
 from enumsol.search.space.space_fathoming import without_sectors
 from enumsol.support.deadlines import TimeOverError, look
 from enumsol.trusted.space.curve_runs import CurveParts, KnownCurve, Run
@@ -56,7 +57,7 @@ _CUTS = 2
 #: than those of a level; a sector is cut so if no more than this share of it is left.
 _ROOM, _NARROWEST, _LEFT = 0.5, 9, 0.5
 #: Boxes of a curve in a row in which a leaf may lie, and how many such rows are tried.
-_LONGEST, _RUNS = 9, 4
+_LONGEST, _RUNS = 64, 4
 #: From the ends of curves inside the interval so far, as a share of it, nothing is searched.
 _AROUND_ENDS = 2.0**-14
 #: Longer pieces are cut where statuses occur along one curve over a part of them.
@@ -191,6 +192,7 @@ class PieceTree:
     Parameters
     ----------
     enclosure : CondensedEnclosure
+        See ``enclosed_over_alpha``.
     interval : (a, b), Fractions
     units : force and length, (p,) arrays of powers of two
     more : callable, optional
@@ -407,6 +409,8 @@ class PieceTree:
         rows, values = point.multipliers(relaxation)
         if at.piece.margin(codes, rows, (values, values), COUNTED) > 0:
             return ExcludedOverPiece(rows, values, values), []
+        if (without := unbalanced(at.piece, codes)) is not None:
+            return without, []
         ends = self._ends(at, codes)
         possible = [(end, other) for end, other in ends if not _is_excluded(other)]
         if not possible:
@@ -523,11 +527,20 @@ class PieceTree:
 
     @staticmethod
     def _middle(piece: AlphaPiece, root: SpaceRoot) -> Array:
-        """Forces and alpha of a root in the middle of a piece, in the units of the problem."""
-        return np.append(piece.forces(root.y).mid, float(piece.middle))
+        """Forces and alpha of a root in the middle of a piece, in the units of the problem.
+
+        Of a body that nothing holds the forces are followed by its rigid displacement.
+        """
+        y = root.y if root.rigid is None else Ball.joined(root.y, -root.rigid)
+        return np.concatenate([piece.forces(y).mid, piece.rigid(y).mid, [float(piece.middle)]])
 
     def _certified(self, at: _Examined, codes: Codes) -> tuple[Any, list[Any]] | None:
-        """One certificate for all that is below an assignment, or the piece is cut since it is too long for that."""
+        """One certificate for all that is below an assignment, or the piece is cut since it is too long for that.
+
+        None of a body that nothing holds: the form says nothing about its rigid displacement.
+        """
+        if self._space.floats:
+            return None
         piece, statuses = at.piece, without_sectors(codes)
         passages = [passage for passage in self._passages(at, statuses) if passage.parts.allowed(statuses)]
         if not passages and statuses == codes and self._is_longer(piece, _SHORT) and self._ends_within(at, statuses):
@@ -621,6 +634,8 @@ class PieceTree:
         piece, found = settled
         if found is None:
             return NoRoot(), []
+        if (without := unbalanced(at.piece, codes)) is not None:
+            return without, []
         run = self._run(piece, found)
         return self._on_arc(at, codes, (piece, found)) if run is None else (InCurveBoxes(*run), [])
 

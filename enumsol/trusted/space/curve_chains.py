@@ -31,21 +31,62 @@ class CurveLink:
     curve : SolutionCurve
     start, end : Balls
         t at both points; those of ``end`` are larger.
+    leaves : int
+        Of a body that nothing holds: 1 if its rigid displacement is within its bounds at ``start``, reaches one of them
+        at one t and is beyond it from there on; -1 if it comes from beyond one; 0 if it is within all along.
     """
 
     curve: SolutionCurve
     start: Ball
     end: Ball
+    leaves: int = 0
 
 
 def link_between(curve: SolutionCurve, start: SolutionCurve, end: SolutionCurve) -> CurveLink | None:
-    """The part of a curve between two of its points, if both lie in its box and in this order."""
+    """The part of a curve between two of its points, if both lie in its box and in this order.
+
+    Of a body that nothing holds, if its rigid displacement is within its bounds at one of them at least and does not
+    come back to them from beyond (theory, section 14.14).
+    """
     ends = start.at(0.0), end.at(0.0)
     if not all(lies_in(curve.box, x) for x in ends):
         return None
     low, high = (parameter_in(curve.box, x) for x in ends)
     between = high - low
-    return CurveLink(curve, low, high) if between.mid > between.rad * SAFE else None
+    if not between.mid > between.rad * SAFE:
+        return None
+    if curve.problem.within(curve.at(_hull(low, high))):
+        return CurveLink(curve, low, high)
+    sides = [side for side, inner, outer in ((1, *ends), (-1, *ends[::-1])) if _leaves(curve, inner, outer, side)]
+    return CurveLink(curve, low, high, sides[0]) if sides else None
+
+
+def _leaves(curve: SolutionCurve, inner: Ball, outer: Ball, side: int) -> bool:
+    """Whether the rigid displacement is within its bounds at one point, and no bound is passed twice on the way out."""
+    problem = curve.problem
+    if not problem.within(inner):
+        return False
+    rigid = problem.rigid
+    there, slope, reach = outer[rigid], curve.slope[rigid], problem.reach
+    # what may be beyond its bound grows all the way
+    outwards = (side * slope.mid * np.sign(there.mid) > slope.rad * SAFE) & (np.abs(there.mid) > there.rad * SAFE)
+    beside = curve.at(_hull(parameter_in(curve.box, inner), parameter_in(curve.box, outer)))[rigid].size * SAFE < reach
+    return bool(np.all(outwards | beside))
+
+
+def _is_beyond(curve: SolutionCurve, end: SolutionCurve, side: int) -> bool:
+    """Whether the rigid displacement is beyond a bound at an end, and even more so in all that a box has behind."""
+    rigid = curve.problem.rigid
+    there, slope = end.at(0.0)[rigid], curve.slope[rigid]
+    far = np.abs(there.mid) - there.rad * SAFE > curve.problem.reach * SAFE
+    return bool(np.any(far & (side * slope.mid * np.sign(there.mid) > slope.rad * SAFE)))
+
+
+def _hull(low: Ball, high: Ball) -> Ball:
+    """A ball of all numbers between two others, which is a little wider."""
+    middle = 0.5 * (low.mid + high.mid)
+    rad = 0.5 * np.abs(high.mid - low.mid) + low.rad + high.rad + 4 * UNIT * (np.abs(low.mid) + np.abs(high.mid))
+    return Ball(middle, rad * SAFE)
 
 
 def goes_on(before: CurveLink, after: CurveLink, joint: SolutionCurve) -> bool:
@@ -74,8 +115,8 @@ class CurveChain:
     closed : bool
         Whether the last point is the first one.
     ends : pair of (Fraction, Fraction) or None
-        Of a first and a last point that are not beyond the interval: bounds of alpha there, and of all that boxes hold
-        beyond them.
+        Of a first and a last point that are not beyond the interval, or beyond the bounds of the rigid displacement:
+        bounds of alpha there, and of all that boxes hold beyond them.
     """
 
     links: Sequence[CurveLink]
@@ -88,7 +129,11 @@ class CurveChain:
         """That of links and joints; None where they do not run on from each other, or do so more than once round."""
         if not links or not all(map(goes_on, links[:-1], links[1:], joints[1:-1])):
             return None
+        if any(link.leaves > 0 for link in links[:-1]) or any(link.leaves < 0 for link in links[1:]):
+            return None
         closed = _same(joints[0].box, joints[-1].box)
+        if closed and any(link.leaves for link in links):
+            return None
         if closed and not goes_on(links[-1], links[0], joints[0]):
             return None
         # a curve that came back to where it was would have an end on a link that is not the one at that end
@@ -99,7 +144,7 @@ class CurveChain:
 
     @property
     def whole(self) -> bool:
-        """Whether it is closed, or leaves the interval at both ends."""
+        """Whether it is closed, or leaves the interval, or the bounds of the rigid displacement, at both ends."""
         return not self.gaps
 
     @property
@@ -147,17 +192,21 @@ def _open_ends(
     """See ``CurveChain.ends``."""
     low, high = interval
     ranges = [_beyond(links, joints[0], -1), _beyond(links, joints[-1], 1)]
-    inside = [None if end < low or begin > high else (begin, end) for begin, end in ranges]
+    inside = [None if there is None or there[1] < low or there[0] > high else there for there in ranges]
     return inside[0], inside[1]
 
 
-def _beyond(links: Sequence[CurveLink], end: SolutionCurve, side: int) -> Range:
+def _beyond(links: Sequence[CurveLink], end: SolutionCurve, side: int) -> Range | None:
     """Bounds of alpha at an end, and of all that any box which holds this end has beyond it.
 
-    The boxes before the last one may be longer than that.
+    The boxes before the last one may be longer than that. None if all of it is beyond the bounds of the rigid
+    displacement.
     """
     x = end.at(0.0)
-    ranges = [_beyond_in(link.curve, end, side) for link in links if not _outside(link.curve, x)]
+    curves = [link.curve for link in links if not _outside(link.curve, x)]
+    if all(_is_beyond(curve, end, side) for curve in curves):
+        return None
+    ranges = [_beyond_in(curve, end, side) for curve in curves]
     return min(low for low, _ in ranges), max(high for _, high in ranges)
 
 

@@ -31,7 +31,7 @@ class CurveMotion:
     ----------
     problem : AlphaProblem
     curve : SolutionCurve
-    border : (3p + 1,) array, optional
+    border : (m + 1,) array, optional
         The row e of the parameter; that of the curve's box by default, and of another box that holds a point if the
         curve is a point.
     """
@@ -39,7 +39,7 @@ class CurveMotion:
     def __init__(self, problem: AlphaProblem, curve: SolutionCurve, border: Floats | None = None) -> None:
         self.problem = problem
         unit, box = np.append(problem.force, 1.0), curve.box
-        self._border, steps = (box.border if border is None else border) * unit, np.ones(3 * problem.p)
+        self._border, steps = (box.border if border is None else border) * unit, np.ones(problem.m)
         self._Z = problem.moves(steps)
         centre, spread = Ball.exact(box.centre / unit), curve.spread / unit
         along, side = (self._Z @ Ball.exact(box.direction / unit)[:, None])[:, 0], upper_product(self._Z.size, spread)
@@ -83,13 +83,13 @@ class CurveMotion:
     # -- first derivatives -----------------------------------------------------------------------------------------
 
     def speed(self, codes: Sequence[int]) -> Ball | None:
-        """dx/dt where the nodes have these statuses, scaled, (3p + 1,); the last one is that of alpha.
+        """dx/dt where the nodes have these statuses, scaled, (m + 1,); the last one is that of alpha.
 
         None where there is no bound.
         """
         key = tuple(codes)
         if key not in self._speeds:
-            B, m = self._bordered(key), 3 * self.problem.p
+            B, m = self._bordered(key), self.problem.m
             right = np.zeros((m + 1, 1))
             right[m] = 1.0
             found = None if B is None else solution(B, Ball.exact(right))
@@ -102,14 +102,16 @@ class CurveMotion:
         return 0 if speed is None else _sign(speed[-1])
 
     def _bordered(self, codes: Sequence[int]) -> Ball | None:
-        """The derivatives of the natural map and the border, (3p + 1, 3p + 1)."""
+        """The derivatives of the natural map and the border, (m + 1, m + 1)."""
         D = self._derivative(codes)
         return None if D is None else Ball.joined(self.problem.part - D @ self._Z, Ball.exact(self._border[None]))
 
     def _derivative(self, codes: Sequence[int]) -> Ball | None:
         """That of the projection P with respect to (z, alpha), by (12.17)."""
-        m = 3 * self.problem.p
+        m = self.problem.m
         D = Ball(np.zeros((m, m + 1)), np.zeros((m, m + 1)))
+        kept = np.arange(3 * self.problem.p, m)
+        D.mid[kept, kept] = 1.0
         for i, (code, t) in enumerate(zip(codes, self.problem.tau, strict=True)):
             if code == OPEN:
                 continue
@@ -177,7 +179,7 @@ class CurveMotion:
 
     def bends(self, codes: Sequence[int]) -> int:
         """The sign of the second derivative of alpha where the nodes have these statuses; 0 where it is not known."""
-        speed, m = self.speed(codes), 3 * self.problem.p
+        speed, m = self.speed(codes), self.problem.m
         B = None if speed is None else self._bordered(codes)
         if speed is None or B is None:
             return 0

@@ -78,9 +78,9 @@ class Run:
     rises : int
     index : int
         Of the roots on it.
-    knots : sequence of (3p + 1,) arrays
+    knots : sequence of (m + 1,) arrays
         Points on it, in floats, in the order of the curve.
-    borders : sequence of (3p + 1,) arrays
+    borders : sequence of (m + 1,) arrays
         Rows of the parameter between two of them.
     start, end : pairs of Fraction
         Bounds of alpha at its first and last point that is known.
@@ -108,24 +108,28 @@ class Turn:
     ----------
     alphas : pair of Fraction
         Between them is all alpha of it.
-    x : (3p + 1,) array
+    x : (m + 1,) array
         A point of it, in floats.
     selections : statuses on both sides, one or two
     settled : bool
         Conditions change their sign once each, or alpha turns back once, and nothing else happens. Where several do,
         alpha goes one way or turns back once in whichever order they do.
+    bounded : bool
+        At an end of the curve: the rigid displacement reaches its bound there, once.
     """
 
     alphas: Range
     x: Floats
     selections: tuple[Codes, ...]
     settled: bool
+    bounded: bool = False
 
     def joined(self, other: Turn) -> Turn:
         """With one that follows at once: what happens there is not settled."""
         ends = (*self.alphas, *other.alphas)
         selections = tuple(dict.fromkeys((*self.selections, *other.selections)))
-        return Turn((min(ends), max(ends)), other.x, selections, settled=False)
+        bounded = self.bounded or other.bounded
+        return Turn((min(ends), max(ends)), other.x, selections, settled=False, bounded=bounded)
 
 
 def in_order(links: Iterable[Sequence[Run | Turn]], *, closed: bool) -> list[Run | Turn] | None:
@@ -144,6 +148,21 @@ def in_order(links: Iterable[Sequence[Run | Turn]], *, closed: bool) -> list[Run
         if not put_behind(found, ahead):
             return None
     return found
+
+
+def up_to_bound(link: CurveLink, parts: Sequence[Run | Turn]) -> Sequence[Run | Turn]:
+    """Parts of a link; one turn where the rigid displacement reaches its bound, with all alpha between both points."""
+    if not link.leaves:
+        return parts
+    alphas: list[Fraction] = []
+    selections: list[Codes] = []
+    for part in parts:
+        alphas += (*part.start, *part.end) if isinstance(part, Run) else part.alphas
+        selections += (part.codes,) if isinstance(part, Run) else part.selections
+    joined: list[Run | Turn] = []
+    first, whole = parts[0], put_behind(joined, parts) and len(joined) == 1
+    x, settled = (first.knots[0], whole) if isinstance(first, Run) else (first.x, False)
+    return [Turn((min(alphas), max(alphas)), x, tuple(dict.fromkeys(selections)), settled, bounded=True)]
 
 
 def arcs_over(parts: Sequence[Run | Turn], interval: Range, *, closed: bool) -> tuple[int, list[Range]]:
@@ -306,7 +325,8 @@ class LinkParts:
     def corner(self, motion: CurveMotion, start: Place, end: Place, sides: tuple[Place, Place]) -> Turn | None:
         """Where nodes change their statuses, each of them once: the first change, between places.
 
-        ``motion`` is that of a curve that has both.
+        ``motion`` is that of a curve that has both. It is not settled where alpha hardly changes beside it, as where a
+        body begins to slide.
         """
         (before, after), one = sides, start.codes
         if before.codes != one or after.codes == one:
@@ -319,7 +339,8 @@ class LinkParts:
         rises = {codes: motion.rises(codes) for codes in passed}
         # in any order of the changes alpha turns back once, or never
         turned = {sum(rises[x] != rises[y] for x, y in pairwise(order)) for order in between}
-        if not all(rises.values()) or turned not in ({0}, {1}):
+        settled = all(rises.values()) and turned in ({0}, {1})
+        if not settled and before.rises and after.rises:
             return None
         step = self._step(before, after)
         reach = Fraction(0)
@@ -329,7 +350,7 @@ class LinkParts:
                 return None
             reach = max(reach, Fraction(float(speed.size[-1])) * step)
         alphas = before.alphas[0] - reach, before.alphas[1] + reach
-        return Turn(alphas, 0.5 * (before.x + after.x), (one, other), settled=True)
+        return Turn(alphas, 0.5 * (before.x + after.x), (one, other), settled)
 
     def behind(self, after: Place, end: Place) -> tuple[SolutionCurve | None, Place, Place, Codes | None]:
         """What follows a corner, as a part: the link's curve and the statuses, where these do not change again."""

@@ -48,9 +48,9 @@ class CurveParts:
         Within the piece.
     F : Ball of shape (N, p)
         Friction at these alphas.
-    z : Ball of shape (N, 3p)
+    z : Ball of shape (N, m)
         Arguments of P at all solutions of a part: y / q + rho q w (see AlphaProblem).
-    rho : (N, 3p) array
+    rho : (N, m) array
     rubs : (p, 2) bool array
         Axes along which there is friction.
     links : (N,) array of ints
@@ -94,7 +94,7 @@ class CurveParts:
 
     def _tangents(self, x: Ball) -> Ball:
         p = len(self.rubs)
-        both = (np.stack([part[:, p : 2 * p], part[:, 2 * p :]], axis=2) for part in (x.mid, x.rad))
+        both = (np.stack([part[:, p : 2 * p], part[:, 2 * p : 3 * p]], axis=2) for part in (x.mid, x.rad))
         return Ball(*(np.where(self.rubs, part, 0.0) for part in both))
 
     @cached_property
@@ -140,7 +140,7 @@ class CurveParts:
 class _Links(NamedTuple):
     """Numbers of all links of a curve: its solutions are at x = c + t d + b, |b| <= radius, t between two points.
 
-    z, slope and wide are those of the arguments of P, (links, 3p); alpha, rate and reach of alpha, (links,).
+    z, slope and wide are those of the arguments of P, (links, m); alpha, rate and reach of alpha, (links,).
     """
 
     t: Ball

@@ -28,7 +28,7 @@ def arc_of(system: EnclosedSpace, codes: Sequence[int], found: SpaceRoot | Open,
 
     Parameters
     ----------
-    system : over a piece of alpha, of a body that is held
+    system : over a piece of alpha
     codes : complete
     found : what ``settle`` says of the leaf
     errors : 1 proves; a writer of proofs takes more
@@ -50,7 +50,8 @@ class LeafArc:
     centre : (q, 2) array
         A direction for every node in a sector.
     angle, radius : (q,) arrays
-        All solutions with these statuses, with angles up to ``radius`` from ``angle``, are on the arc.
+        All solutions with these statuses, with angles up to ``radius`` from ``angle``, are on the arc; of a body that
+        nothing holds, those within the bounds of its rigid displacement.
     """
 
     statuses: Codes
@@ -85,7 +86,7 @@ class _Along(NamedTuple):
 class _ArcLeaf(Leaf):
     """Zeros z = (psi, s) of the equations of a leaf as a graph over one of these unknowns, z_k.
 
-    A normal force that is left free is between psi and s.
+    A normal force that is left free is between psi and s, and so are rigid modes that the equations leave free.
 
     With (12.22d), u being the other ones, the right-hand side maps a box of u into its interior, for every z_k: there
     is one zero for each of them, and these are an arc.
@@ -96,7 +97,7 @@ class _ArcLeaf(Leaf):
 
         ``angle``, ``radius``: a box that holds the directions of all solutions.
         """
-        box = self._around_loose(angle, radius) if self.piece and len(self.free) == len(self.loose) else None
+        box = self._around_free(angle, radius) if self.piece else None
         if box is None:
             return None
         (angle, radius), turning, q = box, len(angle), len(box[0])
@@ -124,7 +125,7 @@ class _ArcLeaf(Leaf):
             radius = radius.copy()
             radius[psi] = np.maximum(radius[psi], _ROOM * needed[: len(psi)])
             # solutions at wider angles may have other forces
-            cut = self._around_loose(angle[:turning], radius[:turning])
+            cut = self._around_free(angle[:turning], radius[:turning])
             if cut is None:
                 return None
             radius[turning:] = np.maximum(radius, (np.abs(cut[0] - angle) + cut[1]) * SAFE)[turning:]
@@ -151,11 +152,13 @@ class _ArcLeaf(Leaf):
             return None
         return LeafArc(_pattern(self.codes), self.centre, angle[:turning], radius[:turning])
 
-    def _around_loose(self, angle: Floats, radius: Floats) -> tuple[Floats, Floats] | None:
+    def _around_free(self, angle: Floats, radius: Floats) -> tuple[Floats, Floats] | None:
         """A box of all unknowns but s that holds all zeros with angles in a box; None if there is none, or no such."""
-        if not self.loose:
+        if not self.free:
             return angle, radius
-        cut = self._cut_free(np.r_[angle, np.zeros(len(self.loose))], np.r_[radius, np.full(len(self.loose), np.inf)])
+        modes = np.array(self.free[len(self.loose) :], dtype=np.intp) - len(self.system.g)
+        wide = np.r_[np.full(len(self.loose), np.inf), self.system.reach[modes]]
+        cut = self._cut_free(np.r_[angle, np.zeros(len(wide))], np.r_[radius, wide])
         return cut if cut is not None and np.all(np.isfinite(cut[1])) else None
 
     def _rates(self, along: _Along, angle: Floats, radius: Floats) -> tuple[Floats, Floats]:
@@ -178,6 +181,9 @@ class _ArcLeaf(Leaf):
                 direction = Ball(towards, np.full(len(t), min(turned, 2.0) + 8 * UNIT))
                 found.append(most - (direction[None] @ (along.y_rate[t] * units)[:, None])[0, 0])
         found += [Ball.exact(np.array(sign)) * along.w_rate[int(np.max(tau[i]))] for i, sign in self.sliding]
+        if np.all(np.isfinite(self.system.reach)):
+            # the bounds of the rigid displacement
+            found += [side[k] for side in (-along.y_rate, along.y_rate) for k in range(len(self.system.g), len(self.E))]
         mid, rad = (np.array([getattr(part, name) for part in found]).reshape(-1) for name in ("mid", "rad"))
         # v is along d at zeros of G, so that what turns d does not change v . d
         d, _ = self._directions(angle, radius)

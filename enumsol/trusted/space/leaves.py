@@ -81,7 +81,7 @@ class Drift(NamedTuple):
 class _Sweep(NamedTuple):
     """Bounds along a parameter t, |t| <= reach, which is s or one of the directions: y, then w, are middle + t turn.
 
-    The other unknowns are beside + t along.
+    The other unknowns are beside + t along; ``place`` is that of the parameter among all.
     """
 
     middle: Ball
@@ -89,7 +89,21 @@ class _Sweep(NamedTuple):
     beside: Ball
     along: Ball
     reach: float
-    by_alpha: bool
+    place: int
+
+    @property
+    def by_alpha(self) -> bool:
+        """Whether the parameter is s."""
+        return self.place == len(self.beside.mid)
+
+    @property
+    def unknowns(self) -> tuple[Ball, Ball]:
+        """``beside`` and ``along`` of all unknowns, the parameter among them, s last."""
+        beside, along = (
+            Ball(np.insert(part.mid, self.place, own), np.insert(part.rad, self.place, 0.0))
+            for part, own in ((self.beside, 0.0), (self.along, 1.0))
+        )
+        return beside, along
 
 
 def _allowed(high: Floats, slope: Floats) -> tuple[float, float] | None:
@@ -169,6 +183,8 @@ class Open:
         Whether rather the piece of alpha stands in the way than the widths of sectors, as computed; no claim.
     span : pair of floats
         Over a piece of alpha, bounds of s, from -1 to 1, at all solutions in it.
+    rigid : Ball of shape (r,), or None
+        As in SpaceRoot; None where y is.
     """
 
     node: int | None
@@ -182,6 +198,7 @@ class Open:
     drift: Drift | None = None
     swept: bool = False
     span: tuple[float, float] = (-1.0, 1.0)
+    rigid: Ball | None = None
 
     def tells_more(self, other: Open) -> bool:
         """True if this leaves less of a piece open than ``other``, or has bounds where that has none; no claim."""
@@ -473,60 +490,50 @@ class Leaf:
         fixed = len(point.y.mid) + np.array([*self.rows, *self.loose], dtype=np.intp)
         for part in (middle, turn):
             part.mid[fixed], part.rad[fixed] = 0.0, 0.0
-        return _Sweep(middle, turn, beside, along, float(sizes[k]), k == q)
+        return _Sweep(middle, turn, beside, along, float(sizes[k]), k)
 
-    def _drift(self, angle: Floats, radius: Floats) -> Drift | None:
-        """Between which two bounds all solutions in a box lie over a piece of alpha."""
+    def _drift(self, angle: Floats, radius: Floats) -> tuple[Drift | None, bool]:
+        """Between which two bounds all solutions in a box lie over a piece of alpha; and whether there may be any."""
         sweep = self._swept(angle, radius)
-        if sweep is None:
-            return None
+        allowed = None if sweep is None else self._allowed_along(sweep, angle, radius)
+        if sweep is None or allowed is None:
+            return None, sweep is None
         ends = []
-        for t in (Ball.exact(np.array(-sweep.reach)), Ball.exact(np.array(sweep.reach))):
+        for share in allowed:
+            t = Ball.exact(np.array(sweep.reach * share))
             s = t if sweep.by_alpha else sweep.beside[-1] + sweep.along[-1] * t
             ends.append((sweep.middle + sweep.turn * t, s))
-        return Drift(*ends)
+        return Drift(*ends), True
 
     def _span(self, angle: Floats, radius: Floats) -> tuple[float, float] | None:
-        """Bounds of s at all solutions in a box over a piece of alpha; None if there are none.
+        """Bounds of s at all solutions in a box over a piece of alpha; None if there are none."""
+        sweep = self._swept(angle, radius, by_alpha=True) if self.piece else None
+        return (-1.0, 1.0) if sweep is None else self._allowed_along(sweep, angle, radius)
 
-        Every condition is at most a + b s with some a and b in balls, and so is what is left to an end of a sector.
+    def _allowed_along(self, sweep: _Sweep, angle: Floats, radius: Floats) -> tuple[float, float] | None:
+        """Bounds of the parameter at all solutions in a box, as shares of its reach; None if there are none.
+
+        Every condition is at most a + b t with some a and b in balls, and so is what is left to an end of a sector.
         """
-        sweep, turns = self._swept(angle, radius, by_alpha=True) if self.piece else None, self.system.turn
-        if sweep is None or turns is None:
-            return -1.0, 1.0
-        m, tau, unit, (middle, turn) = len(self.system.g), self.system.tau, self.system.unit, sweep[:2]
-        pairs = [(middle[i], turn[i]) for i in self.closed] + [(-middle[m + i], -turn[m + i]) for i in self.open]
-        for i in self.stick:
-            t = [int(k) for k in tau[i] if k >= 0]
-            if t:
-                # |tau| is at least e . tau with |e| = 1
-                rubbed = unit[t] * middle.mid[t]
-                length = float(np.linalg.norm(rubbed))
-                e = (rubbed / length if length > 0 else np.zeros(len(t))) * unit[t]
-                towards = Ball(e, 16 * UNIT * np.abs(e))[None]
-                disc, disc_turn = turns.disc[i], turns.disc_turn[i]
-                bent = disc_turn * turn[i]
-                most = disc * middle[i] - (towards @ middle[t][:, None])[0, 0]
-                rate = disc * turn[i] + disc_turn * middle[i] - (towards @ turn[t][:, None])[0, 0]
-                pairs.append((Ball(most.mid, (most.rad + bent.size) * SAFE), rate))
+        m, q, (middle, turn) = len(self.E), len(self.turning), sweep[:2]
+        pairs = [*self._sticking_along(sweep), *self._rigid_along(sweep)]
+        pairs += [(middle[i], turn[i]) for i in self.closed] + [(-middle[m + i], -turn[m + i]) for i in self.open]
         for i, sign in self.sliding:
-            along = m + int(np.max(tau[i]))
-            pairs.append(
-                (Ball(sign * middle.mid[along], middle.rad[along]), Ball(sign * turn.mid[along], turn.rad[along]))
-            )
+            along, way = m + int(np.max(self.system.tau[i])), Ball.exact(np.array(sign))
+            pairs.append((way * middle[along], way * turn[along]))
         high = np.array([part.mid + part.rad for part, _ in pairs])
         slopes = np.array([[part.mid - part.rad, part.mid + part.rad] for _, part in pairs]).reshape(-1, 2)
-        if self.turning:
+        if q:
             d, _ = self._directions(angle, radius)
             ahead, rate = (
                 one * d[:, 0] + other * d[:, 1] for one, other in (self._slips(part[m:]) for part in sweep[:2])
             )
-            q = len(self.turning)
-            beside, turns_by = sweep.beside[:q], sweep.along[:q]
+            beside, turns_by = (part[:q] for part in sweep.unknowns)
             left = Ball.exact(self.half - angle[:q]) - beside, Ball.exact(self.half + angle[:q]) + beside
             first, second = Ball.joined(ahead, *left), Ball.joined(rate, -turns_by, turns_by)
             high = np.concatenate([high, first.mid + first.rad])
             slopes = np.vstack([slopes, np.column_stack([second.mid - second.rad, second.mid + second.rad])])
+        slopes = slopes * sweep.reach
         slack = 8 * UNIT * (np.abs(high) + np.max(np.abs(slopes), axis=1)) + TINY
         if not np.all(np.isfinite(slack)):
             return -1.0, 1.0
@@ -535,6 +542,42 @@ class Leaf:
             return None
         low = -before[1] if before is not None else after[0] if after is not None else 0.0
         return low, after[1] if after is not None else -before[0] if before is not None else 0.0
+
+    def _sticking_along(self, sweep: _Sweep) -> list[tuple[Ball, Ball]]:
+        """By how much nodes that stick are within their discs at most, see ``_allowed_along``."""
+        turns, unit, (middle, turn), pairs = self.system.turn, self.system.unit, sweep[:2], []
+        assert turns is not None
+        for i in self.stick:
+            t = [int(k) for k in self.system.tau[i] if k >= 0]
+            if not t:
+                continue
+            # |tau| is at least e . tau with |e| = 1
+            rubbed = unit[t] * middle.mid[t]
+            length = float(np.linalg.norm(rubbed))
+            e = (rubbed / length if length > 0 else np.zeros(len(t))) * unit[t]
+            towards = Ball(e, 16 * UNIT * np.abs(e))[None]
+            disc, disc_turn = turns.disc[i], turns.disc_turn[i]
+            most, rate = (-(towards @ part[t][:, None])[0, 0] for part in (middle, turn))
+            if sweep.by_alpha:
+                bent = (disc_turn * turn[i]).size
+                most, rate = disc * middle[i] + most, disc * turn[i] + disc_turn * middle[i] + rate
+                most = Ball(most.mid, (most.rad + bent) * SAFE)
+            else:
+                disc = Ball(disc.mid, (disc.rad + disc_turn.size) * SAFE)
+                most, rate = disc * middle[i] + most, disc * turn[i] + rate
+            pairs.append((most, rate))
+        return pairs
+
+    def _rigid_along(self, sweep: _Sweep) -> list[tuple[Ball, Ball]]:
+        """What the rigid displacement leaves of its bounds, see ``_allowed_along``."""
+        reach, first = self.system.reach, len(self.system.g)
+        sides = [(Ball.exact(np.array(sign)), k) for k in range(len(reach)) for sign in (1.0, -1.0)]
+        middle, turn = sweep[:2]
+        return [
+            (Ball.exact(reach[k]) + sign * middle[first + k], sign * turn[first + k])
+            for sign, k in sides
+            if np.isfinite(reach[k])
+        ]
 
     def _is_swept(self, angle: Floats, radius: Floats, state: State | None) -> bool:
         """True if dG/dpsi changes more along the piece than over the angles."""
@@ -589,16 +632,20 @@ class Leaf:
             node = self.turning[int(np.argmax(worth))] if np.any(worth) else None
         m = len(self.system.g)
         y, w = (None, None) if state is None else (state.y[:m], state.w[:m])
+        rigid = None if state is None or not len(self.system.reach) else -state.y[m:]
         cause = self._cause(angle, state)
         mode = self._free_mode(angle) if cause is Cause.RIGID else None
         span = self._span(angle, radius)
         if span is None:
             return None
-        drift, swept = self._drift(angle, radius), self.piece and self._is_swept(angle, radius, state)
+        drift, possible = self._drift(angle, radius)
+        if not possible:
+            return None
+        swept = self.piece and self._is_swept(angle, radius, state)
         angle, radius = angle[:q], radius[:q]
         low, high = np.maximum(angle - radius, -self.half), np.minimum(angle + radius, self.half)
         box = 0.5 * (low + high), 0.5 * np.abs(high - low) * SAFE + 4 * UNIT
-        return Open(node, y, w, self.centre, *box, cause, mode, drift, swept, span)
+        return Open(node, y, w, self.centre, *box, cause, mode, drift, swept, span, rigid)
 
     def _free_mode(self, angle: Floats) -> int:
         """The rigid mode that moves most along what the equations in the middle leave free; no claim."""
@@ -657,7 +704,7 @@ class Leaf:
         # with the columns of q in place of those of -q, and with the rows of equilibrium of the other sign
         sign = -sign if (modes + len(self.free)) % 2 else sign
         q = len(self.turning)
-        drift = self._drift(angle, radius)
+        drift = self._drift(angle, radius)[0]
         angle, radius, reach = angle[:q], radius[:q], reach[:q]
         rigid = -state.y[m:] if modes else None
         return SpaceRoot(state.y[:m], state.w[:m], self.centre, angle, radius, reach, sign, least, rigid, drift)

@@ -172,11 +172,14 @@ class Discs:
         All that occur.
     slope : (p,) array or None
         The derivative of F with respect to the last argument; None where there is no such argument.
+    kept : int
+        So many last components of y are kept as they are: rigid displacements (theory, section 14.14).
     """
 
     tau: Indices
     F: Ball
     slope: Floats | None = None
+    kept: int = 0
 
     def projected(self, z: Ball) -> Ball:
         """P of a ball of arguments."""
@@ -197,6 +200,8 @@ class Discs:
         places = self.tau[has]
         out.mid[places] = (share[:, None] * tangent.mid)[has]
         out.rad[places] = np.broadcast_to(off[:, None], has.shape)[has]
+        first = len(z.mid) - self.kept
+        out[first:] = z[first:]
         return out
 
     def tangents(self, z: Ball) -> Ball:
@@ -220,6 +225,8 @@ class Discs:
         if found is None:
             return None
         block, u, v = found.middle, found.u, found.v
+        same = np.arange(m - self.kept, m)
+        core.mid[same, same] = 1.0
         rows = np.column_stack([np.arange(len(self.tau)), self.tau])
         columns = rows if self.slope is None else np.column_stack([rows, np.full(len(rows), m)])
         there = (rows >= 0)[:, :, None] & (columns >= 0)[:, None, :]

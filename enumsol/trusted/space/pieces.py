@@ -11,9 +11,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
+from enumsol.condensation.space_condensed import FloatingPiece
 from enumsol.trusted.space.leaf_arcs import LeafArc, arc_of
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
 from enumsol.trusted.space.piece_forms import only_on_curve
+from enumsol.trusted.space.resultants import is_unbalanced_in_space, swept_floating_margin
 from enumsol.trusted.space.sector_rows import swept_margin
 from enumsol.trusted.space.space_uniqueness import is_complete
 
@@ -35,7 +37,7 @@ _MARGIN = 2.0**-10
 #: How often a piece is narrowed for a leaf, to which multiples of its half, and where that is too little.
 _NARROWINGS, _GRID, _NARROWER = 8, 1 << 12, Fraction(3, 2)
 #: Halvings of the way through a box.
-_STEPS = 8
+_STEPS = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +76,17 @@ class AlphaPiece:
 
         ``values`` are the multipliers of rows at both ends, between which they are affine in alpha.
         """
-        return swept_margin(self.ends, self.space.at(self.middle), codes, rows, values, errors)
+        (low, high), middle = self.ends, self.space.at(self.middle)
+        if isinstance(low, FloatingPiece) and isinstance(high, FloatingPiece) and isinstance(middle, FloatingPiece):
+            return swept_floating_margin((low, high), middle, codes, rows, values, errors)
+        return swept_margin(self.ends, middle, codes, rows, values, errors)
+
+    def is_unbalanced(self, codes: Sequence[int], z: Array) -> bool:
+        """Whether at no alpha of the piece any forces below a partial assignment are in balance with the load, by z.
+
+        Of a body that nothing holds.
+        """
+        return all(isinstance(end, FloatingPiece) and is_unbalanced_in_space(end, codes, z) for end in self.ends)
 
     def forces(self, y: Ball) -> Ball:
         """Forces in the units of the problem, (3p,), all normals first, of scaled ones."""
@@ -89,7 +101,7 @@ class AlphaPiece:
         return found
 
     def displacements(self, y: Ball, w: Ball, alpha: Ball) -> Ball:
-        """The same of displacements w, (3p,), at all alpha of a ball."""
+        """The same of displacements w, (3p,), at all alpha of a ball; y of ``rigid``."""
         system, (_, length), p = self.space.fixed, self.space.units, len(self.space.units[0])
         found = Ball(np.zeros(3 * p), np.zeros(3 * p))
         found[:p] = Ball(w.mid[:p] * length, w.rad[:p] * length + TINY)
@@ -106,6 +118,8 @@ class AlphaPiece:
             S, g0, g1 = Ball(data.S, data.S_rad), Ball(data.g0, data.g0_rad), Ball(data.g1, data.g1_rad)
             pushed = (S[missing] @ self.forces(y)[:, None])[:, 0]
             found[missing] = g0[missing] + alpha * g1[missing] - pushed
+            if self.space.floats:
+                found[missing] = found[missing] + (self.space.moved[missing] @ self.rigid(y)[:, None])[:, 0]
         return found
 
     @cached_property
@@ -204,10 +218,11 @@ class AlphaPiece:
         return found is None or any(lie_along(ends, curves, errors) for ends in piece.places(found, given))
 
     def place(self, found: SpaceRoot | Open, given: AlphaProblem) -> Ball | None:
-        """Bounds of (zeta, alpha) of what a leaf holds, (3p + 1,); None where there are none."""
+        """Bounds of (zeta, alpha) of what a leaf holds, (m + 1,); None where there are none."""
         if found.y is None or found.w is None:
             return None
-        return self._placed(found.y, found.w, self.alphas, given)
+        y = found.y if found.rigid is None else Ball.joined(found.y, -found.rigid)
+        return self._placed(y, found.w, self.alphas, given)
 
     def places(self, found: SpaceRoot | Open, given: AlphaProblem) -> list[tuple[Ball, ...]]:
         """Bounds of (zeta, alpha) of what a leaf holds: all of it lies in each of these, or between two of them."""
@@ -227,8 +242,19 @@ class AlphaPiece:
         near = float(number)
         return Ball(np.array(near), np.array(float(abs(number - Fraction(near))) * (1.0 + 4 * UNIT) + TINY))
 
+    def rigid(self, y: Ball) -> Ball:
+        """Coordinates q of the rigid displacement, (r,), in the problem's units, of y with -q behind its forces."""
+        if not isinstance(self.whole, FloatingPiece):
+            return y[:0]
+        q, unit = -y[len(self.whole.g) :], self.whole.rows.unit
+        return Ball(q.mid * unit, q.rad * unit + TINY)
+
     def _placed(self, y: Ball, w: Ball, alpha: Ball, given: AlphaProblem) -> Ball:
-        return Ball.joined(given.coordinates(self.forces(y), self.displacements(y, w, alpha)), alpha[None])
+        q = self.rigid(y)
+        forces, moved = self.forces(y), self.displacements(y, w, alpha)
+        # the body is in balance with the load
+        still = Ball.exact(np.zeros(len(q.mid)))
+        return Ball.joined(given.coordinates(Ball.joined(forces, q), Ball.joined(moved, still)), alpha[None])
 
 
 def lies_in(place: Ball | None, curve: SolutionCurve, errors: float = 1.0) -> bool:

@@ -1,5 +1,7 @@
 """The trusted test in 3D that the solutions in a box of forces and alpha are one curve (theory, section 12.8).
 
+Of a body that nothing holds, the coordinates of its rigid displacement are among the forces (theory, section 14.14).
+
 Krawczyk's operator is applied to the natural map with alpha as one more unknown and one linear equation more, for all
 values of that equation's right-hand side, the curve's parameter, at once.
 """
@@ -9,13 +11,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, determinant_sign, solution, upper_norm
 from enumsol.condensation.condensed import node_units
 from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.condensation.floating import RigidRows
 from enumsol.model.sectors import SECTORS
 from enumsol.trusted.space.natural_map import (
     MARGIN,
@@ -67,9 +70,9 @@ _FACTORS = (1.0, 4.0, 16.0, 64.0, 256.0, 0.25, 0.0625, 0.015625)
 class CurveBox:
     """All x = (zeta, alpha) with |t| <= half and |x - centre - t direction| <= radius.
 
-    zeta are the coordinates of AlphaProblem and t = border (x - centre). All arrays have shape (3p + 1,), in the units
-    of forces, all normals first, but for ``rho``, (3p,): steps of the natural map relative to those of AlphaProblem,
-    positive. What is said does not depend on them.
+    zeta are the coordinates of AlphaProblem and t = border (x - centre). All arrays have shape (m + 1,), in the units
+    of forces, all normals first, but for ``rho``, (m,): steps of the natural map relative to those of AlphaProblem,
+    positive. What is said does not depend on them. m is 3p, and of a body that nothing holds r more.
     """
 
     centre: Array
@@ -88,22 +91,27 @@ class AlphaProblem:
     which must not depend on alpha. Solutions are looked for in the coordinates zeta = y / q - rho q w, with the steps
     rho of the natural map (theory, section 12.8).
 
+    Of a body that nothing holds y has its rigid displacement, too, the last r of m = 3p + r components: those of w are
+    h - G y, and those of zeta that displacement itself (theory, section 14.14). Of others m is 3p.
+
     Attributes
     ----------
-    S, g0, g1 : Balls of shapes (3p, 3p), (3p,) and (3p,), in units of the nodes
+    S, g0, g1 : Balls of shapes (m, m), (m,) and (m,), in units of the nodes
     F0, F1 : (p,) arrays
         Exact, those of the first component that has friction.
-    ratio, inverse : Balls of shape (3p,)
+    ratio, inverse : Balls of shape (m,)
         q and 1 / q.
     tau : places of the tau of every node, none, one or two
-    force, length : (3p,) arrays, powers of two
+    force, length : (m,) arrays, powers of two
         Forces and displacements of the problem are as many times those here.
-    rho : (3p,) array
+    rho : (m,) array
         Steps of the natural map: one for lambda_n and one for tau of every node.
-    turned : Ball of shape (3p, 3p)
+    turned : Ball of shape (m, m)
         1 + rho S q, by which y / q is multiplied in zeta.
-    part, offset : Balls of shapes (3p, 3p + 1) and (3p,)
+    part, offset : Balls of shapes (m, m + 1) and (m,)
         y / q is part (zeta, alpha) + offset.
+    reach : (r,) array
+        Bounds of the coordinates of the rigid displacement, in the problem's units.
     """
 
     S: Ball
@@ -120,12 +128,13 @@ class AlphaProblem:
     turned: Ball
     part: Ball
     offset: Ball
+    reach: Array
 
     @classmethod
     def of(cls, enclosure: CondensedEnclosure, steps: Array | None = None) -> AlphaProblem:
-        """Of a problem whose nodes have coefficients with the same ratio for all alpha.
+        """Of a problem whose nodes have coefficients with the same ratio for all alpha (see ``enclosed_over_alpha``).
 
-        ``steps``: positive, (3p,), rho in the units of the problem (force / length); by default some that serve.
+        ``steps``: positive, (m,), rho in the units of the problem (force / length); by default some that serve.
 
         Raises
         ------
@@ -135,44 +144,41 @@ class AlphaProblem:
         problem, p = enclosure.problem, enclosure.problem.p
         coefficients, slopes = np.array(problem.friction), np.array(problem.friction_slope)
         occurs = (coefficients != 0) | (slopes != 0)
-        ratio = Ball.exact(np.ones(3 * p))
-        for i in np.flatnonzero(np.all(occurs, axis=0)):
-            (one, one_slope), (other, other_slope) = [
-                (Fraction(float(coefficients[k, i])), Fraction(float(slopes[k, i]))) for k in range(2)
-            ]
-            if one * other_slope != other * one_slope:
-                raise NotEnclosedError(
-                    f"the ratio of the coefficients of friction of contact node {problem.node_ids[i]} changes with "
-                    "alpha; expected a constant one"
-                )
-            q = other / one if one else other_slope / one_slope
-            exact = Fraction(float(q)) == q
-            ratio.mid[2 * p + i], ratio.rad[2 * p + i] = float(q), 0.0 if exact else 2 * UNIT * abs(float(q))
+        tau = [np.array([(1 + k) * p + i for k in range(2) if occurs[k, i]], dtype=np.intp) for i in range(p)]
         first = np.where(occurs[0], 0, 1), np.arange(p)
         factor = np.tile(node_units(enclosure.S, p), 3)
         size = _power(np.max(np.maximum(np.abs(enclosure.g0), np.abs(enclosure.g1)) * factor))
         force, length = factor * size, size / factor
         with np.errstate(over="ignore", invalid="ignore"):
             pair = force[:, None] / length[None, :]
-            S = ratio[:, None] * Ball(enclosure.S * pair, enclosure.S_rad * pair + TINY)
-            g0 = ratio * Ball(enclosure.g0 / length, enclosure.g0_rad / length + TINY)
-            g1 = ratio * Ball(enclosure.g1 / length, enclosure.g1_rad / length + TINY)
+            data = [
+                Ball(enclosure.S * pair, enclosure.S_rad * pair + TINY),
+                Ball(enclosure.g0 / length, enclosure.g0_rad / length + TINY),
+                Ball(enclosure.g1 / length, enclosure.g1_rad / length + TINY),
+            ]
+            ratio, rows = _ratios(problem, occurs), None
+            if problem.modes is not None:
+                rows = RigidRows.of(problem, Fraction(0), force, length)
+                data, work = _bordered(data, rows), float(force[0] * length[0])
+                ratio = Ball.joined(ratio, Ball.exact(np.ones(len(rows.unit))))
+                force, length = np.append(force, rows.unit), np.append(length, work / rows.unit)
+            S, g0, g1 = (part * ratio if part.mid.ndim == 1 else ratio[:, None] * part for part in data)
             inverse = Ball(1.0 / ratio.mid, (2.0 * ratio.rad / ratio.mid + 2 * UNIT) / ratio.mid * SAFE)
             inverse = Ball(inverse.mid, np.where((ratio.mid == 1) & (ratio.rad == 0), 0.0, inverse.rad))
         if not (S.finite and g0.finite and g1.finite):
             raise NotEnclosedError("the condensed problem over- or underflows float64; expected data in other units")
-        tau = [np.array([(1 + k) * p + i for k in range(2) if occurs[k, i]], dtype=np.intp) for i in range(p)]
+        m = len(force)
         # the steps of a proof may be any floats
         with np.errstate(over="ignore", invalid="ignore"):
             rho = _steps(S.mid / inverse.mid, tau) if steps is None else steps / (force / length)
-            turned = Ball.exact(rho[:, None]) * S * ratio + Ball.exact(np.eye(3 * p))
+            turned = Ball.exact(rho[:, None]) * S * ratio + Ball.exact(np.eye(m))
             right = Ball.exact(rho)[:, None] * Ball.beside(g1[:, None], g0[:, None])
-            found = solution(turned, Ball.beside(Ball.exact(np.eye(3 * p)), right)) if turned.finite else None
+            found = solution(turned, Ball.beside(Ball.exact(np.eye(m)), right)) if turned.finite else None
         if found is None:
             raise NotEnclosedError("forces and displacements of the condensed problem cannot be told apart")
-        part, offset = found[:, : 3 * p + 1], found[:, 3 * p + 1]
-        F0, F1 = coefficients[first], slopes[first]
-        return cls(S, g0, g1, F0, F1, ratio, inverse, tau, force, length, rho, turned, part, offset)
+        part, offset = found[:, : m + 1], found[:, m + 1]
+        F0, F1, reach = coefficients[first], slopes[first], np.zeros(0) if rows is None else rows.reach * rows.unit
+        return cls(S, g0, g1, F0, F1, ratio, inverse, tau, force, length, rho, turned, part, offset, reach)
 
     @property
     def p(self) -> int:
@@ -180,8 +186,29 @@ class AlphaProblem:
         return len(self.F0)
 
     @property
+    def m(self) -> int:
+        """Number of forces, and of coordinates of a rigid displacement."""
+        return len(self.force)
+
+    def discs(self, alpha: Ball) -> Discs:
+        """The projection P for all alpha of a ball."""
+        return Discs(self.places, self.friction(alpha), self.F1, len(self.reach))
+
+    def within(self, x: Ball) -> bool:
+        """True if the rigid displacement is within its bounds, and not at them, at all points (zeta, alpha) of a ball.
+
+        Its coordinates are components of zeta at solutions.
+        """
+        return bool(np.all(x[self.rigid].size * SAFE < self.reach))
+
+    @property
+    def rigid(self) -> slice:
+        """Where the coordinates of the rigid displacement are in (zeta, alpha)."""
+        return slice(3 * self.p, self.m)
+
+    @property
     def steps(self) -> Array:
-        """rho in the units of the problem, (3p,), which are powers of two times those here."""
+        """rho in the units of the problem, (m,), which are powers of two times those here."""
         return np.asarray(self.rho * (self.force / self.length))
 
     @cached_property
@@ -192,21 +219,21 @@ class AlphaProblem:
     @cached_property
     def plain_moves(self) -> Array:
         """Middle of ``moves`` for the steps of the natural map as they are."""
-        return self.moves(np.ones(3 * self.p)).mid
+        return self.moves(np.ones(self.m)).mid
 
     def moves(self, rho: Array) -> Ball:
-        """The derivative of (z, alpha) with respect to (zeta, alpha), (3p + 1, 3p + 1), for steps relative to its own.
+        """The derivative of (z, alpha) with respect to (zeta, alpha), (m + 1, m + 1), for steps relative to its own.
 
         z = y / q + rho' q w is (1 + r) y / q - r zeta where rho' is r times the step of zeta.
         """
-        m = 3 * self.p
+        m = self.m
         out = Ball(np.eye(m + 1), np.zeros((m + 1, m + 1)))
         out[:m] = _one_more(rho)[:, None] * self.part - Ball.exact(rho[:, None] * np.eye(m, m + 1))
         return out
 
     def forces_at(self, x: Ball) -> Ball:
         """y / q at points (zeta, alpha)."""
-        m = 3 * self.p
+        m = self.m
         near = Ball.exact(self.part.mid @ x.mid + self.offset.mid)
         # with what is rounded there as the right-hand side
         missing = x[:m] + Ball.exact(self.rho) * (self.g0 + x[m] * self.g1) - (self.turned @ near[:, None])[:, 0]
@@ -225,13 +252,13 @@ class AlphaProblem:
         return force * (self.inverse * y - step * (self.ratio * v))
 
     def placed(self, x: Array) -> Array:
-        """(zeta, alpha) of forces and alpha, (..., 3p + 1), in floats."""
+        """(zeta, alpha) of forces and alpha, (..., m + 1), in floats."""
         y = x[..., :-1] / self.force
         w = self.g0.mid + x[..., -1:] * self.g1.mid - y @ self.S.mid.T
         return np.append((self.inverse.mid * y - self.rho * w) * self.force, x[..., -1:], axis=-1)
 
     def unplaced(self, x: Array) -> Array:
-        """Forces and alpha of (zeta, alpha), (..., 3p + 1), in floats."""
+        """Forces and alpha of (zeta, alpha), (..., m + 1), in floats."""
         q, unit = self.ratio.mid, np.append(self.force, 1.0)
         y = (x / unit) @ self.part.mid.T + self.offset.mid
         return np.append(y * q * self.force, x[..., -1:], axis=-1)
@@ -239,18 +266,18 @@ class AlphaProblem:
     @cached_property
     def _turn(self) -> Array:
         """The derivative of (zeta, alpha) with respect to forces and alpha, in floats."""
-        force, m = self.force, 3 * self.p
+        force, m = self.force, self.m
         J = np.eye(m + 1)
         S = self.S.mid * (self.rho * force)[:, None] / force
         J[:m, :m], J[:m, m] = np.diag(self.inverse.mid) + S, -self.rho * self.g1.mid * force
         return J
 
     def border_of_forces(self, border: Array) -> Array:
-        """The row by (forces, alpha) of one by (zeta, alpha), (..., 3p + 1), in floats."""
+        """The row by (forces, alpha) of one by (zeta, alpha), (..., m + 1), in floats."""
         return np.asarray(border @ self._turn)
 
     def border_of_zeta(self, border: Array) -> Array:
-        """The row by (zeta, alpha) of one by (forces, alpha), (3p + 1,), in floats."""
+        """The row by (zeta, alpha) of one by (forces, alpha), (m + 1,), in floats."""
         return np.asarray(np.linalg.solve(self._turn.T, border))
 
     def friction(self, alpha: Ball) -> Ball:
@@ -262,9 +289,9 @@ class AlphaProblem:
 
         By derivatives, so that changes of |z_t| and of F z_n along t cancel; without bounds where z_t may vanish.
         """
-        p, m = self.p, 3 * self.p
+        p, m = self.p, self.m
         near = Ball(z.mid, (z.rad + along.size * half + side) * SAFE)
-        plain = Discs(self.places, self.friction(near[m]), self.F1)
+        plain = self.discs(near[m])
         F1 = Ball.exact(self.F1)
         with np.errstate(all="ignore"):
             at = Directions.of(plain.tangents(near[:m]))
@@ -285,7 +312,7 @@ class AlphaProblem:
 
     def statuses(self, z: Ball) -> tuple[int | None, ...]:
         """The status that every node has strictly at all arguments (z, alpha) of P, None where it has none."""
-        p, rubs, plain = self.p, np.any(self.places >= 0, axis=1), Discs(self.places, self.friction(z[-1]))
+        p, rubs, plain = self.p, np.any(self.places >= 0, axis=1), self.discs(z[-1])
         low, high = z.mid[:p] - z.rad[:p] * SAFE, z.mid[:p] + z.rad[:p] * SAFE
         tangent = plain.tangents(z[:-1])
         length, away = np.linalg.norm(tangent.mid, axis=1), upper_norm(tangent.rad, axis=1)
@@ -298,6 +325,37 @@ class AlphaProblem:
         return tuple(None if code < 0 else code for code in codes.tolist())
 
 
+def _ratios(problem: Any, occurs: NDArray[np.bool_]) -> Ball:
+    """Of both coefficients, at the second component of nodes with two; 1 elsewhere, (3p,)."""
+    p = problem.p
+    coefficients, slopes = np.array(problem.friction), np.array(problem.friction_slope)
+    ratio = Ball.exact(np.ones(3 * p))
+    for i in np.flatnonzero(np.all(occurs, axis=0)):
+        (one, one_slope), (other, other_slope) = [
+            (Fraction(float(coefficients[k, i])), Fraction(float(slopes[k, i]))) for k in range(2)
+        ]
+        if one * other_slope != other * one_slope:
+            raise NotEnclosedError(
+                f"the ratio of the coefficients of friction of contact node {problem.node_ids[i]} changes with "
+                "alpha; expected a constant one"
+            )
+        q = other / one if one else other_slope / one_slope
+        exact = Fraction(float(q)) == q
+        ratio.mid[2 * p + i], ratio.rad[2 * p + i] = float(q), 0.0 if exact else 2 * UNIT * abs(float(q))
+    return ratio
+
+
+def _bordered(data: Sequence[Ball], rows: RigidRows) -> list[Ball]:
+    """S, g0 and g1 with the rows of the body as a whole, as (14.9) has them."""
+    (S, g0, g1), G, none = data, rows.G, np.zeros((len(rows.unit),) * 2)
+    mid = np.block([[S.mid, -G.mid.T], [G.mid, none]])
+    return [
+        Ball(mid, np.block([[S.rad, G.rad.T], [G.rad, none]])),
+        Ball.joined(g0, rows.h),
+        Ball.joined(g1, rows.slope),
+    ]
+
+
 def _one_more(rho: Array) -> Ball:
     """1 + rho, which is a float for powers of two near one."""
     total = 1.0 + rho
@@ -306,10 +364,14 @@ def _one_more(rho: Array) -> Ball:
 
 
 def _steps(S: Array, tau: Sequence[NDArray[np.intp]]) -> Array:
-    rho = np.sqrt(np.diagonal(np.linalg.inv(S)) / np.diagonal(S))
+    m = 3 * len(tau)
+    held, G = S[:m, :m], S[m:, :m]
+    rho = np.sqrt(np.diagonal(np.linalg.inv(held)) / np.diagonal(held))
     for t in tau:
         rho[t] = np.min(rho[t], initial=np.inf)
-    return rho
+    # as far as the forces would move the body on springs; a rigid displacement may move no contact node
+    stiffness = np.diagonal(G @ np.linalg.solve(held, G.T))
+    return np.append(rho, 1.0 / np.where(stiffness > 0, stiffness, 1.0))
 
 
 def _power(size: float) -> float:
@@ -334,20 +396,25 @@ class SolutionCurve:
     sign: int
     found: _Proven
 
+    @property
+    def problem(self) -> AlphaProblem:
+        """Whose solutions they are."""
+        return self.found.near.problem
+
     @cached_property
     def spread(self) -> Array:
-        """The solution at t is no farther from centre + t direction, (3p + 1,)."""
+        """The solution at t is no farther from centre + t direction, (m + 1,)."""
         return np.asarray(self.found.spread[0] * self.found.near.unit)
 
     @property
     def reach(self) -> Array:
-        """How far from centre + t direction the set goes in which the curve has the only solutions, (3p + 1,)."""
+        """How far from centre + t direction the set goes in which the curve has the only solutions, (m + 1,)."""
         found = self.found
         return np.asarray(found.step.reach(found.radius, found.shares) * found.near.unit)
 
     @cached_property
     def slope(self) -> Ball:
-        """A ball, (3p + 1,), of all (x(t) - x(t')) / (t - t'); without bounds where none are known."""
+        """A ball, (m + 1,), of all (x(t) - x(t')) / (t - t'); without bounds where none are known."""
         return Ball(self.box.direction.copy(), self.found.slope * self.found.near.unit)
 
     @cached_property
@@ -454,11 +521,11 @@ def only_curve(problem: AlphaProblem, box: CurveBox, errors: float = 1.0) -> Sol
     errors : 1 proves; a writer of proofs takes more, so that a checker comes to the same answer
     """
     arrays = (box.centre, box.direction, box.border, box.radius)
-    if not all(array.shape == (3 * problem.p + 1,) and np.all(np.isfinite(array)) for array in arrays):
+    if not all(array.shape == (problem.m + 1,) and np.all(np.isfinite(array)) for array in arrays):
         return None
     if not np.isfinite(box.half) or box.half < 0 or not np.all(box.radius > 0):
         return None
-    if box.rho.shape != (3 * problem.p,) or not np.all(box.rho > 0) or not np.all(np.isfinite(box.rho)):
+    if box.rho.shape != (problem.m,) or not np.all(box.rho > 0) or not np.all(np.isfinite(box.rho)):
         return None
     with np.errstate(all="ignore"):
         near = _CurveMap(problem, box.centre, box.direction, box.border, box.half, box.rho)
@@ -503,7 +570,7 @@ def corner_steps(
 
     ``known``: what is returned for a longer box around the same corner: mostly it serves for all of them.
     """
-    rho, best = np.ones(3 * problem.p), 0.0
+    rho, best = np.ones(problem.m), 0.0
     if not len(changing):
         return rho, best
     with np.errstate(all="ignore"):
@@ -547,8 +614,8 @@ def curve_point(problem: AlphaProblem, x: Array, border: Array) -> CurvePoint | 
 
     Its direction has the product 1 with the border; at a change of statuses it is that of one side.
     """
-    m, unit = 3 * problem.p, np.append(problem.force, 1.0)
-    x, row, asked = x / unit, border * unit, np.zeros((3 * problem.p + 1, 2))
+    m, unit = problem.m, np.append(problem.force, 1.0)
+    x, row, asked = x / unit, border * unit, np.zeros((m + 1, 2))
     asked[m, 1] = 1.0
     with np.errstate(all="ignore"):
         for _ in range(_STEPS):
@@ -569,7 +636,7 @@ def curve_point(problem: AlphaProblem, x: Array, border: Array) -> CurvePoint | 
 
 
 def _projected(problem: AlphaProblem, z: Array) -> tuple[Array, Array]:
-    """P of arguments (z, alpha) and a derivative of it, (3p,) and (3p, 3p + 1), in floats."""
+    """P of arguments (z, alpha) and a derivative of it, (m,) and (m, m + 1), in floats."""
     p, m = problem.p, len(z) - 1
     has, nodes, F = problem.places >= 0, np.arange(p), problem.F0 + z[m] * problem.F1
     normal, tangent = np.maximum(z[:p], 0.0), np.where(has, z[problem.places], 0.0)
@@ -578,7 +645,8 @@ def _projected(problem: AlphaProblem, z: Array) -> tuple[Array, Array]:
     sticks = touches & (length <= most)
     ratio = np.where(sticks, 1.0, most / np.where(length > 0, length, 1.0))
     e = np.where(sticks, 0.0, 1.0)[:, None] * tangent / np.where(length > 0, length, 1.0)[:, None]
-    P, D = np.zeros(m), np.zeros((m, m + 1))
+    P, D, kept = np.zeros(m), np.zeros((m, m + 1)), np.arange(3 * p, m)
+    P[kept], D[kept, kept] = z[kept], 1.0
     P[:p], D[nodes, nodes] = normal, touches
     for k in (0, 1):
         own = nodes[has[:, k]]
@@ -764,7 +832,7 @@ class _CurveMap:
         """
         m = len(self.c) - 1
         near = extent.near
-        corners = Discs(self.problem.places, self.problem.friction(near[m]), self.problem.F1).corners(near[:m], extent)
+        corners = self.problem.discs(near[m]).corners(near[:m], extent)
         if corners is None:
             return None
         B = self._bordered(corners)
@@ -792,8 +860,7 @@ class _CurveMap:
     @cached_property
     def _moved(self) -> Ball:
         """-N(c)."""
-        discs = Discs(self.problem.places, self.problem.friction(self.alpha), self.problem.F1)
-        return discs.projected(self.z[:-1]) - self.y
+        return self.problem.discs(self.alpha).projected(self.z[:-1]) - self.y
 
     def _bordered(self, corners: Corners) -> Ball:
         B = self.problem.part - corners.still @ self.Z
