@@ -91,7 +91,8 @@ def enclosed_over_alpha(problem: Any) -> CondensedEnclosure:
     NotEnclosedError
         See CondensedEnclosure.
     """
-    return replace(problem.on_springs.enclosure, problem=problem)
+    enclosure: CondensedEnclosure = problem.on_springs.enclosure
+    return replace(enclosure, problem=problem)
 
 
 def moved_by_modes(problem: Any) -> Ball:
