@@ -146,7 +146,7 @@ def test_sliding_for_good_from_a_ball_is_not_decided():
     assert len(history.stages(2)) == 0
     later = proven(problem, [0.5, 1.0, 0.0])
     assert later.unique_until == 1
-    assert "because its start is known within" in later.reasons[0]
+    assert "at the limit of what contact can hold" in later.reasons[0]
 
 
 def test_a_body_held_where_the_supports_bear_nothing_does_the_same():
