@@ -56,11 +56,18 @@ def load_limit(problem: AnyProblem, alpha: Alpha) -> LoadLimit | None:
     modes, f, p = problem.modes, problem.load_at(alpha), problem.p
     assert modes is not None
     N = modes.N / np.max(np.abs(modes.N), axis=0)
-    load, size = N.T @ f, np.abs(N).T @ np.abs(f)
-    if np.all(np.abs(load) <= LIMIT_TOLERANCE * size):
-        return None  # nothing presses the body against its contacts
-    G, F = np.asarray(problem.contact_rows @ N).T, problem.friction_at(alpha).reshape(p, -1)
-    normals, across = G[:, :p].T, G[:, p:].reshape(len(G), -1, p).transpose(2, 1, 0) * F[:, :, None]
+    with np.errstate(over="ignore", invalid="ignore"):
+        load, size = N.T @ f, np.abs(N).T @ np.abs(f)
+        if np.all(np.abs(load) <= LIMIT_TOLERANCE * size):
+            return None  # nothing presses the body against its contacts
+        G, F = np.asarray(problem.contact_rows @ N).T, problem.friction_at(alpha).reshape(p, -1)
+        normals, across = G[:, :p].T, G[:, p:].reshape(len(G), -1, p).transpose(2, 1, 0) * F[:, :, None]
+        # how large forces are means nothing
+        forces = np.maximum(np.max(np.abs(normals), axis=1), np.max(np.abs(across), axis=(1, 2)))
+        unit = np.where(forces > 0, forces, 1.0)
+        normals, across = normals / unit[:, None], across / unit[:, None, None]
+    if not (np.all(np.isfinite(size)) and np.all(np.isfinite(forces))):
+        return None
     z = _motion(load / np.max(np.abs(load)), normals, across)
     if z is None:
         return None
