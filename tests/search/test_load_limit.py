@@ -175,6 +175,7 @@ def test_what_is_no_limit():
     assert load_limit(unloaded, 0) is None
     assert load_limit(block_on_table(press=-1.0), 0) is None
     assert load_limit(block_on_table(press=1e308), 0) is None
+    assert load_limit(block_on_table(press=2.0**1020, push=1.0), 0) is not None
     pushed = block_on_table(push=1.0)
     assert abs(load_limit(pushed, 0).beyond) < LIMIT_TOLERANCE
     nearly = pushed.replace(friction=0.25 * (1 + 1e-6))
