@@ -55,12 +55,19 @@ def load_limit(problem: AnyProblem, alpha: Alpha) -> LoadLimit | None:
     """
     modes, f, p = problem.modes, problem.load_at(alpha), problem.p
     assert modes is not None
-    N = modes.N / np.max(np.abs(modes.N), axis=0)
-    load, size = N.T @ f, np.abs(N).T @ np.abs(f)
-    if np.all(np.abs(load) <= LIMIT_TOLERANCE * size):
+    N, f = modes.N / np.max(np.abs(modes.N), axis=0), f / max(float(np.max(np.abs(f))), np.finfo(float).tiny)
+    load = N.T @ f
+    if np.all(np.abs(load) <= LIMIT_TOLERANCE * (np.abs(N).T @ np.abs(f))):
         return None  # nothing presses the body against its contacts
-    G, F = np.asarray(problem.contact_rows @ N).T, problem.friction_at(alpha).reshape(p, -1)
-    normals, across = G[:, :p].T, G[:, p:].reshape(len(G), -1, p).transpose(2, 1, 0) * F[:, :, None]
+    with np.errstate(over="ignore", invalid="ignore"):
+        G, F = np.asarray(problem.contact_rows @ N).T, problem.friction_at(alpha).reshape(p, -1)
+        normals, across = G[:, :p].T, G[:, p:].reshape(len(G), -1, p).transpose(2, 1, 0) * F[:, :, None]
+        # how large forces are means nothing
+        forces = np.maximum(np.max(np.abs(normals), axis=1), np.max(np.abs(across), axis=(1, 2)))
+        unit = np.where(forces > 0, forces, 1.0)
+        normals, across = normals / unit[:, None], across / unit[:, None, None]
+    if not np.all(np.isfinite(forces)):
+        return None
     z = _motion(load / np.max(np.abs(load)), normals, across)
     if z is None:
         return None
@@ -68,7 +75,7 @@ def load_limit(problem: AnyProblem, alpha: Alpha) -> LoadLimit | None:
     most = np.max(np.abs(moved))
     size = most * np.sum(np.abs(f[np.abs(moved) > LIMIT_TOLERANCE * most]))
     beyond = float(moved @ f / size) if size > 0 else 0.0
-    if abs(beyond) > LIMIT_TOLERANCE:
+    if not abs(beyond) <= LIMIT_TOLERANCE:
         return None
     return LoadLimit(beyond, _codes(normals @ z, across[:, 0] @ z, F[:, 0]) if F.shape[1] == 1 else None)
 
