@@ -122,8 +122,8 @@ class HeldByNothing:
                 suggested = codes + [other for other in suggested if other not in codes]
         return suggested
 
-    def _closer(self, certifier: Certifier) -> None:
-        """There may be no solution: no certificate takes the place of a tree."""
+    def _closer(self, certifier: Certifier) -> Any:
+        """There may be no solution: what takes the place of the tree is a root that is known."""
 
     def _forms(self) -> None:
         """Bounds of these bodies are of the energy."""

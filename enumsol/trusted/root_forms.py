@@ -187,7 +187,7 @@ def _zero(values: Ball) -> Mask:
 
 def _used(rows: Ball) -> Mask:
     """Rows that are not zero."""
-    return np.any(~_zero(rows), axis=1)
+    return np.asarray(np.any(~_zero(rows), axis=1))
 
 
 def _table(W: Ball, P: Ball, least: float) -> Ball | None:
