@@ -72,7 +72,7 @@ class FloatingSpaceSolvers(HeldByNothing, SpaceSolvers):
         """The certifier of this arithmetic."""
         return FloatingSpaceCertifier(self._engine, self.enclosed, self.exclusions, recorder or Unrecorded())
 
-    def _closer(self, certifier: Certifier) -> SpaceReferenceCloser | None:
+    def _closer(self, certifier: Certifier) -> SpaceReferenceCloser | None:  # type: ignore[override]
         if self.exclusions is None or not isinstance(certifier, FloatingSpaceCertifier):
             return None
         return SpaceReferenceCloser(certifier, lambda: self.known_root, self.system.p)
