@@ -120,7 +120,7 @@ class RootForm:
             idle = self.idle & ~_used(moved.T) if len(moved.mid) else self.idle
             used = np.flatnonzero(np.append(~idle, np.ones(len(M.mid) - r, dtype=bool)))
             lacking = _lacks(M[np.ix_(used, used)])
-            if not lacking + self.tilt > 0 and not np.any(idle):
+            if lacking + self.tilt < 0 and not np.any(idle):
                 return True
             # changes of tight rows are not bounded
             bounded = lacking < 0 or not len(tight.mid)

@@ -8,6 +8,8 @@ import scipy.sparse as sp
 import enumsol
 from enumsol import fem
 
+#: Solutions farther away are beyond the bound of the rigid displacement.
+_FAR = 1e4
 OPEN, STICK, SLIP = "open", "stick", "slip"
 
 
@@ -121,7 +123,9 @@ def newton_solutions(problem, starts, seed):
         for _ in range(25):
             R, J = residual(x)
             size = np.linalg.norm(R)
-            if size < 1e-12 * (1 + np.linalg.norm(x)):
+            if np.linalg.norm(x) > _FAR:  # on its way to infinity, as at the limit of sliding
+                break
+            if size < 1e-11:
                 if not any(np.linalg.norm(x - other) < 1e-6 for other in found):
                     found.append(x)
                 break

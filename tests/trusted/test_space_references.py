@@ -6,6 +6,7 @@ The other solutions are found by Newton's method from many starts, which shares 
 from collections import Counter
 
 import numpy as np
+import pytest
 from effort import some
 from floating_space import known_body, newton_solutions
 
@@ -84,10 +85,11 @@ def said(reference, codes, rng):
     return [name for name, way in ways.items() if reference.is_only_root(codes, *way, reference.system.reach)]
 
 
+@pytest.mark.slow
 def test_no_other_solution_where_a_root_is_said_to_be_alone():
     counts = sum((told(seed) for seed in range(some(25, of=1000))), Counter())
-    assert counts["bodies"] > some(15, of=800)
-    assert counts["several"] >= some(2, of=60)
-    assert counts["refused"] > some(20, of=800)
-    assert counts["alone"] > some(40, of=2000)
-    assert counts["by products"] > some(0, of=20)
+    assert counts["bodies"] > some(15, of=700)
+    assert counts["several"] > some(2, of=100)
+    assert counts["refused"] > some(20, of=2000)
+    assert counts["alone"] > some(20, of=800)
+    assert counts["by products"] >= some(0, of=5)

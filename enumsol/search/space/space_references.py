@@ -36,6 +36,8 @@ _NONE, _NOTHING = 1e-9, 1e-8
 _FACTORS = np.geomspace(2.0**-8, 2.0**8, 9)
 #: Assignments that are tried in vain for one more that passes before the next try, and how many pass at most.
 _PATIENCE, _LONGEST = 16, 7
+#: Contact nodes from which a root is sought before the tree; of fewer, assignments that are met before that.
+_MANY, _EASY = 8, 32
 
 
 class OnlyRoot(NamedTuple):
@@ -62,6 +64,7 @@ class SpaceReferenceCloser:
     ----------
     certifier : Referring
     root : callable giving the codes of a leaf with a strict root, or None
+    p : number of contact nodes
 
     Attributes
     ----------
@@ -71,8 +74,10 @@ class SpaceReferenceCloser:
     relaxed: object = None
     leads = False
 
-    def __init__(self, certifier: Referring, root: Callable[[], Codes | None]) -> None:
+    def __init__(self, certifier: Referring, root: Callable[[], Codes | None], p: int) -> None:
         self._certifier, self._root = certifier, root
+        #: Assignments that pass before the first try.
+        self._easy = 0 if p >= _MANY else _EASY
         self.known: Codes | None = None
         self.sliding = dict[int, int]()
         self._wait = self._vain = 0
@@ -88,12 +93,14 @@ class SpaceReferenceCloser:
 
     def whole(self) -> list[Any] | None:
         """The only root, as a list, if one certificate proves that the problem has no other one."""
-        return None if self._reference is None else self.again((UNDECIDED,) * len(self._reference.leaf), None)
+        if self._easy or self._reference is None:
+            return None
+        return self.again((UNDECIDED,) * len(self._reference.leaf), None)
 
     def closed(self, codes: Codes, relaxation: object) -> list[Any] | None:
         """The root, if it was not told before, below an assignment that holds no other one; None if not proven."""
-        if self._wait > 0:
-            self._wait -= 1
+        if self._easy or self._wait:
+            self._easy, self._wait = max(self._easy - 1, 0), max(self._wait - 1, 0)
             return None
         found = self.again(codes, relaxation)
         self._vain = 0 if found is not None else self._vain + 1

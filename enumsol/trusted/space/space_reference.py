@@ -68,12 +68,12 @@ class SpaceReference:
         balance : factor of |G d|^2
         share : c of theory, section 14.11
         """
-        weights = SpaceWeights.of(system, numbers)
-        if weights is None or np.any(weights.wide > 0) or not in_range(system) or not is_complete(system, leaf):
-            return None
-        if not (0 <= balance < np.inf and abs(share) < np.inf):
+        if not (0 <= balance < np.inf and abs(share) < np.inf) or not is_complete(system, leaf):
             return None
         with np.errstate(all="ignore"):
+            weights = SpaceWeights.of(system, numbers)
+            if weights is None or np.any(weights.wide > 0) or not in_range(system):
+                return None
             root = settle(system, leaf)
             if not isinstance(root, SpaceRoot):
                 return None
@@ -100,7 +100,7 @@ class SpaceReference:
         ValueError
             A node has no such row.
         """
-        tight = sorted({row for one, other, _ in products for row in (one, other)})
+        rows, tight = sorted(set(rows)), sorted({row for one, other, _ in products for row in (one, other)})
         coefficients = self.rows(rows), self.rows(tight)
         if not all(self.is_equation(codes, row) for row in rows) or not all(self.is_tight(codes, row) for row in tight):
             return False
