@@ -51,7 +51,7 @@ class RigidRows:
             Something overflows.
         """
         N, slope = problem.modes.N, problem.load_slope
-        with np.errstate(over="ignore", invalid="ignore"):
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             G = _product(problem.contact_rows, N).T
             load = N.T
             h = _product(load, problem.f[:, None])[:, 0]
