@@ -53,7 +53,7 @@ class RigidRows:
             Something overflows.
         """
         load = problem.modes.N.T
-        with np.errstate(over="ignore", invalid="ignore"):
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             G = moved_by_modes(problem).T
             h, turn = _product(load, problem.f[:, None])[:, 0], Ball.exact(np.zeros(len(load)))
             if problem.load_slope is not None:

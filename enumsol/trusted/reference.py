@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, Ball
+from enumsol.arithmetic.balls import SAFE, TINY, Ball
 from enumsol.trusted.at_alpha import VerifiedSelection, solve_selection
 from enumsol.trusted.root_forms import Body, Multipliers, RootForm, less, plus, times
 from enumsol.trusted.selection import PENETRATION, SLIP_BACKWARD, SLIP_FORWARD, Unknowns
@@ -132,7 +132,8 @@ def _multipliers(part: Components, numbers: Weights, root: VerifiedSelection, cr
     lost, cost = np.zeros(len(at.places)), np.zeros(len(at.places))
     for k, n in enumerate(at.normal):
         t = at.tangential[n]
-        lost[t] = numbers.kappa[k] * numbers.off(k, x[n], x[t], w[n], w[t]) * SAFE
+        off = numbers.off(k, x[n], x[t], w[n], w[t])
+        lost[t] = 0.0 if off == 0 else numbers.kappa[k] * off * SAFE + TINY
     nu = np.zeros(p)
     nu[at.normal] = numbers.nu
     price = Ball.exact(numbers.mu) * root.force[:p] + Ball.exact(nu) * root.force[p : 2 * p]

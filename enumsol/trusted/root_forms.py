@@ -99,7 +99,9 @@ class RootForm:
         along, turned = (float(upper_norm(multipliers.lost * _sizes(rows))) for rows in (body.S, body.G.T))
         if table is None or not along <= 0.25 * m / SAFE:
             return None
-        tilt = turned * turned / m * SAFE * SAFE + TINY if np.any(multipliers.lost * _sizes(body.G.T) > 0) else 0.0
+        # products may underflow
+        tilted = np.any((multipliers.lost > 0) & (_sizes(body.G.T) > 0))
+        tilt = turned * turned / m * SAFE * SAFE + TINY if tilted else 0.0
         return cls(body, 0.5 * m / SAFE, tilt, table, ~_used(C), multipliers.cost)
 
     def is_only_root(self, equations: Ball, tight: Ball, products: Sequence[Product], reach: Floats) -> bool:
@@ -116,8 +118,8 @@ class RootForm:
         """
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             r, M = len(self.idle), self.small_matrix(equations, tight, products)
-            moved = Ball.joined(equations, tight) @ self.body.G.T if len(M.mid) else equations
-            idle = self.idle & ~_used(moved.T) if len(moved.mid) else self.idle
+            moved = ~_zero(Ball.joined(equations, tight)) @ ~_zero(self.body.G).T
+            idle = self.idle & ~np.any(moved, axis=0)
             used = np.flatnonzero(np.append(~idle, np.ones(len(M.mid) - r, dtype=bool)))
             lacking = _lacks(M[np.ix_(used, used)])
             if lacking + self.tilt < 0 and not np.any(idle):
@@ -142,7 +144,9 @@ class RootForm:
             # u = -rows S
             crossed = rows @ self.table[:m, m:] * Ball.exact(np.array(-0.5))
             T = Ball.beside(crossed - rows @ self.body.G.T, Ball.exact(np.eye(len(rows.mid))[:, k:]))
-            Y = Ball.exact(np.linalg.pinv(K.mid, hermitian=True, rcond=_LACKING) @ T.mid)
+            # any Y is a choice; with what is not finite M proves nothing
+            inverse = np.linalg.pinv(np.where(np.isfinite(K.mid), K.mid, 0.0), hermitian=True, rcond=_LACKING)
+            Y = Ball.exact(inverse @ T.mid)
             once = Y.T @ T
             M = M + once + once.T - Y.T @ (K @ Y)
         return M.symmetric
