@@ -93,7 +93,7 @@ OTHERS = {
     "iteration": (lambda: enumsol.successive_approximations(TRIANGLE, 5, 10), lambda found: found.iterations),
     "basins": (lambda: enumsol.basin_table(TRIANGLE, ROOTS, [[0.0], [10.0]]), len),
     "map": (
-        lambda: enumsol.multiplicity_map(TRIANGLE, (0, 1), {"gap": [0, 0.1]}, max_boxes=0),
+        lambda: enumsol.multiplicity_map(TRIANGLE, (0, 1), {"gap": [0, 0.1]}),
         lambda found: len(found.rows),
     ),
 }
