@@ -117,6 +117,4 @@ Cross-checks
     - Complete, and another sum or an even number of regular roots: a contradiction, unless nothing holds the body
       (theory, section 14.2). Either the program or the machine
       is wrong; please report it with the problem and the proof.
-
-How far the data may change before the list of roots does: ``checker.stability.stability_radius``.
 """
