@@ -58,7 +58,6 @@ from .errors import (
 from .fixed_points import (
     FixedPoint as FixedPoint,
     TrescaSolution as TrescaSolution,
-    basin_table as basin_table,
     is_fixed_point as is_fixed_point,
     lipschitz_estimate as lipschitz_estimate,
     solve_tresca as solve_tresca,

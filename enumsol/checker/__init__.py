@@ -43,7 +43,7 @@ What checker and search share
       ``trusted.arcs.taylor`` and ``trusted.arcs.many_digits``, the same with many digits, loaded only where a box asks
       for it;
       ``trusted.arcs.only_branch``, the test by which the roots of arcs are the only solutions over a piece, with the
-      form of ``trusted.over_interval`` (on maps, of which no proof is written, ``trusted.data_box`` has it, too);
+      form of ``trusted.over_interval``;
     - for problems in 3D, and loaded for their proofs only: ``trusted.space.sector_rows``, the rows and branchings
       and the exclusion inequality; ``trusted.space.slip_forms``, forms other than the energy;
       ``trusted.space.leaves`` and ``trusted.space.turning``, what a complete assignment holds and which leaves
@@ -119,6 +119,4 @@ Cross-checks
     - Complete, and another sum or an even number of regular roots: a contradiction, unless nothing holds the body
       (theory, section 14.2). Either the program or the machine
       is wrong; please report it with the problem and the proof.
-
-How far the data may change before the list of roots does: ``checker.stability.stability_radius``.
 """

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 def closed_by_balls(system: EnclosedSystem, said: Closed, force: Floats) -> tuple[str | None, ClosedSolution | None]:
     """Why a record proves nothing, or None; and the root that it proves, if it claims one."""
-    ball = _solution(system, said, force)
+    ball = closed_solution(system, said.selection, said.free, said.weights, said.force / force)
     if ball is None:
         return "its reduced problem is not proven to have one solution", None
     if said.enclosure is None:
@@ -42,16 +42,6 @@ def closed_by_balls(system: EnclosedSystem, said: Closed, force: Floats) -> tupl
     inside |= (ball.force.rad == 0) & (mid == 0) & (radius >= 0)
     refusal = said.enclosure.refusal(ball.sign, inside=bool(np.all(inside)))
     return refusal, ball if np.all(inside) else None
-
-
-def one_regular_root(system: EnclosedSystem, said: Closed, force: Floats) -> bool:
-    """True if a record proves that all data in the balls have one root, regular and in its selection."""
-    ball = _solution(system, said, force)
-    return ball is not None and ball.regular is not None
-
-
-def _solution(system: EnclosedSystem, said: Closed, force: Floats) -> ClosedSolution | None:
-    return closed_solution(system, said.selection, said.free, said.weights, said.force / force)
 
 
 def closed_in_rationals(

@@ -45,7 +45,7 @@ _BATCH = 256
 _SUBNORMAL = 2.0**-1070
 
 
-class FormLeaves:
+class _FormLeaves:
     """Forms as they are declared, and leaves that wait to be checked."""
 
     def __init__(self) -> None:
@@ -88,7 +88,7 @@ class Checker(TreeChecker):
     #: Codes of the strict roots of complete selections.
     strict: list[tuple[int, ...]] = field(default_factory=list)
     _waiting: list[tuple[int, tuple[int, ...], Terms]] = field(default_factory=list)
-    _by_forms: FormLeaves = field(default_factory=FormLeaves)
+    _by_forms: _FormLeaves = field(default_factory=_FormLeaves)
 
     # -- header and tree -------------------------------------------------------------------------------------------
 
@@ -154,7 +154,8 @@ class Checker(TreeChecker):
     def _flush(self, *, last: bool) -> None:
         """Check the dual inequalities of the waiting leaves together."""
         if len(self._by_forms) >= (1 if last else _BATCH):
-            self._check_forms(self._by_forms)
+            for number in self._by_forms.failing(self.system):
+                self.fail(f"leaf {number}: its form and multipliers do not exclude it")
             self._by_forms.clear()
         if not self._waiting or (not last and len(self._waiting) < _BATCH):
             return
@@ -166,10 +167,6 @@ class Checker(TreeChecker):
         margins = exclusion_margins(self.system, leaves)
         for number in numbers[~(margins > 0)]:
             self.fail(f"leaf {number}: its multipliers do not exclude it")
-
-    def _check_forms(self, leaves: FormLeaves) -> None:
-        for number in leaves.failing(self.system):
-            self.fail(f"leaf {number}: its form and multipliers do not exclude it")
 
     def _limits(self, codes: Codes, kind: type[Record]) -> records.Limits:
         if not issubclass(kind, records.ClosingRecord):

@@ -222,19 +222,11 @@ class TreeChecker(ABC):
         if kind is None:
             return f"unknown kind of record {quoted(record[0])}"
         try:
-            test = self.tests.get(kind)
-            if test is None:
-                kind.check(record, Limits(codes))
-                return self._untested()
-            return test(codes, kind.read(record, self._limits(codes, kind)))
+            return self.tests[kind](codes, kind.read(record, self._limits(codes, kind)))
         except RecordError as error:
             return str(error)
         except ValueError as error:
             return f"its record cannot be followed ({error})"
-
-    def _untested(self) -> str:
-        """Text about a leaf for whose kind there is no test."""
-        raise NotImplementedError
 
     @cached_property
     def tests(self) -> dict[type[Record], Test]:

@@ -1,8 +1,8 @@
 """Coulomb friction as a fixed point of Tresca problems, in 2D and 3D (theory, section 11; paper, Sections 2 and 3)."""
 
-from enumsol.fixed_points.basins import basin_table, fixed_point_residual, is_fixed_point, plot_basins
 from enumsol.fixed_points.clarabel_solver import TrescaReference
 from enumsol.fixed_points.lipschitz import LipschitzEstimate, lipschitz_estimate
+from enumsol.fixed_points.residual import fixed_point_residual, is_fixed_point
 from enumsol.fixed_points.result import FixedPoint, Outcome
 from enumsol.fixed_points.successive import FixedPointProgress, successive_approximations
 from enumsol.fixed_points.tresca import TrescaSolution, solve_tresca
@@ -17,11 +17,9 @@ __all__ = [
     "TrescaNotSolved",
     "TrescaReference",
     "TrescaSolution",
-    "basin_table",
     "fixed_point_residual",
     "is_fixed_point",
     "lipschitz_estimate",
-    "plot_basins",
     "solve_tresca",
     "successive_approximations",
 ]

@@ -17,7 +17,7 @@ from enumsol.support.plotting import axes_or_none, figure_of, in_units, new_figu
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from enumsol.loading.strips import MapRow, MapStrip
+    from enumsol.loading.map_rows import MapRow
     from enumsol.roots.root import Root
 
 
@@ -196,12 +196,10 @@ _OF_ROOTS: dict[str, Callable[[Root], float]] = {
 
 #: Colours of one solution, two, and so on; the last one is for more.
 _COLOURS = ("#ffffff", "#c9b7dd", "#f2b56b", "#d97b5a", "#c04d6b", "#8a3b82", "#5b3b96", "#333a80", "#1c2c58")
-_UNIQUE, _PROVEN, _PALE, _FOLD = "#2a8a4a", "#b5dcc0", 0.45, "#222222"
+_UNIQUE, _PALE, _FOLD = "#2a8a4a", 0.45, "#222222"
 
 
-def draw_map(
-    name: str, rows: Sequence[MapRow], strips: Sequence[MapStrip], curves: Sequence[Any], title: str, ax: Any
-) -> Any:
+def draw_map(name: str, rows: Sequence[MapRow], curves: Sequence[Any], title: str, ax: Any) -> Any:
     """A figure; see MultiplicityMap.plot."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch, Rectangle
@@ -221,8 +219,6 @@ def draw_map(
             ax.add_patch(Rectangle((a, low), b - a, high - low, facecolor=colour, alpha=_PALE, linewidth=0, zorder=1))
             line = _UNIQUE if count == 1 and row.exact else colour if count > 1 else "#999999"
             ax.plot([a, b], [row.value] * 2, color=line, linewidth=2.2, solid_capstyle="butt", zorder=3)
-    for (a, b), (low, high) in (box for strip in strips for box in strip.boxes):
-        ax.add_patch(Rectangle((a, low), b - a, high - low, facecolor=_PROVEN, linewidth=0, zorder=2))
     for curve in curves:
         places = [(alpha, rows[k].value) for k, alpha in curve]
         ax.plot(*zip(*places, strict=True), "--", color=_FOLD, linewidth=0.9, marker=".", markersize=5, zorder=4)
@@ -237,11 +233,9 @@ def draw_map(
             handles.append(Line2D([], [], color=_UNIQUE, linewidth=2.2, label="one solution, proven at these values"))
         else:
             handles.append(Patch(facecolor=_COLOURS[min(max(count, 1), len(_COLOURS)) - 1], label=words))
-    if any(strip.boxes for strip in strips):
-        handles.append(Patch(facecolor=_PROVEN, label="one solution, proven for all values between"))
     if curves:
         handles.append(Line2D([], [], linestyle="--", color=_FOLD, marker=".", label="folds, linked by statuses"))
-    handles.append(Patch(facecolor="none", label="elsewhere between the values: not proven"))
+    handles.append(Patch(facecolor="none", label="between the values: not proven"))
     ax.legend(handles=handles, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2, frameon=False)
     return figure_of(ax)
 

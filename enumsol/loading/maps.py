@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.branches.construction import branch_graph
 from enumsol.errors import InvalidArgumentError
-from enumsol.loading.strips import MapFold, MapRow, MapStrip, map_strip, ranges_of_one
+from enumsol.loading.map_rows import MapRow, map_row
 from enumsol.model.problem import ContactProblem
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.support import arguments
@@ -49,13 +47,11 @@ def multiplicity_map(
     jobs: int | None = None,
     progress: Callable[[int, int], object] | None = None,
     time_limit: float | None = None,
-    max_boxes: int = 200,
     **options: Any,
 ) -> MultiplicityMap:
     """The number of solutions over alpha and a second parameter: a branch graph at every value of the latter.
 
-    Between two neighbouring values, where both have one solution, it is proven as far as one certificate goes that
-    every problem between them has exactly one, too (theory, section 13.5). Nothing else is known there.
+    The graphs are proven, each at its value. Between two values nothing is known: anything may happen there.
 
     Parameters
     ----------
@@ -76,9 +72,6 @@ def multiplicity_map(
         Called with the numbers of values done and of all.
     time_limit : float, optional
         Stop after this many seconds; what was done by then is kept.
-    max_boxes : int
-        Rectangles of alpha and the second parameter that are tried between two neighbouring values; 0: none, and
-        nothing is proven there. Nor is it with ``make``, in arithmetic "fast", or of a body that nothing holds.
     **options
         Of `branch_graph`: ``arithmetic``, ``max_nodes``.
 
@@ -100,10 +93,10 @@ def multiplicity_map(
     >>> found = enumsol.multiplicity_map(square, (0, 5), {"gap": [0, 0.1]})
     >>> print(found)
     MultiplicityMap over gap, 2 values, alpha in [0, 5]
-         gap  solutions  unique until  to the next value
-           0  1 5 3                 3               36 %
+         gap  solutions  unique until
+           0  1 5 3                 3
          0.1  1 3 5            3.6087
-    complete: yes (proven at these values; says nothing about those between, but for one solution over 36 % of alpha)
+    complete: yes (proven at these values; says nothing about those between)
     """
     interval = arguments.alpha_interval(alphas, "alphas")
     name, make, values = _parameter(problem, over)
@@ -111,10 +104,7 @@ def multiplicity_map(
     arguments.optional_callable(progress, "progress")
     if "interval" in options or "progress" in options:
         raise InvalidArgumentError("interval and progress are not options here; expected those of branch_graph")
-    most = arguments.nonnegative_integer(max_boxes, "max_boxes")
-    if not isinstance(make, _Replaced) or make.problem.modes is not None or options.get("arithmetic") == "fast":
-        most = 0
-    rows = _Rows(name, interval, values, make, options, arguments.optional_seconds(time_limit), most)
+    rows = _Rows(name, interval, values, make, options, arguments.optional_seconds(time_limit))
     with workers_of(executor, jobs) as pool:
         return keeping(
             "multiplicity_map",
@@ -134,22 +124,16 @@ class _Rows:
     make: Callable[[float], ContactProblem]
     options: dict[str, Any]
     seconds: float | None
-    max_boxes: int
     started: float = field(default_factory=time.perf_counter)
     done: dict[int, MapRow] = field(default_factory=dict)
-    strips: list[MapStrip] = field(default_factory=list)
 
     def run(self, executor: Executor | None, progress: Callable[[int, int], object] | None) -> MultiplicityMap:
-        """All rows, then the strips between them."""
+        """The map of all rows, while there is time."""
         with closing(spread(executor, self._row_calls())) as found:
             for place, row in found:
                 self.done[place] = row
                 if progress is not None:
                     progress(len(self.done), len(self.values))
-        rows = sorted(self.done.values(), key=lambda row: row.value)
-        if self.max_boxes and len(rows) == len(self.values):
-            for _, strip in spread(executor, self._strip_calls(rows)):
-                self.strips.append(strip)
         return self.result()
 
     def _row_calls(self) -> Iterator[Call[int]]:
@@ -159,15 +143,6 @@ class _Rows:
                 return
             options = self.options if left is None else {**self.options, "time_limit": max(left, 1e-3)}
             yield place, map_row, (self.make, value, self.interval, options)
-
-    def _strip_calls(self, rows: Sequence[MapRow]) -> Iterator[Call[None]]:
-        """Calls of map_strip, while there is time."""
-        for pair in pairwise(rows):
-            if (left := self._left()) == 0:
-                return
-            values = pair[0].value, pair[1].value
-            least = None if left is None else max(left, 1e-3)
-            yield None, map_strip, (self.make, values, ranges_of_one(pair), self.max_boxes, least)
 
     def _left(self) -> float | None:
         """Seconds, 0 where the time is over; None without a limit."""
@@ -180,44 +155,13 @@ class _Rows:
         missing = f"{why}, {counted(len(left), 'value')} not done" if why is not None else None
         rows = tuple(self.done[k] for k in sorted(self.done))
         ends = float(self.interval[0]), float(self.interval[1])
-        strips = tuple(sorted(self.strips, key=lambda strip: strip.low))
-        return MultiplicityMap(self.name, ends, rows, strips, missing)
-
-
-def map_row(
-    make: Callable[[float], ContactProblem], value: float, interval: tuple[Alpha, Alpha], options: dict[str, Any]
-) -> MapRow:
-    """One row of a map (a module-level function, so that other processes can import it)."""
-    started = time.perf_counter()
-    problem = arguments.instance_of(make(value), ContactProblem, "the problem that over makes")
-    graph = branch_graph(problem, interval, **options)
-    steps, uniqueness = graph.claims.steps(), graph.claims.uniqueness()
-    arcs = {vertex.number: [] for vertex in graph.folds}  # type: dict[int, list[tuple[str, ...]]]
-    for arc in graph.arcs:
-        for end in {arc.tail, arc.head} & arcs.keys():
-            arcs[end].append(tuple(status.value for status in arc.statuses))
-    folds = tuple(MapFold(fold.alpha, tuple(sorted(arcs[fold.number]))) for fold in graph.folds)
-    return MapRow(
-        value=value,
-        alphas=steps.alphas,
-        at_alphas=steps.at,
-        between=steps.between,
-        exact=steps.exact,
-        folds=folds,
-        complete=graph.complete,
-        reasons=tuple(graph.reasons),
-        limit=uniqueness.limit,
-        unique=uniqueness.throughout,
-        seconds=time.perf_counter() - started,
-        within=None if problem.modes is None else problem.rigid_reach,
-    )
+        return MultiplicityMap(self.name, ends, rows, missing)
 
 
 class MultiplicityMap(Immutable):
     """The number of solutions over alpha and a second parameter (made by ``multiplicity_map``).
 
-    What is said of the rows is proven at the values of the second parameter. Between them nothing is known, except that
-    the solution is unique where ``strips`` says so.
+    What is said of the rows is proven at the values of the second parameter; between them nothing is known.
 
     Attributes
     ----------
@@ -227,8 +171,6 @@ class MultiplicityMap(Immutable):
         Of alpha.
     rows : tuple of MapRow
         One for every value, in the order given.
-    strips : tuple of MapStrip
-        Between neighbouring values, ascending: where the solution is proven to be unique there.
     complete : bool
         Every row is proven to be complete, and none is missing.
 
@@ -240,16 +182,9 @@ class MultiplicityMap(Immutable):
     (5, 1, 3)
     """
 
-    def __init__(
-        self,
-        name: str,
-        interval: tuple[float, float],
-        rows: tuple[MapRow, ...],
-        strips: tuple[MapStrip, ...],
-        missing: str | None,
-    ) -> None:
+    def __init__(self, name: str, interval: tuple[float, float], rows: tuple[MapRow, ...], missing: str | None) -> None:
         self.name, self.interval, self.missing = name, interval, missing
-        self.rows, self.strips = Listed(rows, "row"), Listed(strips, "strip")
+        self.rows = Listed(rows, "row")
         self._freeze()
 
     @property
@@ -306,13 +241,10 @@ class MultiplicityMap(Immutable):
     def to_frame(self) -> pd.DataFrame:
         """One row per value and range of alpha with one number of solutions.
 
-        Columns: value; first and last of the range; solutions, exact (or a lower bound); complete (the value's graph);
-        to_next, the share of the range over which the solution is proven to be unique for all values up to the next
-        larger one.
+        Columns: value; first and last of the range; solutions, exact (or a lower bound); complete (the value's graph).
         """
         import pandas as pd
 
-        strips = {strip.low: strip for strip in self.strips}
         return pd.DataFrame(
             [
                 {
@@ -322,20 +254,18 @@ class MultiplicityMap(Immutable):
                     "solutions": count,
                     "exact": row.exact,
                     "complete": row.complete,
-                    "to_next": _share(strips.get(row.value), float(row.alphas[k]), float(row.alphas[k + 1])),
                 }
                 for row in self.rows
                 for k, count in enumerate(row.between)
             ],
-            columns=["value", "first", "last", "solutions", "exact", "complete", "to_next"],
+            columns=["value", "first", "last", "solutions", "exact", "complete"],
         )
 
     def plot(self, *, units: tuple[str, str] | None = None, ax: Any = None, file: str | Path | None = None) -> Any:
         """A figure: alpha across, the second parameter upwards, numbers of solutions by colour, folds as curves.
 
-        What is proven is drawn in full colour: lines at the values, and between them green rectangles, in which the
-        solution is unique. The pale colour elsewhere only fills the space, and dashed curves link folds: that is not
-        proven.
+        What is proven are the lines in full colour, at the values. The pale colour between them only fills the space,
+        and dashed curves link folds: that is not proven.
 
         Parameters
         ----------
@@ -358,13 +288,7 @@ class MultiplicityMap(Immutable):
         from enumsol.loading.figures import draw_map  # matplotlib comes with the first picture
 
         name = in_units(self.name, "length" if self.name == "gap" else None, checked_units(units))
-        return kept(draw_map(name, self.rows, self.strips, self.curves, self.closing_line, ax), file)
-
-    @property
-    def unique_between(self) -> float:
-        """The share of alpha over which the solution is proven to be unique between values, mean of all strips."""
-        shares = [strip.share(*self.interval) for strip in self.strips]
-        return sum(shares) / len(shares) if shares else 0.0
+        return kept(draw_map(name, self.rows, self.curves, self.closing_line, ax), file)
 
     @property
     def closing_line(self) -> str:
@@ -372,10 +296,7 @@ class MultiplicityMap(Immutable):
         if self.missing is not None:
             return f"complete: no ({self.missing})"
         if self.complete:
-            between = "says nothing about those between"
-            if any(strip.unique for strip in self.strips):
-                between += f", but for one solution over {_percent(self.unique_between)} of alpha"
-            return f"complete: yes (proven at these values{self._within()}; {between})"
+            return f"complete: yes (proven at these values{self._within()}; says nothing about those between)"
         number = sum(not row.complete for row in self.rows)
         return f"complete: no (not proven at {number} of {counted(len(self.rows), 'value')}{self._within()})"
 
@@ -393,22 +314,9 @@ class MultiplicityMap(Immutable):
             f"MultiplicityMap over {self.name}, {counted(len(self.rows), 'value')}, alpha in [{low:g}, {high:g}]",
         ]
         width = max([9, *(len(_counts(row)) for row in self.rows)])
-        shares = {strip.low: _percent(strip.share(low, high)) for strip in self.strips}
-        last = "  to the next value" if shares else ""
-        lines.append(f"{self.name:>8}  {'solutions':<{width}}  {'unique until':>12}{last}")
-        for row in self.rows:
-            text = f"{row.value:>8.5g}  {_counts(row):<{width}}  {_limit(row):>12}"
-            lines.append(text + (f"{shares[row.value]:>19}" if row.value in shares else ""))
+        lines.append(f"{self.name:>8}  {'solutions':<{width}}  {'unique until':>12}")
+        lines += [f"{row.value:>8.5g}  {_counts(row):<{width}}  {_limit(row):>12}" for row in self.rows]
         return "\n".join([*lines, self.closing_line])
-
-
-def _share(strip: MapStrip | None, first: float, last: float) -> float:
-    return 0.0 if strip is None else strip.share(first, last)
-
-
-def _percent(share: float) -> str:
-    """Rounded downwards: 100 % is all."""
-    return f"{int(100 * share)} %"
 
 
 def _counts(row: MapRow) -> str:

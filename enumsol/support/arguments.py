@@ -293,11 +293,6 @@ def optional_count(value: Any, name: str) -> int | None:
     return None if value is None else _whole(value, name, lambda k: k >= 1, "a positive integer or None")
 
 
-def nonnegative_integer(value: Any, name: str) -> int:
-    """Value as an int, at least 0."""
-    return _whole(value, name, lambda k: k >= 0, "an integer that is not negative")
-
-
 def row_number(value: Any, name: str, count: int, expected: str = "") -> int:
     """Value as an int in 0 .. count - 1; ``expected`` says in messages what it counts."""
     return _whole(value, name, lambda k: 0 <= k < count, expected or f"a row number below {count}")

@@ -14,7 +14,7 @@ in alpha (see ``trusted.over_interval``). ``trusted.energy_bounds`` has the boun
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple, Self, cast
 
 import numpy as np
@@ -64,10 +64,6 @@ class Leaves:
         rows, values = zip(*terms, strict=True)
         leaf = np.repeat(np.arange(len(rows)), [len(r) for r in rows])
         return cls(np.array(codes, dtype=np.intp), leaf, np.concatenate(rows), np.concatenate(values))
-
-    def times(self, factors: Floats | float) -> Self:
-        """The same with multipliers times a factor, or each assignment's times its own."""
-        return replace(self, values=self.values * (factors[self.leaf] if isinstance(factors, np.ndarray) else factors))
 
 
 def exclusion_margin(

@@ -19,7 +19,7 @@ import numpy as np
 
 import enumsol
 from enumsol import gallery
-from enumsol.fixed_points import plot_basins
+from fixed_points_basins.basins import basin_table, plot_basins
 from shared.figures import panels
 from shared.results import yes
 
@@ -134,7 +134,7 @@ def main(run: Run) -> None:
         roots = enumsol.enumerate_roots(problem, entry.alpha)
         assert roots.complete
         tables = {
-            kind: enumsol.basin_table(problem, roots, starts, anderson=depth)
+            kind: basin_table(problem, roots, starts, anderson=depth)
             for kind, depth in (("plain", 0), ("Anderson", DEPTH))
         }
         basins += [basin_row(name, entry.alpha, kind, table) for kind, table in tables.items()]

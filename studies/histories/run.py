@@ -6,9 +6,7 @@ given in per cent of the largest force, on finer and finer grids of contact node
 is the tangential displacement over that at which everything slips. All histories are enumerated and proven.
 
 Jamming: the wedge of the gallery with friction 1 is pushed in, let go, and pulled in four steps. Maps: the gallery's
-wedge over friction (alpha) and the pull; a clamped block with 64 contact nodes over friction and 20 loads; the wedge
-with a constant pull to the side added, over friction and that. Of each: how much of alpha is proven to have one
-solution between neighbouring values, too.
+wedge over friction (alpha) and the pull; a clamped block with 64 contact nodes over friction and 20 loads.
 
 Cost: the steps of a block that is sheared to and fro, as one history, and by problems built anew from the midpoints of
 the same starts; seconds of one core, measured pair by pair.
@@ -153,10 +151,6 @@ def maps(run: Run) -> None:
     found = enumsol.multiplicity_map(calm, (0, 3), {"load": (wedge.f, values)})
     first = time.process_time() - started
     run.figure("map", found.plot())
-    started = time.process_time()
-    aside = np.where(np.arange(wedge.n) % 2 == 0, np.max(np.abs(wedge.f)), 0.0) / wedge.n
-    sideways = enumsol.multiplicity_map(wedge, (0, 3), {"load": (aside, np.linspace(-1, 1, 2 if run.smoke else 9))})
-    between = time.process_time() - started
     started, p = time.process_time(), 8 if run.smoke else 64
     block = enumsol.gallery.get(f"clamped-block-{p}").build()
     shear = np.where(np.arange(block.n) % 2 == 0, block.f, 0.0)
@@ -169,24 +163,15 @@ def maps(run: Run) -> None:
             "p": size,
             "values": len(result.rows),
             "complete": yes(result.complete),
-            "proven between %": 100 * result.unique_between,
             "CPU seconds": seconds,
-            "of these between %": 100 * _between(result),
         }
         for name, size, result, seconds in (
             ("wedge", wedge.p, found, first),
-            ("wedge pulled aside", wedge.p, sideways, between),
             ("block", p, other, second),
         )
     ]
     several = sum(not row.unique for row in found.rows)
     run.table("maps", rows, f"the wedge has several solutions at {several} of {len(found.rows)} pulls")
-
-
-def _between(found: enumsol.MultiplicityMap) -> float:
-    """The share of the time that strips took."""
-    rows, strips = (sum(part.seconds for part in parts) for parts in (found.rows, found.strips))
-    return float(strips / (rows + strips))
 
 
 def cost(run: Run) -> None:

@@ -14,7 +14,6 @@ from touching import beside_a_loaded_node, row_of_discs, touching_problem
 from trees import above_known_roots, every_subtree
 
 from enumsol import enumerate_roots, verify
-from enumsol.checker.stability import stability_radius
 from enumsol.search import fathoming as closing, solvers
 
 MUTANTS = some(30, of=75)
@@ -206,12 +205,3 @@ def test_a_smaller_core_needs_its_own_proof():
             numbers = mu[part] + [x for row in rows for x in row[part]]
             forged = ["m", records[k][1], records[k][2][part], numbers, *records[k][4:]]
             assert not accepted(problem, replaced(records, k, forged))
-
-
-@pytest.mark.long
-def test_proofs_with_closed_subtrees_have_no_stability_radius():
-    """Unless the whole problem is closed, and its solution regular: that is a root of all data nearby."""
-    for kind in ("m", "M"):
-        for problem, records in cases(kind):
-            alone = kind == "m" and len(records) == 3 and enumerate_roots(problem, 0)[0].regular
-            assert (stability_radius(problem, proof_of(records)) > 0) == alone

@@ -46,7 +46,6 @@ SHARED = {
     "condensation.space_condensed": {"AlphaSpace", "EnclosedSpace", "FloatingPiece", "FloatingSpace", "SpaceSystem"},
     "condensation.unloaded": {"CondensedData", "never_loaded", "vanishing_alpha"},
     "trusted.arcs.only_branch": {"only_roots"},
-    "trusted.data_box": {"DataBox", "Throughout", "only_throughout", "solution_throughout"},
     "trusted.arcs.selection_balls": None,
     "trusted.exclusion": {"Terms", "exclusion_margin"},
     "trusted.floating_bounds": {"is_unbalanced"},

@@ -11,7 +11,6 @@ from space_proofs import RANDOM, Truth, case, mutant, random_problem, values_of,
 
 import enumsol
 from enumsol import Proof, ProofFormatError, enumerate_roots, gallery, verify
-from enumsol.checker.stability import stability_radius
 from enumsol.model.sectors import DEEPEST, SECTORS
 from enumsol.trusted.space.sector_rows import OPEN, STICK
 
@@ -90,7 +89,6 @@ def test_plane_and_space_are_told_apart():
         assert not report.ok
         assert "another problem" in report.failures[0]
     bad_argument(r"problem is a dict; expected a ContactProblem", verify, {}, in_space)
-    bad_argument(r"problem is a ContactProblem3D; expected a ContactProblem", stability_radius, space, in_space)
 
 
 def test_another_problem_and_another_alpha():

@@ -56,17 +56,6 @@ def test_not_converged_is_status_3(capsys):
     assert "not converged within 2 iterations" in out
 
 
-def test_starts_in_2d(capsys, tmp_path):
-    table, picture = tmp_path / "starts.csv", tmp_path / "starts.png"
-    out = printed(capsys, "gallery:one-node-6.1", "--alpha", 5, "--starts", 10, "--csv", table, "--plot", picture)
-    assert "root 1: reached from 0 of 10 starts" in out
-    assert "complete: yes (proven)" in out
-    assert len(pd.read_csv(table)) == 10
-    assert picture.stat().st_size > 1000
-    out = printed(capsys, "gallery:one-node-6.1", "--alpha", 5, "--starts", 5, "--json", "-")
-    assert json.loads(out)["never"] == [1]
-
-
 def test_ctrl_c_prints_the_last_iterate(capsys, monkeypatch):
     monkeypatch.setattr(successive, "solve_scaled", CtrlC(call=3, then=successive.solve_scaled))
     assert "interrupted after 2 iterations" in printed(capsys, "gallery:one-node-3d", "--alpha", 0, status=130)
@@ -79,10 +68,7 @@ def test_ctrl_c_prints_the_last_iterate(capsys, monkeypatch):
         ("gallery:block3d-5 --alpha 1", "did you mean"),
         ("gallery:block3d-4 --alpha -1", "friction F1 at alpha = -1 is -1"),
         ("gallery:block3d-4 --alpha 1 --start -1", "start is -1"),
-        ("gallery:block3d-4 --alpha 1 --starts 5", "is a problem in 3D; expected one in 2D"),
-        ("gallery:one-node-6.1 --alpha 1 --plot p.png", "--plot is given without --starts"),
         ("gallery:one-node-6.1 --alpha 1 --npz -", "--npz is -, but it is a binary file"),
-        ("gallery:one-node-6.1 --alpha 1 --vtu x.vtu --starts 5", "--vtu and --starts are both"),
         ("gallery:one-node-6.1 --alpha 1 --vtu -", "--vtu is -, but it is a binary file"),
         ("gallery:one-node-6.1 --alpha 1 --npz /nowhere/x.npz", "--npz is /nowhere/x.npz"),
         ("gallery:block3d-4 --alpha 1 --vtu x.txt", "--vtu is 'x.txt'; expected a name that ends in .vtu"),
@@ -100,5 +86,3 @@ def test_a_body_that_nothing_holds(capsys, tmp_path):
     assert found["free_motion"] is None
     out = printed(capsys, tmp_path / "slides.npz", status=3)
     assert "the load drives it with 0.825" in " ".join(out.split())
-    status, _, err = run(capsys, tmp_path / "slides.npz", "--starts", 3)
-    assert (status, "has no isolated solution at alpha = 0" in err) == (2, True)

@@ -221,14 +221,6 @@ def test_friction_that_depends_on_the_slip():
     np.testing.assert_allclose(found.coefficients, expected, atol=1e-9)
 
 
-def test_which_starts_reach_the_root():
-    problem = block_on_table(push=0.5)
-    roots = enumsol.enumerate_roots(problem, 0)
-    table = enumsol.basin_table(problem, roots, starts=[[0, 0, 0], [1, 1, 1], [9, 0, 0]])
-    assert table["outcome"].tolist() == ["not feasible", "converged", "converged"]
-    assert table["root"].tolist()[1:] == [0, 0]
-
-
 @pytest.mark.parametrize("push", [0.5, 1.0, 1.1])
 def test_saved_and_loaded(tmp_path, push):
     problem = block_on_table(push=push)

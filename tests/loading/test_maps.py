@@ -5,7 +5,6 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from complete import only_root
 from helpers.floating_bodies import pushed_block
 from helpers.floating_oracle import Oracle
 from interruptions import CtrlC, interrupted
@@ -13,9 +12,7 @@ from refusals import bad_argument, refusal
 
 import enumsol
 from enumsol import MultiplicityMap, enumerate_roots, multiplicity_map
-from enumsol.loading import strips
 from enumsol.loading.maps import _Replaced
-from enumsol.search.data_boxes import Box
 
 SQUARE = enumsol.gallery.two_node_square()
 
@@ -40,62 +37,6 @@ def test_every_value_is_what_enumerate_roots_counts(over_gap):
     assert set(frame["value"]) == {0.0, 0.05, 0.1}
     assert frame["exact"].all()
     assert "says nothing about those between" in repr(over_gap)
-
-
-@pytest.mark.slow
-def test_uniqueness_between_values_is_proven_or_said_not_to_be(over_gap):
-    """Where strips claim it, enumerate_roots finds one root at random values between; folds are not claimed."""
-    rng = np.random.default_rng(0)
-    assert [(strip.low, strip.high) for strip in over_gap.strips] == [(0.0, 0.05), (0.05, 0.1)]
-    for strip, row in zip(over_gap.strips, over_gap.rows, strict=False):
-        assert strip.unique
-        assert strip.tried >= len(strip.boxes) > 0
-        assert strip.unique[-1][1] < row.limit
-        for first, last in strip.unique:
-            for alpha, share in ((first, 0.0), (last, 1.0), *rng.uniform(0, 1, size=(3, 2))):
-                problem = SQUARE.replace(gap=strip.low + share * (strip.high - strip.low))
-                only_root(problem, min(max(alpha, first), last))
-    frame = over_gap.to_frame()
-    assert np.all(frame["to_next"][frame["solutions"] > 1] == 0)
-    assert np.all(frame["to_next"][frame["value"] == 0.1] == 0)
-    assert 0.3 < frame["to_next"].iloc[0] < 1
-    assert "for one solution over 35 % of alpha" in repr(over_gap)
-
-
-@pytest.mark.slow
-def test_a_block_is_unique_between_all_values():
-    block = enumsol.gallery.get("clamped-block-8").build()
-    shear = np.where(np.arange(block.n) % 2 == 0, block.f, 0.0)
-    for over in ({"load": (shear, [0.1, 0.0, 0.2])}, {"gap": [0.0, 1e-4]}):
-        found = multiplicity_map(block, (0.5, 3), over)
-        assert [strip.unique for strip in found.strips] == [((0.5, 3.0),)] * len(found.strips)
-        assert found.unique_between == 1
-        assert "100 %" in repr(found)
-    constant = block.replace(friction=0.5, friction_slope=0, load_slope=shear)
-    by_friction = multiplicity_map(constant, (0.0, 0.25), {"friction": [0.5, 0.55]})
-    assert by_friction.strips[0].unique == ((0.0, 0.25),)
-    assert by_friction.to_frame()["to_next"].tolist() == [1.0, 0.0]
-
-
-@pytest.mark.slow
-def test_strips_are_left_out_on_request_and_where_nothing_can_be_proven(over_gap):
-    over = {"gap": [0.0, 0.05]}
-    none = multiplicity_map(SQUARE, (0, 2), over, max_boxes=0)
-    assert none.strips == ()
-    assert repr(none).endswith("(proven at these values; says nothing about those between)")
-    assert multiplicity_map(SQUARE, (0, 2), over, arithmetic="fast").strips == ()
-    assert multiplicity_map(None, (0, 2), (_with_gap, over["gap"])).strips == ()
-    few = multiplicity_map(SQUARE, (0, 5), over, max_boxes=1)
-    assert (few.strips[0].tried, few.strips[0].unique) == (1, ())
-    message = "max_boxes is -1; expected an integer that is not negative"
-    bad_argument(message, multiplicity_map, SQUARE, (0, 5), over, max_boxes=-1)
-    with ThreadPoolExecutor(2) as pool:
-        spread = multiplicity_map(SQUARE, (0, 5), {"gap": [0.0, 0.05, 0.1]}, executor=pool)
-    assert [strip.boxes for strip in spread.strips] == [strip.boxes for strip in over_gap.strips]
-
-
-def _with_gap(value):
-    return enumsol.ContactProblem(np.eye(2), [[1, 0]], [[0, 1]], [1, 0], value)
 
 
 def test_problems_of_a_map_share_their_factors_and_their_data_are_those_replaced():
@@ -172,11 +113,9 @@ def test_the_picture_has_a_line_for_every_range(over_gap, tmp_path):
     (ax,) = figure.axes
     flat = [line for line in ax.lines if line.get_linestyle() == "-"]
     assert len(flat) == len(over_gap.to_frame())
-    boxes = [patch for patch in ax.patches if patch.get_zorder() == 2]
-    assert len(boxes) == sum(len(strip.boxes) for strip in over_gap.strips)
     labels = [text.get_text() for text in ax.get_legend().get_texts()]
-    assert "one solution, proven for all values between" in labels
-    assert "elsewhere between the values: not proven" in labels
+    assert "one solution, proven at these values" in labels
+    assert "between the values: not proven" in labels
     assert {float(line.get_ydata()[0]) for line in flat} == set(over_gap.values)
     assert len([line for line in ax.lines if line.get_linestyle() == "--"]) == len(over_gap.curves)
 
@@ -197,32 +136,10 @@ def test_parameters_that_cannot_be_used(over, message):
     refusal(kinds, message, multiplicity_map, enumsol.gallery.one_node_triangle(), (1, 5), over)
 
 
-@pytest.mark.parametrize("ends", [(0.1, 0.7), (-1e3, 1.0), (1.0, 1.0 + 1e-9)], ids=str)
-def test_boxes_are_rounded_inward(ends, monkeypatch):
-    """A value at the border of a box, as it is reported, lies in the box that is proven."""
-    boxes = [Box((0.0, 1.0), (k / 64, (k + 1) / 64)) for k in range(64)]
-
-    class Found:
-        found, tried = boxes, 64
-
-        def __init__(self, problems):
-            pass
-
-        def run(self, ranges, most):
-            pass
-
-    monkeypatch.setattr(strips, "BoxSearch", Found)
-    low, high = map(Fraction, ends)
-    for box, (_, values) in zip(boxes, strips.map_strip(str, ends, [], 1, None).boxes, strict=True):
-        shares = [(Fraction(value) - low) / (high - low) for value in values]
-        assert box.shares[0] <= shares[0] < shares[1] <= box.shares[1]
-
-
 def test_a_map_of_a_body_that_nothing_holds_against_rationals():
     problem = pushed_block(1, max_rigid_displacement=4.0)
     found = enumsol.multiplicity_map(problem, (0, 3), {"friction": [0.125, 0.5]})
     assert found.complete
-    assert not found.strips
     for value in found.values:
         for alpha in (0, Fraction(1, 2), 1, 2, 3):
             oracle = Oracle(problem.replace(friction=value), alpha)

@@ -16,7 +16,6 @@ from rational_checker import check_records
 from rational_forms import Data, Forms, _value, exact
 
 from enumsol import enumerate_roots, gallery, verify
-from enumsol.checker.stability import stability_radius
 from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem
 from enumsol.search import form_policy as policy
 from enumsol.search.solvers import Solvers
@@ -318,22 +317,3 @@ def test_workers_make_the_same_proof(monkeypatch):
     assert records_of(one.proof) == records_of(other.proof)
     assert "f" in kinds_of(one.proof)
     assert verify(problem, one.proof).complete
-
-
-@pytest.mark.slow
-def test_the_stability_radius_counts_leaves_with_forms(eager):
-    problem = slipping(2)
-    found = enumerate_roots(problem, 1.0)
-    assert "f" in kinds_of(found.proof)
-    radius = stability_radius(problem, found.proof)
-    assert 0 < radius < 0.5
-    rng = np.random.default_rng(0)
-    S, g = problem.condensed.S, problem.condensed.at(1.0).g
-    for _ in range(20):
-        root = np.sqrt(np.diag(S))
-        change = rng.uniform(-1, 1, size=S.shape)
-        other = S + 0.9 * radius * 0.5 * (change + change.T) * np.outer(root, root)
-        load = g + 0.9 * radius * rng.uniform(-1, 1, size=g.shape) * root * np.max(np.abs(g) / root)
-        F = problem.friction * (1 + 0.9 * radius * rng.uniform(-1, 1, size=problem.p))
-        near = enumerate_roots(from_condensed(other, load, F), 1.0)
-        assert [root.statuses for root in near] == [root.statuses for root in found]

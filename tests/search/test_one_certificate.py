@@ -16,7 +16,6 @@ from touching import problem_of_any_kind, touching_problem
 from trees import above_known_roots, by_the_tree
 
 from enumsol import enumerate_roots, gallery, is_unique, verify
-from enumsol.checker.stability import stability_radius
 from enumsol.model.statuses import UNDECIDED
 from enumsol.search import descent, fathoming as closing, parallel, reduction
 from enumsol.search.definite import Nodes
@@ -219,7 +218,6 @@ def test_blocks_that_are_not_definite_take_one_node(size, traction, alpha, monke
     roots = proven_roots(problem, alpha, max_nodes=1)
     assert roots.by_one_certificate
     assert kinds_of(roots.proof) == ["a"]
-    assert stability_radius(problem, roots.proof) > 0
     if size[0] < 200:
         with by_the_tree():
             tree = enumerate_roots(problem, alpha)

@@ -52,7 +52,6 @@ ROWS = np.eye(3)
 DATA = {"A": np.diag([2.0, 1.0, 1.0]), "Bn": ROWS[:1], "Bt1": ROWS[1:2], "Bt2": ROWS[2:], "f": [1.0, 3.0, 4.0]}
 SOLID = gallery.one_node_3d()
 LIMIT = enumsol.successive_approximations(SOLID, 0)
-TABLE = enumsol.basin_table(PROBLEM, ROOTS, 3)
 BLOCK = gallery.block3d(2, 2, 1, multipliers="elements", ratio=2)
 BOX = fem.box(2, 2, 1, cells="tetrahedra")  # assembled four times as fast as hexahedra
 BODY, BOTTOM = {"points": BOX.points, "cells": BOX.cells, "lame": (1, 1)}, {"contact": "bottom", "clamp": "top"}
@@ -253,13 +252,7 @@ CALLS = [
     ),
     (enumsol.successive_approximations, {"problem": PROBLEM, "alpha": 0}, "start anderson"),
     (enumsol.lipschitz_estimate, {"problem": SOLID, "alpha": 0}, "problem alpha areas lipschitz"),
-    (
-        enumsol.basin_table,
-        {"problem": PROBLEM, "roots": ROOTS, "starts": 2, "max_iterations": 20},
-        "problem roots starts seed anderson tolerance max_iterations distance",
-    ),
     (enumsol.is_fixed_point, {"problem": PROBLEM, "root": ROOTS[0]}, "problem root tolerance"),
-    (fixed_points.plot_basins, {"table": TABLE}, "table ax"),
     (fixed_points.TrescaReference, {"problem": SOLID}, "problem"),
     (
         enumsol.write_vtu,

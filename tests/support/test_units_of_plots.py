@@ -2,21 +2,15 @@
 
 import inspect
 
-import numpy as np
 import pytest
 from parted_meshes import grid
 
 import enumsol
-from enumsol import fem, fixed_points
+from enumsol import fem
 
 UNITS = ("kN", "mm")
 SQUARE = enumsol.gallery.two_node_square()
 SOLID = enumsol.gallery.wedge3d(2, 1, 2)
-
-
-def basins():
-    roots = enumsol.enumerate_roots(SQUARE, 3.5)
-    return fixed_points.basin_table(SQUARE, roots, np.ones((2, 2)))
 
 
 def scene():
@@ -35,7 +29,6 @@ FIGURES = {
     "Root.plot_body": (enumsol.newton(SQUARE, 1).plot_body, "x [mm]"),
     "History.plot": (lambda **o: enumsol.histories(SQUARE, [0, 1]).plot("dissipated", "lambda_n", **o), "[kN mm]"),
     "MultiplicityMap.plot": (lambda **o: enumsol.multiplicity_map(SQUARE, (0, 1), {"gap": [0, 0.1]}).plot(**o), "[mm]"),
-    "plot_basins": (lambda **o: fixed_points.plot_basins(basins(), **o), "[kN]"),
     "Scene.plot": (lambda **o: scene().plot(**o), "x [mm]"),
 }  # fmt: skip
 
@@ -65,7 +58,6 @@ def test_no_figure_is_forgotten():
         made = getattr(enumsol, name)
         if inspect.isclass(made):
             found |= {f"{name}.{part}" for part, _ in inspect.getmembers(made, inspect.isroutine) if part[:4] == "plot"}
-    found |= {name for name in fixed_points.__all__ if name[:4] == "plot"}
     assert found <= FIGURES.keys()
     assert len(found) >= 7
 
