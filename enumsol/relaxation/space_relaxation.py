@@ -119,6 +119,7 @@ class SpaceEngine:
         Number of directions with friction of each node, 0 to 2.
     turning : (p,) array of bool
         Nodes with both.
+    first : nodes of which it is decided before all else whether they are open, in this order
 
     Raises
     ------
@@ -153,6 +154,7 @@ class SpaceEngine:
         self.rows: dict[int, sector_rows.Row] = {}
         self.scale, self._unit = np.ones(self.slots * p), system.row_unit.tolist()
         self.limit = 400 + 20 * len(system.g)
+        self.first: Sequence[int] = ()
         self.full = False
 
     def slot(self, row: sector_rows.Row) -> int | None:
@@ -333,6 +335,9 @@ class SpaceRelaxation:
         Once all statuses are final, slices are cut off the sectors first, and leaves with narrow sectors are tested.
         """
         self.cut = None
+        for node in self._engine.first:
+            if codes[node] == UNDECIDED:
+                return node
         score = self.violations(codes)
         if not {CONTACT, UNDECIDED} & set(codes):
             if self._shaving.leaf_is_due(codes):

@@ -9,7 +9,7 @@ from proof_fuzz import _pick
 from proof_tools import bytes_of, copied, of_kind, proof_of
 from space_judge import Refused, Undecided, judge
 
-from enumsol import ProofFormatError, verify
+from enumsol import NotHeldError, ProofFormatError, verify
 
 
 def _number(rng, records):
@@ -208,7 +208,7 @@ def checked(problem, proof):
     """What the checker says: counts or None, and why not."""
     try:
         report = verify(problem, proof)
-    except ProofFormatError as error:
+    except (ProofFormatError, NotHeldError) as error:
         return None, f"format: {error}"
     return (report if report.ok else None), "; ".join(report.failures)
 

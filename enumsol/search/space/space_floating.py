@@ -75,7 +75,7 @@ class FloatingSpaceSolvers(HeldByNothing, SpaceSolvers):
     def _closer(self, certifier: Certifier) -> SpaceReferenceCloser | None:  # type: ignore[override]
         if self.exclusions is None or not isinstance(certifier, FloatingSpaceCertifier):
             return None
-        return SpaceReferenceCloser(certifier, lambda: self.known_root, self.system.p)
+        return SpaceReferenceCloser(certifier, self._engine, lambda: self.known_root)
 
     def reader(self) -> FloatingReader:
         """Understands the records of an earlier proof."""

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
     from enumsol.condensation.space_condensed import FloatingSpace, SpaceSystem
+    from enumsol.relaxation.space_relaxation import SpaceEngine
     from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.space.leaves import SpaceRoot
     from enumsol.trusted.space.sector_rows import Row
@@ -36,6 +37,8 @@ _NONE, _NOTHING = 1e-9, 1e-8
 _FACTORS = np.geomspace(2.0**-8, 2.0**8, 9)
 #: Assignments that are tried in vain for one more that passes before the next try, and how many pass at most.
 _PATIENCE, _LONGEST = 16, 7
+#: Of rows of size one, what keeps their squares regular.
+_LITTLE = 1e-3
 #: Contact nodes from which a root is sought before the tree; of fewer, assignments that are met before that.
 _MANY, _EASY = 8, 32
 
@@ -63,8 +66,9 @@ class SpaceReferenceCloser:
     Parameters
     ----------
     certifier : Referring
+    engine : SpaceEngine
+        Of the relaxations, which decides first whether some nodes are open.
     root : callable giving the codes of a leaf with a strict root, or None
-    p : number of contact nodes
 
     Attributes
     ----------
@@ -74,10 +78,10 @@ class SpaceReferenceCloser:
     relaxed: object = None
     leads = False
 
-    def __init__(self, certifier: Referring, root: Callable[[], Codes | None], p: int) -> None:
-        self._certifier, self._root = certifier, root
+    def __init__(self, certifier: Referring, engine: SpaceEngine, root: Callable[[], Codes | None]) -> None:
+        self._certifier, self._engine, self._root = certifier, engine, root
         #: Assignments that pass before the first try.
-        self._easy = 0 if p >= _MANY else _EASY
+        self._easy = 0 if engine.system.p >= _MANY else _EASY
         self.known: Codes | None = None
         self.sliding = dict[int, int]()
         self._wait = self._vain = 0
@@ -89,6 +93,7 @@ class SpaceReferenceCloser:
         found = self._certifier.reference(self.known) if self.known else None
         if found is None or not found.is_only_root(self.known, *proposed(found, self.known), found.system.reach):
             return None
+        self._engine.first = _far_apart(found)
         return found
 
     def whole(self) -> list[Any] | None:
@@ -129,6 +134,19 @@ class SpaceReferenceCloser:
         """Nothing that is met makes a search begin again."""
         del nodes
         return False
+
+
+def _far_apart(reference: SpaceReference) -> list[int]:
+    """One contact node more than it takes to hold the body against the foundation, far from each other."""
+    normals = reference.system.rows.G.mid[:, : len(reference.leaf)].T
+    pressed, found = [i for i, code in enumerate(reference.leaf) if code != OPEN], list[int]()
+    M = _LITTLE * np.eye(normals.shape[1])
+    for _ in range(min(int(np.linalg.matrix_rank(normals[pressed])) + 1, len(pressed))):
+        left = [i for i in pressed if i not in found]
+        gain = np.einsum("ij,ij->i", normals[left], np.linalg.solve(M, normals[left].T).T)
+        found.append(left[int(np.argmax(gain))])
+        M += np.outer(normals[found[-1]], normals[found[-1]])
+    return found
 
 
 def proposed(reference: SpaceReference, codes: Codes) -> OnlyRoot:
