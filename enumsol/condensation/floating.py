@@ -92,7 +92,8 @@ def enclosed_over_alpha(problem: Any) -> CondensedEnclosure:
     NotEnclosedError
         See CondensedEnclosure.
     """
-    return replace(problem.on_springs.enclosure, problem=problem)
+    held: CondensedEnclosure = problem.on_springs.enclosure
+    return replace(held, problem=problem)
 
 
 def _product(left: Any, right: Floats) -> Ball:
