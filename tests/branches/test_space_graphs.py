@@ -622,6 +622,7 @@ def test_no_curve_is_followed_from_where_continuation_goes_neither_way(monkeypat
     still = SimpleNamespace(
         lambda_n=np.array([[n]]), lambda_t=t[None, None], alpha=[alpha], status=PathStatus.STALLED, transitions=[]
     )
+    still.rigid_coordinates = None
     monkeypatch.setattr(chains, "_path", lambda *_: still)
     given = AlphaProblem.of(node.problem.enclosure)
     assert chain_through(given, node.problem, np.array([n, *t, alpha]), around(alpha, 1)) is None

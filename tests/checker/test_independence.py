@@ -43,7 +43,7 @@ SHARED = {
     "condensation.enclosure": {"CondensedEnclosure", "EnclosedSystem", "NotEnclosedError"},
     "condensation.free_displacements": {"solved"},
     "condensation.floating": {"FloatingSystem", "RigidRows"},
-    "condensation.space_condensed": {"AlphaSpace", "EnclosedSpace", "FloatingSpace", "SpaceSystem"},
+    "condensation.space_condensed": {"AlphaSpace", "EnclosedSpace", "FloatingPiece", "FloatingSpace", "SpaceSystem"},
     "condensation.unloaded": {"CondensedData", "never_loaded", "vanishing_alpha"},
     "trusted.arcs.only_branch": {"only_roots"},
     "trusted.data_box": {"DataBox", "Throughout", "only_throughout", "solution_throughout"},
