@@ -42,7 +42,7 @@ SHARED = {
     "condensation.data": {"Data", "EXACT_DOF_LIMIT", "ProblemData", "exactly_at"},
     "condensation.enclosure": {"CondensedEnclosure", "EnclosedSystem", "NotEnclosedError"},
     "condensation.free_displacements": {"solved"},
-    "condensation.floating": {"FloatingSystem", "RigidRows", "moved_by_modes"},
+    "condensation.floating": {"FloatingSystem", "RigidRows", "enclosed_over_alpha", "moved_by_modes"},
     "condensation.space_condensed": {"AlphaSpace", "EnclosedSpace", "FloatingPiece", "FloatingSpace", "SpaceSystem"},
     "condensation.unloaded": {"CondensedData", "never_loaded", "vanishing_alpha"},
     "trusted.arcs.only_branch": {"only_roots"},

@@ -135,3 +135,40 @@ def newton_solutions(problem, starts, seed):
             )
             x = x + size * step
     return [(x[:n], x[n:].reshape(p, 3)[:, 0], x[n:].reshape(p, 3)[:, 1:], B @ x[:n] - offset) for x in found]
+
+
+def over_alpha(seed, size=0.3, **options):
+    """Such a body whose load varies with alpha; that solution is one at alpha = 0."""
+    problem = known_body(seed, **options).problem
+    return problem.replace(load_slope=size * np.random.default_rng(seed + 10**6).normal(size=problem.n))
+
+
+def plane_over_alpha(seed, **options):
+    """A body in the plane that nothing holds, over alpha."""
+    given = over_alpha(seed, plane=True, **options)
+    data = {"gap": given.gap, "slip_offset": given.slip_offset[:, 0], "load_slope": given.load_slope}
+    modes = {"rigid_modes": given.rigid_modes, "max_rigid_displacement": given.max_rigid_displacement}
+    return enumsol.ContactProblem(
+        given.A, given.Bn, given.Bt1, given.f, friction=np.array(given.friction)[0], **data, **modes
+    )
+
+
+def floating_in_space(problem):
+    """Such a problem written in 3D: every node has a second tangent with a stiffness of its own, without load."""
+    p, n, r = problem.p, problem.n, problem.modes.r
+    F, _ = problem.affine_friction
+    more, none = sp.csc_array((p, p)), np.zeros(p)
+    A = sp.block_diag([problem.A, sp.eye_array(p)])
+    rows = [sp.hstack([part, more]) for part in (problem.Bn, problem.Bt)]
+    data = {"gap": problem.gap, "slip_offset": np.column_stack([problem.slip_offset, none])}
+    return enumsol.ContactProblem3D(
+        sp.csc_array(A),
+        *(sp.csc_array(part) for part in rows),
+        sp.csc_array(sp.hstack([sp.csc_array((p, n)), sp.eye_array(p)])),
+        np.append(problem.f, none),
+        friction=(F, F),
+        load_slope=np.append(problem.load_slope, none),
+        rigid_modes=np.vstack([problem.rigid_modes, np.zeros((p, r))]),
+        max_rigid_displacement=problem.max_rigid_displacement,
+        **data,
+    )

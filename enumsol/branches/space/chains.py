@@ -54,7 +54,7 @@ _LEAST_STEP = 1e-8
 _TRIMMED = 4
 #: How far a skeleton is prolonged beyond the interval, or beyond the bounds of the rigid displacement, relative to its
 #: last step.
-_BEYOND = {PathStatus.INTERVAL_LEFT: 0.05, PathStatus.RIGID_BOUND: 2.0**-10}
+_BEYOND, _BEYOND_REACH = 0.05, 2.0**-10
 #: How near to a bound of the rigid displacement the joints beside it are put at best, relative to the way between two
 #: joints; by what factor farther others are, and how many.
 _CLOSE, _FARTHER, _TRIALS = 2.0**-36, 16.0, 6
@@ -139,8 +139,8 @@ def skeleton_through(problem: ContactProblem3D, x: Array, span: tuple[float, flo
     if closed:
         return Skeleton(lines[0], corners[0], closed=True)
     for k, (line, path) in enumerate(zip(lines, paths, strict=True)):
-        beyond = _BEYOND.get(PathStatus(path.status))
-        if beyond is not None:
+        if path.status in (PathStatus.INTERVAL_LEFT, PathStatus.RIGID_BOUND):
+            beyond = _BEYOND if path.status == PathStatus.INTERVAL_LEFT else _BEYOND_REACH
             lines[k] = np.vstack([line, line[-1] + beyond * (line[-1] - line[-2])])
     back, last = lines[0][::-1], len(lines[0]) - 1
     places = {last - k for k in corners[0]} | {last + k for k in corners[1]}
