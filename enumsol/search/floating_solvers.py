@@ -219,19 +219,24 @@ class Exclusions:
         only the bound excludes is split, down to complete selections, unless ``within``: the bound is known to be
         needed (theory, section 14.4).
         """
-        rows, values = bound.multipliers()
-        usable = bound.form is None and len(rows)
-        if usable:
-            rows, values = in_balance(self.system, codes, rows, values)
-        if usable and (kept := proven(self._margins[0], codes, rows, values)) is not None:
-            return records.Excluded(Terms(rows, kept)), False
+        tried = list[Terms]()
+        if bound.form is None and len(bound.multipliers()[0]):
+            # as given first: those of an earlier proof stay as they are
+            tried = [Terms(*bound.multipliers())]
+            tried.append(Terms(*in_balance(self.system, codes, *tried[0])))
+        if (found := self._excluded(0, codes, tried)) is not None:
+            return found, False
         if (unbalanced := self.unbalanced(codes)) is not None:
             return unbalanced, False
-        kept = proven(self._margins[1], codes, rows, values) if usable else None
-        within = within or self._within
-        if kept is None or not (within or (all(code in CONDITIONS for code in codes) and self.rests_on_reach(codes))):
+        found, within = self._excluded(1, codes, tried), within or self._within
+        if found is None or not (within or (all(code in CONDITIONS for code in codes) and self.rests_on_reach(codes))):
             return None
-        return records.Excluded(Terms(rows, kept)), True
+        return found, True
+
+    def _excluded(self, margin: int, codes: Codes, tried: list[Terms]) -> records.Excluded | None:
+        """The first multipliers that prove something, with bounds beyond which there are no solutions, or its own."""
+        kept = ((terms, proven(self._margins[margin], codes, *terms)) for terms in tried)
+        return next((records.Excluded(Terms(terms.rows, values)) for terms, values in kept if values is not None), None)
 
     def reference(self, selection: Codes) -> Reference | None:
         """The form of a root, if one is proven definite."""

@@ -1,4 +1,4 @@
-"""Graphs in 3D of bodies that nothing holds (theory, section 14.11)."""
+"""Graphs in 3D of bodies that nothing holds (theory, section 14.14)."""
 
 from concurrent.futures import ThreadPoolExecutor
 from fractions import Fraction

@@ -1,0 +1,47 @@
+"""Relaxations of bodies that nothing holds: multipliers in balance with the load, and slender bodies."""
+
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+from floating_oracle import block_on_table
+
+import enumsol
+from enumsol.model.statuses import UNDECIDED
+from enumsol.search.balance import in_balance
+from enumsol.search.floating_solvers import FloatingSolvers
+from enumsol.trusted.status_rows import FORBIDDEN, NONNEGATIVE, row_signs
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "studies"))
+from contact_alone.bodies import pin, telescope
+
+
+def test_multipliers_are_brought_into_balance_with_signs_that_are_allowed():
+    system = FloatingSolvers(block_on_table(4, push=0.5), Fraction(0), "verified", 1e-9).exclusions.system
+    codes, p = (1, 1, UNDECIDED, 2, UNDECIDED), 5
+    given = np.array([4 * p, 4 * p + 2, 5 * p + 1, 4 * p + 4])
+    rows, values = in_balance(system, codes, given, np.array([1.0, 1.0, 1.0, 1.0]))
+    kind, node = np.divmod(rows, p)
+    y = np.zeros(2 * p)
+    np.add.at(y, np.where(kind == 4, node, p + node), np.where(kind == 5, -values, values))
+    assert np.allclose(system.rows.G.mid @ y, system.rows.h.mid, rtol=0, atol=1e-12)
+    signs = row_signs(np.array(codes), system.F)[node, kind]
+    assert np.all(signs != FORBIDDEN)
+    assert np.all(values[signs == NONNEGATIVE] >= 0)
+
+
+def test_a_telescope_is_searched_without_the_slower_solver():
+    problem = telescope(12)
+    roots = enumsol.enumerate_roots(problem, 0, max_nodes=500)
+    assert len(roots) == 1
+    assert roots.stats.fallback_qps == 0
+    assert roots.complete
+    assert enumsol.verify(problem, roots.proof).complete
+
+
+def test_a_pin_that_nothing_but_contact_holds_has_one_solution():
+    problem = pin(24, 0.5, half=False)
+    roots = enumsol.enumerate_roots(problem, 0, max_nodes=600)
+    assert len(roots) == 1
+    assert roots.complete
