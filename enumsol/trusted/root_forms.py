@@ -1,4 +1,4 @@
-"""The form of a root, factorized once, and the small matrices that show where the root is the only one (theory, 14.11).
+"""The form of a root, factorized once, and small matrices that show where it is the only one (theory, section 14.11).
 
 Of a body that nothing holds, in 2D and 3D. What belongs to one dimension, the multipliers and the rows that an
 assignment imposes, is in ``trusted.reference`` and ``trusted.space.space_reference``.

@@ -96,7 +96,7 @@ class _StartedLeaf(Leaf):
     """A leaf for all slip offsets in a ball."""
 
     def moved(self, root: SpaceRoot, middle: Leaf, beside: Leaf, spread: Floats) -> Ball | None:
-        """w of ``beside`` at the root, for every offset that is in the ball (theory, (13.2b)); None if it is not known.
+        """w of ``beside`` at the root, for every offset in the ball (theory, section 13.2); None if it is not known.
 
         Parameters
         ----------
