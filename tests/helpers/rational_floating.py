@@ -9,6 +9,7 @@ from math import inf, log2, nextafter
 import numpy as np
 from flint import fmpq, fmpq_mat
 from rational_forms import Data, Forms, column_of, exact, matrix_of, need
+from scipy.optimize import nnls
 
 
 class FloatingData(Data):
@@ -36,9 +37,33 @@ class FloatingData(Data):
             A[i, i] += diagonal[i] if diagonal[i] > 0 else most or fmpq(1)
         return A
 
+    def unbalanced(self, codes, ends):
+        """[6.6] Whether one z shows that no forces of a selection are in balance with the load between two alphas."""
+        sides = {1: (1, -1), 2: (1,), 3: (-1,), 4: (0,)}
+        loads, rays = [], []
+        for alpha in ends:
+            loads.append([a + alpha * b for a, b in zip(self.h0, self.h1, strict=True)])
+            F = self.friction(alpha)
+            for i, code in enumerate(codes):
+                found = sides.get(code, ())
+                rays += [[row[i] + side * F[i] * row[self.p + i] for row in self.G] for side in found]
+        z = _apart([sum(pair) for pair in zip(*loads, strict=True)], rays)
+        return all(_dot(z, h) > 0 for h in loads) and all(_dot(z, ray) <= 0 for ray in rays)
+
     def forms(self, alpha):
         h = [a + alpha * b for a, b in zip(self.h0, self.h1, strict=True)]
         return FloatingForms(self.S, self.load(alpha), self.friction(alpha), self.G, h, self.reach)
+
+
+def _apart(load, rays):
+    """What is left of a load without forces in a cone, that of the rays made a little wider; nothing rests on it."""
+    h = np.array([float(Fraction(int(x.p), int(x.q))) for x in load])
+    columns = [np.array([float(Fraction(int(x.p), int(x.q))) for x in ray]) for ray in rays if any(ray)]
+    if columns:
+        around = 1e-6 * np.vstack([np.eye(len(h)), -np.eye(len(h))])
+        wide = np.vstack([column / np.linalg.norm(column) + around for column in columns]).T
+        h = h - wide @ nnls(wide, h)[0]
+    return [exact(value) for value in h.tolist()]
 
 
 def _pivots(modes):
@@ -75,12 +100,15 @@ class FloatingForms(Forms):
         return super().equations(codes) + [self.move(-1, 2 * self.p + j) for j in range(len(self.h))]
 
     def conditions(self, codes):
-        found = super().conditions(codes)
-        for j, most in enumerate(self.reach, start=2 * self.p):
-            for side in (-1, 1):
-                bound = [fmpq(0)] * len(self.rows) + [most]
-                bound[j] = fmpq(side)
-                found.append(bound)
+        return super().conditions(codes) + self.bounds()
+
+    def bounds(self):
+        """[6.6] rho - q of all modes, then rho + q."""
+        found = []
+        for side in (1, -1):
+            for j, most in enumerate(self.reach, start=2 * self.p):
+                found.append([fmpq(0)] * len(self.rows) + [most])
+                found[-1][j] = fmpq(side)
         return found
 
     def excludes(self, terms):
