@@ -4,12 +4,12 @@ Nothing of enumsol is imported. Points are (lambda, -q). Numbers in brackets are
 """
 
 from fractions import Fraction
+from itertools import combinations
 from math import inf, log2, nextafter
 
 import numpy as np
 from flint import fmpq, fmpq_mat
 from rational_forms import Data, Forms, column_of, exact, matrix_of, need
-from scipy.optimize import nnls
 
 
 class FloatingData(Data):
@@ -47,23 +47,25 @@ class FloatingData(Data):
             for i, code in enumerate(codes):
                 found = sides.get(code, ())
                 rays += [[row[i] + side * F[i] * row[self.p + i] for row in self.G] for side in found]
-        z = _apart([sum(pair) for pair in zip(*loads, strict=True)], rays)
-        return all(_dot(z, h) > 0 for h in loads) and all(_dot(z, ray) <= 0 for ray in rays)
+        found = _rests([sum(pair) for pair in zip(*loads, strict=True)], rays)
+        return any(all(_dot(z, h) > 0 for h in loads) and all(_dot(z, ray) <= 0 for ray in rays) for z in found)
 
     def forms(self, alpha):
         h = [a + alpha * b for a, b in zip(self.h0, self.h1, strict=True)]
         return FloatingForms(self.S, self.load(alpha), self.friction(alpha), self.G, h, self.reach)
 
 
-def _apart(load, rays):
-    """What is left of a load without forces in a cone, that of the rays made a little wider; nothing rests on it."""
-    h = np.array([float(Fraction(int(x.p), int(x.q))) for x in load])
-    columns = [np.array([float(Fraction(int(x.p), int(x.q))) for x in ray]) for ray in rays if any(ray)]
-    if columns:
-        around = 1e-6 * np.vstack([np.eye(len(h)), -np.eye(len(h))])
-        wide = np.vstack([column / np.linalg.norm(column) + around for column in columns]).T
-        h = h - wide @ nnls(wide, h)[0]
-    return [exact(value) for value in h.tolist()]
+def _rests(load, rays):
+    """What is left of a load without its projections onto few of the rays; one of these rests is that of the cone."""
+    for size in range(len(load)):
+        for chosen in combinations(rays, size):
+            table = [[_dot(a, b) for b in chosen] for a in chosen]
+            shares = _solution(fmpq_mat(table), [_dot(ray, load) for ray in chosen]) if chosen else []
+            if shares is not None:
+                yield [
+                    h - sum((x * ray[k] for x, ray in zip(shares, chosen, strict=True)), fmpq(0))
+                    for k, h in enumerate(load)
+                ]
 
 
 def _pivots(modes):
