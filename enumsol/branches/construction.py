@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from enumsol.branches.graph import BranchGraph
 from enumsol.branches.graph_data import GraphStats
 from enumsol.branches.ways import Arithmetic, Made, Way, way_of
-from enumsol.condensation.data import EXACT_DOF_LIMIT, exactly_at
-from enumsol.errors import InvalidArgumentError, TooLargeError
+from enumsol.condensation.data import exactly_at
+from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import ContactProblem, check_is_problem
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.support import arguments
@@ -234,12 +234,6 @@ def _check_floating(problem: ContactProblem, arithmetic: Arithmetic) -> None:
     """Refuse what is not there for a body that nothing holds."""
     if arithmetic == "fast":
         raise InvalidArgumentError('arithmetic is "fast" for a body that nothing holds; expected "verified" or "exact"')
-    if problem.n > EXACT_DOF_LIMIT:
-        raise TooLargeError(
-            f"branch_graph follows a body that nothing holds in rationals, up to n = {EXACT_DOF_LIMIT} degrees of "
-            f"freedom, and the problem has n = {problem.n}; expected fewer, or a body held by supports or "
-            f"springs{_AT_SINGLE_ALPHAS}"
-        )
 
 
 def _stage(progress: Callable[[str, float], object] | None, name: str) -> Callable[[float], object] | None:

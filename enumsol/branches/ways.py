@@ -1,7 +1,6 @@
 """The ways in which a graph is worked out: what is searched, what certifies it, and how arcs are followed.
 
-By balls, where the problem can be enclosed; by algebra in rationals, where that is fast or balls leave something open;
-and by algebra for a body that nothing holds.
+By balls, where the problem can be enclosed; by algebra in rationals, where that is fast or balls leave something open.
 """
 
 from __future__ import annotations
@@ -24,8 +23,9 @@ from enumsol.branches.exact.make_elements import make_arcs, make_vertices
 from enumsol.branches.proof_records import write_graph_proof
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.enclosure import NotEnclosedError
-from enumsol.condensation.exact import FAST_EXACT_DOF, ExactCondensed, check_definite
+from enumsol.condensation.exact import FAST_EXACT_DOF, ExactCondensed, check_definite, exact_condensed
 from enumsol.condensation.unloaded import never_loaded, vanishing_alpha
+from enumsol.errors import TooLargeError
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.search.certifiers.interval_certifiers import ExactIntervalCertifier, VerifiedIntervalCertifier
 from enumsol.search.interval.interval_parallel import run_parallel
@@ -109,8 +109,8 @@ class Way:
 
     @property
     def condensed(self) -> CondensedProblem:
-        """Condensed problem that the relaxations of the search are about."""
-        return self.problem.condensed
+        """What the relaxations of the search are about: the body, or that on weak springs (theory, section 14.8)."""
+        return self.problem.condensed if self.problem.modes is None else on_weak_springs(self.problem)
 
     @property
     def origin(self) -> Fraction | None:
@@ -181,7 +181,9 @@ class ByAlgebra(Way):
     def of(cls, problem: ContactProblem, exact: ExactCondensed, arithmetic: Arithmetic) -> ByAlgebra:
         """With the certifier of an arithmetic."""
         certifier: IntervalCertifier = FastIntervalCertifier()
-        if arithmetic == "exact":
+        if problem.modes is not None:
+            certifier = FloatingIntervalCertifier(problem, checkable=arithmetic == "verified")
+        elif arithmetic == "exact":
             certifier = ExactIntervalCertifier(exact)
         elif arithmetic == "verified":
             certifier = VerifiedIntervalCertifier(problem, exact)
@@ -211,20 +213,6 @@ class ByAlgebra(Way):
         return Made(make_vertices(gluing, arcs), arcs, gluing.reasons, stops, self.exact, self.followed)
 
 
-class ForFloating(ByAlgebra):
-    """The same for a body that nothing holds, searched on weak springs (theory, section 14.8)."""
-
-    @classmethod
-    def of(cls, problem: ContactProblem, exact: ExactCondensed, arithmetic: Arithmetic) -> ForFloating:
-        """With the certifier of an arithmetic."""
-        return cls(problem, exact, FloatingIntervalCertifier(problem, checkable=arithmetic == "verified"))
-
-    @property
-    def condensed(self) -> CondensedProblem:
-        """The body on weak springs."""
-        return on_weak_springs(self.problem)
-
-
 class ByBalls(Way):
     """Arcs in ball arithmetic; by algebra where balls leave something open and that does not take too long.
 
@@ -239,7 +227,10 @@ class ByBalls(Way):
         self.problem, self.traced, self.closed = traced.problem, traced, ClosedPieces()
         self._traces: list[Trace] = []
         self._algebra: ByAlgebra | None = None
-        self.certifier = VerifiedIntervalCertifier(traced.problem, None, traced.origin)
+        if self.problem.modes is None:
+            self.certifier = VerifiedIntervalCertifier(traced.problem, None, traced.origin)
+        else:
+            self.certifier = FloatingIntervalCertifier(traced.problem, checkable=True)
 
     @property
     def origin(self) -> Fraction | None:
@@ -248,6 +239,8 @@ class ByBalls(Way):
 
     def close(self, search: IntervalSearch) -> None:
         """Find pieces that need no tree, while there is time."""
+        if self.problem.modes is not None:
+            return
         search.closed = self.closed.pieces
         with suppress(TimeOverError), within(Deadline(search.deadline)):
             self.closed.find(self.traced)
@@ -281,7 +274,7 @@ class ByBalls(Way):
         if (joined.ordered and not joined.open) or stops or large:
             return Made(*make_traced(self.traced, joined), followed.reasons, stops, followed=followed)
         # several conditions vanish at one alpha, or a selection is singular
-        self._algebra = ByAlgebra(problem, ExactCondensed.from_problem(problem), self.certifier, followed)
+        self._algebra = ByAlgebra(problem, exact_condensed(problem), self.certifier, followed)
         return self._algebra.made(search, candidates, tick, limits)
 
 
@@ -290,33 +283,26 @@ def way_of(problem: ContactProblem, interval: tuple[Fraction, Fraction], arithme
 
     Raises
     ------
-    InvalidArgumentError, TooLargeError
-        Nothing holds the body, and there is no such graph of it.
     TooLargeError
-        Exact arithmetic was asked for and the problem is too large for it.
+        Exact arithmetic was asked for, or what nothing holds cannot be enclosed, and the problem is too large for it.
     TimeOverError
         The body is so large that the time was over before it was condensed.
     """
-    if problem.modes is not None:
-        return ForFloating.of(problem, _floating(problem), arithmetic)
-    large = arithmetic == "verified" and problem.n > FAST_EXACT_DOF
-    at_rest = large and never_loaded(problem)
+    held, large = problem.modes is None, arithmetic == "verified" and problem.n > FAST_EXACT_DOF
+    at_rest = large and held and never_loaded(problem)
     if large and not at_rest and (traced := _traced(problem, interval)) is not None:
         return ByBalls(traced)
-    if arithmetic != "exact" and problem.n > (EXACT_DOF_LIMIT if at_rest else FAST_EXACT_DOF):
+    if held and arithmetic != "exact" and problem.n > (EXACT_DOF_LIMIT if at_rest else FAST_EXACT_DOF):
         return ByAlgebra.of(problem, ExactCondensed.from_condensed(problem), arithmetic)
-    exact = ExactCondensed.from_problem(problem)
-    if not problem.condensed.definite:
-        check_definite(exact.S)
-    return ByAlgebra.of(problem, exact, arithmetic)
-
-
-def _floating(problem: ContactProblem) -> ExactCondensed:
-    """The body that nothing holds in rationals; refused if its stiffness on springs is not positive definite."""
-    exact, size = ExactCondensed.floating(problem), 2 * problem.p
+    if large and not held and problem.n > EXACT_DOF_LIMIT:
+        raise TooLargeError(
+            "the stiffness of the body on springs is positive definite only within rounding, and exact algebra takes "
+            f"at most n = {EXACT_DOF_LIMIT} degrees of freedom; the problem has n = {problem.n}"
+        )
+    exact, size = exact_condensed(problem), 2 * problem.p
     if not problem.on_springs.condensed.definite:
         check_definite(fmpq_mat([list(row[:size]) for row in exact.rows[:size]]))
-    return exact
+    return ByAlgebra.of(problem, exact, arithmetic)
 
 
 def _exact_work(problem: ContactProblem, candidates: set[Codes]) -> float:
@@ -348,7 +334,7 @@ def _proof_of_problem(
     followed: Followed | None,
 ) -> Proof | None:
     """The proof for the problem's own data, with the arcs where they can be followed in balls."""
-    if followed is None and problem.modes is None and (traced := _traced(problem, interval)) is not None:
+    if followed is None and (traced := _traced(problem, interval)) is not None:
         followed = follow_selections(traced, pieces)
     whole = followed is None or followed.stopped is None
     return write_graph_proof(problem, interval, "problem", pieces, followed if whole else None)

@@ -55,6 +55,11 @@ class ClaimedEvent:
     index: int
     partners: list[ClaimedEvent]
 
+    @property
+    def bound(self) -> bool:
+        """Whether it is the rigid displacement that reaches a bound there."""
+        return self.condition[0] >= len(self.codes)
+
 
 @dataclass(eq=False)
 class ClaimedArc:
@@ -214,7 +219,8 @@ class ArcChecker:
         except ValueError as error:
             raise RefusedError(f"the arcs cannot be read: {error}") from None
         sides = (0,) if self._origin is None else (-1, 1)
-        self._systems = {side: ArcSystem.of(self._enclosure, *units, float(side)) for side in sides}
+        given = self._problem, self._enclosure
+        self._systems = {side: ArcSystem.of(*given, *units, float(side)) for side in sides}
         record, due = next(records, _END), len(self._due)
         while isinstance(record, list):
             tell("selections followed", min(self.traces, due), due)
@@ -234,7 +240,7 @@ class ArcChecker:
             if failure is not None:
                 self._fail(f"the piece from {float(piece.a)} to {float(piece.b)}: {failure}")
         for place, total in self._degrees.items():
-            if not self._count.open and total != 1:
+            if self._problem.modes is None and not self._count.open and total != 1:
                 self._fail(f"the indices at the {place} alpha add up to {total}; expected 1")
         return self._count, record
 
@@ -350,6 +356,8 @@ class ArcChecker:
             by_codes.setdefault((event.codes, event.side, event.condition), []).append(event)
         for event in self._events:
             node, kind = event.condition
+            if event.bound:
+                continue
             for one, other in (*_PAIRS, *((b, a) for a, b in _PAIRS)):
                 if one != (event.codes[node], kind):
                     continue
@@ -364,6 +372,8 @@ class ArcChecker:
                 same = event.rising != partner.rising
                 if event.index != (partner.index if same else -partner.index):
                     self._fail(f"indices do not balance at {float(event.zero[0])}")
+            elif event.bound:
+                continue  # beyond, nothing is asked
             elif event.partners:
                 where = f"selection {_text(event.codes)} at {float(event.zero[0])}"
                 self._fail(f"an event of {where} has {len(event.partners)} partners")

@@ -106,9 +106,6 @@ class GraphChecker:
         Called with the number of leaves checked after every piece.
     """
 
-    #: A proof may hold arcs, and forms.
-    follows_arcs = True
-
     def __init__(
         self, problem: ContactProblem, header: dict[str, Any], progress: Callable[[int], object] | None
     ) -> None:
@@ -168,8 +165,7 @@ class GraphChecker:
             if len(cut):
                 waiting += [((x + y) / 2, y, cut), (x, (x + y) / 2, cut)]
         claim = {"pieces": self.pieces, "leaves": self.leaves, "selections": len(self.selections)}
-        follows = self.follows_arcs and self.data == "problem"
-        if follows and isinstance(record, dict) and "force" in record and "piece" not in record:
+        if self.data == "problem" and isinstance(record, dict) and "force" in record and "piece" not in record:
             origin = self._zero if self._zero is not None and a <= self._zero <= b else None
             checker = ArcChecker(self.problem, self.enclosure, (a, b), origin, self._handed, self._closed, self._fail)
             self.arcs, record = checker.run(record, records)
@@ -185,7 +181,8 @@ class GraphChecker:
     @cached_property
     def enclosure(self) -> CondensedEnclosure:
         """Balls for what is certified; only exclusions need them."""
-        return as_computed(self.problem) if self.data == "condensed" else CondensedEnclosure.from_problem(self.problem)
+        held = self.problem.on_springs
+        return as_computed(self.problem) if self.data == "condensed" else CondensedEnclosure.from_problem(held)
 
     def _vanishing(self) -> Fraction | None:
         """The alpha at which g vanishes, where the interval is cut first."""
@@ -394,8 +391,6 @@ _KINDS = ("x", "s", "c")
 class FloatingGraphChecker(GraphChecker):
     """Checks that every solution within the bound of the rigid displacement lies in one of the surviving selections."""
 
-    follows_arcs = False
-
     @property
     def within(self) -> float | None:
         """Bound of the rigid displacement."""
@@ -408,9 +403,6 @@ class FloatingGraphChecker(GraphChecker):
             raise reading.RefusedError("a proof about S and g as computed, of a body that nothing holds")
         check_bound(self.header, self.problem)
         return interval
-
-    def _vanishing(self) -> None:
-        """Where g vanishes the body may still be moved."""
 
     def _read_leaves(self, piece: Piece, batch: list[list[Any]]) -> None:
         for record in batch:

@@ -45,42 +45,43 @@ class RigidRows:
 
     @classmethod
     def of(cls, problem: Any, alpha: Fraction, force: Floats, length: Floats) -> RigidRows:
-        """Those of a problem at one alpha, enclosed.
+        """Those of a problem at one alpha, enclosed; errors as ``along``."""
+        rows, slope = cls.along(problem, force, length)
+        if slope is None:
+            return rows
+        value, slack = float_at(alpha)
+        with np.errstate(over="ignore", invalid="ignore"):
+            h = rows.h + Ball(np.array(value), np.array(slack)) * slope
+        if not h.finite:
+            raise NotEnclosedError(_OVERFLOW)
+        return replace(rows, h=h)
+
+    @classmethod
+    def along(cls, problem: Any, force: Floats, length: Floats) -> tuple[RigidRows, Ball | None]:
+        """Those of a problem at alpha = 0, enclosed, and by how much h grows with alpha; None where it does not.
 
         Raises
         ------
         NotEnclosedError
             Something overflows.
         """
-        load = problem.modes.N.T
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             G = moved_by_modes(problem).T
-            h, turn = _product(load, problem.f[:, None])[:, 0], Ball.exact(np.zeros(len(load)))
-            if problem.load_slope is not None:
-                value, slack = float_at(alpha)
-                turn = _product(load, problem.load_slope[:, None])[:, 0]
-                h = h + Ball(np.array(value), np.array(slack)) * turn
             # the rows of G near one
             size = np.max(np.abs(G.mid) / length, axis=1)
             unit = np.exp2(-np.round(np.log2(np.where(size > 0, size, 1.0))))
             pair = unit[:, None] / length
             rows = Ball(G.mid * pair, np.where(G.rad > 0, G.rad * pair + TINY, 0.0))
             work = float(force[0] * length[0])
-            loads, slopes = (
-                Ball(part.mid * unit / work, np.where(part.rad > 0, part.rad * unit / work + TINY, 0.0))
-                for part in (h, turn)
-            )
+            given = [part for part in (problem.f, problem.load_slope) if part is not None]
+            loads = [_in_units(_product(problem.modes.N.T, part[:, None])[:, 0], unit / work) for part in given]
             most = problem.modes.reach(problem.rigid_reach)
             reach = most / unit
-        if not (
-            rows.finite
-            and loads.finite
-            and slopes.finite
-            and np.all(np.isfinite(reach))
-            and np.all(reach * unit == most)
-        ):
-            raise NotEnclosedError("the rows of the rigid modes overflow float64; expected data in other units")
-        return cls(rows, loads, slopes, unit, reach)
+        finite = rows.finite and all(load.finite for load in loads) and np.all(np.isfinite(reach))
+        if not (finite and np.all(reach * unit == most)):
+            raise NotEnclosedError(_OVERFLOW)
+        slope = loads[1] if len(loads) > 1 else Ball.exact(np.zeros(len(unit)))
+        return cls(rows, loads[0], slope, unit, reach), loads[1] if len(loads) > 1 else None
 
 
 def enclosed_over_alpha(problem: Any) -> CondensedEnclosure:
@@ -98,6 +99,14 @@ def enclosed_over_alpha(problem: Any) -> CondensedEnclosure:
 def moved_by_modes(problem: Any) -> Ball:
     """B N, by what each rigid mode moves the contact nodes, (2p, r) or (3p, r)."""
     return _product(problem.contact_rows, problem.modes.N)
+
+
+_OVERFLOW = "the rows of the rigid modes overflow float64; expected data in other units"
+
+
+def _in_units(value: Ball, unit: Floats) -> Ball:
+    """A ball times powers of two; zeros stay exact."""
+    return Ball(value.mid * unit, np.where(value.rad > 0, value.rad * unit + TINY, 0.0))
 
 
 def _product(left: Any, right: Floats) -> Ball:

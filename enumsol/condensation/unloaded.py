@@ -31,12 +31,18 @@ class CondensedData(ProblemData, Protocol):
         """S, g0 and g1 as computed."""
 
     @property
+    def modes(self) -> Any:
+        """Rigid modes of a body that nothing holds, else None."""
+
+    @property
     def enclosure(self) -> CondensedEnclosure:
         """S, g0 and g1 in balls."""
 
 
 def vanishing_alpha(problem: CondensedData, data: Data) -> Fraction | None:
     """The only alpha at which g vanishes exactly; None when there is none, or when g vanishes for every alpha.
+
+    None of a body that nothing holds: it may still be moved there (theory, section 14.8).
 
     Parameters
     ----------
@@ -54,7 +60,7 @@ def vanishing_alpha(problem: CondensedData, data: Data) -> Fraction | None:
     NotEnclosedError
         "problem": A is singular.
     """
-    if problem.load_slope is None:
+    if problem.load_slope is None or problem.modes is not None:
         return None
     if data == "condensed":
         return _of_floats(problem.condensed.g0, problem.condensed.g1)

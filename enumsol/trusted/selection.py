@@ -17,6 +17,8 @@ from enumsol.support.array_types import Indices, Mask
 from enumsol.trusted.status_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
 NORMAL_FORCE, TANGENTIAL_FORCE, CONE_PLUS, CONE_MINUS, PENETRATION, SLIP_FORWARD, SLIP_BACKWARD = range(7)
+#: rho - q and rho + q, of a coordinate q of the rigid displacement and its bound; 7 and 8 are rows over an interval.
+BOUND_PLUS, BOUND_MINUS = 9, 10
 
 
 class Selection:
@@ -30,7 +32,8 @@ class Selection:
         Complete; of a partial assignment those of the nodes that are fixed, and OPEN at the others.
     modes : int
         Of a body that nothing holds, its rigid modes: as many rows of S, g and lambda follow those of the contact
-        nodes, and are always among the unknowns and the equations (theory, section 14.2).
+        nodes, and are always among the unknowns and the equations (theory, section 14.2). Their bounds are among the
+        conditions.
 
     Attributes
     ----------
@@ -46,13 +49,14 @@ class Selection:
     moving, moving_signs : int arrays
         Rows of w that have to be nonnegative, and the signs by which they are multiplied.
     conditions : tuple of (node, kind)
-        What has to be nonnegative: rows of w, forces lambda_n, then both sides of the cones of sticking nodes.
+        What has to be nonnegative: rows of w, forces lambda_n, then both sides of the cones of sticking nodes, then
+        both bounds of the rigid displacement; for its mode j the node is p + j.
     """
 
     def __init__(self, codes: Sequence[int], modes: int = 0) -> None:
         self.codes = tuple(codes)
         self.p = p = len(self.codes)
-        self.size = 2 * p + modes
+        self.size, self.modes = 2 * p + modes, np.arange(modes)
         opened = [i for i, code in enumerate(self.codes) if code == OPEN]
         closed = [i for i, code in enumerate(self.codes) if code != OPEN]
         stick = [i for i in closed if self.codes[i] == STICK]
@@ -72,6 +76,8 @@ class Selection:
             *((i, NORMAL_FORCE) for i in closed),
             *((i, CONE_PLUS) for i in stick),
             *((i, CONE_MINUS) for i in stick),
+            *((p + j, BOUND_PLUS) for j in range(modes)),
+            *((p + j, BOUND_MINUS) for j in range(modes)),
         )
 
     def columns(self, S: Any, F: Any, unit: Any = 1) -> Any:
@@ -105,8 +111,11 @@ class Selection:
             force[self.p + self.slip] = slipping * (turn if slipping.ndim == 1 else turn[:, None])
         return force
 
-    def inequalities(self, W: Any, g: Any, F: Any, zero: Any = 0.0, unit: Any = 1) -> tuple[Any, Any]:
-        """C and c of the conditions c + C y, in their order, from W = ``columns`` of S and g, all rows."""
+    def inequalities(self, W: Any, g: Any, F: Any, zero: Any = 0.0, unit: Any = 1, reach: Any = ()) -> tuple[Any, Any]:
+        """C and c of the conditions c + C y, in their order, from W = ``columns`` of S and g, all rows.
+
+        ``reach`` are the bounds of the last unknowns, which are q.
+        """
         count, size, closed = len(self.conditions), len(self.unknown), len(self.closed)
         C, c = _filled(W, (count, size), zero), _filled(g, (count,), zero)
         first, stick = len(self.moving), np.arange(len(self.stick))
@@ -118,14 +127,21 @@ class Selection:
         for start, side in ((first + closed, -unit), (first + closed + len(stick), unit)):
             C[start + stick, self.stick_columns] = F[self.stick]
             C[start + stick, closed + stick] = zero + side
+        for j, side in ((self.modes - 2 * len(self.modes), -unit), (self.modes - len(self.modes), unit)):
+            if len(j):
+                C[j, self.modes - len(self.modes)], c[j] = zero + side, _times(reach, unit)
         return C, c
 
-    def slacks(self, y: Any, w: Any, F: Any) -> Any:
-        """Values of the conditions at y and w = g - S E y; also their slopes, but for the change of F."""
+    def slacks(self, y: Any, w: Any, F: Any, reach: Any = None) -> Any:
+        """Values of the conditions at y and w = g - S E y; also their slopes, but for the change of F.
+
+        ``reach`` as of ``inequalities``; None where nothing is bounded.
+        """
         closed = len(self.closed)
         bound, stuck = F[self.stick] * y[self.stick_columns], y[closed : closed + len(self.stick)]
         moves = signed(w[self.moving], self.moving_signs)
-        return _joined(moves, y[: len(self.closed)], bound - stuck, bound + stuck)
+        bounds = () if reach is None else (reach - y[-len(self.modes) :], reach + y[-len(self.modes) :])
+        return _joined(moves, y[: len(self.closed)], bound - stuck, bound + stuck, *bounds)
 
 
 class Unknowns:

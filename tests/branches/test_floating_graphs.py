@@ -7,13 +7,16 @@ import numpy as np
 import pytest
 from alike import assert_same
 from complete import accepted_report, read_back, whole_graph
-from helpers.floating_bodies import held_by_springs, pushed_block
+from helpers.floating_bodies import held_by_springs, pushed_block, violation
 from helpers.floating_oracle import Oracle, block_on_table, random_body
 from helpers.proof_tools import copied, multipliers, of_kind, proof_of, records_of, replaced, with_multipliers
 from rational_checker import check_records
 from rational_forms import Refused
+from two_graphs import differences, two_graphs
 
 import enumsol
+from enumsol import fem
+from enumsol.branches import ways
 
 
 def varying(seed):
@@ -121,6 +124,71 @@ def test_arcs_end_where_the_body_has_moved_as_far_as_was_asked():
     wider = enumsol.branch_graph(problem.replace(max_rigid_displacement=1 / 8), (-0.99, 0))
     assert wider.claims.uniqueness().throughout
     assert not [v for v in wider.vertices if v.kind == "bound"]
+
+
+@pytest.mark.few(2, 2)
+@pytest.mark.parametrize("seed", [17, 31, 8, 14, 47])
+def test_balls_and_exact_algebra_agree_about_random_bodies(seed):
+    graphs = two_graphs(varying(seed), (0, 2))
+    assert differences(graphs) == []
+    assert graphs.exact[1]
+
+
+@pytest.mark.few(2)
+@pytest.mark.parametrize("cells", [2, 3, 1])
+def test_balls_find_where_a_body_has_moved_as_far_as_was_asked(cells):
+    graphs = two_graphs(pushed_block(cells, max_rigid_displacement=1 / 64), (-0.98, 0.98))
+    assert differences(graphs) == []
+    assert graphs.open == []
+    assert sum(v.kind == "bound" for v in graphs.traced[0]) == (cells > 1)
+
+
+def test_balls_alone_make_a_graph_that_loads_again(monkeypatch, tmp_path):
+    problem = pushed_block(2, max_rigid_displacement=1 / 64)
+    monkeypatch.setattr(ways, "FAST_EXACT_DOF", 0)
+    graph = whole_graph(problem, (-0.98, 0.98))
+    assert graph.arcs_by == "balls"
+    (bound,) = (v for v in graph.vertices if v.kind == "bound")
+    assert (bound.bounded, bound.index_left, bound.index_right) == (True, 0, 1)
+    report = accepted_report(problem, graph.proof)
+    assert report.complete
+    assert check_records(problem, records_of(graph.proof)) == report.selections
+    for alpha in (-0.97, -0.9, -0.5, 0, 0.75):
+        oracle = Oracle(problem, Fraction(alpha))
+        assert graph.multiplicity_at(alpha) == len(oracle.points) + oracle.families
+        for arc, row in zip(graph.arcs_at(alpha), oracle.forces[0], strict=True):
+            assert np.allclose(np.concatenate(arc.values(alpha)), row[: 2 * problem.p], rtol=1e-9, atol=1e-12)
+    again = read_back(graph, tmp_path / "graph.json")
+    assert_same(again, graph, "problem.fingerprint", "steps")
+    assert np.array_equal(again.arcs[0].values(again.arcs[0].lo), graph.arcs[0].values(graph.arcs[0].lo))
+
+
+def test_at_the_limit_of_sliding_balls_leave_one_place_open(monkeypatch):
+    monkeypatch.setattr(ways, "FAST_EXACT_DOF", 0)
+    monkeypatch.setattr(ways, "EXACT_DOF_LIMIT", 0)
+    graph = enumsol.branch_graph(pushed_block(1, max_rigid_displacement=4.0), (0.0625, 1.25))
+    assert graph.arcs_by == "balls"
+    assert not graph.complete
+    (place,) = (v for v in graph.vertices if v.kind == "unsettled")
+    assert place.enclosure[0] <= 1 <= place.enclosure[1]
+    assert {graph.at_least(alpha) for alpha in (0.0625, 0.5, 0.9)} == {1}
+    assert graph.at_least(1.125) == 0
+
+
+def test_a_plate_of_more_degrees_of_freedom_than_exact_algebra_takes():
+    plate = fem.rectangle(11, 11).parted()
+    pressure = {"top": 0.5, "left": 1.5}
+    given = {"young": 1000.0, "poisson": 0.2, "contact": "bottom", "symmetry": "right", "pressure": pressure}
+    problem = fem.mesh_problem(plate, **given, friction=0.0, max_rigid_displacement="auto").replace(friction_slope=1.0)
+    assert problem.n > 250
+    graph = whole_graph(problem, (0.2, 0.5))
+    assert [v.kind for v in graph.vertices] == ["end", "transition", "end"]
+    assert enumsol.verify(problem, graph.proof).arcs == 2
+    for alpha in (0.25, 0.45):
+        (root,) = graph.roots_at(alpha)
+        assert violation(problem, alpha, root.u, root.lambda_n, root.lambda_t) < 1e-9
+        (arc,) = graph.arcs_at(alpha)
+        assert np.allclose(arc.values(alpha), (root.lambda_n, root.lambda_t), rtol=1e-9, atol=1e-12)
 
 
 def test_a_body_that_slides_without_friction_is_a_sheet():

@@ -12,6 +12,7 @@ from branches.test_degenerate import pair
 from checker.test_graph_mutants import PATHS
 from complete import accepted_report
 from effort import some
+from graph_proofs import GRAPHS
 from path_problems import generic_problem, one_node, planted_corner, together
 from proof_tools import copied, of_kind, proof_of, records_of, why_refused
 
@@ -23,6 +24,7 @@ ORIGINALS = {
     "loading": PATHS["loading"],
     "unloaded": PATHS["unloaded"],
     "both": PATHS["both"],
+    "held by contact": GRAPHS["held by contact"],
     "many digits": lambda: (together(np.random.default_rng(2), push=1e-13), (0.0, 6.0)),
     "open": lambda: (planted_corner(np.random.default_rng(5), 1, "both"), (0.0, 4.0)),
 }

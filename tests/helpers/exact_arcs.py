@@ -99,13 +99,17 @@ class Truth:
     """Determinant and conditions of a selection, as polynomials and at single alphas."""
 
     def __init__(self, exact, codes):
-        self.exact, self.rows = exact, Selection(codes)
+        self.exact, self.rows = exact, Selection(codes, len(exact.reach))
         functions = SelectionFunctions(exact, codes)
-        self.det = functions.det
+        # of a body that nothing holds the index is that of the columns of q, where exact algebra has those of -q
+        turn = (-1) ** len(exact.reach)
+        self.det = functions.det * turn
         if functions.singular:
             self.conditions = []
             return
-        self.conditions = [functions.row(RowKind(kind), node) for node, kind in self.rows.conditions]
+        own = [functions.row(RowKind(kind), node) for node, kind in self.rows.conditions if node < exact.p]
+        bounds = functions.margins()
+        self.conditions = [row * turn for row in (*own, *bounds[1::2], *bounds[::2])]
 
     @cached_property
     def interesting(self):

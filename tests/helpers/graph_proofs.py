@@ -7,6 +7,7 @@ from unittest import mock
 
 import numpy as np
 from generators import through_the_unloaded_state
+from helpers.floating_bodies import pushed_block
 from proof_tools import of_kind, proof_of, records_of
 from rational_checker import check_records
 from rational_forms import Refused
@@ -40,6 +41,7 @@ GRAPHS = {
     "unloaded": through_the_unloaded_state,
     "frictionless": lambda: (triangle(load_slope=[-1.0, 0.5], friction=0.0), (0.0, 4.0)),
     "everything": lambda: (three_with_everything(), (0.0, 3.0)),
+    "held by contact": lambda: (pushed_block(2, max_rigid_displacement=1 / 64), (-0.98, 0.98)),
 }
 
 

@@ -16,6 +16,8 @@ MOST_SYSTEMS = 2000
 #: Partners at an event: code and kind of row [4.3] of one, of the other.
 PARTNERS = [((0, 4), (2, 0)), ((0, 4), (3, 0)), ((0, 4), (4, 0)), ((1, 2), (2, 5)), ((1, 3), (3, 6))]
 PARTNERS += [(other, one) for one, other in PARTNERS]
+#: Conditions of a body that nothing holds: both bounds of q_j, as those of a node p + j.
+BOUNDS = ("rho - q", "rho + q")
 
 
 def alpha_of(value):
@@ -58,18 +60,24 @@ class Selection:
         groups = [{0: 4}, {2: 5, 3: 6}, dict.fromkeys((1, 2, 3, 4), 0), {1: 2}, {1: 3}]
         #: [6.5, conditions] Kind of row and node, by number.
         self.conditions = [(group[code], i) for group in groups for i, code in enumerate(codes) if code in group]
+        modes = range(self._p, self._p + len(data.reach))
+        self.conditions += [(kind, i) for kind in BOUNDS for i in modes]
+        self._size = 2 * self._p + len(modes)
 
     def _forms(self, alpha):
         data = self._data
-        g = [self.side * value for value in data.g1] if self.side else data.load(alpha)
-        return Forms(data.S, g, data.friction(alpha))
+        if not self.side:
+            return data.forms(alpha)
+        return Forms(data.S, [self.side * value for value in data.g1], data.friction(alpha))
 
     def _equations(self, alpha):
-        return self._forms(alpha).equations(self.codes)
+        """With the sign of the index: that of the determinant with q in place of -q."""
+        first, *rest = self._forms(alpha).equations(self.codes)
+        return [[-value for value in first] if len(self._data.reach) % 2 else first, *rest]
 
     def _given(self, alpha):
         forms = self._forms(alpha)
-        return [forms.row(kind, i) for kind, i in self.conditions]
+        return [forms.row(kind, i) for kind, i in self.conditions if kind not in BOUNDS] + forms.bounds()
 
     def _system(self, left, taken):
         """That of the equations left and the conditions taken; its forms are all equations, then all conditions."""
@@ -83,11 +91,11 @@ class Selection:
 
     @cached_property
     def own(self):
-        return self._system(range(2 * self._p), ())
+        return self._system(range(self._size), ())
 
     @property
     def _values(self):
-        return self.own.values[2 * self._p :]
+        return self.own.values[self._size :]
 
     def _index(self, x, y):
         """The sign of det N in all of [x, y], or 0."""
@@ -114,6 +122,8 @@ class Selection:
 
     def empty(self, x, y):
         """[6.5] A part "n"."""
+        if self._data.reach and self._data.unbalanced(self.codes, (x, y)):
+            return
         if self._index(x, y) and any(one_sign(value, x, y) == -self._index(x, y) for value in self._values):
             return
         determinant, products = self.own.determinant, self.own.products
@@ -134,7 +144,7 @@ class Selection:
         The solutions hold no line: where no condition changes, lambda does not. So if there are any, there is a vertex,
         which is the only solution of some equations and some conditions.
         """
-        size, number = 2 * self._p, len(self.conditions)
+        size, number = self._size, len(self.conditions)
         for extra in range(1, min(size, number) + 1):
             need(comb(size, extra) * comb(number, extra) <= MOST_SYSTEMS, "a singular selection asks for too much")
             regular = False
@@ -151,7 +161,7 @@ class Selection:
         return False
 
     def _solved(self, found, at, orientation):
-        equations, given = found.values[: 2 * self._p], found.values[2 * self._p :]
+        equations, given = found.values[: self._size], found.values[self._size :]
         if any(at.sign_of(value) for value in equations):
             return False
         return all(at.sign_of(value) * orientation >= 0 for value in given)
@@ -254,7 +264,7 @@ class Arcs:
         alone, pairs = self._paired()
         need(left_open or not alone, "an event has no partner")
         border = sum(trace.border for trace in self._traces if trace.side < 1 or self._origin == self._a)
-        need(left_open or border == 1, "indices at the first alpha do not add up to 1")
+        need(left_open or self._data.reach or border == 1, "indices at the first alpha do not add up to 1")
         for piece in self._closed:
             piece.check(self._traces, pairs, self._origin)
         return {"traces": len(self._traces), "arcs": sum(trace.arcs for trace in self._traces)}
@@ -291,7 +301,7 @@ class Arcs:
 
     def _paired(self):
         """[6.5, events] Events without a partner, and pairs."""
-        events = [(trace, *event) for trace in self._traces for event in trace.events]
+        events = [(trace, *event) for trace in self._traces for event in trace.events if event[0][0] not in BOUNDS]
         partners = [[other for other in events if _partners(event, other)] for event in events]
         for event, found in zip(events, partners, strict=True):
             need(len(found) < 2, "an event has two partners")

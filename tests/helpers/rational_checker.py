@@ -459,8 +459,7 @@ class FloatingGraph(Graph):
 
     def run(self, records):
         lists = [record[0] for record in records if isinstance(record, list)]
-        need(set(lists) <= {"x", "s", "c"}, "a record that such a graph cannot have")
-        need("pieces" in records[-1] and not any("traces" in record for record in records), "arcs")
+        need(set(lists) <= {"x", "s", "c", "t", "b"}, "a record that such a graph cannot have")
         return super().run(records)
 
     def forms_of(self, ends, loads, F_hi, F_lo):

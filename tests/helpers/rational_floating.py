@@ -4,6 +4,7 @@ Nothing of enumsol is imported. Points are (lambda, -q). Numbers in brackets are
 """
 
 from fractions import Fraction
+from itertools import combinations
 from math import inf, log2, nextafter
 
 import numpy as np
@@ -36,9 +37,35 @@ class FloatingData(Data):
             A[i, i] += diagonal[i] if diagonal[i] > 0 else most or fmpq(1)
         return A
 
+    def unbalanced(self, codes, ends):
+        """[6.6] Whether one z shows that no forces of a selection are in balance with the load between two alphas."""
+        sides = {1: (1, -1), 2: (1,), 3: (-1,), 4: (0,)}
+        loads, rays = [], []
+        for alpha in ends:
+            loads.append([a + alpha * b for a, b in zip(self.h0, self.h1, strict=True)])
+            F = self.friction(alpha)
+            for i, code in enumerate(codes):
+                found = sides.get(code, ())
+                rays += [[row[i] + side * F[i] * row[self.p + i] for row in self.G] for side in found]
+        found = _rests([sum(pair) for pair in zip(*loads, strict=True)], rays)
+        return any(all(_dot(z, h) > 0 for h in loads) and all(_dot(z, ray) <= 0 for ray in rays) for z in found)
+
     def forms(self, alpha):
         h = [a + alpha * b for a, b in zip(self.h0, self.h1, strict=True)]
         return FloatingForms(self.S, self.load(alpha), self.friction(alpha), self.G, h, self.reach)
+
+
+def _rests(load, rays):
+    """What is left of a load without its projections onto few of the rays; one of these rests is that of the cone."""
+    for size in range(len(load)):
+        for chosen in combinations(rays, size):
+            table = [[_dot(a, b) for b in chosen] for a in chosen]
+            shares = _solution(fmpq_mat(table), [_dot(ray, load) for ray in chosen]) if chosen else []
+            if shares is not None:
+                yield [
+                    h - sum((x * ray[k] for x, ray in zip(shares, chosen, strict=True)), fmpq(0))
+                    for k, h in enumerate(load)
+                ]
 
 
 def _pivots(modes):
@@ -77,12 +104,15 @@ class FloatingForms(Forms):
         return super().equations(codes) + [self.move(-1, 2 * self.p + j) for j in range(len(self.h))]
 
     def conditions(self, codes):
-        found = super().conditions(codes)
-        for j, most in enumerate(self.reach, start=2 * self.p):
-            for side in (-1, 1):
-                bound = [fmpq(0)] * len(self.rows) + [most]
-                bound[j] = fmpq(side)
-                found.append(bound)
+        return super().conditions(codes) + self.bounds()
+
+    def bounds(self):
+        """[6.6] rho - q of all modes, then rho + q."""
+        found = []
+        for side in (1, -1):
+            for j, most in enumerate(self.reach, start=2 * self.p):
+                found.append([fmpq(0)] * len(self.rows) + [most])
+                found[-1][j] = fmpq(side)
         return found
 
     def excludes(self, terms):

@@ -110,6 +110,9 @@ def column_of(values):
 class Data:
     """[3.1] S, g0, g1, F0 and F1 in rationals."""
 
+    #: [5.6] Bounds of q, of a body that nothing holds.
+    reach = ()
+
     def __init__(self, problem):
         self.p = p = problem.p
         A = self.stiffness(problem)
@@ -190,6 +193,11 @@ class Forms:
             slip = {2: -self.F[i], 3: self.F[i]}.get(code, fmpq(0))
             tangential.append(self.move(-1, self.p + i) if code == 1 else self.force(slip, 1, i))
         return normal + tangential
+
+    @staticmethod
+    def bounds():
+        """None of a body that is held."""
+        return []
 
     def conditions(self, codes):
         kinds = {0: (4,), 1: (0, 2, 3), 2: (0, 5), 3: (0, 6), 4: (0,)}

@@ -11,9 +11,8 @@ from enumsol.branches.enclosed.make_traced import make_traced
 from enumsol.branches.exact.gluing import glue
 from enumsol.branches.exact.known_selections import KnownSelections
 from enumsol.branches.exact.make_elements import make_arcs, make_vertices
-from enumsol.condensation.exact import ExactCondensed
-from enumsol.search.certifiers.interval_certifiers import VerifiedIntervalCertifier
-from enumsol.search.interval.subintervals import IntervalSearch
+from enumsol.branches.ways import ByAlgebra
+from enumsol.condensation.exact import exact_condensed
 
 
 @dataclass
@@ -40,10 +39,10 @@ class TwoGraphs:
 def two_graphs(problem, interval):
     """Both graphs from one search."""
     a, b = (Fraction(end) for end in interval)
-    exact = ExactCondensed.from_problem(problem)
+    exact = exact_condensed(problem)
     traced = TracedProblem(problem, (a, b), exact.zero)
-    certifier = VerifiedIntervalCertifier(problem, exact, exact.zero)
-    search = IntervalSearch(problem.condensed, (a, b), exact.zero, certifier)
+    way = ByAlgebra.of(problem, exact, "verified")
+    search = way.search((a, b), None, None, None)
     search.run()
     followed = follow_selections(traced, search.pieces, cut_short=search.stopped is not None)
     gluing = glue(KnownSelections(exact, rational(a), rational(b), cut_short=False), search.selections)

@@ -63,15 +63,16 @@ class TracedProblem:
     def __init__(self, problem: ContactProblem, interval: Bounds, origin: Fraction | None) -> None:
         self.problem, self.interval = problem, interval
         self.origin = origin if origin is not None and interval[0] <= origin <= interval[1] else None
-        scaled = problem.condensed.at(float(sum(interval) / 2)).scaled if self.origin is None else None
+        held = problem.on_springs
+        scaled = held.condensed.at(float(sum(interval) / 2)).scaled if self.origin is None else None
         if scaled is None:
             # the load at the end that is farther away
             far = max(interval, key=lambda end: abs(end - Fraction(self.origin or 0)))
-            scaled = problem.condensed.at(float(far)).scaled
+            scaled = held.condensed.at(float(far)).scaled
         self.units = scaled
         self.force, self.length = scaled.force, scaled.length
         self._systems = {
-            side: ArcSystem.of(problem.enclosure, self.force, self.length, side)
+            side: ArcSystem.of(problem, held.enclosure, self.force, self.length, side)
             for side in ((0.0,) if self.origin is None else (-1.0, 1.0))
         }
         self._selections: dict[tuple[Codes, float], ArcSelection] = {}
@@ -246,14 +247,17 @@ def _undecided(place: EventPlace, problem: ContactProblem) -> str:
     count = len(place.members)
     does = f"{counted(count, 'selection')} {'does' if count == 1 else 'do'}"
     where = f"[{float(place.low):.17g}, {float(place.high):.17g}]"
-    nodes = [problem.node_ids[i] for i in sorted(place.nodes)]
+    nodes = [problem.node_ids[i] for i in sorted(place.nodes) if i < problem.p]
     of = f"of contact nodes {listed(nodes)}" if len(nodes) > 1 else "of several contact nodes"
+    bounded = len(nodes) < len(place.nodes)
+    of = f"{of if nodes else ''}{' and ' if nodes else ''}of the rigid displacement's bounds" if bounded else of
+    one = f"of contact node {listed(nodes)}" if nodes else of
     why = {
         OpenCause.BOXES: "one of them was cut into as many boxes as are tried",
         OpenCause.END: "an end of the interval is too close to tell",
         OpenCause.SINGULAR: "the determinant of one of them may vanish there",
         OpenCause.TOGETHER: f"conditions {of} vanish there, too close together to be told apart",
-        OpenCause.FLAT: f"a condition of contact node {listed(nodes)} may vanish there together with its slope",
+        OpenCause.FLAT: f"a condition {one} may vanish there together with its slope",
         OpenCause.PARTNER: "where one of them ends, the one that goes on was not identified",
     }[place.cause]
     return f"what {does} for alpha in {where} is not decided: {why}"

@@ -39,6 +39,8 @@ class EventPlaceKind(enum.StrEnum):
     ORIGIN = "origin"
     #: A condition vanishes.
     EVENT = "event"
+    #: The rigid displacement reaches a bound.
+    BOUND = "bound"
     #: Not decided.
     OPEN = "open"
 
@@ -251,6 +253,11 @@ class _Joining:
         for codes, events in by_codes.items():
             for event in events:
                 if event.place is not None:
+                    continue
+                if event.condition[0] >= len(codes):
+                    bounds = self._bounds(event, event)
+                    event.place = EventPlace(EventPlaceKind.BOUND, *bounds, [codes])
+                    self._joined.places.append(event.place)
                     continue
                 partners = [
                     other

@@ -102,6 +102,7 @@ def _vertex(traced: TracedProblem, number: int, place: EventPlace, exact: Enclos
         place.members,
         border=place.low == place.high and place.low in traced.interval,
         settled=settled,
+        bounded=place.kind is EventPlaceKind.BOUND,
     )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from enumsol.branches.enclosed.cutting import AlphaBox, ArcPart, ArcPartKind, Cutting, OpenCause, Trace, between
 from enumsol.support.deadlines import TimeOverError, look
-from enumsol.trusted.arcs.over_parts import Expansion, expansions, over_parts
+from enumsol.trusted.arcs.over_parts import Expansion, Nowhere, expansions, over_parts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Sequence
@@ -44,10 +44,15 @@ _SINGULAR = 2.0**-26
 #: Boxes of one selection of which nothing is decided, beyond the number of the others, and these others, after which
 #: what is left stays open.
 _MOST_TRIES, _MOST_BOXES = 200, 900
+#: Boxes of which nothing is decided after which it is looked whether the selection is singular at every alpha, and
+#: singular values beside the largest that count as zero.
+_VAIN_TRIES, _ZERO = 8, 2.0**-44
 #: Boxes shorter than this share of the interval are not cut because of a condition that cannot be told from zero.
 _FLAT_BOX = 2.0**-12
 #: Nor is any, after so many boxes in a row of which nothing else was left open: it vanishes everywhere.
 _LEVEL = 8
+#: Why such boxes stay open: one condition, or several.
+_FLAT_CAUSES = OpenCause.FLAT, OpenCause.TOGETHER
 
 
 def trace(
@@ -92,10 +97,10 @@ def _answer(running: list[Asking]) -> None:
 def _answers(questions: list[Question]) -> list[Any]:
     """Expansions of selections, and what is known of expansions."""
     found: list[Any] = [None] * len(questions)
-    over = [k for k, (of, _, _) in enumerate(questions) if isinstance(of, Expansion)]
+    over = [k for k, (of, _, _) in enumerate(questions) if isinstance(of, Expansion | Nowhere)]
     for k, known in zip(over, over_parts([questions[k] for k in over]), strict=True):
         found[k] = known
-    expand = [k for k, (of, _, _) in enumerate(questions) if not isinstance(of, Expansion)]
+    expand = [k for k, (of, _, _) in enumerate(questions) if not isinstance(of, Expansion | Nowhere)]
     for k, expansion in zip(expand, expansions([questions[k] for k in expand], ERRORS), strict=True):
         found[k] = expansion
     return found
@@ -114,6 +119,8 @@ class _Tracing:
         self._decided, self._too_long = 0.0, np.inf
         #: Boxes in a row that are open because of conditions that cannot be told from zero, and nothing else.
         self._level = 0
+        #: The selection is singular at every alpha, as far as can be seen, and has a continuum or nothing.
+        self._hopeless = False
         self.finished = False
 
     def run(self) -> Asking:
@@ -139,7 +146,9 @@ class _Tracing:
         beside_decided = length <= _GROWTH * self._decided and length < self._too_long
         # halving has as many boxes that were not decided as there are parts in the end
         boxes = len(self._found.boxes)
-        exhausted = self._tries - boxes >= _MOST_TRIES or boxes >= _MOST_BOXES
+        if self._tries == _VAIN_TRIES and not boxes:
+            self._hopeless = _always_singular(self._selection, self._found.low, self._found.high)
+        exhausted = self._hopeless or self._tries - boxes >= _MOST_TRIES or boxes >= _MOST_BOXES
         precise = self._precise() if (short or beside_decided) and not exhausted else None
         smallest = share < _SMALLEST_PRECISE if precise is not None else length <= self._spacing
         whole = exhausted or smallest
@@ -162,11 +171,11 @@ class _Tracing:
             box, rest = tried[0]
             if box.parts:
                 self._found.boxes.append(box)
-                self._level = self._level + 1 if all(part.cause is OpenCause.FLAT for part in box.parts) else 0
+                self._level = self._level + 1 if all(part.cause in _FLAT_CAUSES for part in box.parts) else 0
             return rest
         if whole or tiny:
             everywhere = frozenset(range(len(self._selection.rows.codes)))
-            cause = OpenCause.BOXES if exhausted else OpenCause.SINGULAR
+            cause = OpenCause.BOXES if exhausted and not self._hopeless else OpenCause.SINGULAR
             part = ArcPart(ArcPartKind.OPEN, first, last, doubtful=everywhere, cause=cause)
             fine = not isinstance(first, float) or not isinstance(last, float)
             self._found.boxes.append(AlphaBox(first, last, (part,), fine))
@@ -184,7 +193,7 @@ class _Tracing:
         ).run()
         parts = next(cutting)
         while True:
-            if isinstance(expansion, Expansion):
+            if isinstance(expansion, Expansion | Nowhere):
                 known = yield [(expansion, *part) for part in parts]
             else:
                 known = [expansion.over(*part) for part in parts]
@@ -198,6 +207,20 @@ class _Tracing:
 def _decides(box: AlphaBox, rest: list[Interval]) -> bool:
     """True if nothing stays open."""
     return not rest and all(part.kind is not ArcPartKind.OPEN for part in box.parts)
+
+
+def _always_singular(selection: ArcSelection, low: float, high: float) -> bool:
+    """Whether the rows [M, -g] seem to be dependent at several alphas; no claim rests on it."""
+    size = len(selection.rows.unknown)
+    for share in (0.1, 0.4, 0.8):
+        H = selection.forms[0][:size] + (low + share * (high - low)) * selection.forms[1][:size]
+        for axis in (0, 1, 0, 1):
+            largest = np.max(np.abs(H), axis=axis, keepdims=True, initial=0.0)
+            H = H / np.where(largest > 0, largest, 1.0)
+        values = np.linalg.svd(H, compute_uv=False) if size and np.all(np.isfinite(H)) else np.ones(1)
+        if values[-1] > _ZERO * values[0]:
+            return False
+    return True
 
 
 def _as_float(alpha: Number) -> Number:

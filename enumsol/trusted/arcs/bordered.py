@@ -156,7 +156,10 @@ class BorderedLines:
         nothing = c * 0
         free, turn = y.mapped(C, C1, c, c1), v.mapped(C, C1, nothing, nothing)
         found = free.times(v.entry(size - 1)).minus(turn.times(y.entry(size - 1)))
-        return BorderedExpansion(self, low, high, found, sign_of(B.det()), max(v.shift, y.shift))
+        # all solutions of the equations are x + s v; the last row is that of mu
+        lines = list(zip(free.values.entries(), turn.values.entries(), strict=True))[:-1]
+        nowhere = all(_none_above([(a.upper(), (side * b).upper()) for a, b in lines]) for side in (1, -1))
+        return BorderedExpansion(self, low, high, found, sign_of(B.det()), max(v.shift, y.shift), nowhere=nowhere)
 
 
 class BorderedExpansion:
@@ -176,11 +179,19 @@ class BorderedExpansion:
     rough, final = False, True
 
     def __init__(
-        self, lines: BorderedLines, low: Fraction, high: Fraction, found: Smooth, orientation: int, shift: float
+        self,
+        lines: BorderedLines,
+        low: Fraction,
+        high: Fraction,
+        found: Smooth,
+        orientation: int,
+        shift: float,
+        *,
+        nowhere: bool,
     ) -> None:
         self.low, self.high, self.shift = low, high, shift
         self.apart = (high - low) * Fraction(4, 2**ZERO_BITS)
-        self._lines, self._orientation = lines, orientation
+        self._lines, self._orientation, self._nowhere = lines, orientation, nowhere
         values = found.values
         self._whole, self._rises = signs_of(values), signs_of(found.slopes)
         self._small = [bool(abs(values[k, 0]) < arb(2) ** -ZERO_BITS) for k in range(values.nrows())]
@@ -197,7 +208,7 @@ class BorderedExpansion:
         same = (signs == 0) & (first == last) & ((self._rises != 0) | (low == high))
         signs[same] = first[same]
         # at a root they are mu times numbers that are not negative, or all of them and mu vanish
-        none = bool(np.any(signs < 0) and np.any(signs > 0))
+        none = self._nowhere or bool(np.any(signs < 0) and np.any(signs > 0))
         sign = int(signs[-1])
         signs, first, last, rises = (part[:-1] * (sign or 1) for part in (signs, first, last, self._rises))
         return OverInterval(signs, bool(sign), none, sign * self._orientation, (first, last), rises * abs(sign))
@@ -249,6 +260,14 @@ class BorderedExpansion:
                 if step * step <= unit * (self.high - self.low):
                     break
             return alpha
+
+
+def _none_above(lines: list[tuple[Any, Any]]) -> bool:
+    """Whether a + s b is negative for some of these (a, b), at every s >= 0."""
+    if any(a < 0 and b <= 0 for a, b in lines):
+        return True
+    least = [-a / b for a, b in lines if a < 0]
+    return any(-a / b < s for a, b in lines if a >= 0 and b < 0 for s in least)
 
 
 def _nearest_pole(M: Any, M1: Any) -> tuple[list[float], list[float]] | None:

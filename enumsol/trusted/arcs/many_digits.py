@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -70,6 +71,16 @@ def matrix(rows: list[list[Any]]) -> Any:
 def column(values: Sequence[Any]) -> Any:
     """A matrix with one column."""
     return arb_mat(len(values), 1, list(values))
+
+
+def products(left: Any, right: Floats) -> NDArray[Any]:
+    """The product of two matrices of floats, the first of which may be sparse, in balls."""
+    rows, factors = sp.csr_array(left), np.array([[arb(x) for x in row] for row in right.tolist()], dtype=object)
+    found = np.full((rows.shape[0], right.shape[1]), arb(0), dtype=object)
+    for i, (first, last) in enumerate(pairwise(rows.indptr)):
+        for value, j in zip(rows.data[first:last].tolist(), rows.indices[first:last], strict=True):
+            found[i] = found[i] + arb(value) * factors[j]
+    return found
 
 
 def ball_of(alpha: Fraction) -> Any:

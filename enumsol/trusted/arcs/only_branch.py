@@ -50,7 +50,7 @@ def only_roots(asked: Sequence[Span], numbers: PieceNumbers, errors: float = 1.0
             taken, waiting = waiting[-_TOGETHER:], waiting[:-_TOGETHER]
             known = expansions([span for _, span, _ in taken], errors)
             for expansion, (k, span, halvings) in zip(known, taken, strict=True):
-                along = None if expansion is None else _Along(expansion, numbers)
+                along = _Along(expansion, numbers) if isinstance(expansion, Expansion) else None
                 if not found[k] or (along is not None and along.alone(margin)):
                     continue
                 selection, low, high = span

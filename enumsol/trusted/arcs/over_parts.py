@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -114,6 +114,11 @@ class Expansion:
         """Sign of det N."""
         return determinant_sign(self.series.bordered)
 
+    @cached_property
+    def unbalanced(self) -> bool:
+        """Whether no forces of the selection are in balance with the load anywhere in the interval."""
+        return self.selection.unbalanced(self.low, self.high)
+
     @property
     def rough(self) -> bool:
         """Whether the series was truncated too early for bounds near those of rounding: the interval is long."""
@@ -196,24 +201,52 @@ class Expansion:
         return max(ends[0], -1.0), min(ends[1], 1.0)
 
 
-def expansions(asked: Sequence[tuple[ArcSelection, float, float]], errors: float = 1.0) -> list[Expansion | None]:
-    """The conditions of selections over intervals as polynomials; None where an interval is too long.
+@dataclass(frozen=True)
+class Nowhere:
+    """An interval in which no forces of a selection are in balance with the load (theory, (14.7)).
+
+    Attributes
+    ----------
+    selection : ArcSelection
+    low, high : float
+    """
+
+    selection: ArcSelection
+    low: float
+    high: float
+    final: ClassVar = False
+
+    @property
+    def known(self) -> OverInterval:
+        """What is known of every part of it."""
+        unknown = np.zeros(len(self.selection.rows.conditions), dtype=np.int8)
+        return OverInterval(unknown, False, True, 0, (unknown, unknown), unknown)
+
+
+def expansions(
+    asked: Sequence[tuple[ArcSelection, float, float]], errors: float = 1.0
+) -> list[Expansion | Nowhere | None]:
+    """The conditions of selections over intervals as polynomials, or that there are no forces; None where neither is.
 
     Bounds of errors are multiplied by ``errors``: a search asks for more than its checker, which may round otherwise.
     """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         found = expand(asked, errors)
-    return [None if series is None else Expansion(*what, series) for what, series in zip(asked, found, strict=True)]
+        return [
+            Expansion(*what, series) if series else Nowhere(*what) if what[0].unbalanced(*what[1:]) else None
+            for what, series in zip(asked, found, strict=True)
+        ]
 
 
-def over_parts(asked: Sequence[tuple[Expansion, float, float]]) -> list[OverInterval]:
+def over_parts(asked: Sequence[tuple[Expansion | Nowhere, float, float]]) -> list[OverInterval]:
     """What is known of expansions over parts of their intervals."""
-    found: list[OverInterval | None] = [None] * len(asked)
-    groups: dict[int, list[int]] = {}
-    for k, (expansion, _, _) in enumerate(asked):
-        groups.setdefault(expansion.series.coefficients.shape[1], []).append(k)
+    found = [one.known if isinstance(one, Nowhere) else None for one, _, _ in asked]
+    groups: dict[int, list[tuple[int, tuple[Expansion, float, float]]]] = {}
+    for k, (one, *part) in enumerate(asked):
+        if isinstance(one, Expansion):
+            groups.setdefault(one.series.coefficients.shape[1], []).append((k, (one, part[0], part[1])))
     for group in groups.values():
-        for k, known in zip(group, _over([asked[k] for k in group]), strict=True):
+        for (k, _), known in zip(group, _over([one for _, one in group]), strict=True):
             found[k] = known
     return [known for known in found if known is not None]
 
@@ -248,7 +281,8 @@ def _over(asked: Sequence[tuple[Expansion, float, float]]) -> list[OverInterval]
         # by Cramer's rule t = det M / det N, and N is regular throughout
         index = sign * expansion.orientation if settled[k] and not none[k] else 0
         first, last = (part[k, :count] for part in ends)
-        found.append(OverInterval(known[k, :count], bool(sign), bool(none[k]), index, (first, last), slopes[k, :count]))
+        nowhere = bool(none[k]) or (not sign and expansion.unbalanced)
+        found.append(OverInterval(known[k, :count], bool(sign), nowhere, index, (first, last), slopes[k, :count]))
     return found
 
 

@@ -7,7 +7,7 @@ their slopes are enclosed at once; conditions whose slopes have one sign are kno
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -25,11 +25,13 @@ from enumsol.trusted.arcs.many_digits import (
     fraction_of,
     matrix,
     precision,
+    products,
     refined_table,
     rounded,
     sign_of,
     signs_of,
     upper,
+    uppers,
 )
 from enumsol.trusted.arcs.over_parts import OverInterval
 from enumsol.trusted.arcs.taylor import Smooth, columns_of, joined
@@ -39,6 +41,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.model.problem import ContactProblem
+    from enumsol.model.rigid_modes import RigidModes
     from enumsol.support.array_types import NDArray
 
     Signs = NDArray[np.int8]
@@ -63,6 +66,8 @@ class PreciseSystem:
     S : arb_mat, 2p x 2p
     g0, g1 : lists of 2p arb
     F0, F1 : lists of p arb
+    reach : list of r arb
+        As of ``ArcSystem``, in which S, g0 and g1 have as many rows more.
     """
 
     S: Any
@@ -70,6 +75,7 @@ class PreciseSystem:
     g1: list[Any]
     F0: list[Any]
     F1: list[Any]
+    reach: list[Any] = field(default_factory=list)
 
     @classmethod
     def of(cls, problem: ContactProblem) -> PreciseSystem | None:
@@ -81,7 +87,7 @@ class PreciseSystem:
             The deadline that holds here has passed.
         """
         with precision():
-            table = refined_table(problem)
+            table = refined_table(problem.on_springs)
             if table is None:
                 return None
             size = len(table)
@@ -89,7 +95,30 @@ class PreciseSystem:
             S = matrix([row[:size] for row in table])
             g0 = [row[size] - arb(x) for row, x in zip(table, offset, strict=True)]
             F0, F1 = ([arb(float(x)) for x in part] for part in problem.affine_friction)
-            return cls(S, g0, [row[size + 1] for row in table], F0, F1)
+            held = cls(S, g0, [row[size + 1] for row in table], F0, F1)
+            return held if problem.modes is None else held._bordered(problem, problem.modes)
+
+    def _bordered(self, problem: ContactProblem, modes: RigidModes) -> PreciseSystem:
+        """That of the body that nothing holds, from the one on springs."""
+        N, slope, r = modes.N, problem.load_slope, modes.r
+        G = products(problem.contact_rows, N)
+        loads = [[arb(0)] * r if part is None else products(N.T, part[:, None]).ravel() for part in (problem.f, slope)]
+        # units of q in which the rows of G are as large as S
+        sizes = np.array([[abs(float(x.mid())) for x in row] for row in G])
+        largest = float(np.max(uppers(self.S)))
+        units = [largest / size if size > 0 < largest else 1.0 for size in np.max(sizes, axis=0)]
+        unit = as_objects([arb((1, round(float(np.log2(value))))) for value in units])
+        G = G * unit
+        rows = [[*row, *(-G[i])] for i, row in enumerate(self.S.tolist())]
+        rows += [[*G[:, j], *([arb(0)] * r)] for j in range(r)]
+        (g0, g1), reach = loads, modes.reach(problem.rigid_reach)
+        return replace(
+            self,
+            S=matrix(rows),
+            g0=[*self.g0, *(g0 * unit)],
+            g1=[*self.g1, *(g1 * unit)],
+            reach=[arb(float(most)) / one for most, one in zip(reach, unit, strict=True)],
+        )
 
     @cached_property
     def rows(self) -> NDArray[Any]:
@@ -117,14 +146,14 @@ class PreciseSelection:
 
     def __init__(self, system: PreciseSystem, codes: Sequence[int]) -> None:
         self.system = system
-        self.rows = rows = Selection(codes)
+        self.rows = rows = Selection(codes, len(system.reach))
         self._signs: dict[Fraction, Signs | None] = {}
         with precision():
             parts: tuple[list[Any], ...] = ([], [], [], [])
             for load, F, unit in ((system.g0, system.F0, 1), (system.g1, system.F1, 0)):
                 at, friction = as_objects(load), as_objects(F)
                 W = rows.columns(system.rows, friction, unit)
-                held, free = rows.inequalities(W, at, friction, arb(0), unit)
+                held, free = rows.inequalities(W, at, friction, arb(0), unit, as_objects(system.reach))
                 for part, value in zip(parts, (W[rows.unknown], at[rows.unknown], held, free), strict=True):
                     part.append(matrix(value.tolist()) if value.ndim == 2 else column(value.tolist()))
             self._M, self._g, self._C, self._c = (tuple(part) for part in parts)
@@ -276,7 +305,7 @@ class PreciseSelection:
 
     def forces(self, alpha: Fraction) -> tuple[list[Any], list[Any]] | None:
         """lambda and w as 2p arb each."""
-        system, rows = self.system, self.rows
+        system, rows, contact = self.system, self.rows, 2 * self.rows.p
         with precision():
             a = ball_of(alpha)
             solved = self.solve(a)
@@ -285,8 +314,8 @@ class PreciseSelection:
             F = as_objects([F0 + a * F1 for F0, F1 in zip(system.F0, system.F1, strict=True)])
             forces = rows.forces(as_objects(solved[0].entries()), F, arb(0)).tolist()
             moved = system.S * column(forces)
-            w = [system.g0[r] + a * system.g1[r] - moved[r, 0] for r in range(len(forces))]
-            return forces, w
+            w = [system.g0[r] + a * system.g1[r] - moved[r, 0] for r in range(contact)]
+            return forces[:contact], w
 
     def positions(self, alpha: Fraction, offset: Ball) -> Ball | None:
         """Bt u of all nodes for every slip offset in a ball around the system's own; theory, (13.2).

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, Ball, solution
 from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
+from enumsol.condensation.floating import FloatingSystem, RigidRows
 from enumsol.support.array_types import Floats
+from enumsol.trusted.confinement import motion_against
+from enumsol.trusted.floating_bounds import is_unbalanced
 from enumsol.trusted.selection import Selection
 
 #: Smallest quotient of units, far above underflow.
@@ -21,11 +25,16 @@ _LEAST_PAIR = 2.0**-1000
 class ArcSystem:
     """The condensed problem over alpha as balls, in units given by powers of two: w = g0 + alpha g1 - S lambda.
 
+    Of a body that nothing holds, S is bordered by the rows G and the columns -G', and g by h, so that q follow the
+    forces in lambda (theory, section 14.8).
+
     Attributes
     ----------
-    S : Ball of shape (2p, 2p)
-    g0, g1 : Ball of shape (2p,)
+    S : Ball of shape (2p + r, 2p + r)
+    g0, g1 : Ball of shape (2p + r,)
     F0, F1 : (p,) arrays, F = F0 + alpha F1
+    reach : (r,) array
+        Bounds of q; none of a body that is held.
     """
 
     S: Ball
@@ -33,12 +42,28 @@ class ArcSystem:
     g1: Ball
     F0: Floats
     F1: Floats
+    reach: Floats = field(default_factory=lambda: np.zeros(0))
 
     @classmethod
-    def of(cls, enclosure: CondensedEnclosure, force: Floats, length: Floats, side: float = 0.0) -> ArcSystem:
-        """An enclosed problem; with ``side`` 1 or -1 for the constant load +-g1 (see trusted.over_interval)."""
+    def of(
+        cls, problem: Any, enclosure: CondensedEnclosure, force: Floats, length: Floats, side: float = 0.0
+    ) -> ArcSystem:
+        """A problem, and what encloses it, or the body on springs if nothing holds it.
+
+        With ``side`` 1 or -1 for the constant load +-g1 (see trusted.over_interval).
+        """
         with np.errstate(over="ignore", invalid="ignore"):  # what overflows proves nothing
-            return cls._of(enclosure, force, length, side)
+            held = cls._of(enclosure, force, length, side)
+            return held if problem.modes is None else held._bordered(*RigidRows.along(problem, force, length))
+
+    def _bordered(self, rows: RigidRows, slope: Ball | None) -> ArcSystem:
+        """That of the body that nothing holds, from the one on springs."""
+        G, none = rows.G, Ball.exact(np.zeros_like(rows.h.mid))
+        corner = Ball.exact(np.zeros((len(G.mid),) * 2))
+        border = Ball(-G.mid.T, G.rad.T)
+        S = Ball.joined(Ball.beside(self.S, border), Ball.beside(G, corner))
+        g0, g1 = Ball.joined(self.g0, rows.h), Ball.joined(self.g1, none if slope is None else slope)
+        return ArcSystem(S, g0, g1, self.F0, self.F1, rows.reach)
 
     @classmethod
     def _of(cls, enclosure: CondensedEnclosure, force: Floats, length: Floats, side: float) -> ArcSystem:
@@ -81,7 +106,7 @@ class ArcSelection:
 
     def __init__(self, system: ArcSystem, codes: Sequence[int]) -> None:
         self.system = system
-        self.rows = Selection(codes)
+        self.rows = Selection(codes, len(system.reach))
         self.affine = not np.any(system.F1[self.rows.slip])
 
     def at(self, alpha: float) -> tuple[Ball, Ball, Ball] | None:
@@ -96,8 +121,9 @@ class ArcSelection:
                 return None
             w = g - (W @ y)[:, 0]
             w[rows] = 0.0
-            y = y[:, 0]
-            return self.rows.forces(y, F), w, self.rows.slacks(y, w, F)
+            y, contact = y[:, 0], slice(2 * self.system.p)
+            slacks = self.rows.slacks(y, w, F, Ball.exact(self.system.reach) if len(self.system.reach) else None)
+            return self.rows.forces(y, F)[contact], w[contact], slacks
 
     def sign_at(self, alpha: float, condition: int) -> int:
         """Sign of a condition at an alpha at which the selection is regular; 0 where it is not proven."""
@@ -107,13 +133,36 @@ class ArcSelection:
         value, radius = float(found[2].mid[condition]), SAFE * float(found[2].rad[condition])
         return int(value > radius) - int(value < -radius)
 
+    def unbalanced(self, low: float, high: float) -> bool:
+        """Whether no forces of the selection are in balance with the load anywhere between two alphas.
+
+        By one motion for all of them (theory, (14.7)), of a body that nothing holds.
+        """
+        ends = [self._at_end(alpha) for alpha in (low, high)] if len(self.system.reach) else []
+        z = motion_against(ends[0], self.rows.codes) if ends else None
+        return z is not None and all(is_unbalanced(end, self.rows.codes, z) for end in ends)
+
+    def _at_end(self, alpha: float) -> FloatingSystem:
+        system, contact = self.system, slice(2 * self.system.p)
+        F = _affine(Ball.exact(system.F0), Ball.exact(system.F1), alpha)
+        g = _affine(system.g0, system.g1, alpha)
+        rigid, S = slice(2 * system.p, None), system.S[contact, contact]
+        rows = RigidRows(
+            system.S[rigid, contact],
+            g[rigid],
+            Ball.exact(np.zeros(len(system.reach))),
+            np.ones(len(system.reach)),
+            system.reach,
+        )
+        return FloatingSystem(S.mid, S.rad, g.mid[contact], g.rad[contact], F.mid, F.rad, rows=rows)
+
     @cached_property
     def forms(self) -> tuple[Floats, Floats, Floats, Floats]:
         """H0, H1 and their radii: H0 + alpha H1 are rows of coefficients for (y, t), [M, -g_R] and the conditions."""
         system, rows, parts = self.system, self.rows, []
         for g, F, unit in ((system.g0, system.F0, 1), (system.g1, system.F1, 0)):
             W = rows.columns(system.S, Ball.exact(F), unit)
-            C, c = rows.inequalities(W, g, F, unit=unit)
+            C, c = rows.inequalities(W, g, F, unit=unit, reach=Ball.exact(system.reach))
             M, b = W[rows.unknown], g[rows.unknown]
             parts.append(
                 (
