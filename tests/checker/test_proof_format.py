@@ -17,6 +17,7 @@ import rational_closings
 import rational_floating
 import rational_forms
 import rational_pieces
+import rational_references
 import rational_zeros
 from complete import all_roots
 from effort import some
@@ -80,7 +81,7 @@ def test_the_checker_imports_nothing_of_the_package():
     names = set()
     modules = (
         *(rational_checker, rational_arcs, rational_closings, rational_floating),
-        *(rational_forms, rational_pieces, rational_zeros),
+        *(rational_forms, rational_pieces, rational_references, rational_zeros),
     )
     for module in modules:
         tree = ast.parse(Path(module.__file__).read_text(encoding="utf-8"))
