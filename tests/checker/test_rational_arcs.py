@@ -12,7 +12,7 @@ from generators import integer_problem, random_problem, singular_problem
 from graph_proofs import GRAPHS, accepted, graph, parts_of, refused
 from proof_tools import bytes_of, of_kind, proof_of, put, records_of, replaced
 from rational_arcs import Selection, alpha_of
-from rational_checker import check
+from rational_checker import check, data_of
 from rational_forms import Data, Forms, Refused
 from rational_zeros import cells, count, zeros
 
@@ -72,7 +72,7 @@ def test_forged_events(name):
 def test_parts_by_themselves(name):
     """Nothing but what a part says stands, whatever comes before and after it."""
     problem, records, _ = graph(name)
-    data, seen = Data(problem), set()
+    data, seen = data_of(problem), set()
     for k, _, begin, part in parts_of(records, "h", "n", "e"):
         _, codes, *_, side = records[max(j for j in of_kind(records, "t") if j < k)]
         selection, x, y = Selection(data, tuple(map(int, codes)), side), alpha_of(begin), alpha_of(part[1])
