@@ -4,6 +4,7 @@ import ast
 import io
 import re
 import tokenize
+from collections import Counter
 
 import pytest
 from documents import ROOT
@@ -16,6 +17,7 @@ BOUNDS = {
     "parameters annotated Any": 610,
     "files": 336,
     "docstrings that begin with a pronoun": 425,
+    "class names used twice or more": 13,
 }
 _NO_CODE = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER)
 _PRONOUN = re.compile(r"(What|Of|The same|Where|Those|That|As|In which|How|Whether|One)\b")
@@ -41,7 +43,7 @@ def _names(nodes):
 def measured(texts):
     """The measures of modules, given by their texts."""
     found = dict.fromkeys(BOUNDS, 0)
-    bases = {}
+    bases, named = {}, Counter()
     for text in texts:
         tree = ast.parse(text)
         found["files"] += 1
@@ -49,6 +51,7 @@ def measured(texts):
         for node in ast.walk(tree):
             if isinstance(node, ast.ClassDef):
                 found["classes"] += 1
+                named[node.name] += 1
                 bases.setdefault(node.name, set()).update(_names(node.bases))
             elif isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
                 every = (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)
@@ -59,6 +62,7 @@ def measured(texts):
     while more := {name for name, of in bases.items() if of & records} - records:
         records |= more
     found["kinds of records"] = len(records) - 1
+    found["class names used twice or more"] = sum(count > 1 for count in named.values())
     return found
 
 
@@ -87,4 +91,5 @@ class Kind(records.Record):
 
 class Other(Kind): ...
 '''
-    assert list(measured([text]).values()) == [6, 2, 2, 2, 1, 1]
+    assert list(measured([text]).values()) == [6, 2, 2, 2, 1, 1, 0]
+    assert list(measured([text, text]).values()) == [12, 4, 2, 4, 2, 2, 2]

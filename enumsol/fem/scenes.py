@@ -55,7 +55,7 @@ class Scene:
         On all nodes, and their derivatives with respect to alpha [force].
     springs : (d N, d N) csc_array
     lame : (2,) or (M, 2) array
-    pieces : list of Piece
+    pieces : list of BodyPiece
         The connected bodies.
     """
 
@@ -68,7 +68,7 @@ class Scene:
     slope: Floats
     springs: sp.csc_array
     lame: Floats
-    pieces: list[conditions.Piece]
+    pieces: list[conditions.BodyPiece]
 
     @classmethod
     def of(cls, source: Any, options: Mapping[str, Any]) -> Scene:
