@@ -1,6 +1,5 @@
 """Set-up of the whole suite."""
 
-import dataclasses
 import os
 import signal
 from collections import defaultdict
@@ -11,6 +10,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 import effort
 import numpy as np
 import pytest
+from alike import anew
 from trees import by_the_tree, without_boxes
 
 from enumsol import gallery
@@ -40,7 +40,7 @@ def wedge():
 def pulled_wedge():
     """A wedge with four contact nodes and friction 1; alpha is its pull."""
     wedge = gallery.wedge(2, 2, friction=1.0)
-    return dataclasses.replace(wedge, f=0 * wedge.f, load_slope=wedge.f)
+    return anew(wedge, f=0 * wedge.f, load_slope=wedge.f)
 
 
 @pytest.fixture

@@ -360,7 +360,8 @@ def main() -> int:
         print(time.process_time() - begun)
         return 0
     if given.times is not None:
-        times(*given.times, given.rounds)
+        # not resolved: the link in an environment is what makes it that environment
+        times(*map(os.path.abspath, given.times), given.rounds)
         return 0
     if given.compare is not None:
         old, new = (json.loads(path.read_text(encoding="utf-8")) for path in given.compare)

@@ -208,7 +208,7 @@ class HullTooLargeError(ValueError):
     """A root set has more than MAX_CANDIDATES candidate vertices."""
 
 
-class Conditions(Protocol):
+class LinearConditions(Protocol):
     """Equations and inequalities of selections, as of a RationalSystem."""
 
     @property
@@ -237,7 +237,7 @@ class Hull:
     dimension: int
 
 
-def hull_of_selections(system: Conditions, *selections: Sequence[int]) -> Hull:
+def hull_of_selections(system: LinearConditions, *selections: Sequence[int]) -> Hull:
     """The root set that the given selections have in common, a polytope.
 
     It is bounded, and therefore the hull of its vertices, because S is positive definite (theory, section 5.1), and
@@ -268,7 +268,7 @@ def hull_of_selections(system: Conditions, *selections: Sequence[int]) -> Hull:
     return Hull(sorted(found), _dimension(sorted(found)))
 
 
-def _solution_set(system: Conditions, selections: Sequence[Sequence[int]]) -> tuple[list[Any], list[Any]] | None:
+def _solution_set(system: LinearConditions, selections: Sequence[Sequence[int]]) -> tuple[list[Any], list[Any]] | None:
     """A point that solves all equations and a basis of their kernel, or None if they contradict each other."""
     size = system.size
     table = []

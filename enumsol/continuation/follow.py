@@ -8,7 +8,7 @@ from enumsol.continuation.follower import Follower
 from enumsol.continuation.path import Path
 from enumsol.continuation.start import Start
 from enumsol.continuation.tangents import Tangent, admissible_tangents
-from enumsol.continuation.transitions import ACTIVE_TOLERANCE, CurvePoint
+from enumsol.continuation.transitions import ACTIVE_TOLERANCE, TangentPoint
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.arguments import direction_value, row_number, shown
 
@@ -106,7 +106,7 @@ def follow(
         raise InvalidArgumentError(f"visited is {shown(visited)}; expected a list of Path")
     first = Start(problem, start, interval, options, smooth_path)
     chosen = _choose(first, direction, tangent)
-    point = CurvePoint(first.x, chosen.codes, chosen.vector)
+    point = TangentPoint(first.x, chosen.codes, chosen.vector)
     sign = chosen.orientation or direction
     return Follower(Path, first, point, sign, visited).run()
 

@@ -15,8 +15,8 @@ from enumsol.continuation.scaled_equation import STATUS_TOLERANCE, ScaledEquatio
 from enumsol.continuation.tangents import RATE_TOLERANCE, Tangent, curve_tangent, orientation
 from enumsol.continuation.transitions import (
     FORWARD_TOLERANCE,
-    CurvePoint,
     Kink,
+    TangentPoint,
     confirm,
     continuations,
     next_kink,
@@ -53,7 +53,7 @@ MAX_CHANGES_IN_PLACE = 32
 class _Step:
     """An accepted step: its end, the transition points passed on the way, and how it was found."""
 
-    end: CurvePoint
+    end: TangentPoint
     kinks: tuple[Kink, ...]
     length: float
     corrections: int
@@ -73,7 +73,7 @@ class Follower(Generic[_Path]):
     kind : subclass of PathData
         What is made of the points.
     start : Start
-    first : CurvePoint
+    first : TangentPoint
         The start and the direction in which to leave it.
     sign : {+1, -1}
         Orientation kept along the path.
@@ -81,7 +81,7 @@ class Follower(Generic[_Path]):
     """
 
     def __init__(
-        self, kind: type[_Path], start: Start, first: CurvePoint, sign: int, visited: Sequence[PathData] = ()
+        self, kind: type[_Path], start: Start, first: TangentPoint, sign: int, visited: Sequence[PathData] = ()
     ) -> None:
         self._kind, self._smooth_path = kind, start.smooth_path
         self.equation, self.options, self.interval = start.equation, start.options, start.interval
@@ -161,7 +161,7 @@ class Follower(Generic[_Path]):
         falling = falls < -RATE_TOLERANCE
         ahead = float(np.min(np.maximum(slacks[falling], 0.0) / -falls[falling], initial=np.inf))
         length = min(ahead, float(np.min(room)))
-        end = CurvePoint(start.x + length * start.tangent, start.codes, start.tangent)
+        end = TangentPoint(start.x + length * start.tangent, start.codes, start.tangent)
         if ahead == length:
             return self._leave(end)
         stop = self._return(start, end)
@@ -209,7 +209,7 @@ class Follower(Generic[_Path]):
         kink = confirm(self.equation, self.current, end, self.sign, self.options.transition_tolerance)
         return None if kink is None else _Step(end, (kink,), h, correction.count)
 
-    def _end_point(self, correction: Correction) -> CurvePoint | None:
+    def _end_point(self, correction: Correction) -> TangentPoint | None:
         """The solution beside a corrected point, converged to rounding; None when it is not admissible.
 
         H is small near the tip of a fold even without a solution: only the conditions of a converged point decide.
@@ -225,7 +225,7 @@ class Follower(Generic[_Path]):
         if x is None or np.min(equation.slacks(codes, x)) < -ROUNDING:
             return None
         tangent = curve_tangent(equation, codes, x, self.sign)
-        return None if tangent is None else CurvePoint(x, codes, tangent)
+        return None if tangent is None else TangentPoint(x, codes, tangent)
 
     def _unchecked(self, correction: Correction, h: float) -> _Step | None:
         """The step as the paper's Algorithm 5.1 takes it: any converged correction, with the tangent of its last."""
@@ -234,13 +234,13 @@ class Follower(Generic[_Path]):
         tangent = curve_tangent(self.equation, codes, correction.x, self.sign)
         if tangent is None:
             return None
-        end = CurvePoint(correction.x, codes, tangent)
+        end = TangentPoint(correction.x, codes, tangent)
         kinks: tuple[Kink, ...] = ()
         if end.codes != self.current.codes:
             kink = confirm(self.equation, self.current, end, self.sign, self.options.transition_tolerance)
             kinks = () if kink is None else (kink,)
         if self.equation.dot(end.tangent, correction.tangent) < 0:
-            end = CurvePoint(end.x, end.codes, -end.tangent)
+            end = TangentPoint(end.x, end.codes, -end.tangent)
             self.sign = orientation(self.equation, end.codes, end.x, end.tangent)
         return _Step(end, kinks, h, correction.count)
 
@@ -260,7 +260,7 @@ class Follower(Generic[_Path]):
             return self._stalled("no transition point was found ahead")
         return self._leave(arrival)
 
-    def _leave(self, arrival: CurvePoint) -> _Stop | None:
+    def _leave(self, arrival: TangentPoint) -> _Stop | None:
         """Leave a transition point of the current curve."""
         equation, options = self.equation, self.options
         moved = equation.norm(arrival.x - self.current.x) > SAME_POINT
@@ -277,7 +277,7 @@ class Follower(Generic[_Path]):
         chosen = keep[index]
         alternatives = (*(t for k, t in enumerate(keep) if k != index), *others)
         self.record.count(selection_changes=1)
-        kink = Kink(arrival, CurvePoint(arrival.x, chosen.codes, chosen.vector), alternatives)
+        kink = Kink(arrival, TangentPoint(arrival.x, chosen.codes, chosen.vector), alternatives)
         self.h = options.h_init
         return self._enter(self.current, kink)
 
@@ -305,7 +305,7 @@ class Follower(Generic[_Path]):
         self.current = step.end
         return None
 
-    def _enter(self, start: CurvePoint, kink: Kink) -> _Stop | None:
+    def _enter(self, start: TangentPoint, kink: Kink) -> _Stop | None:
         """Go from ``start`` on its curve to a transition point and through it."""
         stop = self._piece(start, kink.before)
         if stop is not None:
@@ -316,7 +316,7 @@ class Follower(Generic[_Path]):
         self._landmarks.append((kink.after.x, kink.after.codes, False))
         return arrived
 
-    def _piece(self, start: CurvePoint, end: CurvePoint) -> _Stop | None:
+    def _piece(self, start: TangentPoint, end: TangentPoint) -> _Stop | None:
         """Stop conditions met between two points of one curve; the path is ended there. A fold is recorded."""
         fold = turning_point(self.equation, start, end, self.options.transition_tolerance)
         if fold is not None:
@@ -331,7 +331,7 @@ class Follower(Generic[_Path]):
                 return arrived
         return self._border(start, end) or self._beyond(start, end) or self._return(start, end)
 
-    def _beyond(self, start: CurvePoint, end: CurvePoint) -> _Stop | None:
+    def _beyond(self, start: TangentPoint, end: TangentPoint) -> _Stop | None:
         """Where a body that nothing holds comes to the bound of its rigid displacement."""
         equation = self.equation
         here, there = equation.rigid(start.x), equation.rigid(end.x)
@@ -342,7 +342,7 @@ class Follower(Generic[_Path]):
             row, side = equation.rigid_rows[mode] / equation.reach[mode], math.copysign(1.0, there[mode])
             x = smooth_newton(equation, end.codes, end.x, row, side, self.options.transition_tolerance)
             if x is not None:
-                self._end(CurvePoint(x, end.codes, end.tangent))
+                self._end(TangentPoint(x, end.codes, end.tangent))
             return self._at_bound(int(mode))
         return None
 
@@ -356,7 +356,7 @@ class Follower(Generic[_Path]):
     def _inside(self, x: Floats) -> bool:
         return bool(self._low <= x[-1] <= self._high)
 
-    def _border(self, start: CurvePoint, end: CurvePoint) -> _Stop | None:
+    def _border(self, start: TangentPoint, end: TangentPoint) -> _Stop | None:
         if self._inside(end.x):
             return None
         value = self._low if end.x[-1] < self._low else self._high
@@ -366,7 +366,7 @@ class Follower(Generic[_Path]):
         x = smooth_newton(self.equation, end.codes, end.x, row, value, self.options.transition_tolerance)
         if x is not None:
             x[-1] = value
-            self._end(CurvePoint(x, end.codes, end.tangent))
+            self._end(TangentPoint(x, end.codes, end.tangent))
         low, high = self.interval
         return _Stop(
             PathStatus.INTERVAL_LEFT,
@@ -374,18 +374,18 @@ class Follower(Generic[_Path]):
             "path.resume(interval=...) continues",
         )
 
-    def _return(self, start: CurvePoint, end: CurvePoint) -> _Stop | None:
+    def _return(self, start: TangentPoint, end: TangentPoint) -> _Stop | None:
         if self._passes(start, end, self._origin.x, self._origin.codes):
             self._end(self._origin)
             return self._closed()
         for x, codes, foreign in self._landmarks:
             if foreign and self._passes(start, end, x, codes):
                 tangent = curve_tangent(self.equation, codes, x, self.sign)
-                self._end(CurvePoint(x, codes, start.tangent if tangent is None else tangent))
+                self._end(TangentPoint(x, codes, start.tangent if tangent is None else tangent))
                 return self._visited(x)
         return None
 
-    def _passes(self, start: CurvePoint, end: CurvePoint, x: Floats, codes: Codes) -> bool:
+    def _passes(self, start: TangentPoint, end: TangentPoint, x: Floats, codes: Codes) -> bool:
         """True if the piece from start to end of one curve goes through a known point of the same selection."""
         equation = self.equation
         if codes != start.codes or equation.dot(x - start.x, start.tangent) <= FORWARD_TOLERANCE:
@@ -395,12 +395,12 @@ class Follower(Generic[_Path]):
         tangent = curve_tangent(equation, codes, x, self.sign)
         if tangent is None:
             return False
-        middle = CurvePoint(x, codes, tangent)
+        middle = TangentPoint(x, codes, tangent)
         if not equation.single_valued and not self._on_piece(start, end, middle):
             return False
         return same_curve(equation, start, middle, sharp=True) and same_curve(equation, middle, end, sharp=True)
 
-    def _on_piece(self, start: CurvePoint, end: CurvePoint, point: CurvePoint) -> bool:
+    def _on_piece(self, start: TangentPoint, end: TangentPoint, point: TangentPoint) -> bool:
         """True if the curve between two points runs through a third one, and not beside it on another curve."""
         equation, row = self.equation, self.equation.metric @ point.tangent
         chord = end.x - start.x
@@ -423,7 +423,7 @@ class Follower(Generic[_Path]):
                 return self._visited(x)
         return None
 
-    def _end(self, point: CurvePoint) -> None:
+    def _end(self, point: TangentPoint) -> None:
         if self.equation.norm(point.x - self.record.last.x) > FORWARD_TOLERANCE:
             self.record.add(point, PointKind.END)
         self.current = point
@@ -443,7 +443,7 @@ class Follower(Generic[_Path]):
             "a smaller h_min or h_init may pass, and branch_graph shows which arcs meet there",
         )
 
-    def _dead_end(self, arrival: CurvePoint, others: int) -> _Stop:
+    def _dead_end(self, arrival: TangentPoint, others: int) -> _Stop:
         self._end(arrival)
         return _Stop(
             PathStatus.DEAD_END,

@@ -12,7 +12,7 @@ from enumsol.continuation.follower import Follower
 from enumsol.continuation.path_data import ARRAYS, RIGID, PathData, PathStats, PathStatus, PointKind, Transition
 from enumsol.continuation.start import Start
 from enumsol.continuation.tangents import curve_tangent
-from enumsol.continuation.transitions import CurvePoint
+from enumsol.continuation.transitions import TangentPoint
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.statuses import ContactStatus
 from enumsol.roots.local_branch import LocalBranchTest
@@ -304,6 +304,6 @@ class Path(PathData):
             raise InvalidArgumentError(
                 "the path ends where its tangent is not unique; start anew with follow(tangent=...)"
             )
-        follower = Follower(Path, start, CurvePoint(start.x, codes, vector), self.orientation)
+        follower = Follower(Path, start, TangentPoint(start.x, codes, vector), self.orientation)
         follower.h = min(max(self.next_step, start.options.h_min), start.options.h_max)
         return self.joined(follower.run())

@@ -14,7 +14,7 @@ from enumsol.errors import TooLargeError
 
 if TYPE_CHECKING:
     from enumsol.continuation.scaled_equation import ScaledEquation
-    from enumsol.continuation.transitions import CurvePoint, Kink
+    from enumsol.continuation.transitions import Kink, TangentPoint
     from enumsol.roots.local_branch import LocalBranchTest
     from enumsol.support.array_types import Floats
 
@@ -26,7 +26,7 @@ _AHEAD = 1e-6
 class _Recorded:
     """A point of a path, and all that is recorded of it: an interruption comes before or after it."""
 
-    point: CurvePoint
+    point: TangentPoint
     kind: PointKind
     step: float = 0.0
     corrections: int = 0
@@ -42,7 +42,7 @@ class PathRecorder:
     stats: PathStats = field(default_factory=PathStats)
     started: float = field(default_factory=time.perf_counter)
 
-    def add(self, point: CurvePoint, kind: PointKind, step: float = 0.0, corrections: int = 0) -> None:
+    def add(self, point: TangentPoint, kind: PointKind, step: float = 0.0, corrections: int = 0) -> None:
         """Append a point."""
         self.points.append(_Recorded(point, kind, step, corrections))
 
@@ -64,7 +64,7 @@ class PathRecorder:
         self.points.append(_Recorded(after, PointKind.TRANSITION, transition=transition))
 
     @property
-    def last(self) -> CurvePoint:
+    def last(self) -> TangentPoint:
         """The point that was added last."""
         return self.points[-1].point
 
@@ -96,7 +96,7 @@ class PathRecorder:
             RIGID: np.array([equation.rigid(point.x) for point in points]) if equation.modes else None,
         }
 
-    def _slip(self, point: CurvePoint, step: float) -> Floats:
+    def _slip(self, point: TangentPoint, step: float) -> Floats:
         return self.equation.w(point.x + step * point.tangent)[self.equation.p :]
 
     def _local_test(self, x: Floats) -> LocalBranchTest | None:

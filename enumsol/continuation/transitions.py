@@ -38,7 +38,7 @@ LEAST_COSINE = 0.5
 
 
 @dataclass(frozen=True)
-class CurvePoint:
+class TangentPoint:
     """A point of a selection's solution curve with the curve's tangent in the direction of travel."""
 
     x: Floats
@@ -52,18 +52,18 @@ class Kink:
 
     Attributes
     ----------
-    before, after : CurvePoint
+    before, after : TangentPoint
         The same point on the two curves.
     alternatives : tuple of Tangent
         All other directions, apart from the one of arrival, in which solutions leave the point.
     """
 
-    before: CurvePoint
-    after: CurvePoint
+    before: TangentPoint
+    after: TangentPoint
     alternatives: tuple[Tangent, ...] = ()
 
 
-def same_curve(equation: ScaledEquation, start: CurvePoint, end: CurvePoint, *, sharp: bool = False) -> bool:
+def same_curve(equation: ScaledEquation, start: TangentPoint, end: TangentPoint, *, sharp: bool = False) -> bool:
     """Whether ``end`` lies ahead of ``start`` on one smooth piece of a selection's curve, all of it admissible.
 
     The piece is judged by both tangents and by the cubic Hermite interpolants of all conditions: one that dips below
@@ -87,7 +87,7 @@ def same_curve(equation: ScaledEquation, start: CurvePoint, end: CurvePoint, *, 
     return equation.single_valued or _joined(equation, start, end, length)
 
 
-def _joined(equation: ScaledEquation, start: CurvePoint, end: CurvePoint, length: float) -> bool:
+def _joined(equation: ScaledEquation, start: TangentPoint, end: TangentPoint, length: float) -> bool:
     """Whether the curve runs near the cubic Hermite interpolant between two of its points, in its middle."""
     chord = end.x - start.x
     middle = start.x + 0.5 * chord + length / 8 * (start.tangent - end.tangent)
@@ -96,7 +96,9 @@ def _joined(equation: ScaledEquation, start: CurvePoint, end: CurvePoint, length
     return x is not None and equation.norm(x - middle) <= DETOUR_TOLERANCE * length + FORWARD_TOLERANCE
 
 
-def turning_point(equation: ScaledEquation, start: CurvePoint, end: CurvePoint, tolerance: float) -> CurvePoint | None:
+def turning_point(
+    equation: ScaledEquation, start: TangentPoint, end: TangentPoint, tolerance: float
+) -> TangentPoint | None:
     """The fold between two points of a smooth piece, at which alpha turns back; None where there is none.
 
     Only a selection that has several solutions at one alpha turns within itself (theory, section 8.12).
@@ -108,7 +110,7 @@ def turning_point(equation: ScaledEquation, start: CurvePoint, end: CurvePoint, 
     chord = end.x - start.x
     row, far = equation.metric @ chord, equation.dot(chord, chord)
     sign = orientation(equation, start.codes, start.x, start.tangent)
-    found: dict[float, CurvePoint] = {}
+    found: dict[float, TangentPoint] = {}
 
     def slope(share: float) -> float:
         x = smooth_newton(
@@ -117,7 +119,7 @@ def turning_point(equation: ScaledEquation, start: CurvePoint, end: CurvePoint, 
         tangent = None if x is None else curve_tangent(equation, start.codes, x, sign)
         if x is None or tangent is None:
             raise ValueError("no point of the curve")
-        found[share] = CurvePoint(x, start.codes, tangent)
+        found[share] = TangentPoint(x, start.codes, tangent)
         return float(tangent[-1])
 
     try:
@@ -143,8 +145,8 @@ def _hermite_minimum(s0: Floats, s1: Floats, d0: Floats, d1: Floats) -> Floats:
 
 
 def locate(
-    equation: ScaledEquation, start: CurvePoint, which: tuple[int, int], sign: int, tolerance: float
-) -> CurvePoint | None:
+    equation: ScaledEquation, start: TangentPoint, which: tuple[int, int], sign: int, tolerance: float
+) -> TangentPoint | None:
     """The point ahead on the curve of ``start`` at which this slack vanishes and every other condition still holds."""
     x = smooth_newton(equation, start.codes, start.x, which, 0.0, tolerance)
     if x is None or np.min(equation.slacks(start.codes, x)) < -ACTIVE_TOLERANCE:
@@ -155,7 +157,7 @@ def locate(
         chord = x - start.x
         length = equation.norm(chord)
         tangent = start.tangent if length <= FORWARD_TOLERANCE else chord / length
-    point = CurvePoint(x, start.codes, tangent)
+    point = TangentPoint(x, start.codes, tangent)
     return point if same_curve(equation, start, point) else None
 
 
@@ -168,7 +170,9 @@ def single_flip(equation: ScaledEquation, before: Codes, after: Codes) -> tuple[
     return next(((i, k) for k in range(2) if after[i] in equation.across(before[i], k)), None)
 
 
-def confirm(equation: ScaledEquation, start: CurvePoint, end: CurvePoint, sign: int, tolerance: float) -> Kink | None:
+def confirm(
+    equation: ScaledEquation, start: TangentPoint, end: TangentPoint, sign: int, tolerance: float
+) -> Kink | None:
     """The one transition point between two points whose selections differ in one status; None if it is not between."""
     which = single_flip(equation, start.codes, end.codes)
     if which is None:
@@ -179,12 +183,12 @@ def confirm(equation: ScaledEquation, start: CurvePoint, end: CurvePoint, sign: 
     tangent = curve_tangent(equation, end.codes, before.x, sign)
     if tangent is None or np.min(equation.slacks(end.codes, before.x)) < -ACTIVE_TOLERANCE:
         return None
-    after = CurvePoint(before.x, end.codes, tangent)
+    after = TangentPoint(before.x, end.codes, tangent)
     return Kink(before, after) if same_curve(equation, after, end) else None
 
 
 def _vanishing(
-    equation: ScaledEquation, point: CurvePoint, size: Callable[[Floats], Floats]
+    equation: ScaledEquation, point: TangentPoint, size: Callable[[Floats], Floats]
 ) -> Iterator[tuple[int, int]]:
     """Slacks that fall along the tangent, in the order of the distances ``size`` of the slack by its rate."""
     slacks = equation.slacks(point.codes, point.x)
@@ -197,7 +201,7 @@ def _vanishing(
         yield int(i), int(k)
 
 
-def next_kink(equation: ScaledEquation, start: CurvePoint, sign: int, tolerance: float) -> CurvePoint | None:
+def next_kink(equation: ScaledEquation, start: TangentPoint, sign: int, tolerance: float) -> TangentPoint | None:
     """The nearest point ahead at which the curve of ``start`` stops being admissible; near zeros are tried first."""
     for which in _vanishing(equation, start, lambda slacks: np.maximum(slacks, 0.0)):
         point = locate(equation, start, which, sign, tolerance)
@@ -207,8 +211,8 @@ def next_kink(equation: ScaledEquation, start: CurvePoint, sign: int, tolerance:
 
 
 def passed_kink(
-    equation: ScaledEquation, start: CurvePoint, sign: int, tolerance: float, reach: float
-) -> CurvePoint | None:
+    equation: ScaledEquation, start: TangentPoint, sign: int, tolerance: float, reach: float
+) -> TangentPoint | None:
     """The nearest transition point of the curve of ``start`` within ``reach``, be it ahead or just behind.
 
     Corrections that stop at eps may end a little beyond a fold, where H is small and no solution is.
@@ -219,11 +223,11 @@ def passed_kink(
             continue
         if np.min(equation.slacks(start.codes, x)) >= -ACTIVE_TOLERANCE:
             tangent = curve_tangent(equation, start.codes, x, sign)
-            return CurvePoint(x, start.codes, start.tangent if tangent is None else tangent)
+            return TangentPoint(x, start.codes, start.tangent if tangent is None else tangent)
     return None
 
 
-def continuations(equation: ScaledEquation, arrival: CurvePoint, sign: int) -> tuple[list[Tangent], list[Tangent]]:
+def continuations(equation: ScaledEquation, arrival: TangentPoint, sign: int) -> tuple[list[Tangent], list[Tangent]]:
     """Directions that leave a transition point: those that keep the orientation, and all others but the arrival's.
 
     The balance of degrees at a vertex (theory, (7.3)) leaves at least one of the first kind where all solutions

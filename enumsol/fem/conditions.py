@@ -150,7 +150,7 @@ class Held:
 
 
 @dataclass(frozen=True)
-class Piece:
+class BodyPiece:
     """A connected body, separate from all others.
 
     Attributes
@@ -195,14 +195,14 @@ class Piece:
         return np.asarray(motions @ table.T)
 
 
-def pieces_of(mesh: PartedMesh) -> list[Piece]:
+def pieces_of(mesh: PartedMesh) -> list[BodyPiece]:
     """All connected bodies of a mesh."""
     points, cells = mesh.points, mesh.cells
     first = np.repeat(cells[:, :1], cells.shape[1] - 1, axis=1)
     links = (np.ones(first.size), (first.ravel(), cells[:, 1:].ravel()))
     count, piece_of = connected_components(sp.coo_array(links, shape=(len(points),) * 2), directed=False)
     masks = [piece_of == piece for piece in range(count)]
-    return [Piece(mask, "the body" if count == 1 else _name_of(mesh, mask)) for mask in masks]
+    return [BodyPiece(mask, "the body" if count == 1 else _name_of(mesh, mask)) for mask in masks]
 
 
 def _name_of(mesh: PartedMesh, inside: Mask) -> str:
@@ -223,7 +223,7 @@ def holding(supports: Supports, springs: sp.csc_array) -> sp.csc_array:
     return sp.csc_array(hold + springs / largest) if largest > 0 else hold
 
 
-def check_held(pieces: Sequence[Piece], points: Floats, hold: sp.csc_array) -> None:
+def check_held(pieces: Sequence[BodyPiece], points: Floats, hold: sp.csc_array) -> None:
     """Refuse bodies if one of them can move as a rigid body; ``hold`` is a stiffness of supports and springs.
 
     Raises
@@ -239,7 +239,7 @@ def check_held(pieces: Sequence[Piece], points: Floats, hold: sp.csc_array) -> N
             )
 
 
-def rigid_modes_of(pieces: Sequence[Piece], points: Floats, hold: sp.csc_array) -> Floats | None:
+def rigid_modes_of(pieces: Sequence[BodyPiece], points: Floats, hold: sp.csc_array) -> Floats | None:
     """The rigid motions of bodies that nothing holds, (d N, r); None if there are none."""
     modes = np.hstack([piece.free_modes(points, hold) for piece in pieces])
     return modes if modes.shape[1] else None

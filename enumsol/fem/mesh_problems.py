@@ -155,8 +155,15 @@ def mesh_problem(
     >>> problem.n, problem.p
     (24, 4)
     """
-    given = locals()  # all arguments by their names
-    return Scene.of(given.pop("mesh"), given).problem()
+    given = {
+        "young": young, "poisson": poisson, "contact": contact, "pairs": pairs, "plane": plane,
+        "thickness": thickness, "friction": friction, "friction_slope": friction_slope, "friction2": friction2,
+        "friction2_slope": friction2_slope, "axis": axis, "clamp": clamp, "symmetry": symmetry,
+        "displacement": displacement, "spring": spring, "load": load, "load_slope": load_slope, "pressure": pressure,
+        "pressure_slope": pressure_slope, "body_force": body_force, "gap": gap, "obstacle": obstacle,
+        "max_rigid_displacement": max_rigid_displacement, "groups": groups,
+    }  # fmt: skip
+    return Scene.of(mesh, given).problem()
 
 
 def mesh_scene(mesh: PartedMesh | str | os.PathLike[str] | Any, **options: Any) -> Scene:

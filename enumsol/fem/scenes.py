@@ -26,6 +26,7 @@ from enumsol.fem.scene_checks import refuse_overlaps, refuse_pairs, refuse_walls
 from enumsol.fem.scene_text import described, draw_scene, sections_of
 from enumsol.model.mesh import BodyMesh
 from enumsol.model.problem import given_friction, old_friction
+from enumsol.model.restart import afresh
 from enumsol.support.arguments import finite_number, one_of, positive_number, shown
 from enumsol.support.array_arguments import short_vector
 from enumsol.support.plotting import checked_units, kept
@@ -54,7 +55,7 @@ class Scene:
         On all nodes, and their derivatives with respect to alpha [force].
     springs : (d N, d N) csc_array
     lame : (2,) or (M, 2) array
-    pieces : list of Piece
+    pieces : list of BodyPiece
         The connected bodies.
     """
 
@@ -67,7 +68,7 @@ class Scene:
     slope: Floats
     springs: sp.csc_array
     lame: Floats
-    pieces: list[conditions.Piece]
+    pieces: list[conditions.BodyPiece]
 
     @classmethod
     def of(cls, source: Any, options: Mapping[str, Any]) -> Scene:
@@ -169,8 +170,7 @@ class Scene:
             mesh=lambda left: BodyMesh.of_dofs(mesh.points, mesh.cells, left, offset, surface, lame=self.lame),
             **more,
         )
-        problem.__dict__["notes"] = tuple(self.notes)
-        return problem
+        return afresh(problem, notes=tuple(self.notes))
 
     def _modes(self, more: dict[str, Any]) -> Floats | None:
         """Rigid motions that nothing holds, if a bound for them is given; the bound joins the other arguments."""

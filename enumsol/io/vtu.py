@@ -36,7 +36,7 @@ _SLIPS = 2.0
 _ORTHONORMAL = 1e-8
 
 
-class State(Protocol):
+class SolvedState(Protocol):
     """Displacements and contact forces of a problem: a FixedPoint, a TrescaSolution, or one's own."""
 
     @property
@@ -60,7 +60,7 @@ class State(Protocol):
         """Slips, shape (p, 2) [length]."""
 
 
-def write_vtu(problem: AnyProblem, state: State | Sequence[State], path: str | os.PathLike[str]) -> None:
+def write_vtu(problem: AnyProblem, state: SolvedState | Sequence[SolvedState], path: str | os.PathLike[str]) -> None:
     """Write displacements, contact forces and stresses to a VTU file for ParaView, by meshio.
 
     Of one state the file at ``path`` is written. Of several, such as a RootSet, one file each is written beside it
@@ -140,14 +140,14 @@ def write_vtu(problem: AnyProblem, state: State | Sequence[State], path: str | o
         write_files(files)
 
 
-def _empty(states: Sequence[State]) -> str:
+def _empty(states: Sequence[SolvedState]) -> str:
     families = getattr(states, "families", ())
     if not families:
         return "empty"
     return f"a RootSet without isolated roots, whose {counted(len(families), 'family', 'families')} no file shows"
 
 
-def _picture(meshio: Any, problem: AnyProblem, state: State) -> Any:
+def _picture(meshio: Any, problem: AnyProblem, state: SolvedState) -> Any:
     return _plane(meshio, problem, state) if isinstance(problem, ContactProblem) else _space(meshio, problem, state)
 
 
@@ -172,7 +172,7 @@ def _stresses(problem: AnyProblem, u: Floats) -> dict[str, Floats]:
     return {"stress": np.pad(stress, ((0, 0), (0, 1), (0, 1))).reshape(-1, 9)}
 
 
-def _space(meshio: Any, problem: ContactProblem3D, state: State) -> Any:
+def _space(meshio: Any, problem: ContactProblem3D, state: SolvedState) -> Any:
     data = _row_data(problem, state)
     if problem.mesh is None:
         if problem.coordinates is None:
@@ -184,7 +184,7 @@ def _space(meshio: Any, problem: ContactProblem3D, state: State) -> Any:
     return _body(meshio, problem, problem.mesh, u, data)
 
 
-def _plane(meshio: Any, problem: ContactProblem, state: State) -> Any:
+def _plane(meshio: Any, problem: ContactProblem, state: SolvedState) -> Any:
     p = problem.p
     data = {name: _array(state, name, (p,)) for name in ("lambda_n", "lambda_t", "u_n", "u_t")}
     statuses = getattr(state, "statuses", None)
@@ -211,7 +211,7 @@ def _in_space(vectors: Floats) -> Floats:
     return np.concatenate([vectors, np.zeros((len(vectors), 1))], axis=1)
 
 
-def _array(state: State, name: str, shape: tuple[int, ...]) -> Floats:
+def _array(state: SolvedState, name: str, shape: tuple[int, ...]) -> Floats:
     if not hasattr(state, name):
         raise InvalidArgumentError(
             f"state is a {type(state).__name__} without {name}; expected u, lambda_n, lambda_t, u_n and u_t"
@@ -222,7 +222,7 @@ def _array(state: State, name: str, shape: tuple[int, ...]) -> Floats:
     return array
 
 
-def _row_data(problem: ContactProblem3D, state: State) -> dict[str, Floats]:
+def _row_data(problem: ContactProblem3D, state: SolvedState) -> dict[str, Floats]:
     """Scalars of the contact rows, each (p,)."""
     p = problem.p
     normal, tangential = _array(state, "lambda_n", (p,)), _array(state, "lambda_t", (p, 2))

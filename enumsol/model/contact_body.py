@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import inspect
 from contextlib import suppress
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 import scipy.sparse as sp
@@ -40,8 +39,8 @@ ROW_RANK_TOLERANCE = 1e-12
 class ContactBody(Immutable):
     """A linear elastic body with p contact nodes: A, Bn and one or two tangents, f(alpha), gap and slip offset.
 
-    ``problem.replace(f=...)`` makes a problem of the same data but for those named. So does ``dataclasses.replace``,
-    which computes everything again: every argument of a subclass is the name of an attribute that it takes back.
+    ``problem.replace(f=...)`` makes a problem of the same data but for those named: every argument of a subclass is the
+    name of an attribute that it takes back.
 
     Parameters
     ----------
@@ -54,7 +53,7 @@ class ContactBody(Immutable):
     coordinates : (p, dimension) array_like or None
     """
 
-    _instead = "build a new problem, or one with other data by dataclasses.replace or problem.replace"
+    _instead = "build a new problem, or one with other data by problem.replace"
     friction: Any
     friction_slope: Any
     slip_offset: Floats
@@ -71,15 +70,6 @@ class ContactBody(Immutable):
     mesh: BodyMesh | None = None
     #: What of a scene (``fem.mesh_problem``) may not have been intended; copies with other data have none.
     notes: tuple[str, ...] = ()
-    __dataclass_fields__: ClassVar[dict[str, dataclasses.Field[Any]]]
-
-    def __init_subclass__(cls) -> None:
-        super().__init_subclass__()
-        arguments = list(inspect.signature(cls).parameters)
-        # neither a constructor nor comparison or text of a dataclass, only what dataclasses.replace asks for
-        like = dataclasses.make_dataclass(cls.__name__, arguments, init=False, repr=False, eq=False)
-        for name in ("__dataclass_fields__", "__dataclass_params__"):
-            setattr(cls, name, getattr(like, name))
 
     def __init__(
         self,
@@ -155,20 +145,19 @@ class ContactBody(Immutable):
             return self
         # pictures of it are of no use, nor are bounds of a rigid displacement
         without = {"A", *self._rows, "coordinates", "areas", "mesh", "rigid_modes", "max_rigid_displacement"}
-        data = {name: getattr(self, name) for name in self.__dataclass_fields__ if name not in without}
+        data = {name: value for name, value in self.arguments.items() if name not in without}
+        known = {"offset_radius": self.offset_radius, "exact_offset": self.exact_offset}
         if self._origin is not None:
-            held: Any = self._origin.on_springs.replace(**data)
-        else:
-            rows = (matrix.matrix() for matrix in self._rows.values())
-            try:
-                held = type(self)(sp.csc_array(self.A + self.modes.springs()), *rows, **data)
-            except InvalidProblemError as error:
-                raise InvalidProblemError(
-                    f"A is singular or indefinite on more than the {self.modes.r} rigid_modes, for springs that hold "
-                    f"these leave it so ({error})"
-                ) from None
-        held.__dict__.update(offset_radius=self.offset_radius, exact_offset=self.exact_offset)
-        return held  # type: ignore[no-any-return]
+            held: Any = self._origin.on_springs
+            return held._made(held.arguments | data, _origin=held._origin or held, **known)  # type: ignore[no-any-return]
+        rows = {name: matrix.matrix() for name, matrix in self._rows.items()}
+        try:
+            return self._made({"A": sp.csc_array(self.A + self.modes.springs()), **rows, **data}, **known)
+        except InvalidProblemError as error:
+            raise InvalidProblemError(
+                f"A is singular or indefinite on more than the {self.modes.r} rigid_modes, for springs that hold "
+                f"these leave it so ({error})"
+            ) from None
 
     @cached_property
     def rigid_reach(self) -> float:
@@ -258,11 +247,13 @@ class ContactBody(Immutable):
         """True if rationals hold all data: a slip offset may be known as a ball only."""
         return self.offset_radius is None or self.exact_offset is not None
 
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """The data by the names of the arguments: ``type(problem)(**problem.arguments)`` builds the same anew."""
+        return {name: getattr(self, name) for name in inspect.signature(type(self)).parameters}
+
     def replace(self, **changes: Any) -> Self:
         """Copy of the problem with other data; what depends on A, Bn and Bt alone is not computed again.
-
-        ``dataclasses.replace`` makes a problem that shares nothing with this one, and keeps ``friction_slope`` if only
-        ``friction`` is named.
 
         Parameters
         ----------
@@ -295,19 +286,25 @@ class ContactBody(Immutable):
                 "friction is given without friction_slope, which is not 0 in this problem; expected both, "
                 "friction_slope=0 for a coefficient that does not depend on alpha"
             )
-        other = object.__new__(type(self))
-        given = {name: getattr(self, name) for name in self.__dataclass_fields__} | changes
         matrices = {"A": self._A, **self._rows}
         kept = [
             name for name, own in matrices.items() if name not in changes or own.holds(real_matrix(changes[name], name))
         ]
+        known: dict[str, Any] = {}
         if len(kept) == len(matrices) and "rigid_modes" not in changes:
-            other.__dict__["_origin"] = self._origin or self
+            known["_origin"] = self._origin or self
         elif "A" in kept and self.modes is None:
-            other.__dict__["factorization"] = self.factorization
-        type(self).__init__(other, **given)
+            known["factorization"] = self.factorization
         if "slip_offset" not in changes:
-            other.__dict__.update(offset_radius=self.offset_radius, exact_offset=self.exact_offset)
+            known |= {"offset_radius": self.offset_radius, "exact_offset": self.exact_offset}
+        return self._made(self.arguments | changes, **known)
+
+    def _made(self, arguments: Mapping[str, Any], **known: Any) -> Self:
+        """A problem of the same class, with attributes that no argument gives."""
+        other = object.__new__(type(self))
+        for name, value in known.items():
+            setattr(other, name, value)
+        type(self).__init__(other, **arguments)
         return other
 
     @property

@@ -94,27 +94,30 @@ def restarted(problem: _Body, start: SlipStart, load: Floats | None = None, fric
     load : (n,) array, which does not depend on alpha, or None
     friction : (p,) array, in 3D (p, 2), which does not depend on alpha, or None
     """
-    other = afresh(problem)
-    given = other.__dict__
-    given["_origin"] = problem._origin or problem
-    given["slip_offset"] = sealed(start.offset.reshape(problem.slip_offset.shape) + 0.0)
-    given["offset_radius"] = None if start.radius is None else sealed(start.radius.reshape(start.offset.shape))
-    given["exact_offset"] = start.exact
+    given: dict[str, Any] = {
+        "_origin": problem._origin or problem,
+        "slip_offset": sealed(start.offset.reshape(problem.slip_offset.shape) + 0.0),
+        "offset_radius": None if start.radius is None else sealed(start.radius.reshape(start.offset.shape)),
+        "exact_offset": start.exact,
+    }
     if friction is not None:
-        given.update(problem.constant_friction(friction))
+        given |= problem.constant_friction(friction)
     if load is not None:
-        given.update(f=sealed(load + 0.0), load_slope=None)
-    return other
+        given |= {"f": sealed(load + 0.0), "load_slope": None}
+    return afresh(problem, **given)
 
 
-def afresh(problem: _Body) -> _Body:
-    """The same problem without what it has computed, but for the factors of A, on whose accuracy no bound rests."""
+def afresh(problem: _Body, **known: Any) -> _Body:
+    """The same problem without what it has computed, but for the factors of A, on whose accuracy no bound rests.
+
+    ``known`` are attributes that are other ones in the copy.
+    """
     other, kind = object.__new__(type(problem)), type(problem)
     # not copy.copy, which leaves the factorization behind as pickles have to
-    other.__dict__.update({
+    kept = {
         name: value
         for name, value in problem.__dict__.items()
         if name == "factorization" or not isinstance(getattr(kind, name, None), cached_property)
-    })  # fmt: skip
-    other.__dict__.pop("_origin", None)
+    }
+    other.__setstate__(kept | {"_origin": None} | known)
     return other

@@ -25,7 +25,7 @@ _OPEN = (f'["{UndecidedRecord.kind}"'.encode(), b"{")
 _FORM = f'["{DeclaredForm.kind}"'.encode()
 
 
-class Extent(NamedTuple):
+class ProofExtent(NamedTuple):
     """How far a proof goes that was begun.
 
     Attributes
@@ -75,7 +75,7 @@ class BegunProof:
         """What follows the header, up to the last record that is whole."""
         return itertools.islice(self._records(), 1, None)
 
-    def extent(self) -> Extent:
+    def extent(self) -> ProofExtent:
         """How far the file goes."""
         needed = nodes = undecided = 0
         for number, line in enumerate(itertools.islice(self._lines(), 1, None), start=1):
@@ -83,7 +83,7 @@ class BegunProof:
                 needed = number
             nodes += line.startswith(b"[") and not line.startswith(_FORM)
             undecided += line.startswith(_OPEN[0])
-        return Extent(needed, nodes, undecided)
+        return ProofExtent(needed, nodes, undecided)
 
     def _records(self) -> Iterator[Any]:
         for line in self._lines():

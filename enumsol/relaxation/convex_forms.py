@@ -214,7 +214,9 @@ class FormAscent:
         signed = live >= 2 * scaled.p
         numbers, _ = found.relaxation.multipliers()
         normals = row_normals(scaled.p, scaled.F, scaled.S, numbers) @ space.across
-        terms = Products(scaled.S, scaled.g, lambda rows: self._left(rows)[live], lambda rows: self._right(rows)[live])
+        terms = FormProducts(
+            scaled.S, scaled.g, lambda rows: self._left(rows)[live], lambda rows: self._right(rows)[live]
+        )
         forces = found.relaxation.forces
         gradient, hessian = terms.derivatives(found.form.H, found.factor, forces, scale, normals, space.across)
         slope = np.where(signed, found.multipliers[live], 1.0)
@@ -243,7 +245,7 @@ class FormAscent:
 
 
 @dataclass(frozen=True)
-class Products:
+class FormProducts:
     """Products of a factor in y and one in S y - g, of which a form is the sum with multipliers.
 
     Attributes

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import factor_above
-from enumsol.relaxation.convex_forms import Products, newton_step
+from enumsol.relaxation.convex_forms import FormProducts, newton_step
 from enumsol.support.deadlines import look
 from enumsol.trusted.space.sector_rows import sector_row_terms
 from enumsol.trusted.space.slip_forms import SlipForm
@@ -70,7 +70,7 @@ class SpaceFormAscent:
         #: Places of kappa and c of the nodes with friction; a c that does not occur has the last place, a zero.
         rubs = np.flatnonzero(np.any(system.tau >= 0, axis=1))
         self._cones = np.column_stack([p + rubs, np.where(system.tau[rubs] >= 0, p + system.tau[rubs], size + p)])
-        self._products = Products(system.S, system.g, lambda rows: rows[self._left], lambda rows: rows[self._right])
+        self._products = FormProducts(system.S, system.g, lambda rows: rows[self._left], lambda rows: rows[self._right])
 
     def ascended(self, rows: Rows) -> tuple[SlipForm, SpaceRelaxation] | None:
         """The tightest form that was found, with the mean curvature of the energy, and its relaxation; or None."""

@@ -5,12 +5,11 @@ show in the peak resident size of the process.
 
 Read ``condense / solve``, which should be near the 81 right-hand sides, and the memory beside that of one dense n x n
 matrix. For loads, read ``ratio``: the processor time of searches under several loads, with a problem for each that
-dataclasses.replace builds, divided by that with problems that problem.replace makes.
+is built anew, divided by that with problems that problem.replace makes.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import resource
 import time
 import tracemalloc
@@ -81,7 +80,7 @@ def sweep(problem, replace, loads):
 def loads_row(nx, ny):
     """One body under several loads."""
     problem, loads = gallery.clamped_block(nx, ny, contact=CONTACT), np.linspace(0.5, 1.5, LOADS)
-    anew, roots = sweep(problem, dataclasses.replace, loads)
+    anew, roots = sweep(problem, lambda body, f: type(body)(**body.arguments | {"f": f}), loads)
     shared, same = sweep(problem, type(problem).replace, loads)
     return {
         "n": problem.n,

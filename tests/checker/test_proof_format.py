@@ -1,7 +1,6 @@
 """docs/proof_format.md suffices: a checker written from it alone accepts proofs of small problems, and no forgery."""
 
 import ast
-import dataclasses
 import functools
 import json
 import re
@@ -19,6 +18,7 @@ import rational_forms
 import rational_pieces
 import rational_references
 import rational_zeros
+from alike import anew
 from complete import all_roots
 from effort import some
 from generators import integer_problem, random_problem, singular_problem
@@ -317,7 +317,7 @@ def test_swapped_children_prove_nothing():
 def test_the_proof_of_a_neighbour():
     """The same problem but for one bit of its load."""
     problem, _, roots = point("one-node-6.1")
-    near = dataclasses.replace(problem, f=np.nextafter(problem.f, np.inf))
+    near = anew(problem, f=np.nextafter(problem.f, np.inf))
     for other in (near, point("five roots")[0]):
         assert "another problem" in verify(other, roots.proof).failures[0]
 

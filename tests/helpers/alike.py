@@ -28,3 +28,8 @@ def _equal(ours, theirs):
     if isinstance(ours, tuple) and isinstance(theirs, tuple):
         return len(ours) == len(theirs) and all(map(_equal, ours, theirs))
     return np.array_equal(ours, theirs) if isinstance(ours, np.ndarray) else ours == theirs
+
+
+def anew(problem, **changes):
+    """A problem with other data that shares nothing with this one."""
+    return type(problem)(**problem.arguments | changes)

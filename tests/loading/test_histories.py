@@ -1,13 +1,12 @@
 """What a history answers, its limits, and what is proven about starts in balls."""
 
-import dataclasses
 import json
 from fractions import Fraction
 
 import numpy as np
 import pandas as pd
 import pytest
-from alike import assert_close, assert_same
+from alike import anew, assert_close, assert_same
 from complete import all_roots, read_back
 from interruptions import CtrlC, interrupted
 from refusals import bad_argument
@@ -40,7 +39,7 @@ def test_every_step_is_what_enumerate_roots_finds(out_again, pulled_wedge):
     """Starts without a radius are ordinary problems: by hand, with problems built anew."""
     for stage in out_again.data.stages:
         alpha = float(stage.roots.alpha)
-        by_hand = dataclasses.replace(pulled_wedge, slip_offset=stage.start.offset)
+        by_hand = anew(pulled_wedge, slip_offset=stage.start.offset)
         roots = enumerate_roots(by_hand, alpha)
         assert [root.statuses for root in roots] == [root.statuses for root in stage.roots]
         for one, other in zip(roots, stage.roots, strict=True):
@@ -50,17 +49,17 @@ def test_every_step_is_what_enumerate_roots_finds(out_again, pulled_wedge):
 
 def test_steps_in_space_by_hand():
     given = enumsol.gallery.get("block3d-4").build()
-    block = dataclasses.replace(given, friction=tuple(given.friction_at(0.5).T), friction_slope=0.0)
+    block = anew(given, friction=tuple(given.friction_at(0.5).T), friction_slope=0.0)
     loads = [block.f, block.f * 1.5, -0.5 * block.f]
     history = histories(block, loads)
     assert history.counts == (1, 1, 1)
-    problem = dataclasses.replace(block, f=loads[0])
+    problem = anew(block, f=loads[0])
     for step, load in enumerate(loads, 1):
-        problem = dataclasses.replace(problem, f=load)
+        problem = anew(problem, f=load)
         (root,) = enumerate_roots(problem, 0)
         assert root.statuses == history.root((step, 0)).statuses
         assert np.allclose(root.lambda_t, history.root((step, 0)).lambda_t, atol=1e-10)
-        problem = dataclasses.replace(problem, slip_offset=problem.slip_offset + root.u_t)
+        problem = anew(problem, slip_offset=problem.slip_offset + root.u_t)
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
@@ -76,7 +75,7 @@ def test_a_complete_step_is_complete_for_every_start_in_its_ball(dimension, pull
     assert widest > 1e-7  # the start's radius, not rounding
     for _ in range(5):
         offset = radius * rng.choice([-1.0, 1.0], size=shape)
-        found = enumerate_roots(dataclasses.replace(problem, slip_offset=offset), alpha)
+        found = enumerate_roots(anew(problem, slip_offset=offset), alpha)
         assert [root.statuses for root in found] == [root.statuses for root in roots]
         for one, ball in zip(found, roots, strict=True):
             for name in ("lambda_n", "lambda_t", "u_n", "u_t"):
@@ -104,7 +103,7 @@ def test_the_slip_offset_moves_no_more_than_it_has_to():
     """Steps share what depends on the matrices only: the same numbers, and no new factorization."""
     block = enumsol.gallery.clamped_block(8, 2, 2.0)
     other = restarted(block, SlipStart(np.linspace(0, 1e-3, 8)), load=2.0 * block.f)
-    again = dataclasses.replace(block, slip_offset=np.linspace(0, 1e-3, 8), f=2.0 * block.f, load_slope=None)
+    again = anew(block, slip_offset=np.linspace(0, 1e-3, 8), f=2.0 * block.f, load_slope=None)
     assert other.factorization is block.factorization
     assert_same(other, again, "fingerprint", "condensed.g0")
     assert_same(other.enclosure, again.enclosure, "S", "g0", "g0_rad")

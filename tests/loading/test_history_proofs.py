@@ -1,11 +1,11 @@
 """One proof for a whole history: what the checker accepts, and what it refuses or does not believe."""
 
 import copy
-import dataclasses
 import re
 
 import numpy as np
 import pytest
+from alike import anew
 from complete import accepted_report, complete_report
 from proof_tools import of_kind, proof_of, put, records_of
 
@@ -22,7 +22,7 @@ def test_a_branching_history_is_verified(out_again, pulled_wedge):
 def test_a_history_in_space_is_verified():
     wedge = enumsol.gallery.get("wedge3d-2-3").build()
     given = {"friction": tuple(wedge.friction_at(1).T), "friction_slope": 0.0, "f": 0 * wedge.f, "load_slope": wedge.f}
-    wedge = dataclasses.replace(wedge, **given)
+    wedge = anew(wedge, **given)
     history = histories(wedge, [-1, 0, 0.5, 1])
     assert history.complete
     assert complete_report(wedge, history.proof).roots == (1, 1, 3, 5)
@@ -33,7 +33,7 @@ def test_loads_and_friction_of_steps_are_part_of_the_proof():
     steps = [enumsol.LoadStep(load=[2, 0.5], friction=0.25), enumsol.LoadStep(load=[2, 3]), [1, -3]]
     history = histories(problem, steps)
     complete_report(problem, history.proof)
-    assert not verify(dataclasses.replace(problem, friction=0.25), history.proof).ok
+    assert not verify(anew(problem, friction=0.25), history.proof).ok
     for step, part, value in ((1, 1, [2.0, 3.5]), (0, 2, [-0.25])):
         records = records_of(history.proof)
         records[0]["steps"][step][part] = value
@@ -304,7 +304,7 @@ def test_a_start_that_is_proven_and_too_narrow_is_not_believed(pulled_wedge):
     history = histories(pulled_wedge, [0.5, 1])
     records = records_of(history.proof)
     places = of_kind(records, "s")
-    alone = dataclasses.replace(pulled_wedge, slip_offset=records[places[1]][2])
+    alone = anew(pulled_wedge, slip_offset=records[places[1]][2])
     honest = records_of(enumsol.enumerate_roots(alone, 1.0).proof)
     assert records[places[1]][3] is not None
     records[places[1]][3] = None

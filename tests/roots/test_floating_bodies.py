@@ -1,6 +1,5 @@
 """Bodies that nothing holds, in 2D: all solutions against an oracle in rationals, which condenses nothing."""
 
-import dataclasses
 import itertools
 import pickle
 from concurrent.futures import ThreadPoolExecutor
@@ -9,6 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from alike import anew
 from complete import all_roots, proven_roots
 from helpers.floating_oracle import Oracle, block_on_table, random_body
 from refusals import bad_argument, bad_problem, refusal
@@ -133,7 +133,7 @@ def test_weak_springs_tend_to_the_body_that_nothing_holds(push):
 def test_solutions_do_not_depend_on_the_basis_of_the_modes():
     problem = block_on_table(push=0.5)
     N = problem.rigid_modes @ np.array([[1, 2, 0], [0, 1, -1], [1, 0, 4]])
-    (one,), (two,) = (enumsol.enumerate_roots(p, 0) for p in (problem, dataclasses.replace(problem, rigid_modes=N)))
+    (one,), (two,) = (enumsol.enumerate_roots(p, 0) for p in (problem, anew(problem, rigid_modes=N)))
     assert np.allclose(one.u, two.u, atol=1e-12)
     assert np.allclose(one.lambda_n, two.lambda_n, atol=1e-12)
 
@@ -163,9 +163,9 @@ def test_what_is_kept_of_a_body_that_nothing_holds(tmp_path):
         again = enumsol.read_problem(tmp_path / place)
         assert (again.fingerprint, again.max_rigid_displacement) == (problem.fingerprint, 7.0)
     assert pickle.loads(pickle.dumps(problem)).fingerprint == problem.fingerprint
-    assert dataclasses.replace(problem, f=2 * problem.f).rigid_reach == 7.0
+    assert anew(problem, f=2 * problem.f).rigid_reach == 7.0
     changes = {"max_rigid_displacement": 8.0}, {"rigid_modes": 2 * problem.rigid_modes}
-    others = problem, problem.on_springs, *(dataclasses.replace(problem, **change) for change in changes)
+    others = problem, problem.on_springs, *(anew(problem, **change) for change in changes)
     assert len({other.fingerprint for other in others}) == 4
     with pytest.raises(enumsol.EnumsolError, match="fclib has no place for rigid_modes"):
         enumsol.write_problem(problem, tmp_path / "block.h5")
@@ -216,7 +216,7 @@ N = block_on_table().rigid_modes
     ],
 )
 def test_modes_that_cannot_be_used(change, words):
-    bad_problem(words, dataclasses.replace, block_on_table(), **change)
+    bad_problem(words, anew, block_on_table(), **change)
 
 
 @pytest.mark.parametrize(

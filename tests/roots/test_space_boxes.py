@@ -1,11 +1,11 @@
 """Degenerate roots in 3D that boxes settle: complete results, several roots, resumed and spread searches."""
 
-import dataclasses
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import oracles3d
 import pytest
+from alike import anew
 from complete import accepted_report, all_roots
 from effort import some
 from problems3d import bounds, degenerate_integers, forces, from_compliance, unmatched
@@ -115,7 +115,7 @@ def test_what_stays_open_says_why_and_the_hint_helps(seed):
     sums = set()
     for sign in (-1, 1):
         change = 1e-4 * sign * np.max(np.abs(problem.f)) * np.random.default_rng(5).normal(size=problem.n)
-        near = all_roots(dataclasses.replace(problem, f=problem.f + change), 0)
+        near = all_roots(anew(problem, f=problem.f + change), 0)
         assert near.index_sum == 1
         sums.add(len(near))
     assert sums == {1, 3}

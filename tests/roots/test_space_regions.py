@@ -1,6 +1,5 @@
 """Degenerate roots and continua in 3D that no box settles: undecided regions, which hold what is known to be there."""
 
-import dataclasses
 import json
 from concurrent.futures import ProcessPoolExecutor
 
@@ -8,6 +7,7 @@ import numpy as np
 import oracles3d
 import pytest
 import scipy.linalg
+from alike import anew
 from complete import accepted_report
 from problems3d import from_compliance, random_coupled
 from roots.test_space_weak_springs import body
@@ -237,7 +237,7 @@ def undecided_and_perturbed(problem):
     assert not roots.complete
     assert "at least 1 exists" in repr(roots)
     change = 1e-4 * np.max(np.abs(problem.f)) * np.random.default_rng(5).normal(size=problem.n)
-    near = enumerate_roots(dataclasses.replace(problem, f=problem.f + change), 0, max_nodes=400)
+    near = enumerate_roots(anew(problem, f=problem.f + change), 0, max_nodes=400)
     return {(region.reason, region.hint) for region in roots.undecided}, near.complete
 
 

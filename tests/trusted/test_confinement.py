@@ -1,11 +1,11 @@
 """How far a body that nothing holds can move: no solution lies beyond what is proven, and what is proven is of use."""
 
-import dataclasses
 from fractions import Fraction
 from itertools import product
 
 import numpy as np
 import pytest
+from alike import anew
 from complete import all_roots
 from helpers.floating_oracle import Oracle, block_on_table, random_body
 
@@ -42,7 +42,7 @@ def test_no_solution_lies_beyond_what_is_proven():
             continue
         proven += 1
         most = free.reach * free.rows.unit
-        far = dataclasses.replace(problem, max_rigid_displacement=1000 * problem.rigid_reach)
+        far = anew(problem, max_rigid_displacement=1000 * problem.rigid_reach)
         q = coordinates(far, Oracle(far).parts)
         assert np.all(np.abs(q) <= most * (1 + 1e-12))
         beyond += bool(np.any(np.abs(q) > 0))
@@ -82,7 +82,7 @@ def test_a_block_moves_far_only_at_the_limit(push, confined):
 
 def test_a_narrow_bound_is_said_to_be_needed_only_if_it_is():
     free = block_on_table(push=0.5)
-    narrow = dataclasses.replace(free, max_rigid_displacement=1e-3)
+    narrow = anew(free, max_rigid_displacement=1e-3)
     wide, cut = (enumsol.enumerate_roots(problem, 0) for problem in (free, narrow))
     beyond = np.max(np.abs(wide[0].rigid_displacement)) > 1e-3
     assert (len(cut), cut.rigid_bound.needed) == (0 if beyond else 1, beyond)
@@ -91,9 +91,9 @@ def test_a_narrow_bound_is_said_to_be_needed_only_if_it_is():
 def test_a_root_beyond_the_bound_is_not_listed():
     problem = block_on_table(push=0.0)
     # tilted until both nodes touch: the body has to come down by 1/2
-    lifted = dataclasses.replace(problem, gap=0.5)
+    lifted = anew(problem, gap=0.5)
     assert len(enumsol.enumerate_roots(lifted, 0)) == 1
-    near = dataclasses.replace(lifted, max_rigid_displacement=0.25)
+    near = anew(lifted, max_rigid_displacement=0.25)
     roots = all_roots(near, 0)
     assert (len(roots), roots.rigid_bound.needed) == (0, True)
     assert "within rigid displacements of 0.25" in roots.closing_line

@@ -165,7 +165,7 @@ class _Item:
     forced: tuple[int, ...] | None
 
 
-class PieceTree:
+class SubintervalTree:
     """Trees over one piece.
 
     Parameters

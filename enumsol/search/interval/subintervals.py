@@ -21,7 +21,7 @@ from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.model.statuses import UNDECIDED
 from enumsol.relaxation.interval_relaxation import IntervalSystem
 from enumsol.search.floating_solvers import WEAK
-from enumsol.search.interval.interval_tree import LARGEST_TREE, EmptyLeaf, PieceTree, Subtree, TreeResult
+from enumsol.search.interval.interval_tree import LARGEST_TREE, EmptyLeaf, SubintervalTree, Subtree, TreeResult
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.trusted.exclusion import exclusion_margin
 from enumsol.trusted.over_interval import EnclosedPiece, PieceNumbers
@@ -160,7 +160,7 @@ class Worker:
     ) -> None:
         self._condensed, self._origin, self.leaves = condensed, origin, leaves
         self._length = float(interval[1] - interval[0])
-        self._trees: tuple[Piece, IntervalSystem, PieceTree] | None = None
+        self._trees: tuple[Piece, IntervalSystem, SubintervalTree] | None = None
 
     def run(self, task: Task, max_nodes: int | None = None, deadline: float | None = None) -> TreeResult:
         """Search the tree of a task."""
@@ -173,7 +173,7 @@ class Worker:
         """The system of a piece."""
         return self._on(piece)[1]
 
-    def _on(self, piece: Piece) -> tuple[Piece, IntervalSystem, PieceTree]:
+    def _on(self, piece: Piece) -> tuple[Piece, IntervalSystem, SubintervalTree]:
         if self._trees is None or self._trees[0] != piece:
             system, middle = self._make(piece), None
             share = float(piece.b - piece.a) / self._length
@@ -181,7 +181,7 @@ class Worker:
                 middle = self._make(Piece(piece.middle, piece.middle))
             convex = partial(self.leaves.convex, piece, system) if self.leaves.forms else None
             long = share > LONG_PIECE and bool(np.any(system.F_lo != system.F))
-            trees = PieceTree(system, middle, partial(self.leaves.excluded, piece, system), convex, long=long)
+            trees = SubintervalTree(system, middle, partial(self.leaves.excluded, piece, system), convex, long=long)
             self._trees = (piece, system, trees)
         return self._trees
 
