@@ -109,7 +109,7 @@ class Way:
 
     @property
     def condensed(self) -> CondensedProblem:
-        """What the relaxations of the search are about: the body, or that on weak springs (theory, section 14.8)."""
+        """System of the relaxations of the search: the body, or that on weak springs (theory, section 14.8)."""
         return self.problem.condensed if self.problem.modes is None else on_weak_springs(self.problem)
 
     @property

@@ -57,7 +57,7 @@ class ClaimedEvent:
 
     @property
     def bound(self) -> bool:
-        """Whether it is the rigid displacement that reaches a bound there."""
+        """True if it is the rigid displacement that reaches a bound there."""
         return self.condition[0] >= len(self.codes)
 
 

@@ -201,7 +201,7 @@ class HistoryChecker:
     # -- what follows ----------------------------------------------------------------------------------------------
 
     def _conclusions(self) -> tuple[bool, int, float | None]:
-        """Whether these are all histories, up to which step there is one only, and within which rigid displacements."""
+        """True if these are all histories, up to which step there is one only, and within which rigid displacements."""
         first = [stage for stage in self.stages if stage.step == 1]
         if len(first) != 1 or first[0].start.key != SlipStart.of(self.problem).key:
             raise RefusedError("the first step does not start from the problem's own slip offset")

@@ -140,7 +140,7 @@ class SpaceGraphChecker:
 
     @property
     def _limits(self) -> Limits:
-        """Of boxes around curves."""
+        """Limits of records about boxes around curves."""
         return Limits((UNDECIDED,) * self.problem.p, modes=modes_of(self.problem))
 
     def _curve(self, given: AlphaProblem, count: Any, records: Iterator[Any]) -> None:

@@ -103,7 +103,7 @@ class CondensedEnclosure(Sealed):
         return moved
 
     def without_offsets(self, moves: Mask) -> CondensedEnclosure:
-        """The same with a load that lacks the slip offsets of components that move, on which no force depends.
+        """These balls with a load that lacks the slip offsets of components that move, on which no force depends.
 
         Their w is then where they move to (theory, section 13.2).
 

@@ -45,7 +45,7 @@ class RigidRows:
 
     @classmethod
     def of(cls, problem: Any, alpha: Fraction, force: Floats, length: Floats) -> RigidRows:
-        """Those of a problem at one alpha, enclosed; errors as ``along``."""
+        """Rows of a problem at one alpha, enclosed; errors as ``along``."""
         rows, slope = cls.along(problem, force, length)
         if slope is None:
             return rows
@@ -58,7 +58,7 @@ class RigidRows:
 
     @classmethod
     def along(cls, problem: Any, force: Floats, length: Floats) -> tuple[RigidRows, Ball | None]:
-        """Those of a problem at alpha = 0, enclosed, and by how much h grows with alpha; None where it does not.
+        """Rows of a problem at alpha = 0, enclosed, and by how much h grows with alpha; None where it does not.
 
         Raises
         ------

@@ -503,12 +503,12 @@ class AlphaSpace:
 
     @property
     def floats(self) -> bool:
-        """Whether nothing holds the body."""
+        """True if nothing holds the body."""
         return self.enclosure.problem.modes is not None
 
     @cached_property
     def moved(self) -> Ball:
-        """What a rigid displacement of size one moves the contact nodes by in the problem's units, (3p, r)."""
+        """Displacements of the contact nodes by rigid displacements of size one in the problem's units, (3p, r)."""
         ones = np.ones(len(self.enclosure.g0))
         rows = RigidRows.of(self.enclosure.problem, self.reference, ones, ones)
         return Ball(*(part.T / rows.unit for part in (rows.G.mid, rows.G.rad)))
@@ -576,7 +576,7 @@ class FloatingSpace(FloatingSystem, EnclosedSpace):
     def of(
         cls, problem: Any, alpha: Fraction, force: Floats, length: Floats, enclosure: CondensedEnclosure | None = None
     ) -> Self:
-        """That of a problem, in units of the nodes given by powers of two; ``enclosure`` in place of that on springs.
+        """System of a problem, in units of the nodes given by powers of two; ``enclosure`` in place of that on springs.
 
         Raises
         ------
@@ -593,7 +593,7 @@ class FloatingSpace(FloatingSystem, EnclosedSpace):
 
 
 def _on_tau(rows: RigidRows, own: Indices, weight: Ball) -> RigidRows:
-    """Those that act on (lambda_n, tau): some columns of G, each times its weight."""
+    """Rows that act on (lambda_n, tau): some columns of G, each times its weight."""
     G = rows.G[:, own]
     product = G * weight
     # zeros are exact

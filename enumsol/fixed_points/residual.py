@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def fixed_point_residual(problem: Problem, root: Any) -> float:
-    """How far Psi moves a root, relative to the load [-].
+    """Distance by which Psi moves a root, relative to the load [-].
 
     The largest change of a contact force when the Tresca problem with the root's normal forces as slip bounds, and
     the coefficients at its slips, is solved, with displacements at the root as the body itself has them: what S has
@@ -50,7 +50,7 @@ def fixed_point_residual(problem: Problem, root: Any) -> float:
 
 
 def is_fixed_point(problem: Problem, root: Any, tolerance: float = 1e-8) -> bool:
-    """Whether a root is a fixed point of Psi within a tolerance (theory, section 11.3).
+    """True if a root is a fixed point of Psi within a tolerance (theory, section 11.3).
 
     With coefficients that do not depend on the solution the fixed points are exactly the solutions with Coulomb
     friction; every root of `enumerate_roots` is one.

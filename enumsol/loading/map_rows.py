@@ -1,4 +1,4 @@
-"""What is proven at one value of a map's second parameter: a branch graph over alpha, in numbers."""
+"""Claims at one value of a map's second parameter: a branch graph over alpha, in numbers."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class MapRow:
 def map_row(
     make: Callable[[float], ContactProblem], value: float, interval: tuple[Alpha, Alpha], options: dict[str, Any]
 ) -> MapRow:
-    """One row of a map (a module-level function, so that other processes can import it)."""
+    """Row of a map (a module-level function, so that other processes can import it)."""
     started = time.perf_counter()
     problem = arguments.instance_of(make(value), ContactProblem, "the problem that over makes")
     graph = branch_graph(problem, interval, **options)

@@ -26,7 +26,7 @@ _FORM = f'["{DeclaredForm.kind}"'.encode()
 
 
 class ProofExtent(NamedTuple):
-    """How far a proof goes that was begun.
+    """Extent of a proof that was begun.
 
     Attributes
     ----------

@@ -339,7 +339,7 @@ class Unbalanced(Exclusion):
 
 @dataclass(frozen=True, eq=False)
 class SharedRoot(Solved):
-    """Of a body that nothing holds: selections share one root, in which some nodes of this one stick or slip.
+    """Selections of a body that nothing holds share one root, in which some nodes of this one stick or slip.
 
     Attributes
     ----------

@@ -295,7 +295,7 @@ class RootSet(Sequence[Root], Immutable):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What may mislead about the roots, each in a sentence: a load at the limit, displacements that are not small.
+        """Warnings about the roots, each in a sentence: a load at the limit, displacements that are not small.
 
         They are also printed, and shown in reports.
         """

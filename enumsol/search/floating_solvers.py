@@ -251,7 +251,7 @@ class Exclusions:
         return self._references[selection]
 
     def only_root(self, codes: Codes, reference: Reference, proposal: OnlyRoot, *, within: bool) -> bool | None:
-        """Whether the bound is needed for no other root to lie below an assignment; None if that is not proven."""
+        """True if the bound is needed for no other root to lie below an assignment; None if that is not proven."""
         for system in (self.free, self.system)[: 2 if within else 1]:
             if reference.is_only_root(codes, proposal.rows, proposal.products, system.reach):
                 return system is self.system

@@ -94,7 +94,7 @@ class ReferenceCloser:
 
     @property
     def leads(self) -> bool:
-        """Whether the tree is led."""
+        """True if the tree is led."""
         return any(cover.pays for _, cover in self._references)
 
     def led(self, codes: Codes) -> Led | None:
@@ -154,7 +154,7 @@ _SHARED = 0.5
 
 
 def reference_numbers(system: FloatingSystem, selection: Codes) -> Iterator[tuple[Floats, float, float]]:
-    """What the form of a root may be made of: weights, balance and share (see ``trusted.reference``)."""
+    """Numbers of which the form of a root may be made: weights, balance and share (see ``trusted.reference``)."""
     root = solve_selection(system, selection)
     if root is None or not root.is_root:
         return
@@ -229,7 +229,7 @@ class Cover:
 
     @cached_property
     def pays(self) -> bool:
-        """Whether single nodes that stick, and pairs that slip in opposite directions, mostly leave no other root."""
+        """True if single nodes that stick, and pairs that slip in opposite directions, mostly leave no other root."""
         p, stick = self._reference.system.p, [i for i in self._first if self._reference.selection[i] == STICK]
         if not stick:
             return False
@@ -243,7 +243,7 @@ class Cover:
         return self._reference.is_only_root(codes, proposal.rows, proposal.products, reach)
 
     def is_due(self, codes: Codes) -> bool:
-        """Whether an assignment may be one that leaves the root alone."""
+        """True if an assignment may be one that leaves the root alone."""
         rows, forward, backward = rows_of(self._reference, codes)
         return bool(forward and backward) or any(row >= FORTH * len(codes) for row in rows)
 
@@ -282,7 +282,7 @@ class Cover:
         return np.abs(np.array([self._normal[i], self._tangential[i]]) @ modes) > _NOTHING
 
     def _opposes(self, i: int, j: int, modes: Floats) -> bool:
-        """Whether two nodes in contact move in the same direction along what is left."""
+        """True if two nodes in contact move in the same direction along what is left."""
         if not modes.shape[1]:
             return False
         normal = self._normal[i] @ modes

@@ -511,7 +511,7 @@ class TreeSearch:
         return outcome.stopped is not None
 
     def _rounding_decides(self) -> bool:
-        """Whether a load at the limit leaves no hope of a complete search."""
+        """True if a load at the limit leaves no hope of a complete search."""
         if self.at_limit is None:
             return False
         endless = self.limits.max_nodes is None and self.limits.deadline is None

@@ -47,7 +47,7 @@ class JointRoot:
     rigid: Ball | None
 
     def has(self, codes: Codes) -> bool:
-        """Whether it is the root of a selection, if that has one."""
+        """True if it is the root of a selection, if that has one."""
         return all(code in held for code, held in zip(codes, self.possible, strict=True))
 
     @property

@@ -124,7 +124,7 @@ def _pressing(forces: Ball, p: int) -> Ball:
 
 
 def _by_selections(problem: Any, alpha: Fraction, selections: Iterable[Sequence[int]], before: Ball) -> Ball | None:
-    """Where nodes are at the root of a body that nothing holds which is that of one of these selections.
+    """Places of nodes at the root of a body that nothing holds which is that of one of these selections.
 
     None where there are none, or one may be singular.
     """

@@ -79,13 +79,13 @@ class Reference:
             return None if form is None else cls(system, tuple(selection), root, at, form)
 
     def lies_below(self, codes: Sequence[int]) -> bool:
-        """Whether the root has the statuses of an assignment."""
+        """True if the root has the statuses of an assignment."""
         return all(refines(own, code) for own, code in zip(self.selection, codes, strict=True))
 
     def is_only_root(
         self, codes: Sequence[int], rows: Sequence[int], products: Sequence[Product], reach: Floats
     ) -> bool:
-        """Whether every root below an assignment, with |q| within reach, is this one.
+        """True if every root below an assignment, with |q| within reach, is this one.
 
         Parameters
         ----------
@@ -101,7 +101,7 @@ class Reference:
         return self.form.is_only_root(self.rows(rows), self.rows(tight), numbered, reach)
 
     def _allow(self, codes: Sequence[int], rows: Sequence[int], tight: Sequence[int]) -> bool:
-        """Whether the first rows are equations, and the others nonnegative but not positive at the root."""
+        """True if the first rows are equations, and the others nonnegative but not positive at the root."""
         p, F = self.system.p, self.system.F
         signs, own = (row_signs(np.array(given), F) for given in (codes, self.selection))
         for row in (*rows, *tight):

@@ -27,7 +27,7 @@ _LACKING, _MORE, _TRIES = 8 * UNIT, 16.0, 4
 
 @dataclass(frozen=True)
 class Body:
-    """What a body that nothing holds adds to the changes d of some components of lambda: G d = 0, w - w* = G'e - S d.
+    """Compliance and rigid rows for the changes d of some components of lambda: G d = 0, w - w* = G'e - S d.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ class RootForm:
         return cls(body, 0.5 * m / SAFE, tilt, table, ~_used(C), multipliers.cost)
 
     def is_only_root(self, equations: Ball, tight: Ball, products: Sequence[Product], reach: Floats) -> bool:
-        """Whether no other root has its changes of w in these rows, and |q| within reach.
+        """True if no other root has its changes of w in these rows, and |q| within reach.
 
         Parameters
         ----------
@@ -152,7 +152,7 @@ class RootForm:
         return M.symmetric
 
     def _costs(self, equations: Ball, lacking: float, reach: Floats) -> bool:
-        """Whether gaps of loaded nodes cost more than the form lacks (theory, (14.17))."""
+        """True if gaps of loaded nodes cost more than the form lacks (theory, (14.17))."""
         loaded = np.flatnonzero(self.cost > 0)
         rows = Ball.joined(Ball.exact(np.diag(self.cost)[loaded]), equations)
         moved = rows @ self.body.G.T

@@ -210,7 +210,7 @@ def _decides(box: AlphaBox, rest: list[Interval]) -> bool:
 
 
 def _always_singular(selection: ArcSelection, low: float, high: float) -> bool:
-    """Whether the rows [M, -g] seem to be dependent at several alphas; no claim rests on it."""
+    """True if the rows [M, -g] seem to be dependent at several alphas; no claim rests on it."""
     size = len(selection.rows.unknown)
     for share in (0.1, 0.4, 0.8):
         H = selection.forms[0][:size] + (low + share * (high - low)) * selection.forms[1][:size]

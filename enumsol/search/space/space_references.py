@@ -113,7 +113,7 @@ class SpaceReferenceCloser:
         return found
 
     def again(self, codes: Codes, relaxation: object) -> list[Any] | None:
-        """The same, whether or not other assignments were tried in vain."""
+        """The solutions as ``closed`` gives them, whether or not other assignments were tried in vain."""
         del relaxation
         if self._reference is None:
             return None
@@ -137,7 +137,7 @@ class SpaceReferenceCloser:
 
 
 def _far_apart(reference: SpaceReference) -> list[int]:
-    """One contact node more than it takes to hold the body against the foundation, far from each other."""
+    """Contact nodes, one more than it takes to hold the body against the foundation, far from each other."""
     normals = reference.system.rows.G.mid[:, : len(reference.leaf)].T
     pressed, found = [i for i, code in enumerate(reference.leaf) if code != OPEN], list[int]()
     M = _LITTLE * np.eye(normals.shape[1])

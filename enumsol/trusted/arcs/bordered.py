@@ -263,7 +263,7 @@ class BorderedExpansion:
 
 
 def _none_above(lines: list[tuple[Any, Any]]) -> bool:
-    """Whether a + s b is negative for some of these (a, b), at every s >= 0."""
+    """True if a + s b is negative for some of these (a, b), at every s >= 0."""
     if any(a < 0 and b <= 0 for a, b in lines):
         return True
     least = [-a / b for a, b in lines if a < 0]

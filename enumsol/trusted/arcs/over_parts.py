@@ -116,7 +116,7 @@ class Expansion:
 
     @cached_property
     def unbalanced(self) -> bool:
-        """Whether no forces of the selection are in balance with the load anywhere in the interval."""
+        """True if no forces of the selection are in balance with the load anywhere in the interval."""
         return self.selection.unbalanced(self.low, self.high)
 
     @property
@@ -218,7 +218,7 @@ class Nowhere:
 
     @property
     def known(self) -> OverInterval:
-        """What is known of every part of it."""
+        """Knowledge of every part of it."""
         unknown = np.zeros(len(self.selection.rows.conditions), dtype=np.int8)
         return OverInterval(unknown, False, True, 0, (unknown, unknown), unknown)
 

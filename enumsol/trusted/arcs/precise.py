@@ -99,7 +99,7 @@ class PreciseSystem:
             return held if problem.modes is None else held._bordered(problem, problem.modes)
 
     def _bordered(self, problem: ContactProblem, modes: RigidModes) -> PreciseSystem:
-        """That of the body that nothing holds, from the one on springs."""
+        """System of the body that nothing holds, from the one on springs."""
         N, slope, r = modes.N, problem.load_slope, modes.r
         G = products(problem.contact_rows, N)
         loads = [[arb(0)] * r if part is None else products(N.T, part[:, None]).ravel() for part in (problem.f, slope)]

@@ -57,7 +57,7 @@ class ArcSystem:
             return held if problem.modes is None else held._bordered(*RigidRows.along(problem, force, length))
 
     def _bordered(self, rows: RigidRows, slope: Ball | None) -> ArcSystem:
-        """That of the body that nothing holds, from the one on springs."""
+        """System of the body that nothing holds, from the one on springs."""
         G, none = rows.G, Ball.exact(np.zeros_like(rows.h.mid))
         corner = Ball.exact(np.zeros((len(G.mid),) * 2))
         border = Ball(-G.mid.T, G.rad.T)
@@ -134,7 +134,7 @@ class ArcSelection:
         return int(value > radius) - int(value < -radius)
 
     def unbalanced(self, low: float, high: float) -> bool:
-        """Whether no forces of the selection are in balance with the load anywhere between two alphas.
+        """True if no forces of the selection are in balance with the load anywhere between two alphas.
 
         By one motion for all of them (theory, (14.7)), of a body that nothing holds.
         """

@@ -62,7 +62,7 @@ def link_between(curve: SolutionCurve, start: SolutionCurve, end: SolutionCurve)
 
 
 def _leaves(curve: SolutionCurve, inner: Ball, outer: Ball, side: int) -> bool:
-    """Whether the rigid displacement is within its bounds at one point, and no bound is passed twice on the way out."""
+    """True if the rigid displacement is within its bounds at one point, and no bound is passed twice on the way out."""
     problem = curve.problem
     if not problem.within(inner):
         return False
@@ -75,7 +75,7 @@ def _leaves(curve: SolutionCurve, inner: Ball, outer: Ball, side: int) -> bool:
 
 
 def _is_beyond(curve: SolutionCurve, end: SolutionCurve, side: int) -> bool:
-    """Whether the rigid displacement is beyond a bound at an end, and even more so in all that a box has behind."""
+    """True if the rigid displacement is beyond a bound at an end, and even more so in all that a box has behind."""
     rigid = curve.problem.rigid
     there, slope = end.at(0.0)[rigid], curve.slope[rigid]
     far = np.abs(there.mid) - there.rad * SAFE > curve.problem.reach * SAFE
@@ -144,7 +144,7 @@ class CurveChain:
 
     @property
     def whole(self) -> bool:
-        """Whether it is closed, or leaves the interval, or the bounds of the rigid displacement, at both ends."""
+        """True if it is closed, or leaves the interval, or the bounds of the rigid displacement, at both ends."""
         return not self.gaps
 
     @property

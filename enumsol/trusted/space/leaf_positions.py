@@ -83,7 +83,7 @@ def leaf_positions(problem: Any, alpha: Fraction, forces: Ball, codes: Sequence[
 
 
 def _spread(problem: Any, enclosed: EnclosedSpace, length: Floats) -> Floats:
-    """How far the slip offset may be from its middle, scaled, (m,)."""
+    """Distance by which the slip offset may be from its middle, scaled, (m,)."""
     spread = np.zeros(len(enclosed.g))
     for k in range(2 if problem.offset_radius is not None else 0):
         nodes = np.flatnonzero(enclosed.tau[:, k] >= 0)
@@ -128,7 +128,7 @@ class _StartedLeaf(Leaf):
         return Ball(found.mid, (found.rad + wide) * SAFE)[:m]
 
     def _by_load(self, angle: Floats, load: Indices) -> tuple[Ball, Ball] | None:
-        """What one unit more of some rows of the load adds to w and to G, (m, k) and (q, k), directions held."""
+        """Changes by one unit more of some rows of the load to w and to G, (m, k) and (q, k), directions held."""
         turning, q = self._turning(angle), len(self.turning)
         if turning is None:
             return None

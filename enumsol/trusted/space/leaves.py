@@ -93,7 +93,7 @@ class _Sweep(NamedTuple):
 
     @property
     def by_alpha(self) -> bool:
-        """Whether the parameter is s."""
+        """True if the parameter is s."""
         return self.place == len(self.beside.mid)
 
     @property
@@ -569,7 +569,7 @@ class Leaf:
         return pairs
 
     def _rigid_along(self, sweep: _Sweep) -> list[tuple[Ball, Ball]]:
-        """What the rigid displacement leaves of its bounds, see ``_allowed_along``."""
+        """Distances of the rigid displacement from its bounds, see ``_allowed_along``."""
         reach, first = self.system.reach, len(self.system.g)
         sides = [(Ball.exact(np.array(sign)), k) for k in range(len(reach)) for sign in (1.0, -1.0)]
         middle, turn = sweep[:2]

@@ -82,7 +82,7 @@ class AlphaPiece:
         return swept_margin(self.ends, middle, codes, rows, values, errors)
 
     def is_unbalanced(self, codes: Sequence[int], z: Array) -> bool:
-        """Whether at no alpha of the piece any forces below a partial assignment are in balance with the load, by z.
+        """True if at no alpha of the piece any forces below a partial assignment are in balance with the load, by z.
 
         Of a body that nothing holds.
         """
@@ -101,7 +101,7 @@ class AlphaPiece:
         return found
 
     def displacements(self, y: Ball, w: Ball, alpha: Ball) -> Ball:
-        """The same of displacements w, (3p,), at all alpha of a ball; y of ``rigid``."""
+        """Bounds of displacements w, (3p,), at all alpha of a ball; y of ``rigid``."""
         system, (_, length), p = self.space.fixed, self.space.units, len(self.space.units[0])
         found = Ball(np.zeros(3 * p), np.zeros(3 * p))
         found[:p] = Ball(w.mid[:p] * length, w.rad[:p] * length + TINY)

@@ -50,7 +50,7 @@ def swept_floating_margin(
     multipliers: tuple[Floats, Floats],
     errors: float = 1.0,
 ) -> float:
-    """The same at all alpha between two, by (14.19), with multipliers between those of both ends (``swept_margin``)."""
+    """Lower bound at all alpha between two, by (14.19), multipliers between both ends (``swept_margin``)."""
     own, mixed = (
         [Multiplied.of(end, codes, lines, part) for end, part in zip(ends, values, strict=True)]
         for values in (multipliers, multipliers[::-1])

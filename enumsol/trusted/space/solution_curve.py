@@ -132,7 +132,7 @@ class AlphaProblem:
 
     @classmethod
     def of(cls, enclosure: CondensedEnclosure, steps: Array | None = None) -> AlphaProblem:
-        """Of a problem whose nodes have coefficients with the same ratio for all alpha (see ``enclosed_over_alpha``).
+        """Map of a problem whose nodes have coefficients of one ratio for all alpha (see ``enclosed_over_alpha``).
 
         ``steps``: positive, (m,), rho in the units of the problem (force / length); by default some that serve.
 
@@ -203,7 +203,7 @@ class AlphaProblem:
 
     @property
     def rigid(self) -> slice:
-        """Where the coordinates of the rigid displacement are in (zeta, alpha)."""
+        """Places of the coordinates of the rigid displacement in (zeta, alpha)."""
         return slice(3 * self.p, self.m)
 
     @property
@@ -326,7 +326,7 @@ class AlphaProblem:
 
 
 def _ratios(problem: Any, occurs: NDArray[np.bool_]) -> Ball:
-    """Of both coefficients, at the second component of nodes with two; 1 elsewhere, (3p,)."""
+    """Ratios of both coefficients, at the second component of nodes with two; 1 elsewhere, (3p,)."""
     p = problem.p
     coefficients, slopes = np.array(problem.friction), np.array(problem.friction_slope)
     ratio = Ball.exact(np.ones(3 * p))
@@ -408,7 +408,7 @@ class SolutionCurve:
 
     @property
     def reach(self) -> Array:
-        """How far from centre + t direction the set goes in which the curve has the only solutions, (m + 1,)."""
+        """Distance from centre + t direction of the set in which the curve has the only solutions, (m + 1,)."""
         found = self.found
         return np.asarray(found.step.reach(found.radius, found.shares) * found.near.unit)
 

@@ -86,7 +86,7 @@ class SpaceReference:
     def is_only_root(
         self, codes: Sequence[int], rows: Sequence[Row], products: Sequence[SpaceProduct], reach: Floats
     ) -> bool:
-        """Whether every root below an assignment, with |q| within reach, is this one.
+        """True if every root below an assignment, with |q| within reach, is this one.
 
         Parameters
         ----------
@@ -110,12 +110,12 @@ class SpaceReference:
         return self.form.is_only_root(*coefficients, numbered, reach)
 
     def is_equation(self, codes: Sequence[int], row: Row) -> bool:
-        """Whether a row on displacements vanishes below an assignment and at the root."""
+        """True if a row on displacements vanishes below an assignment and at the root."""
         node = row[1]
         return row[0] in (GAP, SLIP) and row_sign(codes[node], row) == row_sign(self.leaf[node], row) == FREE
 
     def is_tight(self, codes: Sequence[int], row: Row) -> bool:
-        """Whether a row on displacements is nonnegative below an assignment, and not positive at the root."""
+        """True if a row on displacements is nonnegative below an assignment, and not positive at the root."""
         kind, node, _ = row
         if kind not in (GAP, ALONG, LEFT, RIGHT) or row_sign(codes[node], row) not in (NONNEGATIVE, FREE):
             return False

@@ -267,7 +267,7 @@ class SpaceWeights:
         return bool(room * gap / SAFE >= self.kappa[i] * slip * SAFE * SAFE + TINY)
 
     def off_at(self, system: EnclosedSpace, i: int, y: Ball, w: Ball) -> float:
-        """How far theta is at most from one that serves a solution within a node's balls; infinite if that is open."""
+        """Largest distance of theta from one that serves a solution within a node's balls; infinite if that is open."""
         places = system.tau[i]
         t, theta = places[places >= 0], self.theta[i][places >= 0]
         if not len(t) or self.wide[i] > 0:
@@ -293,7 +293,7 @@ class SpaceWeights:
 
 
 def in_range(system: EnclosedSpace) -> bool:
-    """Whether nothing underflows with units of tau, and the discs have the radius one."""
+    """True if nothing underflows with units of tau, and the discs have the radius one."""
     discs = system.discs
     return bool(
         np.max(np.maximum(system.unit, 1.0 / system.unit)) <= LARGEST_UNIT
