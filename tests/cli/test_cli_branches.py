@@ -2,7 +2,6 @@ import csv
 import importlib.util
 import io
 import json
-import re
 
 import numpy as np
 import pytest
@@ -10,7 +9,7 @@ from branches.test_degenerate import pair
 from command_line import assert_refused, on_terminal, printed, run
 from interruptions import CtrlC
 
-from enumsol import BranchGraph, NotHeldError, branch_graph, gallery, write_problem
+from enumsol import BranchGraph, gallery, write_problem
 
 GRAPH = ("graph", "gallery:one-node-6.1", "--from", 0, "--to", 20)
 TABLE = ("table", "gallery:one-node-6.1")
@@ -292,22 +291,6 @@ def test_an_empty_table_explains_nothing(capsys, monkeypatch):
 # -- bodies that nothing holds -----------------------------------------------------------------------------------------
 
 
-def test_a_graph_that_there_is_not_is_refused_before_any_work_in_the_words_of_commands(capsys, monkeypatch, tmp_path):
-    """In 3D nothing is computed; the sentence names commands and options here, in Python functions and arguments."""
-    table = gallery.block_on_table3d()
-    write_problem(table, tmp_path / "table.npz")
-    interval = ("--from", 0, "--to", 1)
-    for work in ("condensed", "enclosure"):
-        monkeypatch.setattr(type(table), work, property(lambda _: pytest.fail("it begins to work")))
-    cure = "springs (weak ones will do), or {}, which counts the solutions at single alphas"
-    for verb in ("graph", "report"):
-        refused = run(capsys, verb, tmp_path / "table.npz", *interval)
-        assert_refused(
-            *refused, "enumsol graph in 3D cannot take a body that nothing holds", cure.format("enumsol table")
-        )
-        assert "_" not in refused[2]
-    with pytest.raises(NotHeldError, match=re.escape(cure.format("multiplicity_table"))):
-        branch_graph(table, (0, 1))
-    name = ("gallery:block-on-table-5",)
-    assert_refused(*run(capsys, "graph", *name, *interval, "--arithmetic", "fast"), "--arithmetic is fast for a body")
-    assert_refused(*run(capsys, "history", *name, "--steps", "0,1"), "enumsol history cannot", "--arithmetic exact")
+def test_a_graph_that_there_is_not_is_refused_in_the_words_of_commands(capsys):
+    name, interval = "gallery:block-on-table-5", ("--from", 0, "--to", 1)
+    assert_refused(*run(capsys, "graph", name, *interval, "--arithmetic", "fast"), "--arithmetic is fast for a body")

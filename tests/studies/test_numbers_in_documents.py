@@ -220,14 +220,6 @@ CLAIMS = [
     ),
     (
         "histories",
-        r"unique over (\d+) per cent of alpha; .* it is (\d+) per cent",
-        lambda: tuple(
-            int(where("histories/maps", "proven between %", map=m, p=p).item())
-            for m, p in (("block", "64"), ("wedge", "8"))
-        ),
-    ),
-    (
-        "histories",
         r"([\d,]+) random histories of four",
         lambda: re.findall(r"(\d+) histories, 0", notes("histories", "random")),
     ),
@@ -267,6 +259,7 @@ CLAIMS = [
 #: Paragraphs that name a study without a number of its results.
 WITHOUT_NUMBERS = {
     ("architecture.md", "branching_rule"),
+    ("three_dimensions.md", "fixed_points_basins"),
     ("architecture.md", "search_in_3d_choices"),
     ("README.md", "peers"),
     ("README.md", "same_body_by_other_codes"),
