@@ -52,7 +52,7 @@ def sphere(cells: int) -> enumsol.ContactProblem:
     A, push = np.block([[K, none], [none, K]]), K @ np.ones(p)
     load, slope = np.r_[push, np.zeros(p)], np.r_[np.zeros(p), FRICTION * push]
     rows, gap = np.eye(2 * p), 0.5 * np.sum(places**2, axis=1)
-    return enumsol.ContactProblem(0.5 * (A + A.T), rows[:p], rows[p:], load, gap, FRICTION, slope)
+    return enumsol.ContactProblem(0.5 * (A + A.T), rows[:p], rows[p:], load, gap, FRICTION, load_slope=slope)
 
 
 def mindlin(shares: Any) -> Any:
