@@ -122,7 +122,7 @@ class RootForm:
         return (M + M.transpose()) / arb(2)
 
     def costs(self, equations, lacking):
-        """Theory, (14.17)."""
+        """See theory, (14.17)."""
         rows = [*equations]
         for i, cost in self.cost:
             rows.append([cost if k == i else arb(0) for k in range(self.system.m)])

@@ -1,6 +1,6 @@
 """The trusted test in 3D that a strict root is the only one below assignments of a body that nothing holds.
 
-Theory, sections 14.6 and 14.11. The multipliers are those of section 12.6.
+See theory, sections 14.6 and 14.11; the multipliers are those of theory, section 12.6.
 """
 
 from __future__ import annotations
