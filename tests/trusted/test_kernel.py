@@ -271,8 +271,9 @@ def test_displacements_of_ill_conditioned_selections(monkeypatch):
     radii = []
 
     def recorded(*args, closer=point._closer):
-        radii.append(closer(*args))
-        return radii[-1]
+        found = closer(*args)
+        radii.append(found.rad)
+        return found
 
     monkeypatch.setattr(point, "_closer", recorded)
     for name in ("is_root", "is_excluded"):

@@ -21,7 +21,7 @@ from enumsol.proof.space_records import (
     OnlySpaceReference,
 )
 from enumsol.relaxation.engine import PRUNE_MARGIN
-from enumsol.search.certifiers.protocol import Bound, Certified, Certifier, Refine, UndecidedPart, Unrecorded
+from enumsol.search.certifiers.protocol import Bound, Certified, Refine, UndecidedPart, Unrecorded
 from enumsol.search.floating_solvers import WEAK, FloatingReader, weakly_held
 from enumsol.search.setup import HeldByNothing
 from enumsol.search.space.space_references import SpaceReferenceCloser, reference_numbers
@@ -72,8 +72,8 @@ class FloatingSpaceSolvers(HeldByNothing, SpaceSolvers):
         """The certifier of this arithmetic."""
         return FloatingSpaceCertifier(self._engine, self.enclosed, self.exclusions, recorder or Unrecorded())
 
-    def _closer(self, certifier: Certifier) -> SpaceReferenceCloser | None:  # type: ignore[override]
-        if self.exclusions is None or not isinstance(certifier, FloatingSpaceCertifier):
+    def _closer(self, certifier: FloatingSpaceCertifier) -> SpaceReferenceCloser | None:  # type: ignore[override]
+        if self.exclusions is None:
             return None
         return SpaceReferenceCloser(certifier, self._engine, lambda: self.known_root)
 
