@@ -219,12 +219,13 @@ class Exclusions:
         only the bound excludes is split, down to complete selections, unless ``within``: the bound is known to be
         needed (theory, section 14.4).
         """
-        tried = list[Terms]()
+        found, tried = None, list[Terms]()
         if bound.form is None and len(bound.multipliers()[0]):
-            # as given first: those of an earlier proof stay as they are
-            tried = [Terms(*bound.multipliers())]
-            tried.append(Terms(*in_balance(self.system, codes, *tried[0])))
-        if (found := self._excluded(0, codes, tried)) is not None:
+            # as given first: those of an earlier proof stay as they are, and many need no other ones
+            given = Terms(*bound.multipliers())
+            if (found := self._excluded(0, codes, [given])) is None:
+                tried = [given, Terms(*in_balance(self.system, codes, *given))]
+        if (found := found or self._excluded(0, codes, tried[1:])) is not None:
             return found, False
         if (unbalanced := self.unbalanced(codes)) is not None:
             return unbalanced, False

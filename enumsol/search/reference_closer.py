@@ -88,9 +88,8 @@ class ReferenceCloser:
 
     def whole(self) -> list[SelectionSolution] | None:
         """All solutions of the problem, if one certificate proves that there is one only."""
-        return next(
-            (self._only((UNDECIDED,) * reference.system.p, reference) for reference, _ in self._references), None
-        )
+        known = self._references
+        return self.again((UNDECIDED,) * known[0][0].system.p, None) if known else None
 
     @property
     def leads(self) -> bool:
