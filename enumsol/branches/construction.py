@@ -125,7 +125,7 @@ def branch_graph(
     if not isinstance(problem, ContactProblem):
         with workers_of(executor, jobs) as pool:
             return _in_space(problem, (a, b), arithmetic, progress, max_nodes, limits, pool)
-    if problem.modes is not None:
+    if not problem.held:
         _check_floating(problem, arithmetic)
     _check_friction(problem, a, b)
     call = _Construction(problem, (a, b), arithmetic, started)

@@ -134,7 +134,7 @@ def _graph_kind(problem: AnyProblem, vertices: Any) -> dict[str, Any]:
         "statuses": statuses,
         "vertices": Array(None, p, 2),
         "dimension": range(3 * p + 7),
-        "rigid_coordinates?": Array(None, 0 if problem.modes is None else problem.modes.r),
+        "rigid_coordinates?": Array(None, problem.modes.r),
     }
     vertex = {
         **dict.fromkeys(("lo", "hi"), is_fraction),
@@ -160,7 +160,7 @@ def _graph_kind(problem: AnyProblem, vertices: Any) -> dict[str, Any]:
 
 def _unknowns(problem: AnyProblem) -> int:
     """Number of forces in 3D, and of coordinates of a rigid displacement."""
-    return 3 * problem.p + (0 if problem.modes is None else problem.modes.r)
+    return 3 * problem.p + problem.modes.r
 
 
 def _is_whole(value: Any) -> bool:

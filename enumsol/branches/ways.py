@@ -110,7 +110,7 @@ class Way:
     @property
     def condensed(self) -> CondensedProblem:
         """System of the relaxations of the search: the body, or that on weak springs (theory, section 14.8)."""
-        return self.problem.condensed if self.problem.modes is None else on_weak_springs(self.problem)
+        return self.problem.condensed if self.problem.held else on_weak_springs(self.problem)
 
     @property
     def origin(self) -> Fraction | None:
@@ -181,7 +181,7 @@ class ByAlgebra(Way):
     def of(cls, problem: ContactProblem, exact: ExactCondensed, arithmetic: Arithmetic) -> ByAlgebra:
         """With the certifier of an arithmetic."""
         certifier: IntervalCertifier = FastIntervalCertifier()
-        if problem.modes is not None:
+        if not problem.held:
             certifier = FloatingIntervalCertifier(problem, checkable=arithmetic == "verified")
         elif arithmetic == "exact":
             certifier = ExactIntervalCertifier(exact)
@@ -227,7 +227,7 @@ class ByBalls(Way):
         self.problem, self.traced, self.closed = traced.problem, traced, ClosedPieces()
         self._traces: list[Trace] = []
         self._algebra: ByAlgebra | None = None
-        if self.problem.modes is None:
+        if self.problem.held:
             self.certifier = VerifiedIntervalCertifier(traced.problem, None, traced.origin)
         else:
             self.certifier = FloatingIntervalCertifier(traced.problem, checkable=True)
@@ -239,7 +239,7 @@ class ByBalls(Way):
 
     def close(self, search: IntervalSearch) -> None:
         """Find pieces that need no tree, while there is time."""
-        if self.problem.modes is not None:
+        if not self.problem.held:
             return
         search.closed = self.closed.pieces
         with suppress(TimeOverError), within(Deadline(search.deadline)):
@@ -288,7 +288,7 @@ def way_of(problem: ContactProblem, interval: tuple[Fraction, Fraction], arithme
     TimeOverError
         The body is so large that the time was over before it was condensed.
     """
-    held, large = problem.modes is None, arithmetic == "verified" and problem.n > FAST_EXACT_DOF
+    held, large = problem.held, arithmetic == "verified" and problem.n > FAST_EXACT_DOF
     at_rest = large and held and never_loaded(problem)
     if large and not at_rest and (traced := _traced(problem, interval)) is not None:
         return ByBalls(traced)

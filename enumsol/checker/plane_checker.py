@@ -228,7 +228,7 @@ class Checker(TreeChecker):
     @cached_property
     def _precise(self) -> PreciseAtAlpha | None:
         """The problem in many digits; None where that is not to be had, or the proof is about S and g as computed."""
-        if self.data == "condensed" or self.problem.modes is not None:
+        if self.data == "condensed" or not self.problem.held:
             return None
         from enumsol.trusted.precise_at_alpha import PreciseAtAlpha  # python-flint, not always needed
 
@@ -343,7 +343,7 @@ class Checker(TreeChecker):
         from enumsol.arithmetic.rationals import to_fraction
         from enumsol.checker.rational import Hull, hull_of_selections
 
-        regular = self.problem.modes is None and self._definite
+        regular = self.problem.held and self._definite
         point = self._body.point(codes) if regular else None
         if point is None:
             return hull_of_selections(self.rational, codes)

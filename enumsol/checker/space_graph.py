@@ -92,7 +92,7 @@ class SpaceGraphChecker:
             arcs=self.arcs,
             open=len(self.gaps),
             curves=len(self.curves),
-            within=None if self.problem.modes is None else self.problem.rigid_reach,
+            within=None if self.problem.held else self.problem.rigid_reach,
         )
 
     def _fail(self, message: str) -> None:
@@ -134,7 +134,7 @@ class SpaceGraphChecker:
             self.interval, units, steps = _read(self.header, self.problem)
         except ValueError as error:
             raise RefusedError(f"the header cannot be read: {error}") from None
-        if self.problem.modes is not None:
+        if not self.problem.held:
             check_bound(self.header, self.problem)
         return units, steps
 
@@ -183,7 +183,7 @@ class SpaceGraphChecker:
 
 def modes_of(problem: ContactProblem3D) -> int:
     """Number of rigid modes."""
-    return 0 if problem.modes is None else problem.modes.r
+    return problem.modes.r
 
 
 def _read(

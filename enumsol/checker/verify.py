@@ -64,12 +64,12 @@ def verify(
     instance_of(proof, Proof, "proof")
     optional_callable(progress, "progress")
     proof.check_integrity()
-    checker: type[TreeChecker] = Checker if problem.modes is None else FloatingChecker
+    checker: type[TreeChecker] = Checker if problem.held else FloatingChecker
     if in_space:
         # with its trusted core, for problems in 3D only
         from enumsol.checker.space_checker import FloatingSpaceChecker, SpaceChecker
 
-        checker = SpaceChecker if problem.modes is None else FloatingSpaceChecker
+        checker = SpaceChecker if problem.held else FloatingSpaceChecker
     lines = proof.records()
     header = next(lines, None)
     if isinstance(header, dict) and header.get("kind") == "history":
@@ -77,7 +77,7 @@ def verify(
 
         return HistoryChecker(problem, header, checker, progress).run(lines)
     if isinstance(header, dict) and header.get("kind") == "graph" and not in_space:
-        graphs = GraphChecker if problem.modes is None else FloatingGraphChecker
+        graphs = GraphChecker if problem.held else FloatingGraphChecker
         return graphs(cast("ContactProblem", problem), header, progress).run(lines)
     if isinstance(header, dict) and header.get("kind") == "graph":
         from enumsol.checker.space_graph import SpaceGraphChecker  # for graphs in 3D only

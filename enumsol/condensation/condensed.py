@@ -353,4 +353,4 @@ def solved(S: Floats, right: Floats) -> Floats:
 
 def condensation_of(problem: Any) -> Any:
     """``problem.condensed``, or that of a body that nothing holds."""
-    return problem.condensed if problem.modes is None else FloatingCondensation.of(problem)
+    return problem.condensed if problem.held else FloatingCondensation.of(problem)

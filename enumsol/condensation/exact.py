@@ -242,7 +242,7 @@ class FloatingExactSystem(ExactSystem):
 
 def exact_system(problem: Any, alpha: Alpha) -> ExactSystem:
     """The condensed problem in rationals, of a body that is held or not."""
-    return ExactSystem.from_problem(problem, alpha) if problem.modes is None else FloatingExactSystem.of(problem, alpha)
+    return ExactSystem.from_problem(problem, alpha) if problem.held else FloatingExactSystem.of(problem, alpha)
 
 
 @dataclass(frozen=True)
@@ -376,7 +376,7 @@ class ExactCondensed:
 
 def exact_condensed(problem: Any) -> ExactCondensed:
     """The condensed problem in rationals for all alpha, of a body that is held or not."""
-    return ExactCondensed.from_problem(problem) if problem.modes is None else ExactCondensed.floating(problem)
+    return ExactCondensed.from_problem(problem) if problem.held else ExactCondensed.floating(problem)
 
 
 @dataclass(frozen=True)

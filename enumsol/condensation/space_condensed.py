@@ -504,7 +504,7 @@ class AlphaSpace:
     @property
     def floats(self) -> bool:
         """True if nothing holds the body."""
-        return self.enclosure.problem.modes is not None
+        return not self.enclosure.problem.held
 
     @cached_property
     def moved(self) -> Ball:

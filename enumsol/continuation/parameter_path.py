@@ -153,7 +153,7 @@ class CallablePath:
         for start in range(0, B.shape[0], RHS_BLOCK):
             block = B[start : start + RHS_BLOCK].T.toarray()
             rows[start : start + RHS_BLOCK] = problem.on_springs.factorization.solve(block).T
-        return rows if problem.modes is None else np.vstack([rows, problem.modes.N.T])
+        return rows if problem.held else np.vstack([rows, problem.modes.N.T])
 
     def at(self, alpha: float) -> PathValues:
         """Values at alpha."""

@@ -113,7 +113,7 @@ class ContactSystem:
         S = condensed.S * everywhere[:, None] * everywhere[None, :]
         g = condensed.free_displacements(value) * everywhere
         cholesky = cholesky_factor(S)
-        r = 0 if problem.modes is None else problem.modes.r
+        r = problem.modes.r
         G: Floats = np.zeros((r, len(S)))
         h: Floats = np.zeros(r)
         rigid: Floats = np.zeros((r, r))

@@ -114,7 +114,7 @@ class Enumeration(ABC, Generic[_Solvers]):
         earlier = () if self._begun is None or self.writer is None else (self._begun, self.writer.replace)
         self.outcome = search.outcome
         search.at_limit = solvers.at_limit
-        search.otherwise = AWAY if search.at_limit is not None else "" if self.problem.modes is None else HOLD
+        search.otherwise = AWAY if search.at_limit is not None else "" if self.problem.held else HOLD
         search.continua = self._continua
         if solvers.unloaded():
             self.certifier.unloaded()
@@ -179,7 +179,7 @@ class Enumeration(ABC, Generic[_Solvers]):
             at_least=at_least,
             certified_data=certified_data,
             proof=self._proof(**counts),
-            rigid_bound=None if modes is None else RigidBound(self.problem.rigid_reach, needed, beyond),
+            rigid_bound=None if modes.r == 0 else RigidBound(self.problem.rigid_reach, needed, beyond),
         )
 
     def _stats(self) -> SearchStats:

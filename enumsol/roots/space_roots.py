@@ -291,7 +291,7 @@ def _around(middle: float, radius: float) -> Floats:
 
 def solvers_in_space(problem: ContactProblem3D, alpha: Alpha, arithmetic: str) -> SpaceSolvers:
     """Solvers for a body that is held, or that nothing holds."""
-    if problem.modes is None:
+    if problem.held:
         return SpaceSolvers(problem, alpha, arithmetic)
     from enumsol.search.space.space_floating import FloatingSpaceSolvers  # for such bodies only
 

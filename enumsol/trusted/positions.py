@@ -103,10 +103,10 @@ def tangential_positions(
         moved = (enclosure.moved_freely(alpha) - (S @ forces[:, None])[:, 0])[p:]
         if rigid is not None:
             moved = moved + (moved_by_modes(problem)[p:] @ rigid[:, None])[:, 0]
-        elif problem.modes is not None:
+        elif not problem.held:
             moved = Ball(moved.mid, np.full_like(moved.rad, np.inf))
     well_known, found = np.max(moved.rad) <= share * _WELL_KNOWN * np.max(np.abs(moved.mid)), None
-    if len(moved.mid) == p and problem.modes is not None:
+    if len(moved.mid) == p and not problem.held:
         selections = [codes] if codes is not None else product(*among) if among is not None else ()
         found = _by_selections(problem, alpha, selections, before)
     elif codes is not None and not well_known:

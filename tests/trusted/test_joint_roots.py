@@ -21,9 +21,7 @@ def system_of(problem, alpha):
     """Balls of a problem in units of one."""
     ones = np.ones(2 * problem.p)
     held = problem.on_springs.enclosure.at(alpha, ones, ones)
-    return (
-        held if problem.modes is None else FloatingSystem.on(held, RigidRows.of(problem, Fraction(alpha), ones, ones))
-    )
+    return held if problem.held else FloatingSystem.on(held, RigidRows.of(problem, Fraction(alpha), ones, ones))
 
 
 def held_again(problem, alpha, offset=None):

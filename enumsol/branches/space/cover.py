@@ -176,7 +176,7 @@ class SpaceCover:
                 "interval": [str(end) for end in self.interval],
                 "p": self.problem.p,
                 "data": "problem",
-                **({} if self.problem.modes is None else {"max_rigid_displacement": self.problem.rigid_reach}),
+                **({} if self.problem.held else {"max_rigid_displacement": self.problem.rigid_reach}),
                 **unit_exponents(*self._units()),
                 "steps": AlphaProblem.of(self.enclosure).steps.tolist(),
             }

@@ -90,7 +90,7 @@ def state_of(problem: ContactProblem3D, x: Floats, active: Sequence[Set[int]]) -
     m, condensed = 3 * problem.p, problem.on_springs.condensed
     forces = x[:m]
     w = condensed.free_displacements(float(x[-1])) - condensed.S @ forces
-    if problem.modes is not None:
+    if not problem.held:
         w = w + problem.contact_rows @ (problem.modes.N @ x[m:-1])
     return with_exact_zeros((forces + 0.0, w), active)
 

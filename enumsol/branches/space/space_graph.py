@@ -210,7 +210,7 @@ def _gaps(cover: SpaceCover) -> list[str]:
         why, remedy = "pieces of alpha as short as are tried left statuses undecided", SHORT_INTERVAL
         if ends:
             curves = counted(ends, "end of a curve", "ends of curves")
-            floats = cover.problem.modes is not None
+            floats = not cover.problem.held
             where = "branches meet" + (" or a rigid displacement reaches its bound" if floats else "")
             why, remedy = f"nothing is proven beyond {curves} there, as where {where}", ANOTHER_INTERVAL
         elif cover.unexplained(low, high):

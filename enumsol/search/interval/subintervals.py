@@ -343,7 +343,7 @@ _MARGIN = 1e-12
 def on_weak_springs(problem: ContactProblem) -> CondensedProblem:
     """What the relaxations are about: the body on weak springs at the degrees of freedom where springs hold it."""
     modes = problem.modes
-    if modes is None:
+    if modes.r == 0:
         raise AssertionError("the body is held")
     condensed: CondensedProblem = problem.on_springs.replace(A=problem.A + WEAK * modes.springs()).condensed
     return condensed

@@ -79,7 +79,7 @@ class FloatingSpaceSolvers(HeldByNothing, SpaceSolvers):
 
     def reader(self) -> FloatingReader:
         """Understands the records of an earlier proof."""
-        modes = len(self.problem.modes.held) if self.problem.modes else 0
+        modes = self.problem.modes.r
         return FloatingReader(super().reader(), FLOATING_LEAVES, modes)
 
 

@@ -96,7 +96,7 @@ class PreciseSystem:
             g0 = [row[size] - arb(x) for row, x in zip(table, offset, strict=True)]
             F0, F1 = ([arb(float(x)) for x in part] for part in problem.affine_friction)
             held = cls(S, g0, [row[size + 1] for row in table], F0, F1)
-            return held if problem.modes is None else held._bordered(problem, problem.modes)
+            return held if problem.held else held._bordered(problem, problem.modes)
 
     def _bordered(self, problem: ContactProblem, modes: RigidModes) -> PreciseSystem:
         """System of the body that nothing holds, from the one on springs."""

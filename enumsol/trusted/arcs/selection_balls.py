@@ -54,7 +54,7 @@ class ArcSystem:
         """
         with np.errstate(over="ignore", invalid="ignore"):  # what overflows proves nothing
             held = cls._of(enclosure, force, length, side)
-            return held if problem.modes is None else held._bordered(*RigidRows.along(problem, force, length))
+            return held if problem.held else held._bordered(*RigidRows.along(problem, force, length))
 
     def _bordered(self, rows: RigidRows, slope: Ball | None) -> ArcSystem:
         """System of the body that nothing holds, from the one on springs."""

@@ -154,7 +154,7 @@ def _scaled(problem: Any, enclosure: CondensedEnclosure, alpha: Fraction) -> tup
     """The problem as balls, in units of forces and displacements of its own; the latter, (p,)."""
     system = SpaceSystem.scaled(enclosure.S, enclosure.moved_freely(alpha).mid, problem.friction_at(alpha))
     units = alpha, system.force, system.length
-    if problem.modes is None:
+    if problem.held:
         return EnclosedSpace.of_problem(enclosure, *units), system.length
     return FloatingSpace.of(problem, *units, enclosure), system.length
 

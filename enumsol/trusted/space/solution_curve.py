@@ -157,7 +157,7 @@ class AlphaProblem:
                 Ball(enclosure.g1 / length, enclosure.g1_rad / length + TINY),
             ]
             ratio, rows = _ratios(problem, occurs), None
-            if problem.modes is not None:
+            if not problem.held:
                 rows = RigidRows.of(problem, Fraction(0), force, length)
                 data, work = _bordered(data, rows), float(force[0] * length[0])
                 ratio = Ball.joined(ratio, Ball.exact(np.ones(len(rows.unit))))
