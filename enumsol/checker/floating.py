@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from enumsol.checker.plane_checker import Checker
 from enumsol.checker.walk import TreeChecker
-from enumsol.condensation.floating import FloatingSystem, RigidRows
+from enumsol.condensation.enclosure import EnclosedSystem
 from enumsol.proof import records
 from enumsol.proof.reading import RefusedError, quoted, same
 from enumsol.trusted.at_alpha import holds_no_root, solve_selection
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
 
     from enumsol.checker.rational import RationalSystem
     from enumsol.checker.walk import Test
-    from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.proof.records import Record
     from enumsol.support.array_types import Codes, Indices
 
@@ -46,11 +45,6 @@ class WithinReach(TreeChecker):
     @property
     def _within(self) -> float | None:
         return self.problem.rigid_reach if self.bounded else None
-
-    def enclosed(self) -> CondensedEnclosure:
-        """Balls for S and g of the body on springs."""
-        enclosure: CondensedEnclosure = self.problem.on_springs.enclosure
-        return enclosure
 
     def _declare(self, record: list[Any]) -> None:
         raise RefusedError(f"a record {quoted(record)} that no leaf of this proof can refer to")
@@ -76,15 +70,15 @@ class FloatingChecker(WithinReach, Checker):
     shared: dict[tuple[Codes, tuple[tuple[int, int], ...]], JointRoot | None] = field(default_factory=dict)
 
     @cached_property
-    def system(self) -> FloatingSystem:
+    def system(self) -> EnclosedSystem:
         """Balls for S, g, F, G and h in the proof's units."""
-        held = self.enclosed().at(self.alpha, self.force, self.length)
-        if not held.smallest_eigenvalue > 0:
+        system = self.enclosed().at(self.alpha, self.force, self.length)
+        if not system.smallest_eigenvalue > 0:
             raise RefusedError("S is not proven positive definite")
-        return FloatingSystem.on(held, RigidRows.of(self.problem, self.alpha, self.force, self.length))
+        return system
 
     @cached_property
-    def free(self) -> FloatingSystem:
+    def free(self) -> EnclosedSystem:
         """The same with bounds beyond which there are no solutions."""
         return without_bound(self.system)
 

@@ -181,8 +181,7 @@ class GraphChecker:
     @cached_property
     def enclosure(self) -> CondensedEnclosure:
         """Balls for what is certified; only exclusions need them."""
-        held = self.problem.on_springs
-        return as_computed(self.problem) if self.data == "condensed" else CondensedEnclosure.from_problem(held)
+        return as_computed(self.problem) if self.data == "condensed" else CondensedEnclosure.from_problem(self.problem)
 
     def _vanishing(self) -> Fraction | None:
         """The alpha at which g vanishes, where the interval is cut first."""
@@ -410,6 +409,3 @@ class FloatingGraphChecker(GraphChecker):
             if kind not in _KINDS:
                 raise ValueError(f"unknown kind of record {reading.quoted(kind)}")
         super()._read_leaves(piece, batch)
-
-    def _data_on(self, piece: Piece) -> EnclosedPiece:
-        return EnclosedPiece.floating(self.problem, piece.a, piece.b, piece.force, piece.length)

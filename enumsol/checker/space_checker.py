@@ -15,7 +15,7 @@ from enumsol.arithmetic.balls import SAFE, TINY, Ball
 from enumsol.checker.floating import WithinReach
 from enumsol.checker.walk import Located, TreeChecker
 from enumsol.condensation.data import exactly_at
-from enumsol.condensation.space_condensed import EnclosedSpace, FloatingSpace
+from enumsol.condensation.space_condensed import EnclosedSpace
 from enumsol.proof import records, space_records
 from enumsol.proof.reading import RefusedError, data_of, exponents_from, rational_from, shown_alpha
 from enumsol.proof.records import EnclosureRecord, Limits, NoRoot, Record, RegularRoot
@@ -288,15 +288,7 @@ class FloatingSpaceChecker(WithinReach, SpaceChecker):
     reference: SpaceReference | None = None
 
     @cached_property
-    def system(self) -> FloatingSpace:
-        """Balls for S, g, F, G and h in the proof's units."""
-        enclosed = FloatingSpace.of(self.problem, self.alpha, self.force, self.length)
-        if not enclosed.smallest_eigenvalue > 0:
-            raise RefusedError("S is not proven positive definite")
-        return enclosed
-
-    @cached_property
-    def free(self) -> FloatingSpace:
+    def free(self) -> EnclosedSpace:
         """System without bounds of the rigid displacement."""
         return unbounded(self.system)
 

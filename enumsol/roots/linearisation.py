@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.condensation.condensed import Condensation, FloatingCondensation, condensation_of
+from enumsol.condensation.condensed import Condensation, condensation_of
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK, ContactStatus
 from enumsol.support.immutable import Sealed
@@ -80,8 +80,6 @@ class SelectionTangent(Sealed):
 
     def _bordered(self, floats: FloatSelections, matrix: Floats, E: Floats) -> Floats:
         """The matrix of the selection with q and equilibrium as a whole."""
-        if not isinstance(self.condensed, FloatingCondensation):
-            return matrix
         system, rows = floats.system, floats.reduced(self.codes)[0]
         G = np.asarray(self.condensed.moves * self.condensed.node_scale * np.sqrt(system.force / system.length))
         size = 1.0 / np.sqrt(np.diagonal(system.S))
@@ -99,7 +97,7 @@ class SelectionTangent(Sealed):
         scale, matrix = condensed.node_scale, condensed.bordered
         g1, J = condensed.g1 / scale, np.eye(len(matrix))
         right: Floats = np.zeros(len(matrix))
-        if isinstance(condensed, FloatingCondensation):
+        if len(matrix) > m:
             J[m:], right[m:] = matrix[m:], np.linalg.solve(condensed.mixing, condensed.h[1])
         for i, code in enumerate(self.codes):
             if code == OPEN:

@@ -22,7 +22,7 @@ from enumsol.trusted.status_rows import FREE, row_signs
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from enumsol.condensation.floating import FloatingSystem
+    from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.relaxation.engine import Relaxation
     from enumsol.search.certifiers.protocol import Led
     from enumsol.selections.solution import SelectionSolution
@@ -139,7 +139,7 @@ _NUMBERS = tuple((mu, balance) for balance in (16.0, 1024.0) for mu in (1.0, 3.0
 _SHARED = 0.5
 
 
-def reference_numbers(system: FloatingSystem, selection: Codes) -> Iterator[tuple[Floats, float, float]]:
+def reference_numbers(system: EnclosedSystem, selection: Codes) -> Iterator[tuple[Floats, float, float]]:
     """Numbers of which the form of a root may be made: weights, balance and share (see ``trusted.reference``)."""
     root = solve_selection(system, selection)
     if root is None or not root.is_root:

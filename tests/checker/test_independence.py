@@ -40,10 +40,11 @@ SHARED = {
         *("as_objects", "is_positive_definite", "rational", "rational_matrix", "simplest", "to_fraction")
     },
     "condensation.data": {"Data", "EXACT_DOF_LIMIT", "ProblemData", "exactly_at"},
-    "condensation.enclosure": {"CondensedEnclosure", "EnclosedSystem", "NotEnclosedError"},
+    "condensation.enclosure": {
+        *("CondensedEnclosure", "EnclosedSystem", "NotEnclosedError", "RigidRows", "enclosure_of", "moved_by_modes")
+    },
     "condensation.free_displacements": {"solved"},
-    "condensation.floating": {"FloatingSystem", "RigidRows", "enclosed_over_alpha", "moved_by_modes"},
-    "condensation.space_condensed": {"AlphaSpace", "EnclosedSpace", "FloatingPiece", "FloatingSpace", "SpaceSystem"},
+    "condensation.space_condensed": {"AlphaSpace", "EnclosedSpace", "PieceSpace", "SpaceSystem"},
     "condensation.unloaded": {"CondensedData", "never_loaded", "vanishing_alpha"},
     "trusted.arcs.only_branch": {"only_roots"},
     "trusted.arcs.selection_balls": None,

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.branches.space.chains import chain_through
-from enumsol.condensation.floating import enclosed_over_alpha
+from enumsol.condensation.enclosure import enclosure_of
 from enumsol.proof.proof_file import Proof
 from enumsol.proof.records import UndecidedRecord
 from enumsol.proof.space_records import CurveBoxRecord
@@ -103,7 +103,7 @@ class SpaceCover:
     @cached_property
     def enclosure(self) -> CondensedEnclosure:
         """Balls for all alpha; NotEnclosedError where there are none."""
-        return enclosed_over_alpha(self.problem)
+        return enclosure_of(self.problem)
 
     def _units(self) -> tuple[Array, Array]:
         system = SpaceSolvers(self.problem, sum(self.interval) / 2, "verified").system

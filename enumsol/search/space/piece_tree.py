@@ -180,7 +180,7 @@ class PieceTree:
     Parameters
     ----------
     enclosure : CondensedEnclosure
-        See ``enclosed_over_alpha``.
+        The problem's own.
     interval : (a, b), Fractions
     units : force and length, (p,) arrays of powers of two
     curves : Curves
@@ -469,7 +469,7 @@ class PieceTree:
 
         None of a body that nothing holds: the form says nothing about its rigid displacement.
         """
-        if self._space.floats:
+        if not self._space.fixed.held:
             return None
         piece, statuses = at.piece, without_sectors(codes)
         passages = [passage for passage in self._passages(at, statuses) if passage.parts.allowed(statuses)]

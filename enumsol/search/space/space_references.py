@@ -21,7 +21,7 @@ from enumsol.trusted.space.sector_rows import ALONG, GAP, LEFT, RIGHT, SLIP
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from enumsol.condensation.space_condensed import FloatingSpace, SpaceSystem
+    from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
     from enumsol.relaxation.space_relaxation import SpaceEngine
     from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.space.leaves import SpaceRoot
@@ -195,7 +195,7 @@ def _products(reference: SpaceReference, rows: list[Row], tight: list[Row], y: F
 
 
 def reference_numbers(
-    system: SpaceSystem, enclosed: FloatingSpace, root: SpaceRoot, leaf: Codes
+    system: SpaceSystem, enclosed: EnclosedSpace, root: SpaceRoot, leaf: Codes
 ) -> Iterator[tuple[Floats, float, float]]:
     """Numbers, balance and share of forms that may be definite, as ``SpaceReference.of`` takes them."""
     tau, p, unit = enclosed.tau, len(enclosed.tau), enclosed.unit

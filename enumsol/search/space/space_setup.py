@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.condensation.enclosure import NotEnclosedError, enclosure_of
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.proof.writer import Recorder, point_header, unit_exponents
 from enumsol.relaxation.space_convex_forms import SpaceFormAscent
@@ -81,7 +81,7 @@ class SpaceSolvers(SearchSetup):
 
     def _in_balls(self, alpha: Fraction, force: Floats, length: Floats) -> EnclosedSpace:
         """The problem in balls; NotEnclosedError where that cannot be."""
-        return EnclosedSpace.of_problem(self.problem.enclosure, alpha, force, length)
+        return EnclosedSpace.of_problem(enclosure_of(self.problem), alpha, force, length)
 
     @property
     def enclosed(self) -> EnclosedSpace:
