@@ -23,7 +23,7 @@ from enumsol.branches.exact.make_elements import make_arcs, make_vertices
 from enumsol.branches.proof_records import write_graph_proof
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.enclosure import NotEnclosedError
-from enumsol.condensation.exact import FAST_EXACT_DOF, ExactCondensed, check_definite, exact_condensed
+from enumsol.condensation.exact import FAST_EXACT_DOF, ExactCondensed, check_definite
 from enumsol.condensation.unloaded import never_loaded, vanishing_alpha
 from enumsol.errors import TooLargeError
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
@@ -274,7 +274,7 @@ class ByBalls(Way):
         if (joined.ordered and not joined.open) or stops or large:
             return Made(*make_traced(self.traced, joined), followed.reasons, stops, followed=followed)
         # several conditions vanish at one alpha, or a selection is singular
-        self._algebra = ByAlgebra(problem, exact_condensed(problem), self.certifier, followed)
+        self._algebra = ByAlgebra(problem, ExactCondensed.from_problem(problem), self.certifier, followed)
         return self._algebra.made(search, candidates, tick, limits)
 
 
@@ -299,7 +299,7 @@ def way_of(problem: ContactProblem, interval: tuple[Fraction, Fraction], arithme
             "the stiffness of the body on springs is positive definite only within rounding, and exact algebra takes "
             f"at most n = {EXACT_DOF_LIMIT} degrees of freedom; the problem has n = {problem.n}"
         )
-    exact, size = exact_condensed(problem), 2 * problem.p
+    exact, size = ExactCondensed.from_problem(problem), 2 * problem.p
     if not problem.on_springs.condensed.definite:
         check_definite(fmpq_mat([list(row[:size]) for row in exact.rows[:size]]))
     return ByAlgebra.of(problem, exact, arithmetic)

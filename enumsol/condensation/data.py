@@ -72,6 +72,10 @@ class CondensableData(Protocol):
     def on_springs(self) -> Any:
         """The problem of the body on springs; of a body that is held the problem itself."""
 
+    @property
+    def rigid_reach(self) -> float:
+        """How far the body may move as a whole [length]."""
+
     def load_at(self, alpha: AlphaLike) -> Floats:
         """f(alpha), shape (n,)."""
 

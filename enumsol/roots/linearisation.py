@@ -168,10 +168,10 @@ class SlipSigns:
         """All signs in rationals; None when the problem is too large for them."""
         if self.problem.n > EXACT_DOF_LIMIT or not self.problem.known_exactly:
             return None
-        from enumsol.condensation.exact import exact_system  # python-flint, not for fast arithmetic
+        from enumsol.condensation.exact import ExactSystem  # python-flint, not for fast arithmetic
         from enumsol.selections.rational_selections import ExactSelections
 
-        solver = ExactSelections(exact_system(self.problem, self.alpha))
+        solver = ExactSelections(ExactSystem.from_problem(self.problem, self.alpha))
         solution = solver.solve(self.codes)
         return None if solution is None else solver.slip_signs(solution.vertices[0])
 

@@ -65,12 +65,12 @@ class FloatingSolvers(HeldByNothing, Solvers):
     @cached_property
     def exact(self) -> ExactSelections | None:
         """Selections in rationals; None when the problem is too large for them."""
-        from enumsol.condensation.exact import FloatingExactSystem, check_definite  # python-flint
+        from enumsol.condensation.exact import ExactSystem, check_definite  # python-flint
         from enumsol.selections.rational_selections import ExactSelections  # python-flint
 
         if self.arithmetic != "exact" and not self._in_rationals:
             return None
-        system = FloatingExactSystem.of(self.problem, self.alpha)
+        system = ExactSystem.from_problem(self.problem, self.alpha)
         if self.enclosed is None:
             check_definite(system.contact_compliance)
         return ExactSelections(system)
