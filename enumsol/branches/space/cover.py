@@ -19,8 +19,9 @@ from enumsol.proof.records import UndecidedRecord
 from enumsol.proof.space_records import CurveBoxRecord
 from enumsol.proof.writer import ProofWriter, unit_exponents
 from enumsol.roots.enumerate import enumerate_roots
+from enumsol.search.space.known_curves import Curves, joined
 from enumsol.search.space.piece_parallel import spread_over
-from enumsol.search.space.piece_tree import OpenLeaf, PieceTree, joined
+from enumsol.search.space.piece_tree import OpenLeaf, PieceTree
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.support.deadlines import look, remaining
 from enumsol.trusted.space.curve_chains import apart
@@ -130,11 +131,11 @@ class SpaceCover:
                 chain = None
             # what is left open costs as much at every further point of the same curve
             self.failed += chain is None or not self._is_of_use(chain)
-            tree.more = more if self.failed < _FAILURES else None
+            curves.more = more if self.failed < _FAILURES else None
             return chain
 
-        tree = PieceTree(self.enclosure, self.interval, self._units(), more, max_nodes, tick, solutions=self._solutions)
-        tree.more = more if self.failed < _FAILURES else None
+        curves = Curves(self.enclosure, self.interval, more if self.failed < _FAILURES else None, self._solutions)
+        tree = PieceTree(self.enclosure, self.interval, self._units(), curves, max_nodes, tick)
         try:
             tree.run(None if executor is None else partial(spread_over, executor))
         finally:

@@ -16,7 +16,7 @@ from enumsol.branches.space.pieces import runs_and_turns
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.proof.space_records import CutPiece
 from enumsol.search.outcome import Stop, StopReason
-from enumsol.search.space.piece_tree import joined
+from enumsol.search.space.known_curves import joined
 from enumsol.support.deadlines import Deadline, TimeOverError, within
 from enumsol.support.keeping import keeping
 from enumsol.support.messages import counted
