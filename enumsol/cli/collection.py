@@ -9,7 +9,7 @@ import typer
 from enumsol.cli.common import ExitStatus
 from enumsol.cli.files import FileCommand
 from enumsol.cli.options import JsonFile, Quiet, csv
-from enumsol.cli.output import check_outputs, deliver, list_entries, named_group
+from enumsol.cli.output import deliver, list_entries, named_group
 from enumsol.support.messages import counted
 
 app = named_group("Problems with certified solutions, and a check of what other solvers find.")
@@ -20,7 +20,6 @@ def list_(json_file: JsonFile = None) -> None:
     """List the problems, each with its dimension, its contact nodes and the number of its solutions."""
     from enumsol.collection import COLLECTION  # numpy: not for --help
 
-    check_outputs(json=json_file)
     columns = ("NAME", "dimension", "nodes", "solutions", "what it shows")
     rows = [
         (entry.name, str(entry.dimension), str(entry.p), entry.solutions_in_words(), entry.summary)
@@ -45,7 +44,6 @@ def export(
     """Write the problems as .npz and .h5 (fclib), with their certified solutions (JSON) and proofs, to FOLDER."""
     from enumsol import collection  # as above
 
-    check_outputs(json=json_file)
     written = collection.export(folder, [name.removeprefix("collection:") for name in names] if names else None)
     deliver(
         json_file=json_file,
@@ -93,7 +91,6 @@ def check(
     """
     from enumsol import collection  # as above
 
-    check_outputs(json=json_file, csv=csv_file)
     report = collection.check(solutions, tolerance)
     deliver(
         json_file=json_file,

@@ -57,9 +57,6 @@ def fixed_point(
     Ctrl-C, after printing the last iterate; 74 if a result could not be written; 141 if the program that read it has
     ended.
     """
-    output.check_outputs(json=json_file, csv=csv_file, npz=npz_file)
-    output.check_vtu(vtu_file)
-    output.check_named_files(", but it is a binary file", npz=npz_file)
     body, names = load_problem(problem), units_of(problem, units)
     value = _alpha(alpha, problem, body)
     options: dict[str, Any] = {"tolerance": tolerance, "max_iterations": max_iterations, "anderson": anderson}

@@ -10,7 +10,7 @@ import typer
 from enumsol.cli import options
 from enumsol.cli.common import ExitStatus, finish, load_problem, node_row, parse_alpha, parse_interval, units_of
 from enumsol.cli.graph import read_graph
-from enumsol.cli.output import check_outputs, check_plot, deliver, write_figure
+from enumsol.cli.output import deliver, write_figure
 from enumsol.cli.progress import Display, SearchDisplay
 from enumsol.errors import Interrupted, InvalidArgumentError, OutOfMemoryError
 from enumsol.support.messages import counted
@@ -88,8 +88,6 @@ def follow(
     input; 130 on Ctrl-C, after printing the paths so far; 74 if a result could not be written; 141 if the program that
     read it has ended.
     """
-    check_outputs(json=json_file, csv=csv_file)
-    check_plot(plot_file)
     if graph_file is not None and plot_file is None:
         raise InvalidArgumentError("--graph is given without --plot; expected both")
     if tangent is not None and (root is None or direction == "both"):

@@ -8,7 +8,7 @@ import typer
 
 from enumsol.cli.files import FileCommand
 from enumsol.cli.options import JsonFile, Quiet
-from enumsol.cli.output import check_outputs, deliver, list_entries, named_group
+from enumsol.cli.output import deliver, list_entries, named_group
 
 if TYPE_CHECKING:
     from enumsol.gallery import GalleryEntry
@@ -21,7 +21,6 @@ def list_(json_file: JsonFile = None) -> None:
     """List the problems, each with an alpha of interest and the number of its roots there."""
     from enumsol import gallery  # numpy and scipy: not for --help
 
-    check_outputs(json=json_file)
     entries = list(gallery.GALLERY.values())
     rows = [(entry.name, f"{entry.alpha:g}", _count(entry), entry.summary) for entry in entries]
     hint = "Try one: enumsol roots gallery:NAME --alpha ALPHA"
@@ -52,7 +51,6 @@ def write(
     from enumsol import gallery  # as above
     from enumsol.io import write_problem
 
-    check_outputs(json=json_file)
     entry = gallery.get(name.removeprefix("gallery:"))
     problem = entry.build()
     write_problem(problem, file)

@@ -19,7 +19,7 @@ from enumsol.cli.common import (
     units_of,
     workers,
 )
-from enumsol.cli.output import check_named_files, check_outputs, check_plot, deliver, write_figure
+from enumsol.cli.output import deliver, write_figure
 from enumsol.cli.progress import Display
 from enumsol.errors import InvalidArgumentError
 
@@ -77,9 +77,6 @@ def graph(
     vertex); 3 if the graph is known to be incomplete; 2 on bad input; 130 on Ctrl-C, after printing the graph so far;
     74 if a result could not be written; 141 if the program that read it has ended.
     """
-    check_outputs(json=json_file, csv=csv_file)
-    check_named_files(save=save_file, graphml=graphml_file, proof=proof_file)
-    check_plot(plot_file)
     interval, body = parse_interval(first, last), load_problem(problem)
     chosen = None if nodes is None else [body.node_ids[node_row(body, label.strip())] for label in nodes.split(",")]
     drawn: dict[str, Any] = {

@@ -33,7 +33,7 @@ from enumsol.cli.options import (
     file,
     seconds,
 )
-from enumsol.cli.output import as_json, check_outputs, check_plot, check_writable, deliver, write_figure
+from enumsol.cli.output import as_json, deliver, write_figure
 from enumsol.cli.progress import Display
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.messages import counted
@@ -107,12 +107,6 @@ def history(
     Ctrl-C, after printing what was found so far; 74 if a result could not be written; 141 if the program that read it
     has ended.
     """
-    check_outputs(json=json_file, csv=csv_file)
-    check_plot(plot)
-    for option, path in (("--proof", proof_file), ("--save", save), ("--report", report)):
-        if path == "-":
-            raise InvalidArgumentError(f"{option} is -; expected the name of a file")
-        check_writable(path, option)
     if proof_file is not None and arithmetic != "verified":
         raise InvalidArgumentError(f"--proof is given with {arithmetic} arithmetic; expected verified")
     given, names, body = _steps(problem, steps), units_of(problem, units), load_problem(problem)

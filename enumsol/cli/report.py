@@ -11,7 +11,7 @@ import typer
 from enumsol.cli import options
 from enumsol.cli.common import ExitStatus, finish, load_problem, parse_interval, scene_of, so_far, title_of, units_of
 from enumsol.cli.graph import HowExact, as_content, build, graph_as_text, write_proof
-from enumsol.cli.output import check_named_files, check_outputs, checking_commands, deliver
+from enumsol.cli.output import checking_commands, deliver
 from enumsol.errors import MissingDependencyError
 
 
@@ -46,8 +46,6 @@ def report(
 
     Exit status: as enumsol graph. If the graph is not complete, the page is written all the same and says so.
     """
-    check_outputs(json=json_file)
-    check_named_files(output=output, proof=proof_file)
     if find_spec("plotly") is None:
         raise MissingDependencyError.of("reports", "plotly", "report")
     interval, body, names = parse_interval(first, last), load_problem(problem), units_of(problem, units)
