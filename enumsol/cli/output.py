@@ -10,7 +10,9 @@ import json
 import math
 import shlex
 import sys
+from collections.abc import Mapping
 from dataclasses import fields
+from enum import Enum
 from fractions import Fraction
 from importlib.util import find_spec
 from pathlib import Path
@@ -141,16 +143,25 @@ def write_figure(path: str, figure: Any) -> None:
 
 
 def as_json(content: Any) -> str:
-    """JSON text of dictionaries, sequences, arrays and numbers; what is not finite is null. A text is JSON already."""
+    """JSON text of what `plain` takes; what is not finite is null. A text is JSON already."""
     return content if isinstance(content, str) else json.dumps(plain(content), indent=1)
 
 
+def taken(of: Any, *names: str) -> dict[str, Any]:
+    """Attributes of a result by their names, for JSON."""
+    return {name: getattr(of, name) for name in names}
+
+
 def plain(value: Any) -> Any:
-    """Dictionaries, lists and numbers that JSON can hold, as in `as_json`."""
-    if isinstance(value, dict):
+    """What JSON can hold, of mappings, sequences, sets, arrays, numbers and members of enumerations."""
+    if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [plain(item) for item in value]
+    if isinstance(value, frozenset):
+        return sorted(plain(item) for item in value)
+    if isinstance(value, Enum):
+        return value.value
     if isinstance(value, Fraction):
         return plain(float(value))
     if hasattr(value, "tolist"):  # arrays and numbers of numpy, which is not imported for --help
