@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from flint import arb
+from flint import arb, arb_mat
 
 from enumsol.trusted.arcs.many_digits import ball_of, column, matrix, sign_of, signs_of, uppers
 from enumsol.trusted.arcs.taylor import AlphaFunctions, ShortExpansion, Smooth, columns_of, joined
@@ -42,7 +42,7 @@ class BorderedLines(AlphaFunctions):
     c: tuple[Any, Any]
 
     @classmethod
-    def near(cls, lines: Sequence[tuple[Any, Any]], alpha: Any, radius: Any) -> BorderedLines | None:
+    def near(cls, lines: Sequence[tuple[Any, Any]], alpha: arb, radius: arb) -> BorderedLines | None:
         """With a border that takes away the zero of det M closest to an alpha; None where none is found.
 
         No claim rests on how well it does so. ``lines``: M, g, C and c of the equations M y = g of a selection and its
@@ -66,7 +66,7 @@ class BorderedLines(AlphaFunctions):
         c, c1 = (column([*part.entries(), arb(one)]) for part, one in zip(constants, (1, 0), strict=True))
         return cls((B, B1), (G, G1), (C, C1), (c, c1))
 
-    def signs_by(self, a: Any, algorithm: str | None) -> Signs | None:
+    def signs_by(self, a: arb, algorithm: str | None) -> Signs | None:
         """Signs of the functions over a ball; None where B is not proven regular."""
         try:
             X = (self.B[0] + self.B[1] * a).solve(self.G[0] + self.G[1] * a, algorithm=algorithm)
@@ -75,7 +75,7 @@ class BorderedLines(AlphaFunctions):
         (q, _), (w, _), ((mu, _), (rho, _)) = self._parts(a, X, X)
         return signs_of(q * mu - w * rho)
 
-    def rise(self, a: Any, k: int) -> tuple[Any, Any] | None:
+    def rise(self, a: arb, k: int) -> tuple[Any, Any] | None:
         """About the value of a function and its slope; no claim rests on them."""
         B = self.B[0] + self.B[1] * a
         try:
@@ -88,7 +88,7 @@ class BorderedLines(AlphaFunctions):
         slope = q1 * mu + q * mu1 - w1 * rho - w * rho1
         return value[k, 0], slope[k, 0]
 
-    def _parts(self, a: Any, X: Any, X1: Any) -> tuple[Any, Any, Any]:
+    def _parts(self, a: arb, X: arb_mat, X1: arb_mat) -> tuple[Any, Any, Any]:
         """Of c + C y and of C v, mu and rho, their values and slopes, from those of both columns."""
         C, last = self.C[0] + self.C[1] * a, X.nrows() - 1
         (v, y), (v1, y1) = ([column([part[i, j] for i in range(last + 1)]) for j in (0, 1)] for part in (X, X1))
@@ -132,7 +132,7 @@ def _none_above(lines: list[tuple[Any, Any]]) -> bool:
     return any(-a / b < s for a, b in lines if a >= 0 and b < 0 for s in least)
 
 
-def _nearest_pole(M: Any, M1: Any) -> tuple[list[float], list[float]] | None:
+def _nearest_pole(M: arb_mat, M1: arb_mat) -> tuple[list[float], list[float]] | None:
     """A column b = M1 w and a row d, with (M + tau M1) w = 0 and d M^-1 (M + tau M1) = 0 for the tau closest to zero.
 
     The matrix with this border changes with tau as if this zero of det (M + tau M1) were not there.

@@ -166,7 +166,7 @@ class PreciseSelection(AlphaFunctions):
         """Sign of det M where M does not depend on alpha."""
         return sign_of(self._M[0].det()) if self._M[0].nrows() else 1
 
-    def solve(self, a: Any, algorithm: str | None = None) -> tuple[Any, Any] | None:
+    def solve(self, a: arb, algorithm: str | None = None) -> tuple[Any, Any] | None:
         """Unknowns for every alpha in a ball, and the matrix; None where that is not proven regular."""
         M = self._M[0] + self._M[1] * a
         if not M.nrows():
@@ -176,7 +176,7 @@ class PreciseSelection(AlphaFunctions):
         except ZeroDivisionError:
             return None
 
-    def signs_by(self, a: Any, algorithm: str | None) -> Signs | None:
+    def signs_by(self, a: arb, algorithm: str | None) -> Signs | None:
         """Signs of the conditions over a ball, and 1; None where M is not proven regular."""
         if self._lines is not None:
             values = self._lines[0] + self._lines[1] * a
@@ -186,7 +186,7 @@ class PreciseSelection(AlphaFunctions):
             return None
         return np.append(signs_of(values), np.int8(1))
 
-    def rise(self, a: Any, k: int) -> tuple[Any, Any] | None:
+    def rise(self, a: arb, k: int) -> tuple[Any, Any] | None:
         """About the value of a condition and its slope; no claim rests on them."""
         if self._lines is not None:
             constant, slope = (part[k, 0] for part in self._lines)
@@ -220,7 +220,7 @@ class PreciseSelection(AlphaFunctions):
             bordered = None if lines is None else lines.expansion(first, last)
             return bordered if found is None or (bordered is not None and bordered.shift < found.shift / 2) else found
 
-    def _expansion(self, first: Fraction, last: Fraction, middle: Any, radius: Any) -> ShortExpansion | None:
+    def _expansion(self, first: Fraction, last: Fraction, middle: arb, radius: arb) -> ShortExpansion | None:
         """The conditions by the powers of tau, with what is left of the unknowns (theory, (7.17))."""
         M, M1 = self._M[0] + self._M[1] * middle, self._M[1] * radius
         C, C1 = self._C[0] + self._C[1] * middle, self._C[1] * radius
@@ -240,7 +240,13 @@ class PreciseSelection(AlphaFunctions):
         return self._short((first, last), found.values, found.slopes, sign_of(M.det()), found.terms[0], found.shift)
 
     def _short(
-        self, ends: tuple[Fraction, Fraction], values: Any, slopes: Any, index: int, near: Any, shift: float = 0.0
+        self,
+        ends: tuple[Fraction, Fraction],
+        values: arb_mat,
+        slopes: arb_mat,
+        index: int,
+        near: arb_mat,
+        shift: float = 0.0,
     ) -> ShortExpansion:
         """Expansion where M is regular throughout; the last function is then 1."""
         values, slopes = (column([*part.entries(), arb(one)]) for part, one in ((values, 1), (slopes, 0)))

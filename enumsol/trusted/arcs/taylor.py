@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from flint import arb
+from flint import arb, arb_mat
 
 from enumsol.arithmetic.balls import SAFE, UNIT, upper_sum
 from enumsol.trusted.arcs.many_digits import (
@@ -73,7 +73,7 @@ class Smooth:
     shift: float = 0.0
 
     @classmethod
-    def solution(cls, y: Any, rise: Any, P: Any, sizes: Floats | None = None) -> Smooth | None:
+    def solution(cls, y: arb_mat, rise: arb_mat, P: arb_mat, sizes: Floats | None = None) -> Smooth | None:
         """The unknowns of M y = g, with y and their slopes ``rise`` at tau = 0 and P = M(0)^{-1} M'.
 
         They are y + tau (I + tau P)^{-1} rise (theory, (7.16)). None where P is too large. ``sizes`` are at least those
@@ -94,7 +94,7 @@ class Smooth:
         left, left_slope = (column([arb(0, float(e)) for e in error]) for error in errors)
         return cls(terms, left, left_slope, k)
 
-    def mapped(self, C: Any, C1: Any, c: Any, c1: Any) -> Smooth:
+    def mapped(self, C: arb_mat, C1: arb_mat, c: arb_mat, c1: arb_mat) -> Smooth:
         """(c + tau c1) + (C + tau C1) times these functions."""
         before = [None, *self.terms]
         terms = [
@@ -173,12 +173,12 @@ def _power(k: int) -> Any:
     return arb(1) if k == 0 else arb(0.5, 0.5) if k % 2 == 0 else arb(0, 1)
 
 
-def joined(*parts: Any) -> Any:
+def joined(*parts: arb_mat) -> Any:
     """Matrices beside one another."""
     return matrix([[x for row in rows for x in row] for rows in zip(*(part.tolist() for part in parts), strict=True)])
 
 
-def columns_of(X: Any, *counts: int) -> list[Any]:
+def columns_of(X: arb_mat, *counts: int) -> list[Any]:
     """A matrix cut into matrices of so many columns."""
     rows, found, first = X.tolist(), [], 0
     for count in counts:
@@ -194,11 +194,11 @@ class AlphaFunctions:
     def _signs(self) -> dict[Fraction, Signs | None]:
         return {}
 
-    def signs_by(self, a: Any, algorithm: str | None) -> Signs | None:
+    def signs_by(self, a: arb, algorithm: str | None) -> Signs | None:
         """Signs of the functions over a ball; None where the equations are not proven regular."""
         raise NotImplementedError
 
-    def rise(self, a: Any, k: int) -> tuple[Any, Any] | None:
+    def rise(self, a: arb, k: int) -> tuple[Any, Any] | None:
         """About the value of a function and its slope; no claim rests on them."""
         raise NotImplementedError
 
@@ -287,13 +287,13 @@ class ShortExpansion:
         self,
         functions: AlphaFunctions,
         ends: Bounds,
-        values: Any,
-        slopes: Any,
+        values: arb_mat,
+        slopes: arb_mat,
         orientation: int,
         *,
         shift: float = 0.0,
         nowhere: bool = False,
-        near: Any = None,
+        near: arb_mat | None = None,
     ) -> None:
         (self.low, self.high), self.shift = ends, shift
         self.apart = (self.high - self.low) * Fraction(4, 2**ZERO_BITS)
