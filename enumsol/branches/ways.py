@@ -25,7 +25,7 @@ from enumsol.branches.proof_records import write_graph_proof
 from enumsol.branches.unfinished import Effort
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.enclosure import NotEnclosedError
-from enumsol.condensation.exact import FAST_EXACT_DOF, ExactCondensed, check_definite, exact_condensed
+from enumsol.condensation.exact import FAST_EXACT_DOF, ExactCondensed, check_definite
 from enumsol.condensation.unloaded import never_loaded, vanishing_alpha
 from enumsol.errors import TooLargeError
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
@@ -316,7 +316,7 @@ class ByBalls(PlaneWay):
             if (joined.ordered and not joined.open) or stopped or large:
                 return self._made(make_traced(self.traced, joined), followed.reasons, followed.stopped, followed)
             # several conditions vanish at one alpha, or a selection is singular
-            algebra = ByAlgebra(problem, self.interval, exact_condensed(problem), self.certifier, followed)
+            algebra = ByAlgebra(problem, self.interval, ExactCondensed.from_problem(problem), self.certifier, followed)
             algebra.search, algebra.candidates = search, candidates
             self._algebra = algebra
         return self._algebra.worked_out(effort)
@@ -354,7 +354,7 @@ def way_of(problem: ContactProblem, interval: tuple[Fraction, Fraction], arithme
             "the stiffness of the body on springs is positive definite only within rounding, and exact algebra takes "
             f"at most n = {EXACT_DOF_LIMIT} degrees of freedom; the problem has n = {problem.n}"
         )
-    exact, size = exact_condensed(problem), 2 * problem.p
+    exact, size = ExactCondensed.from_problem(problem), 2 * problem.p
     if not problem.on_springs.condensed.definite:
         check_definite(fmpq_mat([list(row[:size]) for row in exact.rows[:size]]))
     return ByAlgebra.of(problem, interval, exact, arithmetic)

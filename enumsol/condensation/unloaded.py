@@ -31,10 +31,6 @@ class CondensedData(ProblemData, Protocol):
         """S, g0 and g1 as computed."""
 
     @property
-    def held(self) -> bool:
-        """True if supports or springs hold the body."""
-
-    @property
     def enclosure(self) -> CondensedEnclosure:
         """S, g0 and g1 in balls."""
 

@@ -16,7 +16,6 @@ from scipy.linalg import block_diag, cho_solve, solve_triangular
 from enumsol.arithmetic.balls import UNIT
 from enumsol.condensation.condensed import (
     Condensation,
-    FloatingCondensation,
     cholesky_factor,
     condensation_of,
     load_unit,
@@ -117,7 +116,7 @@ class ContactSystem:
         G: Floats = np.zeros((r, len(S)))
         h: Floats = np.zeros(r)
         rigid: Floats = np.zeros((r, r))
-        if isinstance(condensed, FloatingCondensation):
+        if r:
             still, slope = condensed.h
             G = solve_triangular(condensed.mixing, condensed.G * everywhere, lower=True, check_finite=False)
             h = solve_triangular(condensed.mixing, still + float(value) * slope, lower=True, check_finite=False)

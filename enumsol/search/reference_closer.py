@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from enumsol.model.statuses import BACKWARD, FORWARD, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.search.closing import TreeCloser
 from enumsol.trusted.at_alpha import solve_selection
 from enumsol.trusted.selection import PENETRATION, SLIP_BACKWARD as BACK, SLIP_FORWARD as FORTH
 from enumsol.trusted.status_rows import FREE, row_signs
@@ -21,7 +22,7 @@ from enumsol.trusted.status_rows import FREE, row_signs
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from enumsol.condensation.floating import FloatingSystem
+    from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.relaxation.engine import Relaxation
     from enumsol.search.certifiers.protocol import Led
     from enumsol.selections.solution import SelectionSolution
@@ -55,7 +56,7 @@ class Referring(Protocol):
         """The roots below an assignment, this one or none; None if that is not proven."""
 
 
-class ReferenceCloser:
+class ReferenceCloser(TreeCloser):
     """Ends the tree where only a known root is left, and leads it there.
 
     Parameters
@@ -68,15 +69,12 @@ class ReferenceCloser:
     known : tuple of selections of strict roots
     """
 
-    #: As of other closers.
-    relaxed: Callable[[Codes], Relaxation | None]
-
     def __init__(self, certifier: Any, root: Callable[[], Codes | None]) -> None:
+        super().__init__()
         self._certifier: Referring = certifier
         self._root = root
         self.known: tuple[Codes, ...] | None = None
         self._wait = self._pause = 0
-        self.sliding = dict[int, int]()
 
     @cached_property
     def _references(self) -> list[tuple[Reference, Cover]]:
@@ -134,17 +132,6 @@ class ReferenceCloser:
     def _only(self, codes: Codes, reference: Reference) -> list[SelectionSolution] | None:
         return self._certifier.only_root(codes, reference, proposed(reference, codes))
 
-    def begins_again(self, nodes: int) -> bool:
-        """Nothing that is met makes a search begin again."""
-        del nodes
-        return False
-
-    def met(self, answer: object) -> None:
-        """Nothing is made of complete selections."""
-
-    def alone(self, *_: object) -> None:
-        """Roots of bodies that are held are closed in this way."""
-
 
 #: mu of all nodes where kappa is one, and factors of |G d|^2, that are tried.
 _NUMBERS = tuple((mu, balance) for balance in (16.0, 1024.0) for mu in (1.0, 3.0, 10.0))
@@ -152,7 +139,7 @@ _NUMBERS = tuple((mu, balance) for balance in (16.0, 1024.0) for mu in (1.0, 3.0
 _SHARED = 0.5
 
 
-def reference_numbers(system: FloatingSystem, selection: Codes) -> Iterator[tuple[Floats, float, float]]:
+def reference_numbers(system: EnclosedSystem, selection: Codes) -> Iterator[tuple[Floats, float, float]]:
     """Numbers of which the form of a root may be made: weights, balance and share (see ``trusted.reference``)."""
     root = solve_selection(system, selection)
     if root is None or not root.is_root:

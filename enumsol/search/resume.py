@@ -158,7 +158,7 @@ class Replay:
             if number == needed:
                 break  # what follows is open, and all of it on the stack
             if outcome.resumed % _REPORT_EVERY == 0:
-                self._search.report(self._search.covered)
+                self._search.report()
         passed()
         return stack
 

@@ -193,9 +193,7 @@ class Solvers(SpaceSolvers):
     def search(self, certifier, limits=None, progress=None):
         """A search of the tree."""
         splitting = SpaceSplitting(self._engine)
-        return Search(
-            self.system, certifier, engine=self._engine, splitting=splitting, limits=limits, progress=progress
-        )
+        return Search(self.system.p, certifier, self._engine, splitting, limits=limits, progress=progress)
 
     def searched(self, limits):
         """What a search takes, and its engine."""

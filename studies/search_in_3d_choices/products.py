@@ -265,14 +265,14 @@ class Search(TreeSearch):
         found = super().relax(item)
         if self.every is None or found.pruned or found.stalled:
             return found
-        begun = (UNDECIDED,) * self.system.p
+        begun = (UNDECIDED,) * self.p
         last = found.codes if isinstance(found, FormRelaxation) else None
         if last is not None and decided(item.codes) < decided(last) + self.every:
             return found
         if last is None and item.codes != begun:
             return found
         started = process_time()
-        form = best_form(self.system, item.codes)
+        form = best_form(self.engine.system, item.codes)
         self.seconds += process_time() - started
         if form is None:
             return found
@@ -296,9 +296,7 @@ class Solvers(SpaceSolvers):
     def search(self, certifier, limits=None, progress=None):
         """A search of the tree."""
         splitting = SpaceSplitting(self._engine)
-        return Search(
-            self.system, certifier, engine=self._engine, splitting=splitting, limits=limits, progress=progress
-        )
+        return Search(self.system.p, certifier, self._engine, splitting, limits=limits, progress=progress)
 
 
 def forms(run: Run, most: int) -> None:

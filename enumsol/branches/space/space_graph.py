@@ -15,7 +15,7 @@ from enumsol.branches.ways import Made
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.proof.space_records import CutPiece
 from enumsol.search.outcome import Stop, StopReason
-from enumsol.search.space.piece_tree import joined
+from enumsol.search.space.known_curves import joined
 from enumsol.support.deadlines import TimeOverError, within
 from enumsol.support.messages import counted
 from enumsol.trusted.space.curve_parts import Run

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.condensation.enclosure import NotEnclosedError, enclosure_of
 from enumsol.model.statuses import UNDECIDED
 from enumsol.relaxation.interval_relaxation import IntervalSystem
 from enumsol.search.floating_solvers import WEAK
@@ -375,7 +375,8 @@ class FloatingIntervalCertifier(IntervalCertifier):
     def _on(self, piece: Piece, system: IntervalSystem) -> Margin | None:
         units = system.scaled
         try:
-            within = EnclosedPiece.floating(self._problem, piece.a, piece.b, units.force, units.length)
+            enclosure = enclosure_of(self._problem)
+            within = EnclosedPiece.from_enclosure(enclosure, piece.a, piece.b, units.force, units.length, None)
         except NotEnclosedError:
             return None
         if not all(end.smallest_eigenvalue > 0 for end in within.ends):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.condensation.space_condensed import EnclosedSpace, FloatingSpace, SpaceSystem
+from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.proof.records import Exclusion, NoRoot, Unbalanced
 from enumsol.proof.space_records import (
@@ -34,7 +34,6 @@ from enumsol.trusted.space.space_reference import SpaceReference
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from fractions import Fraction
 
     from enumsol.proof.writer import Recorder
     from enumsol.relaxation.space_relaxation import SpaceEngine
@@ -49,16 +48,13 @@ class FloatingSpaceSolvers(HeldByNothing, SpaceSolvers):
 
     offered = '"verified"'
 
-    def _in_balls(self, alpha: Fraction, force: Floats, length: Floats) -> FloatingSpace:
-        return FloatingSpace.of(self.problem, alpha, force, length)
-
     @cached_property
     def relaxed(self) -> SpaceSystem:
         """The body on weak springs (theory, section 14.5)."""
         return self._on_springs(WEAK)
 
     def _on_springs(self, stiffness: float) -> SpaceSystem:
-        if not isinstance(self.enclosed, FloatingSpace):
+        if self.enclosed.held:
             return self.system
         S, g = weakly_held(self.system.S, self.system.g, self.enclosed.rows, stiffness)
         return replace(self.system, S=S, g=g)
@@ -66,7 +62,7 @@ class FloatingSpaceSolvers(HeldByNothing, SpaceSolvers):
     @cached_property
     def exclusions(self) -> SpaceExclusions | None:
         """What excludes assignments; None without balls."""
-        return SpaceExclusions(self.enclosed) if isinstance(self.enclosed, FloatingSpace) else None
+        return SpaceExclusions(self.enclosed) if not self.enclosed.held else None
 
     def certifier(self, recorder: Recorder | None) -> FloatingSpaceCertifier:
         """The certifier of this arithmetic."""
@@ -88,15 +84,15 @@ class SpaceExclusions:
 
     Parameters
     ----------
-    enclosed : FloatingSpace
+    enclosed : EnclosedSpace
 
     Attributes
     ----------
-    system, free : FloatingSpace
+    system, free : EnclosedSpace
         With its bound, and with one beyond which there are no solutions.
     """
 
-    def __init__(self, enclosed: FloatingSpace) -> None:
+    def __init__(self, enclosed: EnclosedSpace) -> None:
         self.system, self.free = enclosed, unbounded(enclosed)
         self._references: dict[Codes, SpaceReference | None] = {}
         #: How the forms of roots are declared, but for enclosures, by their leaves.

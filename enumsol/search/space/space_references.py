@@ -14,13 +14,14 @@ from scipy.optimize import nnls
 
 from enumsol.model.sectors import SECTORS
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.search.closing import TreeCloser
 from enumsol.search.space.space_fathoming import DefiniteForm
 from enumsol.trusted.space.sector_rows import ALONG, GAP, LEFT, RIGHT, SLIP
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
 
-    from enumsol.condensation.space_condensed import FloatingSpace, SpaceSystem
+    from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
     from enumsol.relaxation.space_relaxation import SpaceEngine
     from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.space.leaves import SpaceRoot
@@ -60,7 +61,7 @@ class Referring(Protocol):
         """The root, if it was not told before, as a list; None if it is not proven that no other one lies below."""
 
 
-class SpaceReferenceCloser:
+class SpaceReferenceCloser(TreeCloser):
     """Tries the whole problem, and then every assignment, unless not even the root's own statuses leave it alone.
 
     Parameters
@@ -75,15 +76,11 @@ class SpaceReferenceCloser:
     known : codes of that leaf, none if there is none, and None if that is not known
     """
 
-    relaxed: object = None
-    leads = False
-
     def __init__(self, certifier: Referring, engine: SpaceEngine, root: Callable[[], Codes | None]) -> None:
+        super().__init__()
         self._certifier, self._engine, self._root = certifier, engine, root
         #: Assignments that pass before the first try.
         self._easy = 0 if engine.system.p >= _MANY else _EASY
-        self.known: Codes | None = None
-        self.sliding = dict[int, int]()
         self._wait = self._vain = 0
 
     @cached_property
@@ -120,20 +117,6 @@ class SpaceReferenceCloser:
         with np.errstate(all="ignore"):
             proposal = proposed(self._reference, codes)
         return self._certifier.only_root(codes, self._reference, proposal)
-
-    def led(self, codes: Codes) -> None:
-        """No node of the tree is decided, or split, before its relaxation is solved."""
-
-    def alone(self, *_: object) -> None:
-        """Roots of bodies that are held are closed in this way."""
-
-    def met(self, answer: object) -> None:
-        """Nothing is made of leaves."""
-
-    def begins_again(self, nodes: int) -> bool:
-        """Nothing that is met makes a search begin again."""
-        del nodes
-        return False
 
 
 def _far_apart(reference: SpaceReference) -> list[int]:
@@ -212,7 +195,7 @@ def _products(reference: SpaceReference, rows: list[Row], tight: list[Row], y: F
 
 
 def reference_numbers(
-    system: SpaceSystem, enclosed: FloatingSpace, root: SpaceRoot, leaf: Codes
+    system: SpaceSystem, enclosed: EnclosedSpace, root: SpaceRoot, leaf: Codes
 ) -> Iterator[tuple[Floats, float, float]]:
     """Numbers, balance and share of forms that may be definite, as ``SpaceReference.of`` takes them."""
     tau, p, unit = enclosed.tau, len(enclosed.tau), enclosed.unit
