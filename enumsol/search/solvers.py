@@ -19,6 +19,7 @@ from enumsol.relaxation.engine import Engine, not_compiled
 from enumsol.relaxation.interior_point import InteriorPointEngine
 from enumsol.search.certifiers.float_certifier import FastCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier
+from enumsol.search.closing import TreeCloser
 from enumsol.search.fathoming import Closer, Closing, propose
 from enumsol.search.form_policy import Forms, plane_forms
 from enumsol.search.reduction import WeightSource
@@ -245,7 +246,7 @@ class Solvers(SearchSetup):
     def _splitting(self, certifier: Certifier) -> PlaneSplitting:
         return PlaneSplitting(self.scaled.F, sliding=certifier.sliding)
 
-    def _closer(self, certifier: Certifier) -> Closer | None:
+    def _closer(self, certifier: Certifier) -> TreeCloser | None:
         return Closer(self.scaled, cast("Closing", certifier))
 
     def _forms(self) -> Forms | None:
