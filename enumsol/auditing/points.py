@@ -133,7 +133,7 @@ def _check_nodes(found: int, p: int) -> None:
 
 
 def _modes(problem: Body) -> int:
-    return 0 if problem.modes is None else problem.modes.r
+    return problem.modes.r
 
 
 def _check_modes(found: int, problem: Body) -> None:

@@ -226,7 +226,7 @@ class BranchGraph(GraphData):
         F^2 lmax((S^-1)_nn) lmax(S_tt) < 1 at every contact node, in 3D for both coefficients; evaluated in floats. None
         for a body that nothing holds.
         """
-        return None if self.problem.modes is not None else uniqueness_bound(self.problem, self.interval)
+        return uniqueness_bound(self.problem, self.interval) if self.problem.held else None
 
     def starting_point(self, branch: Branch) -> Root | None:
         """A regular root in the middle of the branch's longest arc; None when there is none at any float alpha."""

@@ -137,7 +137,7 @@ class GraphData(Immutable):
         standing = Standing.INCOMPLETE if self.reasons else whole
         # what contradicts itself may be wrong anywhere
         known = None if self.gaps else self.left_open
-        held = self.problem.modes is None
+        held = self.problem.held
         return Claims(self.vertices, self.arcs, self.exact_interval, standing, held=held, open_ranges=known)
 
     @property
@@ -158,7 +158,7 @@ class GraphData(Immutable):
         if not self.complete:
             return "complete: not proven (degrees balance at every vertex)"
         about = "" if self.certified_data == "problem" else " for S and g as computed"
-        if self.problem.modes is not None:
+        if not self.problem.held:
             about = f", within rigid displacements of {self.problem.rigid_reach:g}"
         return f"complete: yes (proven{about})"
 
@@ -219,7 +219,7 @@ class GraphData(Immutable):
                 continue  # beyond the bound nothing is known
             if v.index_left is None or v.index_right is None:
                 # where a body slides it may be that of a continuum that reaches the bound
-                if self.problem.modes is not None:
+                if not self.problem.held:
                     continue
                 found.append(f"vertex {v.number} at alpha = {v.alpha:.17g}: the degree of an arc is not known")
             elif not v.border and v.index_left != v.index_right:
@@ -229,7 +229,7 @@ class GraphData(Immutable):
                 )
         start = [v.index_right for v in self.vertices if v.border and v.alpha == first]
         total = sum(k for k in start if k is not None)
-        if self.problem.modes is None and not self.undecided and None not in start and total != 1:
+        if self.problem.held and not self.undecided and None not in start and total != 1:
             found.append(f"the degrees of all arcs at alpha = {first:g} sum to {total:+d} and not to +1")
         return tuple(found)
 

@@ -21,8 +21,8 @@ from enumsol.branches.enclosed.following import TracedProblem
 from enumsol.branches.enclosed.make_traced import TracedArcValues
 from enumsol.branches.exact.make_elements import ExactArcValues
 from enumsol.branches.graph_data import GraphData, GraphStats
-from enumsol.condensation.exact import ExactCondensed, exact_condensed
-from enumsol.condensation.floating import enclosed_over_alpha
+from enumsol.condensation.enclosure import enclosure_of
+from enumsol.condensation.exact import ExactCondensed
 from enumsol.condensation.unloaded import vanishing_alpha
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.mesh import BodyMesh
@@ -134,7 +134,7 @@ def _graph_kind(problem: AnyProblem, vertices: Any) -> dict[str, Any]:
         "statuses": statuses,
         "vertices": Array(None, p, 2),
         "dimension": range(3 * p + 7),
-        "rigid_coordinates?": Array(None, 0 if problem.modes is None else problem.modes.r),
+        "rigid_coordinates?": Array(None, problem.modes.r),
     }
     vertex = {
         **dict.fromkeys(("lo", "hi"), is_fraction),
@@ -160,7 +160,7 @@ def _graph_kind(problem: AnyProblem, vertices: Any) -> dict[str, Any]:
 
 def _unknowns(problem: AnyProblem) -> int:
     """Number of forces in 3D, and of coordinates of a rigid displacement."""
-    return 3 * problem.p + (0 if problem.modes is None else problem.modes.r)
+    return 3 * problem.p + problem.modes.r
 
 
 def _is_whole(value: Any) -> bool:
@@ -178,7 +178,7 @@ def _values(
         @cache
         def given() -> AlphaProblem:
             """Made for the first arc: a graph without any may be one of a problem that has no such form."""
-            return AlphaProblem.of(enclosed_over_alpha(problem))
+            return AlphaProblem.of(enclosure_of(problem))
 
         def along(item: dict[str, Any]) -> ArcValues:
             codes, knots = tuple(item["selections"][0]), np.array(item["knots"], dtype=np.float64)
@@ -197,7 +197,7 @@ def _values(
         traced = cache(lambda: TracedProblem(problem, interval, vanishing_alpha(problem, "problem")))
         return None, partial(of_selection, lambda codes, sample: TracedArcValues(traced(), codes, sample))
     exactly = record["condensed_exactly"]
-    exact = exact_condensed(problem) if exactly else ExactCondensed.from_condensed(problem)
+    exact = ExactCondensed.from_problem(problem) if exactly else ExactCondensed.from_condensed(problem)
     return exact, partial(of_selection, partial(ExactArcValues, exact))
 
 

@@ -61,7 +61,7 @@ def write_graph_proof(
             "p": problem.p,
             "data": data,
         }
-        | ({} if problem.modes is None else {"max_rigid_displacement": problem.rigid_reach})
+        | ({} if problem.held else {"max_rigid_displacement": problem.rigid_reach})
     )
     selections = set()
     leaves = 0

@@ -57,7 +57,7 @@ def roots_on(
 def _roots_of(data: GraphData, alpha: Alpha, selections: Sequence[Codes]) -> RootSet:
     """Roots and families that the selections have at ``alpha``; in floats where these find all of them."""
     problem = data.problem
-    if data.exact is None or problem.modes is not None:
+    if data.exact is None or not problem.held:
         # those that are proven for the problem's data as given
         positive = tuple(F > 0 for F in exactly_at(Fraction(alpha), *problem.affine_friction))
         return roots_of_selections(problem, alpha, _codes_at(selections, positive), whole=not data.reasons)

@@ -174,7 +174,7 @@ def link_samples(
     samples = sorted(set(alpha_list(alphas)))
     if not samples:
         raise InvalidArgumentError("alphas is empty; expected at least one number")
-    arithmetic = arithmetic or ("fast" if problem.modes is None else "verified")
+    arithmetic = arithmetic or ("fast" if problem.held else "verified")
     root_sets = []
     for k, alpha in enumerate(samples):
         root_sets.append(enumerate_roots(problem, alpha, arithmetic))  # type: ignore[arg-type]
@@ -372,7 +372,7 @@ def _frame(problem: AnyProblem, done: dict[int, dict[str, Any]]) -> pd.DataFrame
     columns = [*counts, "complete", "undecided", "stopped", "nodes", "seconds"]
     table = pd.DataFrame([done[k] for k in sorted(done)], columns=columns)
     table = table.astype({"index_sum": "Int64"})  # whole numbers, and missing ones
-    table.attrs["held"] = problem.modes is None
+    table.attrs["held"] = problem.held
     return table
 
 

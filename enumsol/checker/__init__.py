@@ -14,8 +14,8 @@ What a verified proof says
     excluded.
 
 What checker and search share
-    The checkers (``checker.verify``, ``checker.graph_checker``, ``checker.history_checker``, ``checker.space_checker``,
-    ``checker.floating``) import nothing of the search, neither its trees and relaxations nor its arcs and results, and
+    The checkers (``checker.verify``, ``checker.graph_checker``, ``checker.history_checker``, ``checker.space_checker``)
+    import nothing of the search, neither its trees and relaxations nor its arcs and results, and
     a test guards that. They are not independent of all that it uses. These serve both, and an error in one of them may
     write a false proof and accept it:
 
@@ -27,9 +27,9 @@ What checker and search share
     - ``trusted.exclusion``: the exclusion inequality, of which the search has a compiled copy, at one alpha and over
       a piece of an interval (``trusted.over_interval``); ``trusted.energy_bounds``, what multipliers prove;
       ``trusted.quadratic_forms``, other forms than the energy;
-    - of bodies that nothing holds: ``model.rigid_modes``, the springs and the bounds; ``condensation.floating``, balls
-      for G and h; ``trusted.floating_bounds``, what multipliers prove, ``trusted.confinement``, beyond which bounds
-      there are no solutions, and ``trusted.joint_roots``, which selections share one root;
+    - of bodies that nothing holds: ``model.rigid_modes``, the springs and the bounds; in ``condensation.enclosure``
+      balls for G and h; ``trusted.floating_bounds``, what multipliers prove, ``trusted.confinement``, beyond which
+      bounds there are no solutions, and ``trusted.joint_roots``, which selections share one root;
     - ``trusted.at_alpha``: the verified solve of a selection and the contradiction of its equations;
       ``trusted.precise_at_alpha``, the same solve with many digits, loaded where double arithmetic does not decide;
     - ``trusted.uniqueness``, the test by which a subtree is closed by its only possible solution, and which of these

@@ -240,7 +240,7 @@ class ArcChecker:
             if failure is not None:
                 self._fail(f"the piece from {float(piece.a)} to {float(piece.b)}: {failure}")
         for place, total in self._degrees.items():
-            if self._problem.modes is None and not self._count.open and total != 1:
+            if self._problem.held and not self._count.open and total != 1:
                 self._fail(f"the indices at the {place} alpha add up to {total}; expected 1")
         return self._count, record
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.checker.reports import MAX_FAILURES, HistoryVerificationReport
-from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.condensation.enclosure import NotEnclosedError, enclosure_of
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.model.restart import SlipStart, afresh, restarted
 from enumsol.proof.reading import RefusedError, numbers_from, quoted, rational_from, same
@@ -150,7 +150,7 @@ class HistoryChecker:
         step = self.steps[stage.step - 1]
         problem = restarted(self._base(stage.step), stage.start)
         checker = self.checker(problem, self.progress)
-        checker.enclosure, checker.located = problem.on_springs.enclosure, {}
+        checker.enclosure, checker.located = enclosure_of(problem), {}
         tell("searches", number, count)
         with heard_by(tell_part(f"of search {number + 1}")):
             report = checker.run(_Part(_search(records)))

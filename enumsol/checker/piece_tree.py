@@ -114,10 +114,10 @@ class PieceTreeChecker:
             split = Branching.covering(record, codes, self._covers)
             return [(piece.low, piece.high, below) for below in split.below(codes)]
         modes = self.enclosure.problem.modes
-        known = kind_of(record, PIECE_LEAVES if modes is None else FLOATING_PIECE_LEAVES)
+        known = kind_of(record, PIECE_LEAVES if modes.r == 0 else FLOATING_PIECE_LEAVES)
         if known is None:
             raise RecordError(f"unknown kind of record {quoted(kind)}")
-        components, r = len(codes) + sum(self._tangents), 0 if modes is None else modes.r
+        components, r = len(codes) + sum(self._tangents), modes.r
         leaf = known.read(record, Limits(codes, boxes=len(self._boxes), components=components, modes=r))
         self.leaves += 1
         if isinstance(leaf, UndecidedRecord):

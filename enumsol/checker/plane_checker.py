@@ -21,14 +21,19 @@ from enumsol.proof import records
 from enumsol.proof.proof_file import fraction_text
 from enumsol.proof.reading import RefusedError, data_of, friction_at, rational_from, same, units_from
 from enumsol.trusted.at_alpha import VerifiedSelection, holds_no_root, solve_selection
+from enumsol.trusted.confinement import without_bound
 from enumsol.trusted.exclusion import Leaves, Terms, exclusion_margins
-from enumsol.trusted.joint_roots import JointRoot
+from enumsol.trusted.floating_bounds import is_unbalanced
+from enumsol.trusted.joint_roots import JointRoot, joint_root
 from enumsol.trusted.positions import certain_statuses
 from enumsol.trusted.quadratic_forms import EnclosedForm
+from enumsol.trusted.reference import Reference
 from enumsol.trusted.status_rows import ROW_KINDS, UNDECIDED, is_covering, row_signs
 from enumsol.trusted.uniqueness import ClosedSolution, lone_root
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from enumsol.checker.rational import Hull, RationalBody, RationalSystem
     from enumsol.checker.walk import Test
     from enumsol.proof.records import EnclosureRecord, Record
@@ -81,7 +86,7 @@ class _FormLeaves:
 class Checker(TreeChecker):
     """Checks one proof of a problem in 2D."""
 
-    kinds = records.LEAVES
+    held_kinds, floating_kinds = records.LEAVES, records.FLOATING_LEAVES
 
     polytopes: list[Polytope] = field(default_factory=list)
     closed: dict[tuple[int, ...], ClosedSolution | JointRoot] = field(default_factory=dict)
@@ -89,6 +94,11 @@ class Checker(TreeChecker):
     strict: list[tuple[int, ...]] = field(default_factory=list)
     _waiting: list[tuple[int, tuple[int, ...], Terms]] = field(default_factory=list)
     _by_forms: _FormLeaves = field(default_factory=_FormLeaves)
+    #: Of a body that nothing holds, what was declared of roots, and their forms; None where these are not definite.
+    _declared: list[records.DeclaredReference] = field(default_factory=list)
+    _references: dict[int, Reference | None] = field(default_factory=dict)
+    #: Roots that selections share, by the one in which all their nodes stick, and by how these slip.
+    shared: dict[tuple[Codes, tuple[tuple[int, int], ...]], JointRoot | None] = field(default_factory=dict)
 
     # -- header and tree -------------------------------------------------------------------------------------------
 
@@ -121,12 +131,17 @@ class Checker(TreeChecker):
             raise RefusedError("S is not proven positive definite")
         return enclosed
 
+    def _without_bound(self) -> EnclosedSystem:
+        return without_bound(self.system)
+
     @cached_property
     def rational(self) -> RationalSystem:
         """The condensed problem in rationals; computed only if a leaf needs it."""
         self._allow_rationals()
-        from enumsol.checker.rational import RationalSystem  # python-flint, not always needed
+        from enumsol.checker.rational import FloatingRationalSystem, RationalSystem  # python-flint, not always needed
 
+        if not self.problem.held:
+            return FloatingRationalSystem(self.problem, self.alpha)
         return RationalSystem(self.problem, self.alpha, definite=self._definite)
 
     @cached_property
@@ -164,11 +179,16 @@ class Checker(TreeChecker):
         self._check_exclusions(np.array(numbers), Leaves.of(codes, terms))
 
     def _check_exclusions(self, numbers: Indices, leaves: Leaves) -> None:
-        margins = exclusion_margins(self.system, leaves)
-        for number in numbers[~(margins > 0)]:
+        proven = exclusion_margins(self.free, leaves) > 0
+        if not self.problem.held and not np.all(proven):
+            self.bounded = True
+            proven |= exclusion_margins(self.system, leaves) > 0
+        for number in numbers[~proven]:
             self.fail(f"leaf {number}: its multipliers do not exclude it")
 
     def _limits(self, codes: Codes, kind: type[Record]) -> records.Limits:
+        if not self.problem.held:
+            return records.Limits(codes, self.friction, self._declared, modes=self.problem.modes.r)
         if not issubclass(kind, records.ClosingRecord):
             return records.Limits(codes, self.friction, self._by_forms.declared)
         # as the kernel has it
@@ -178,11 +198,15 @@ class Checker(TreeChecker):
         return records.Limits(codes, friction)
 
     def _declare(self, record: list[Any]) -> None:
+        nothing = (UNDECIDED,) * self.problem.p
         try:
-            form = records.DeclaredForm.read(record, records.Limits((UNDECIDED,) * self.problem.p))
+            if self.problem.held:
+                self._by_forms.declared.append(records.DeclaredForm.read(record, records.Limits(nothing)))
+            else:
+                limits = records.Limits(nothing, (self.system.F > 0).tolist())
+                self._declared.append(records.DeclaredReference.read(record, limits))
         except ValueError as error:
             raise RefusedError(str(error)) from None
-        self._by_forms.declared.append(form)
 
     def _covers(self, node: int, code: int, children: list[int]) -> bool:
         return is_covering(code, children, friction=self.friction[node])
@@ -205,6 +229,9 @@ class Checker(TreeChecker):
             records.Closed: self._closed,
             records.ClosedInRationals: self._closed_in_rationals,
             records.Alone: self._alone,
+            records.Unbalanced: self._unbalanced,
+            records.OnlyReference: self._only_reference,
+            records.SharedRoot: self._shared,
         }
 
     def _at_rest(self) -> None:
@@ -228,14 +255,14 @@ class Checker(TreeChecker):
     @cached_property
     def _precise(self) -> PreciseAtAlpha | None:
         """The problem in many digits; None where that is not to be had, or the proof is about S and g as computed."""
-        if self.data == "condensed" or self.problem.modes is not None:
+        if self.data == "condensed" or not self.problem.held:
             return None
         from enumsol.trusted.precise_at_alpha import PreciseAtAlpha  # python-flint, not always needed
 
         return PreciseAtAlpha.of(self.problem, self.alpha, self.force, self.length)
 
     def _no_root(self, codes: Codes, said: records.NoRoot) -> str | None:
-        if holds_no_root(self.system, codes, solve_selection(self.system, codes)):
+        if self._either(lambda system: holds_no_root(system, codes, solve_selection(system, codes))):
             return None
         ball = self._solved(codes)
         if ball is not None and ball.is_excluded:
@@ -264,6 +291,42 @@ class Checker(TreeChecker):
             reach = np.abs(centre - ball.force.mid * self.force) + ball.force.rad * self.force
             inside = reach * SAFE + np.where(ball.force.rad > 0, _SUBNORMAL, 0.0) <= radius
         return said.refusal(ball.det_sign, inside=bool(np.all(inside)))
+
+    def _unbalanced(self, codes: Codes, said: records.Unbalanced) -> str | None:
+        if is_unbalanced(self.system, codes, said.direction):
+            return None
+        return "forces below it may be in balance with the load"
+
+    def _only_reference(self, codes: Codes, said: records.OnlyReference) -> str | None:
+        known = self._reference(len(self._declared) - said.back)
+        if known is None:
+            return "the form of its root is not proven definite"
+        if not self._either(lambda system: known.is_only_root(codes, said.rows, said.products, system.reach)):
+            return "its root is not proven to be the only one"
+        if not known.lies_below(codes):
+            return None if said.enclosure is None else "its root does not lie below its assignment"
+        if said.enclosure is None:
+            return "it has no enclosure of the root that lies below its assignment"
+        return self._regular(known.selection, known.root, said.enclosure)
+
+    def _reference(self, place: int) -> Reference | None:
+        if place not in self._references:
+            said = self._declared[place]
+            numbers = said.weights, said.balance, said.share
+            self._references[place] = Reference.of(self.system, said.selection, *numbers)
+        return self._references[place]
+
+    def _shared(self, codes: Codes, said: records.SharedRoot) -> str | None:
+        core = said.core(codes)
+        if (core, said.slips) not in self.shared:
+            self.shared[core, said.slips] = joint_root(self.system, core, dict(said.slips))
+        found = self.shared[core, said.slips]
+        if found is None:
+            return "its selections are not proven to share one root"
+        if self.closed.setdefault(core, found) is not found:
+            return "its selections overlap with others that share a root"
+        self._locate(core, found)
+        return self._placed(found, said.enclosure)
 
     def _closed(self, codes: Codes, said: records.Closed) -> str | None:
         from enumsol.checker.fathomed_subtrees import closed_by_balls
@@ -310,7 +373,15 @@ class Checker(TreeChecker):
         """w_t at a point, exactly."""
         from enumsol.arithmetic.rationals import rational  # python-flint, as above
 
-        return self._body.moved([rational(x) for x in point])[len(point) // 2 :]
+        numbers = [rational(x) for x in point]
+        if self.problem.held:
+            return self._body.moved(numbers)[len(point) // 2 :]
+        rows = (self.rational.row(5, node) for node in range(self.problem.p))
+        return [sum((a * x for a, x in zip(form, numbers, strict=True)), constant) for form, constant in rows]
+
+    def _rests_on_reach(self, codes: Codes, points: Sequence[Sequence[Fraction]]) -> bool:
+        """Whether what a selection holds may be other without the bounds of the rigid displacement."""
+        return not self.problem.held and self.rational.rests_on_reach(codes, points)  # type: ignore[attr-defined]
 
     def _alone(self, codes: Codes, said: records.Alone) -> str | None:
         root = lone_root(self.system, codes, *said.arguments)
@@ -336,6 +407,7 @@ class Checker(TreeChecker):
         return None if positive else "its multipliers do not exclude it in rational arithmetic"
 
     def _no_rational_root(self, codes: Codes, said: records.NoRootInRationals) -> str | None:
+        self.bounded |= self._rests_on_reach(codes, [])
         return "it holds a root" if self._hull(codes).points else None
 
     def _hull(self, codes: Codes) -> Hull:
@@ -343,7 +415,7 @@ class Checker(TreeChecker):
         from enumsol.arithmetic.rationals import to_fraction
         from enumsol.checker.rational import Hull, hull_of_selections
 
-        regular = self.problem.modes is None and self._definite
+        regular = self.problem.held and self._definite
         point = self._body.point(codes) if regular else None
         if point is None:
             return hull_of_selections(self.rational, codes)
@@ -357,6 +429,7 @@ class Checker(TreeChecker):
         if not found or sorted(said.points) != sorted(found) or not same(said.dimension, hull.dimension):
             return "its roots are not those that are claimed"
         self.polytopes.append((codes, hull.points, hull.dimension))
+        self.bounded |= self._rests_on_reach(codes, hull.points)
         return None
 
     # -- counting --------------------------------------------------------------------------------------------------

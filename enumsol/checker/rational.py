@@ -340,7 +340,7 @@ class FloatingRationalSystem(RationalSystem):
     def __init__(self, problem: ContactProblem, alpha: Fraction) -> None:
         super().__init__(problem.on_springs, alpha)
         modes, a = problem.modes, rational(alpha)
-        if modes is None:
+        if modes.r == 0:
             raise AssertionError("the body is held")
         columns = [[rational(x) for x in column] for column in modes.N.T.tolist()]
         rows = problem.contact_rows.toarray().tolist()

@@ -1,7 +1,4 @@
-"""The checker of proofs about problems in 3D: leaves are statuses and sectors of slip directions.
-
-Bodies that nothing holds (theory, section 14.6) have a checker of their own.
-"""
+"""The checker of proofs about problems in 3D: leaves are statuses and sectors of slip directions."""
 
 from __future__ import annotations
 
@@ -12,10 +9,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, Ball
-from enumsol.checker.floating import WithinReach
 from enumsol.checker.walk import Located, TreeChecker
 from enumsol.condensation.data import exactly_at
-from enumsol.condensation.space_condensed import EnclosedSpace, FloatingSpace
+from enumsol.condensation.space_condensed import EnclosedSpace
 from enumsol.proof import records, space_records
 from enumsol.proof.reading import RefusedError, data_of, exponents_from, rational_from, shown_alpha
 from enumsol.proof.records import EnclosureRecord, Limits, NoRoot, Record, RegularRoot
@@ -42,7 +38,7 @@ _NO_FORM = "no form that is convex was declared over it"
 class SpaceChecker(TreeChecker):
     """Checks one proof of a problem in 3D."""
 
-    kinds = space_records.LEAVES
+    held_kinds, floating_kinds = space_records.LEAVES, space_records.FLOATING_LEAVES
 
     roots: list[tuple[tuple[int, ...], SpaceRoot]] = field(default_factory=list)
     boxed: list[tuple[tuple[int, ...], BoxedSolution]] = field(default_factory=list)
@@ -52,6 +48,8 @@ class SpaceChecker(TreeChecker):
     form: SlipForm | None = None
     #: The ellipsoid of the form of products that was declared last; None where it is not proven to be one.
     ellipsoid: Ellipsoid | None = None
+    #: The root that was declared last, with its form; None where it is not proven. Of a body that nothing holds.
+    reference: SpaceReference | None = None
 
     # -- header and tree -------------------------------------------------------------------------------------------
 
@@ -84,7 +82,11 @@ class SpaceChecker(TreeChecker):
     # -- leaves ----------------------------------------------------------------------------------------------------
 
     def _limits(self, codes: Codes, kind: type[Record]) -> Limits:
-        return Limits(codes, components=len(self.system.g) if kind is space_records.OnlyRoot else 0)
+        components = len(self.system.g) if kind is space_records.OnlyRoot else 0
+        return Limits(codes, components=components, modes=self.problem.modes.r)
+
+    def _without_bound(self) -> EnclosedSpace:
+        return unbounded(self.system)
 
     def _tests(self) -> dict[type[Record], Test]:
         return {
@@ -96,6 +98,8 @@ class SpaceChecker(TreeChecker):
             space_records.MissedByProducts: self._missed,
             space_records.EnclosedByProducts: self._in_ellipsoid,
             space_records.OnlyRoot: self._only,
+            records.Unbalanced: self._unbalanced,
+            space_records.OnlySpaceReference: self._only_reference,
         }
 
     def _at_rest(self) -> None:
@@ -104,8 +108,21 @@ class SpaceChecker(TreeChecker):
         self.locate(None, Located(Ball.exact(np.zeros(3 * self.problem.p)), still))
 
     def _excluded(self, codes: Codes, said: space_records.ExcludedInSpace) -> str | None:
-        positive = sector_margin(self.system, codes, said.rows, said.values) > 0
+        margin = sector_margin if self.problem.held else floating_margin
+        positive = self._either(lambda system: margin(system, codes, said.rows, said.values) > 0)
         return None if positive else "its multipliers do not exclude it"
+
+    def _unbalanced(self, codes: Codes, said: records.Unbalanced) -> str | None:
+        if is_unbalanced_in_space(self.system, codes, said.direction):
+            return None
+        return "forces below it may be in balance with the load"
+
+    def _only_reference(self, codes: Codes, said: space_records.OnlySpaceReference) -> str | None:
+        known = self.reference
+        if known is None:
+            return "no root was declared"
+        proven = self._either(lambda system: known.is_only_root(codes, said.rows, said.products, system.reach))
+        return None if proven else "the root that was declared is not proven to be the only one in it"
 
     def _flush(self, *, last: bool) -> None:
         """Nothing waits: every leaf is checked as it is read."""
@@ -114,6 +131,9 @@ class SpaceChecker(TreeChecker):
         system = self.system
         try:
             limits = Limits((UNDECIDED,) * self.problem.p, components=len(system.g))
+            if not self.problem.held:
+                self._declare_root(space_records.DeclaredSpaceReference.read(record, limits))
+                return
             if len(record) in space_records.DeclaredProductForm.sizes:
                 said = space_records.DeclaredProductForm.read(record, limits)
                 with np.errstate(over="ignore", invalid="ignore"):
@@ -126,6 +146,19 @@ class SpaceChecker(TreeChecker):
         except ValueError as error:
             raise RefusedError(str(error)) from None
 
+    def _declare_root(self, said: space_records.DeclaredSpaceReference) -> None:
+        """Take note of a root, which is one whatever leaves refer to it."""
+        self.reference = SpaceReference.of(self.system, said.leaf, said.numbers, said.balance, said.share)
+        if self.reference is None:
+            self.fail("the root that is declared is not proven to be one whose form is definite")
+            return
+        root = self.reference.root
+        if (reason := self._placed(root, said.enclosure)) is not None:
+            self.fail(f"the root that is declared: {reason}")
+        self._ask_without_bound(said.leaf)
+        self.roots.append((said.leaf, root))
+        self._locate(said.leaf, root, said.leaf)
+
     def _excluded_by_form(self, codes: Codes, said: space_records.ExcludedBySlipForm) -> str | None:
         if self.form is None:
             return "its form was not declared"
@@ -134,12 +167,17 @@ class SpaceChecker(TreeChecker):
 
     def _no_root(self, codes: Codes, said: NoRoot) -> str | None:
         del said
-        found = settle(self.system, codes)
-        if isinstance(found, Open):
-            return _OPEN
-        return None if found is None else "it holds a root"
+        if self._either(lambda system: settle(system, codes) is None):
+            return None
+        return _OPEN if isinstance(settle(self.system, codes), Open) else "it holds a root"
+
+    def _ask_without_bound(self, leaf: Codes) -> None:
+        """Take note of a root that is not proven without the bound of the rigid displacement."""
+        if not self.problem.held:
+            self.bounded |= not isinstance(settle(self.free, leaf), SpaceRoot)
 
     def _regular_root(self, codes: Codes, said: RegularRoot) -> str | None:
+        self._ask_without_bound(codes)
         found = settle(self.system, codes)
         if isinstance(found, Open):
             return _OPEN
@@ -276,87 +314,3 @@ def _units(header: dict[str, Any], p: int) -> tuple[Floats, Floats]:
     if len({a + b for a, b in zip(force, length, strict=True)}) != 1:
         raise ValueError("the units are not a common scaling of energy")
     return np.ldexp(1.0, np.array(force)), np.ldexp(1.0, np.array(length))
-
-
-@dataclass
-class FloatingSpaceChecker(WithinReach, SpaceChecker):
-    """Checks one proof of a body in 3D that nothing holds."""
-
-    kinds = space_records.FLOATING_LEAVES
-
-    #: The root that was declared last, with its form; None where it is not proven.
-    reference: SpaceReference | None = None
-
-    @cached_property
-    def system(self) -> FloatingSpace:
-        """Balls for S, g, F, G and h in the proof's units."""
-        enclosed = FloatingSpace.of(self.problem, self.alpha, self.force, self.length)
-        if not enclosed.smallest_eigenvalue > 0:
-            raise RefusedError("S is not proven positive definite")
-        return enclosed
-
-    @cached_property
-    def free(self) -> FloatingSpace:
-        """System without bounds of the rigid displacement."""
-        return unbounded(self.system)
-
-    def _limits(self, codes: Codes, kind: type[Record]) -> records.Limits:
-        del kind
-        return records.Limits(codes, modes=self.problem.modes.r)
-
-    def _tests(self) -> dict[type[Record], Test]:
-        return super()._tests() | {
-            records.Unbalanced: self._unbalanced,
-            space_records.OnlySpaceReference: self._only_reference,
-        }
-
-    def _declare(self, record: list[Any]) -> None:
-        """Take note of a root, which is one whatever leaves refer to it."""
-        limits = Limits((UNDECIDED,) * self.problem.p, components=len(self.system.g))
-        try:
-            said = space_records.DeclaredSpaceReference.read(record, limits)
-            self.reference = SpaceReference.of(self.system, said.leaf, said.numbers, said.balance, said.share)
-            if self.reference is None:
-                self.fail("the root that is declared is not proven to be one whose form is definite")
-                return
-            root = self.reference.root
-            reason = self._placed(root, said.enclosure)
-        except ValueError as error:
-            raise RefusedError(str(error)) from None
-        if reason is not None:
-            self.fail(f"the root that is declared: {reason}")
-        self.bounded |= not isinstance(settle(self.free, said.leaf), SpaceRoot)
-        self.roots.append((said.leaf, root))
-        self._locate(said.leaf, root, said.leaf)
-
-    def _only_reference(self, codes: Codes, said: space_records.OnlySpaceReference) -> str | None:
-        reference = self.reference
-        if reference is None:
-            return "no root was declared"
-        if reference.is_only_root(codes, said.rows, said.products, self.free.reach):
-            return None
-        self.bounded = True
-        proven = reference.is_only_root(codes, said.rows, said.products, self.system.reach)
-        return None if proven else "the root that was declared is not proven to be the only one in it"
-
-    def _excluded(self, codes: Codes, said: space_records.ExcludedInSpace) -> str | None:
-        if floating_margin(self.free, codes, said.rows, said.values) > 0:
-            return None
-        self.bounded = True
-        positive = floating_margin(self.system, codes, said.rows, said.values) > 0
-        return None if positive else "its multipliers do not exclude it"
-
-    def _unbalanced(self, codes: Codes, said: records.Unbalanced) -> str | None:
-        if is_unbalanced_in_space(self.system, codes, said.direction):
-            return None
-        return "forces below it may be in balance with the load"
-
-    def _no_root(self, codes: Codes, said: records.NoRoot) -> str | None:
-        if settle(self.free, codes) is None:
-            return None
-        self.bounded = True
-        return super()._no_root(codes, said)
-
-    def _regular_root(self, codes: Codes, said: records.RegularRoot) -> str | None:
-        self.bounded |= not isinstance(settle(self.free, codes), SpaceRoot)
-        return super()._regular_root(codes, said)

@@ -21,7 +21,6 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from enumsol.checker.curve_cuts import parts_of
-from enumsol.checker.floating import check_bound
 from enumsol.checker.piece_tree import PieceTreeChecker
 from enumsol.checker.reports import MAX_FAILURES, GraphVerificationReport
 from enumsol.condensation.data import exactly_at
@@ -92,7 +91,7 @@ class SpaceGraphChecker:
             arcs=self.arcs,
             open=len(self.gaps),
             curves=len(self.curves),
-            within=None if self.problem.modes is None else self.problem.rigid_reach,
+            within=None if self.problem.held else self.problem.rigid_reach,
         )
 
     def _fail(self, message: str) -> None:
@@ -134,14 +133,12 @@ class SpaceGraphChecker:
             self.interval, units, steps = _read(self.header, self.problem)
         except ValueError as error:
             raise RefusedError(f"the header cannot be read: {error}") from None
-        if self.problem.modes is not None:
-            check_bound(self.header, self.problem)
         return units, steps
 
     @property
     def _limits(self) -> Limits:
         """Limits of records about boxes around curves."""
-        return Limits((UNDECIDED,) * self.problem.p, modes=modes_of(self.problem))
+        return Limits((UNDECIDED,) * self.problem.p, modes=self.problem.modes.r)
 
     def _curve(self, given: AlphaProblem, count: Any, records: Iterator[Any]) -> None:
         number = len(self.curves) + 1
@@ -181,11 +178,6 @@ class SpaceGraphChecker:
                     self._fail("two curves may be the same")
 
 
-def modes_of(problem: ContactProblem3D) -> int:
-    """Number of rigid modes."""
-    return 0 if problem.modes is None else problem.modes.r
-
-
 def _read(
     header: dict[str, Any], problem: ContactProblem3D
 ) -> tuple[tuple[Fraction, Fraction], tuple[Any, Any], Array]:
@@ -202,7 +194,7 @@ def _read(
     for pair in zip(problem.friction, problem.friction_slope, strict=True):
         if min(min(exactly_at(end, *pair)) for end in (low, high)) < 0:
             raise ValueError("friction is negative in the interval")
-    steps = numbers_from(header.get("steps"), 3 * problem.p + modes_of(problem))
+    steps = numbers_from(header.get("steps"), 3 * problem.p + problem.modes.r)
     if not np.all(steps > 0):
         raise ValueError("a step is not positive")
     return (low, high), (np.ldexp(1.0, np.array(force)), np.ldexp(1.0, np.array(length))), steps

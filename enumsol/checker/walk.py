@@ -83,8 +83,12 @@ class TreeChecker(ABC):
     #: The problem's balls, where whoever asks for the check has made them already.
     enclosure: CondensedEnclosure | None = None
 
-    #: Kinds of leaves, by their letters.
-    kinds: ClassVar[dict[str, type[Record]]]
+    #: Of a body that nothing holds: some leaf rests on the bound of its rigid displacement.
+    bounded: bool = False
+
+    #: Kinds of leaves, by their letters, of bodies that are held, and of others.
+    held_kinds: ClassVar[dict[str, type[Record]]]
+    floating_kinds: ClassVar[dict[str, type[Record]]]
 
     def run(self, proof: Proof) -> VerificationReport:
         """Check all records.
@@ -125,7 +129,26 @@ class TreeChecker(ABC):
     @property
     def _within(self) -> float | None:
         """The bound of rigid displacements that the leaves rest on."""
-        return None
+        return self.problem.rigid_reach if self.bounded else None
+
+    @property
+    def kinds(self) -> dict[str, type[Record]]:
+        """Kinds of leaves, by their letters: some rest on a stiffness that is positive definite, others on balance."""
+        return self.held_kinds if self.problem.held else self.floating_kinds
+
+    @cached_property
+    def free(self) -> Any:
+        """The system with bounds of the rigid displacement beyond which there are no solutions."""
+        return self.system if self.problem.held else self._without_bound()
+
+    def _either(self, holds: Callable[[Any], bool]) -> bool:
+        """Whether something holds of the system, if possible without the bound of the rigid displacement."""
+        if holds(self.free):
+            return True
+        if self.problem.held:
+            return False
+        self.bounded = True
+        return holds(self.system)
 
     def enclosed(self) -> CondensedEnclosure:
         """Balls for S and g of the problem's own data."""
@@ -135,6 +158,15 @@ class TreeChecker(ABC):
 
     def _read_header(self, header: Any) -> None:
         raise NotImplementedError
+
+    @property
+    @abstractmethod
+    def system(self) -> Any:
+        """Balls for the data in the proof's units."""
+
+    @abstractmethod
+    def _without_bound(self) -> Any:
+        """See ``free``, for a body that nothing holds."""
 
     @abstractmethod
     def _covers(self, node: int, code: int, children: list[int]) -> bool:

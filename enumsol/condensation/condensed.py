@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Self
 
@@ -14,7 +14,7 @@ from enumsol.support.arguments import alpha_value
 from enumsol.support.immutable import Sealed, sealed
 
 if TYPE_CHECKING:
-    from enumsol.condensation.data import CondensableData, FloatingData, ProblemData
+    from enumsol.condensation.data import CondensableData, ProblemData
     from enumsol.condensation.products import WithProducts
     from enumsol.support.array_types import Alpha, AlphaLike, Floats
 
@@ -177,6 +177,9 @@ def _rounding(S: Floats) -> float:
 class Condensation(Sealed):
     """A problem condensed to its contact forces for all alpha: S, and g(alpha) = g0 + alpha g1.
 
+    Of a body that nothing holds S and g are those of the body on springs, with its equilibrium as a whole: with q the
+    coordinates of the rigid displacement, w = g - S lambda + G'q and G lambda = h (theory, (14.2)).
+
     Attributes
     ----------
     S : (m, m) array
@@ -226,10 +229,49 @@ class Condensation(Sealed):
         scale = self.node_scale
         return sealed(np.asarray(self.S / scale[:, None] / scale[None, :]))
 
-    @property
+    @cached_property
+    def G(self) -> Floats:  # noqa: N802 (the field's letter)
+        """(B N)', shape (r, m)."""
+        return sealed(np.asarray((self.problem.contact_rows @ self.problem.modes.N).T))
+
+    @cached_property
+    def h(self) -> tuple[Floats, Floats]:
+        """N'f at alpha = 0 and its derivative, shapes (r,)."""
+        N, slope = self.problem.modes.N, self.problem.load_slope
+        change = np.zeros(N.shape[1]) if slope is None else N.T @ slope
+        return sealed(np.asarray(N.T @ self.problem.f)), sealed(np.asarray(change))
+
+    @cached_property
+    def mixing(self) -> Floats:
+        """L with L L' = G S^-1 G', the units of rigid displacements (theory, section 14.7), shape (r, r).
+
+        Raises
+        ------
+        NotHeldError
+            Some rigid displacement moves no contact node.
+        """
+        if self.problem.held:
+            return np.zeros((0, 0))
+        G = self.G / self.node_scale
+        size = np.linalg.norm(G, axis=1)
+        values, vectors = np.linalg.eigh(G @ G.T / np.outer(*(np.where(size > 0, size, 1.0),) * 2))
+        if values[0] <= _MODE_RANK * values[-1]:
+            raise NotHeldError(
+                f"rigid mode {int(np.argmax(np.abs(vectors[:, 0])))}, perhaps with others, moves no contact node: "
+                "contact cannot hold the body; expected a body that every rigid mode moves at its contact nodes"
+            )
+        return sealed(np.asarray(np.linalg.cholesky(G @ solved(self.balanced, G.T))))
+
+    @cached_property
+    def moves(self) -> Floats:
+        """G in the units of ``balanced`` and of ``mixing``, shape (r, m); raises as ``mixing``."""
+        return sealed(np.asarray(np.linalg.solve(self.mixing, self.G / self.node_scale)))
+
+    @cached_property
     def bordered(self) -> Floats:
-        """``balanced``, or of a body that nothing holds the matrix of theory, (14.9)."""
-        return self.balanced
+        """The matrix of theory, (14.9), shape (m + r, m + r); raises as ``mixing``."""
+        G = self.moves
+        return sealed(np.block([[self.balanced, -G.T], [G, np.zeros((len(G), len(G)))]]))
 
     def free_displacements(self, alpha: AlphaLike) -> Floats:
         """g(alpha), shape (m,) [length].
@@ -247,10 +289,10 @@ class Condensation(Sealed):
         return np.asarray(g)
 
     def displacement(self, alpha: AlphaLike, forces: Floats) -> Floats:
-        """u = A^{-1} (f(alpha) - B' lambda), shape (n,), for forces of shape (m,)."""
-        problem = self.problem
+        """u = A^{-1} (f(alpha) - B' lambda), shape (n,), for forces of shape (m,); less any rigid displacement."""
+        problem = self.problem.on_springs
         rhs = problem.load_at(alpha) - problem.contact_rows.T @ forces
-        return problem.factorization.solve(np.asarray(rhs))
+        return np.asarray(problem.factorization.solve(np.asarray(rhs)))
 
 
 @dataclass(frozen=True)
@@ -281,68 +323,6 @@ class CondensedProblem(Condensation):
         return CondensedSystem(self.S, self.free_displacements(alpha), F)
 
 
-@dataclass(frozen=True)
-class FloatingCondensation(Condensation):
-    """A body that nothing holds, condensed: S and g of the body on springs, and its equilibrium as a whole.
-
-    With q the coordinates of the rigid displacement, w = g - S lambda + G'q and G lambda = h (theory, (14.2)).
-    """
-
-    problem: FloatingData = field(repr=False)
-
-    @classmethod
-    def of(cls, problem: FloatingData) -> FloatingCondensation:
-        """Condensation of a problem."""
-        held = problem.on_springs.condensed
-        return cls(held.S, held.g0, held.g1, problem)
-
-    @cached_property
-    def G(self) -> Floats:  # noqa: N802 (the field's letter)
-        """(B N)', shape (r, m)."""
-        return sealed(np.asarray((self.problem.contact_rows @ self.problem.rigid_modes).T))
-
-    @cached_property
-    def h(self) -> tuple[Floats, Floats]:
-        """N'f at alpha = 0 and its derivative, shapes (r,)."""
-        N, slope = self.problem.rigid_modes, self.problem.load_slope
-        change = np.zeros(N.shape[1]) if slope is None else N.T @ slope
-        return sealed(np.asarray(N.T @ self.problem.f)), sealed(np.asarray(change))
-
-    @cached_property
-    def mixing(self) -> Floats:
-        """L with L L' = G S^-1 G', the units of rigid displacements (theory, section 14.7), shape (r, r).
-
-        Raises
-        ------
-        NotHeldError
-            Some rigid displacement moves no contact node.
-        """
-        G = self.G / self.node_scale
-        size = np.linalg.norm(G, axis=1)
-        values, vectors = np.linalg.eigh(G @ G.T / np.outer(*(np.where(size > 0, size, 1.0),) * 2))
-        if values[0] <= _MODE_RANK * values[-1]:
-            raise NotHeldError(
-                f"rigid mode {int(np.argmax(np.abs(vectors[:, 0])))}, perhaps with others, moves no contact node: "
-                "contact cannot hold the body; expected a body that every rigid mode moves at its contact nodes"
-            )
-        return sealed(np.asarray(np.linalg.cholesky(G @ solved(self.balanced, G.T))))
-
-    @cached_property
-    def moves(self) -> Floats:
-        """G in the units of ``balanced`` and of ``mixing``, shape (r, m); raises as ``mixing``."""
-        return sealed(np.asarray(np.linalg.solve(self.mixing, self.G / self.node_scale)))
-
-    @cached_property
-    def bordered(self) -> Floats:
-        """The matrix of theory, (14.9), shape (m + r, m + r); raises as ``mixing``."""
-        G = self.moves
-        return sealed(np.block([[self.balanced, -G.T], [G, np.zeros((len(G), len(G)))]]))
-
-    def displacement(self, alpha: AlphaLike, forces: Floats) -> Floats:
-        """u less the rigid displacement: A_k^-1 (f(alpha) - B' lambda), shape (n,)."""
-        return np.asarray(self.problem.on_springs.condensed.displacement(alpha, forces))
-
-
 def solved(S: Floats, right: Floats) -> Floats:
     """S^-1 times columns; of least length where S is singular within rounding."""
     try:
@@ -353,4 +333,4 @@ def solved(S: Floats, right: Floats) -> Floats:
 
 def condensation_of(problem: Any) -> Any:
     """``problem.condensed``, or that of a body that nothing holds."""
-    return problem.condensed if problem.modes is None else FloatingCondensation.of(problem)
+    return problem.condensed if problem.held else replace(problem.on_springs.condensed, problem=problem)

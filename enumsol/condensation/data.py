@@ -60,6 +60,22 @@ class CondensableData(Protocol):
     def factorization(self) -> Factorization:
         """Factors of A."""
 
+    @property
+    def held(self) -> bool:
+        """True if supports or springs hold the body."""
+
+    @property
+    def modes(self) -> Any:
+        """Rigid modes of a body that nothing holds; of others there are none."""
+
+    @property
+    def on_springs(self) -> Any:
+        """The problem of the body on springs; of a body that is held the problem itself."""
+
+    @property
+    def rigid_reach(self) -> float:
+        """How far the body may move as a whole [length]."""
+
     def load_at(self, alpha: AlphaLike) -> Floats:
         """f(alpha), shape (n,)."""
 
@@ -87,18 +103,6 @@ class ProblemData(CondensableData, Protocol):
 
     def friction_at(self, alpha: AlphaLike) -> Floats:
         """F(alpha), shape (p,)."""
-
-
-class FloatingData(CondensableData, Protocol):
-    """A problem of a body that nothing holds, in 2D or 3D."""
-
-    @property
-    def rigid_modes(self) -> Floats:
-        """Rigid modes, (n, r)."""
-
-    @property
-    def on_springs(self) -> Any:
-        """The problem of the body on springs."""
 
 
 def exactly_at(alpha: Fraction, first: Floats, slope: Floats) -> list[Fraction]:

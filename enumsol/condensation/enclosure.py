@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import scipy.sparse as sp
@@ -39,7 +39,7 @@ class NotEnclosedError(EnumsolError):
 
 @dataclass(frozen=True)
 class CondensedEnclosure(Sealed):
-    """Balls that hold S, g0 and g1 of a problem for its exact data (theory, section 4.4).
+    """Balls that hold S, g0 and g1 for the exact data of a problem (theory, section 4.4), or of its body on springs.
 
     Attributes
     ----------
@@ -66,11 +66,15 @@ class CondensedEnclosure(Sealed):
     def from_problem(cls, problem: CondensableData, products: Products | None = None) -> CondensedEnclosure:
         """Enclose S and g from the problem's own matrices; ``products`` of it are taken if they are known.
 
+        Of a body that nothing holds these are those of the body on springs.
+
         Raises
         ------
         NotEnclosedError
             A is positive definite only within rounding.
         """
+        if not problem.held:
+            return enclosure_of(problem)
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             enclosed = cls._from_problem(problem, products)
         return enclosed._finite()
@@ -154,7 +158,7 @@ class CondensedEnclosure(Sealed):
         F, inexact = nearest_floats(exact)
         F_rad = np.where(inexact, 2 * UNIT * F + TINY, 0.0)
         S, S_rad, g, g_rad = self.in_units(a, force, length)
-        return EnclosedSystem(S, S_rad, g, g_rad, F, F_rad)
+        return EnclosedSystem(S, S_rad, g, g_rad, F, F_rad, rows=RigidRows.of(self.problem, a, force, length))
 
     def constant_load(self, side: float) -> CondensedEnclosure:
         """The same with g = side g1 at every alpha, ``side`` 1 or -1: what solutions are beside a zero of g."""
@@ -200,6 +204,12 @@ class CondensedEnclosure(Sealed):
         if not all(np.all(np.isfinite(array)) for array in arrays):
             raise NotEnclosedError(_OVERFLOW)
         return arrays
+
+
+def enclosure_of(problem: Any) -> CondensedEnclosure:
+    """``problem.enclosure``, or that of a body that nothing holds: S and g are those of the body on springs."""
+    enclosure: CondensedEnclosure = problem.on_springs.enclosure
+    return enclosure if problem.held else replace(enclosure, problem=problem)
 
 
 #: Smallest quotient of units, far above underflow.
@@ -268,15 +278,121 @@ def _smallest_eigenvalue(problem: CondensableData, scale: Floats) -> float:
     return value
 
 
+def moved_by_modes(problem: Any) -> Ball:
+    """B N, by what each rigid mode moves the contact nodes, (2p, r) or (3p, r)."""
+    return _product(problem.contact_rows, problem.modes.N)
+
+
+_RIGID_OVERFLOW = "the rows of the rigid modes overflow float64; expected data in other units"
+
+
+def _in_units(value: Ball, unit: Floats) -> Ball:
+    """A ball times powers of two; zeros stay exact."""
+    return Ball(value.mid * unit, np.where(value.rad > 0, value.rad * unit + TINY, 0.0))
+
+
+def _product(left: Any, right: Floats) -> Ball:
+    """The product of two matrices, the first of which may be sparse, with the error of its sums; zeros are exact."""
+    mid = np.asarray(left @ right)
+    size = np.asarray(abs(left) @ np.abs(right))
+    terms = int(np.max(np.diff(sp.csr_array(left).indptr))) if sp.issparse(left) else left.shape[1]
+    k = gamma(terms + 2)
+    return Ball(mid, np.where(size > 0, size * k * (1 + 2 * k) * SAFE + TINY, 0.0))
+
+
+@dataclass(frozen=True)
+class RigidRows:
+    """The rows of equilibrium of a body that nothing holds as a whole, G lambda = h, in units given by powers of two.
+
+    With q the coordinates of the rigid displacement N q, G = (B N)' and h = N'f(alpha),
+
+        w = g - S lambda + G'q,    G lambda = h
+
+    where S and g are those of the body held by springs (theory, section 14.2). With mu = -q the two are one system, S
+    and g bordered by G and h. Of a body that is held there are none: r = 0.
+
+    Attributes
+    ----------
+    G : Ball (r, 2p)
+    h, slope : Ball (r,)
+        At one alpha, and by how much h grows with alpha.
+    unit : (r,) array
+        Units of the coordinates q of the rigid displacement.
+    reach : (r,) array
+        How large these can be, in these units.
+    """
+
+    G: Ball
+    h: Ball
+    slope: Ball
+    unit: Floats
+    reach: Floats
+
+    @classmethod
+    def none(cls, size: int) -> RigidRows:
+        """The rows of a body that is held, for ``size`` contact forces."""
+        nothing = np.zeros(0)
+        return cls(Ball.exact(np.zeros((0, size))), Ball.exact(nothing), Ball.exact(nothing), nothing, nothing)
+
+    @classmethod
+    def of(cls, problem: Any, alpha: Fraction, force: Floats, length: Floats) -> RigidRows:
+        """Rows of a problem at one alpha, enclosed; errors as ``along``."""
+        rows = cls.along(problem, force, length)
+        if not np.any(rows.slope.size):
+            return rows
+        value, slack = float_at(alpha)
+        with np.errstate(over="ignore", invalid="ignore"):
+            h = rows.h + Ball(np.array(value), np.array(slack)) * rows.slope
+        if not h.finite:
+            raise NotEnclosedError(_RIGID_OVERFLOW)
+        return replace(rows, h=h)
+
+    @classmethod
+    def along(cls, problem: Any, force: Floats, length: Floats) -> RigidRows:
+        """Rows of a problem at alpha = 0, enclosed.
+
+        Raises
+        ------
+        NotEnclosedError
+            Something overflows.
+        """
+        if problem.held:
+            return cls.none(len(force))
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            G = moved_by_modes(problem).T
+            # the rows of G near one
+            size = np.max(np.abs(G.mid) / length, axis=1)
+            unit = np.exp2(-np.round(np.log2(np.where(size > 0, size, 1.0))))
+            pair = unit[:, None] / length
+            rows = Ball(G.mid * pair, np.where(G.rad > 0, G.rad * pair + TINY, 0.0))
+            work = float(force[0] * length[0])
+            given = [part for part in (problem.f, problem.load_slope) if part is not None]
+            loads = [_in_units(_product(problem.modes.N.T, part[:, None])[:, 0], unit / work) for part in given]
+            most = problem.modes.reach(problem.rigid_reach)
+            reach = most / unit
+        finite = rows.finite and all(load.finite for load in loads) and np.all(np.isfinite(reach))
+        if not (finite and np.all(reach * unit == most)):
+            raise NotEnclosedError(_RIGID_OVERFLOW)
+        slope = loads[1] if len(loads) > 1 else Ball.exact(np.zeros(len(unit)))
+        return cls(rows, loads[0], slope, unit, reach)
+
+
+#: Stands for those of a body that is held, of any number of contact forces.
+_NO_ROWS = RigidRows.none(0)
+
+
 @dataclass(frozen=True)
 class EnclosedSystem:
     """The condensed problem at one alpha as balls, in scaled units: w = g - S lambda.
+
+    Of a body that nothing holds S and g are those of the body on springs, and rows of its equilibrium come with them.
 
     Attributes
     ----------
     S, S_rad : (2p, 2p) arrays
     g, g_rad : (2p,) arrays
     F, F_rad : (p,) arrays
+    rows : RigidRows, by default none
     """
 
     S: Floats
@@ -285,6 +401,11 @@ class EnclosedSystem:
     g_rad: Floats
     F: Floats
     F_rad: Floats
+    rows: RigidRows = field(kw_only=True, default=_NO_ROWS)
+
+    def __post_init__(self) -> None:
+        if self.rows is _NO_ROWS:
+            object.__setattr__(self, "rows", RigidRows.none(len(self.g)))
 
     @classmethod
     def as_computed(cls, S: Floats, g: Floats, F: Floats, *, exactly: bool = False) -> EnclosedSystem:
@@ -298,8 +419,13 @@ class EnclosedSystem:
 
     @cached_property
     def balls(self) -> tuple[Ball, Ball, Ball]:
-        """S, g and F."""
-        return Ball(self.S, self.S_rad), Ball(self.g, self.g_rad), Ball(self.F, self.F_rad)
+        """S and g, bordered by G and h, and F."""
+        G, h = self.rows.G, self.rows.h
+        corner = np.zeros((len(G.mid),) * 2)
+        mid, rad = (
+            np.block([[own, border.T], [border, corner]]) for own, border in ((self.S, G.mid), (self.S_rad, G.rad))
+        )
+        return Ball(mid, rad), Ball.joined(Ball(self.g, self.g_rad), h), Ball(self.F, self.F_rad)
 
     @cached_property
     def smallest_eigenvalue(self) -> float:
@@ -317,29 +443,54 @@ class EnclosedSystem:
         return bound
 
     @property
+    def held(self) -> bool:
+        """True if the body has no rigid modes."""
+        return not len(self.rows.reach)
+
+    @property
     def reach(self) -> Floats:
-        """Bounds of the coordinates of a rigid displacement; none of a body that is held."""
-        return np.zeros(0)
+        """Bounds of the coordinates of a rigid displacement, (r,)."""
+        return self.rows.reach
 
     @property
     def rigid_unit(self) -> Floats:
-        """Units of the coordinates of a rigid displacement; none of a body that is held."""
-        return np.zeros(0)
+        """Units of the coordinates of a rigid displacement, (r,)."""
+        return self.rows.unit
+
+    def reaching(self, reach: Floats) -> Self:
+        """The same with other bounds of the rigid displacement."""
+        return replace(self, rows=replace(self.rows, reach=reach))
 
     @property
     def largest_work(self) -> float:
-        """A bound of the work of the load on a rigid displacement; none of a body that is held."""
-        return 0.0
-
-    @property
-    def largest_unknowns(self) -> float:
-        """A bound of the norm of all unknowns at a root."""
-        return self.largest_forces
+        """A bound of h'q, the work of the load on a rigid displacement within the bounds."""
+        h, k = self.rows.h.size, gamma(len(self.reach) + 8)
+        # what no load works on may be infinite
+        return float(h[h > 0] @ self.reach[h > 0]) * (1 + k) * SAFE
 
     @cached_property
     def largest_forces(self) -> float:
-        """A bound of the norm of lambda at a root: ||g|| / mu, by theory, (5.2)."""
-        return float(upper_norm(np.abs(self.g) + self.g_rad) / self.smallest_eigenvalue * SAFE)
+        """A bound of the norm of lambda at a root within the bounds (theory, (14.5)); of a held body ||g|| / mu."""
+        mu, g = self.smallest_eigenvalue, float(upper_norm(np.abs(self.g) + self.g_rad))
+        if self.held:
+            return g / mu * SAFE
+        load, k = self.largest_work, gamma(len(self.reach) + 8)
+        return float((g + np.hypot(g, 2 * np.sqrt(mu) * np.sqrt(load))) / (2 * mu) * (1 + k) * SAFE)
+
+    @property
+    def largest_unknowns(self) -> float:
+        """A bound of the norm of all unknowns, (lambda, q), at a root within the bounds."""
+        return (
+            float(np.hypot(self.largest_forces, upper_norm(self.reach)) * SAFE)
+            if len(self.reach)
+            else self.largest_forces
+        )
+
+    @cached_property
+    def mode_inverse(self) -> Floats:
+        """Approximate inverse of G S^-1 G'; no claim rests on its accuracy."""
+        G = self.rows.G.mid
+        return np.asarray(np.linalg.pinv(G @ self.inverse @ G.T, hermitian=True))
 
     @cached_property
     def inverse(self) -> Floats:

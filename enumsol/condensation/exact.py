@@ -52,13 +52,17 @@ class ExactSystem:
 
     Attributes
     ----------
-    S : fmpq_mat (2p, 2p)
-    g, F : tuples of fmpq
+    S : fmpq_mat (2p + r, 2p + r)
+        Of a body that nothing holds S and g are bordered by G and h (theory, section 14.2); of others r = 0.
+    g, F : tuples of 2p + r and p fmpq
+    reach : tuple of r fmpq
+        Bounds of the coordinates q of a rigid displacement.
     """
 
     S: Any
     g: tuple[Any, ...]
     F: tuple[Any, ...]
+    reach: tuple[Any, ...] = ()
 
     @property
     def p(self) -> int:
@@ -66,13 +70,15 @@ class ExactSystem:
         return len(self.F)
 
     @property
-    def reach(self) -> tuple[Any, ...]:
-        """Bounds of the coordinates of a rigid displacement; none of a body that is held."""
-        return ()
+    def contact_compliance(self) -> Any:
+        """S without the border, fmpq_mat (2p, 2p)."""
+        size = 2 * self.p
+        return fmpq_mat([row[:size] for row in self.S.tolist()[:size]])
 
     def along(self, direction: tuple[Any, ...]) -> ExactSystem:
-        """The system whose g is a direction."""
-        return ExactSystem(self.S, direction, self.F)
+        """What changes with g along a direction: neither h nor the bounds of a rigid displacement."""
+        zeros = (fmpq(0),) * len(self.reach)
+        return ExactSystem(self.S, (*direction[: 2 * self.p], *zeros), self.F, zeros)
 
     def moved(self, point: tuple[Any, ...]) -> list[Any]:
         """w = g - S lambda."""
@@ -91,7 +97,7 @@ class ExactSystem:
             The problem has more than EXACT_DOF_LIMIT degrees of freedom.
         """
         problem.friction_at(alpha)
-        return ExactCondensed(*_Given.of(problem).condensed, condensed_exactly=True, zero=None).system(rational(alpha))
+        return ExactCondensed.beside_zero(problem, None).system(rational(alpha))
 
 
 class UncondensedSystem:
@@ -202,50 +208,6 @@ class UncondensedSystem:
 
 
 @dataclass(frozen=True)
-class FloatingExactSystem(ExactSystem):
-    """That of a body that nothing holds: S and g are bordered by G and h (theory, section 14.2).
-
-    Attributes
-    ----------
-    reach : tuple of r fmpq
-        Bounds of the coordinates q of a rigid displacement.
-    """
-
-    reach: tuple[Any, ...] = ()
-
-    @classmethod
-    def of(cls, problem: Any, alpha: Alpha) -> FloatingExactSystem:
-        """Condense the body on springs, and find G and h, without any rounding.
-
-        Raises
-        ------
-        InvalidArgumentError
-            Friction is negative there.
-        TooLargeError
-            The problem has more than EXACT_DOF_LIMIT degrees of freedom.
-        """
-        problem.friction_at(alpha)
-        exact = ExactCondensed.floating(problem)
-        return cls(exact.S, *exact.at(rational(alpha)), exact.reach)
-
-    @property
-    def contact_compliance(self) -> Any:
-        """S of the body on springs, fmpq_mat (2p, 2p)."""
-        size = 2 * self.p
-        return fmpq_mat([row[:size] for row in self.S.tolist()[:size]])
-
-    def along(self, direction: tuple[Any, ...]) -> FloatingExactSystem:
-        """What changes with g along a direction: neither h nor the bounds."""
-        zeros = (fmpq(0),) * len(self.reach)
-        return FloatingExactSystem(self.S, (*direction[: 2 * self.p], *zeros), self.F, zeros)
-
-
-def exact_system(problem: Any, alpha: Alpha) -> ExactSystem:
-    """The condensed problem in rationals, of a body that is held or not."""
-    return ExactSystem.from_problem(problem, alpha) if problem.modes is None else FloatingExactSystem.of(problem, alpha)
-
-
-@dataclass(frozen=True)
 class ExactCondensed:
     """The condensed problem in rationals: w = g0 + alpha g1 - S lambda, F = F0 + alpha F1.
 
@@ -276,34 +238,29 @@ class ExactCondensed:
     reach: tuple[Any, ...] = ()
 
     @classmethod
-    def floating(cls, problem: Any) -> ExactCondensed:
-        """Condensation of a body that nothing holds: on springs, with G and h, without any rounding.
+    def from_problem(cls, problem: CondensedData) -> ExactCondensed:
+        """Condense A, Bn, Bt, f, load_slope, gap, slip_offset and friction without any rounding; on springs, with G, h.
 
         Raises
         ------
         TooLargeError
             The problem has more than EXACT_DOF_LIMIT degrees of freedom.
         """
-        given, N = _Given.of(problem.on_springs), rational_matrix(problem.modes.N)
-        rows, g0, g1, F0, F1 = given.condensed
-        G = (given.B * N).transpose().tolist()
-        h = (N.transpose() * given.loads).tolist()
-        bordered = [(*row, *(mode[k] for mode in G)) for k, row in enumerate(rows)]
-        bordered += [(*mode, *([fmpq(0)] * len(G))) for mode in G]
-        reach = tuple(rational(float(x)) for x in problem.modes.reach(problem.rigid_reach))
-        g0, g1 = (*g0, *(load for load, _ in h)), (*g1, *(change for _, change in h))
-        return cls(tuple(bordered), g0, g1, F0, F1, condensed_exactly=True, zero=None, reach=reach)
+        return cls.beside_zero(problem, vanishing_alpha(problem, "problem"))
 
     @classmethod
-    def from_problem(cls, problem: CondensedData) -> ExactCondensed:
-        """Condense A, Bn, Bt, f, load_slope, gap, slip_offset and friction without any rounding.
-
-        Raises
-        ------
-        TooLargeError
-            The problem has more than EXACT_DOF_LIMIT degrees of freedom.
-        """
-        return cls(*_Given.of(problem).condensed, condensed_exactly=True, zero=vanishing_alpha(problem, "problem"))
+    def beside_zero(cls, problem: ProblemData, zero: Fraction | None) -> ExactCondensed:
+        """The same where ``zero`` is known already, or not asked for."""
+        given, r = _Given.of(problem.on_springs), problem.modes.r
+        rows, g0, g1, F0, F1 = given.condensed
+        if r:
+            N = rational_matrix(problem.modes.N)
+            G, h = (given.B * N).transpose().tolist(), (N.transpose() * given.loads).tolist()
+            bordered = [(*row, *(mode[k] for mode in G)) for k, row in enumerate(rows)]
+            rows = (*bordered, *((*mode, *([fmpq(0)] * r)) for mode in G))
+            g0, g1 = (*g0, *(load for load, _ in h)), (*g1, *(change for _, change in h))
+        reach = tuple(rational(float(x)) for x in problem.modes.reach(problem.rigid_reach))
+        return cls(rows, g0, g1, F0, F1, condensed_exactly=True, zero=zero, reach=reach)
 
     @property
     def S(self) -> Any:  # noqa: N802 (the field's letter)
@@ -369,14 +326,7 @@ class ExactCondensed:
 
     def system(self, alpha: Any) -> ExactSystem:
         """The condensed problem at an alpha of any exact field."""
-        if self.reach:
-            return FloatingExactSystem(self.S, *self.at(alpha), self.reach)
-        return ExactSystem(self.S, *self.at(alpha))
-
-
-def exact_condensed(problem: Any) -> ExactCondensed:
-    """The condensed problem in rationals for all alpha, of a body that is held or not."""
-    return ExactCondensed.from_problem(problem) if problem.modes is None else ExactCondensed.floating(problem)
+        return ExactSystem(self.S, *self.at(alpha), self.reach)
 
 
 @dataclass(frozen=True)

@@ -8,15 +8,14 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, upper_norm
 from enumsol.condensation.condensed import LARGEST_FRICTION, cholesky_factor, load_unit, node_units
 from enumsol.condensation.data import exactly_at
-from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, nearest_floats
-from enumsol.condensation.floating import FloatingSystem, RigidRows
+from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, RigidRows, nearest_floats
 from enumsol.errors import InvalidProblemError
 
 if TYPE_CHECKING:
@@ -279,17 +278,19 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
             load = weight * g[rows]
             load_rad = weight * g_rad[rows] + rad * (np.abs(g[rows]) + g_rad[rows]) + 4 * UNIT * np.abs(load)
             load_rad = load_rad * SAFE + TINY
+            own = _on_tau(RigidRows.of(problem, alpha, np.tile(force, 3), np.tile(length, 3)), rows, Ball(weight, rad))
         if not all(np.all(np.isfinite(array)) for array in (scaled, scaled_rad, load, load_rad)):
             raise NotEnclosedError(_OVERFLOW)
-        return cls(scaled, scaled_rad, load, load_rad, F, F_rad, tau, unit)
+        return cls(scaled, scaled_rad, load, load_rad, F, F_rad, tau, unit, rows=own)
 
 
 @dataclass(frozen=True)
 class PieceSpace(EnclosedSpace):
-    """All problems over a piece of alpha as balls, in variables that do not depend on alpha (theory, section 12.9).
+    """All problems over a piece of alpha, or at a point, as balls, in variables that do not depend on alpha.
 
     lambda_t is F tau with one F for the whole piece, so that S is the same everywhere and |tau| is at most the radius
-    of a disc times lambda_n. g and these radii are affine in alpha; here they are the balls of the whole piece.
+    of a disc times lambda_n. g, h and these radii are affine in alpha; here they are the balls of the whole piece
+    (theory, sections 12.9 and 14.14). In ``turn`` g is bordered by h.
 
     Attributes
     ----------
@@ -358,15 +359,6 @@ class PieceSpace(EnclosedSpace):
         return self.fixed.product_error
 
 
-@dataclass(frozen=True)
-class FloatingPiece(FloatingSystem, PieceSpace):
-    """The problem of a body that nothing holds over a piece of alpha, or at a point (theory, section 14.14).
-
-    S, g and discs are those of a PieceSpace of the body on springs, h and G are those of the whole piece. In ``turn``
-    g is bordered by h.
-    """
-
-
 @dataclass(frozen=True, eq=False)
 class AlphaSpace:
     """A problem over an interval of alpha, in variables that do not depend on alpha (theory, section 12.9).
@@ -376,7 +368,7 @@ class AlphaSpace:
     Attributes
     ----------
     enclosure : CondensedEnclosure of a problem whose nodes have coefficients of constant ratios
-        See ``enclosed_over_alpha``.
+        The problem's own.
     reference : Fraction
         An alpha at which every node with friction somewhere on the interval has it.
     units : force and length, (p,) arrays of powers of two (see SpaceSystem)
@@ -423,7 +415,8 @@ class AlphaSpace:
         S_rad = np.maximum(scaled.rad, scaled.rad.T) + np.abs(scaled.mid - scaled.mid.T)
         S = np.tril(scaled.mid) + np.tril(scaled.mid, -1).T
         unit = np.concatenate([np.ones(len(F)), scale[node, axis]])
-        return EnclosedSpace(S, S_rad * SAFE, load.mid, load.rad, F * scale, F_rad * scale, tau, unit)
+        data = S, S_rad * SAFE, load.mid, load.rad, F * scale, F_rad * scale, tau, unit
+        return EnclosedSpace(*data, rows=self._rigid(self.reference))
 
     @cached_property
     def _quotients(self) -> list[tuple[Fraction, Fraction]]:
@@ -491,20 +484,13 @@ class AlphaSpace:
             raise NotEnclosedError(_OVERFLOW)
         rad = (disc.rad + disc_turn.size) * SAFE
         data = held.S, held.S_rad, whole.mid, whole.rad, held.F, held.F_rad, held.tau, held.unit, disc.mid, rad
-        if not self.floats:
-            return PieceSpace(*data, along, held)
         rigid = self._rigid(middle)
         if along is not None:
             turn = rigid.slope * Ball(np.array(float(half)), np.array(2 * UNIT * float(half)))
             turn = Ball(turn.mid, np.where(rigid.slope.size > 0, turn.rad, 0.0))
             along = replace(along, g=Ball.joined(along.g, rigid.h), g_turn=Ball.joined(along.g_turn, turn))
             rigid = replace(rigid, h=Ball(rigid.h.mid, (rigid.h.rad + turn.size) * SAFE))
-        return FloatingPiece(*data, along, held, rows=rigid)
-
-    @property
-    def floats(self) -> bool:
-        """True if nothing holds the body."""
-        return self.enclosure.problem.modes is not None
+        return PieceSpace(*data, along, held, rows=rigid)
 
     @cached_property
     def moved(self) -> Ball:
@@ -563,33 +549,6 @@ _ONE_AXIS = (
 
 def _affine(value: float, slope: float) -> tuple[Fraction, Fraction]:
     return Fraction(value), Fraction(slope)
-
-
-@dataclass(frozen=True)
-class FloatingSpace(FloatingSystem, EnclosedSpace):
-    """The problem of a body in 3D that nothing holds at one alpha as balls, in the variables of EnclosedSpace.
-
-    S and g are those of the body on springs. The rows G of its equilibrium as a whole act on (lambda_n, tau).
-    """
-
-    @classmethod
-    def of(
-        cls, problem: Any, alpha: Fraction, force: Floats, length: Floats, enclosure: CondensedEnclosure | None = None
-    ) -> Self:
-        """System of a problem, in units of the nodes given by powers of two; ``enclosure`` in place of that on springs.
-
-        Raises
-        ------
-        NotEnclosedError
-            Something over- or underflows.
-        """
-        held = EnclosedSpace.of_problem(enclosure or problem.on_springs.enclosure, alpha, force, length)
-        rows = RigidRows.of(problem, alpha, np.tile(force, 3), np.tile(length, 3))
-        _, own, node, axis = places(held.F > 0)
-        none = np.zeros(held.p)
-        weight = Ball(np.r_[none + 1.0, held.F[node, axis]], np.r_[none, held.F_rad[node, axis]])
-        data = held.S, held.S_rad, held.g, held.g_rad, held.F, held.F_rad, held.tau, held.unit
-        return cls(*data, rows=_on_tau(rows, own, weight))
 
 
 def _on_tau(rows: RigidRows, own: Indices, weight: Ball) -> RigidRows:

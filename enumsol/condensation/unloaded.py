@@ -31,10 +31,6 @@ class CondensedData(ProblemData, Protocol):
         """S, g0 and g1 as computed."""
 
     @property
-    def modes(self) -> Any:
-        """Rigid modes of a body that nothing holds, else None."""
-
-    @property
     def enclosure(self) -> CondensedEnclosure:
         """S, g0 and g1 in balls."""
 
@@ -60,7 +56,7 @@ def vanishing_alpha(problem: CondensedData, data: Data) -> Fraction | None:
     NotEnclosedError
         "problem": A is singular.
     """
-    if problem.load_slope is None or problem.modes is not None:
+    if problem.load_slope is None or not problem.held:
         return None
     if data == "condensed":
         return _of_floats(problem.condensed.g0, problem.condensed.g1)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from enumsol.condensation.condensed import RHS_BLOCK, FloatingCondensation, condensation_of
+from enumsol.condensation.condensed import RHS_BLOCK, condensation_of
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import check_is_problem
 from enumsol.support.arguments import alpha_value, optional_callable
@@ -104,7 +104,7 @@ class AffinePath:
         self.problem: Any = problem
         self.condensed = condensed = condensation_of(problem)
         self.friction = problem.affine_friction
-        h = condensed.h if isinstance(condensed, FloatingCondensation) else (np.zeros(0), np.zeros(0))
+        h = condensed.h
         self._load = np.append(condensed.g0, h[0]), np.append(condensed.g1, h[1])
 
     def at(self, alpha: float) -> PathValues:
@@ -153,7 +153,7 @@ class CallablePath:
         for start in range(0, B.shape[0], RHS_BLOCK):
             block = B[start : start + RHS_BLOCK].T.toarray()
             rows[start : start + RHS_BLOCK] = problem.on_springs.factorization.solve(block).T
-        return rows if problem.modes is None else np.vstack([rows, problem.modes.N.T])
+        return rows if problem.held else np.vstack([rows, problem.modes.N.T])
 
     def at(self, alpha: float) -> PathValues:
         """Values at alpha."""

@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.condensation.condensed import FloatingCondensation, solved
+from enumsol.condensation.condensed import solved
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -85,7 +85,7 @@ class ScaledEquation(ABC):
         sigma, self.S = condensed.node_scale, condensed.balanced
         self.m = len(sigma)
         #: L of theory, section 14.7.
-        self._mixing = condensed.mixing if isinstance(condensed, FloatingCondensation) else np.zeros((0, 0))
+        self._mixing = condensed.mixing
         #: Of theory, (14.9); without rigid modes S.
         self.bordered = condensed.bordered
         self._energy = np.eye(len(self.bordered))

@@ -77,7 +77,7 @@ class Start:
         self.options = instance_of(chosen, ContinuationOptions, "options")
         self.smooth_path = smooth_path
         plane = isinstance(problem, ContactProblem)
-        modes = 0 if problem.modes is None else problem.modes.r
+        modes = problem.modes.r
         alpha, forces, rigid = _start_values(start, (problem.p,) if plane else (problem.p, 2), modes)
         self.interval = _interval(problem, interval, alpha, smooth_path)
         low, high = self.interval

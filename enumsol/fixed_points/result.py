@@ -34,11 +34,11 @@ _PRINTED, _WIDTH, _NOISE = 32, 80, 1e-12
 
 
 def _names(body: Problem) -> tuple[str, ...]:
-    return _ARRAYS if body.modes is None else _ARRAYS + _RIGID_ARRAYS
+    return _ARRAYS if body.held else _ARRAYS + _RIGID_ARRAYS
 
 
 def _check_shapes(arrays: dict[str, Floats], body: Problem, path: str) -> None:
-    p, modes = body.p, 0 if body.modes is None else body.modes.r
+    p, modes = body.p, body.modes.r
     tangential = body.slip_offset.shape  # (p,) in 2D, (p, 2) in 3D
     shapes = {"coefficients": (p, len(tangential)), "lambda_t": tangential, "u_t": tangential}
     shapes["increments"] = (len(arrays["increments"]), 2) if arrays["increments"].ndim else (0, 2)
@@ -129,7 +129,7 @@ class FixedPoint(TrescaState):
         `enumerate_roots` lists solutions within this bound, and so not this one (theory, section 14.2).
         """
         q, body = self.rigid_coordinates, self.problem
-        if q is None or body.modes is None:
+        if q is None or body.held:
             return False
         return bool(np.any(np.abs(q) > body.modes.reach(body.rigid_reach)))
 

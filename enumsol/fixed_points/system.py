@@ -16,7 +16,6 @@ from scipy.linalg import block_diag, cho_solve, solve_triangular
 from enumsol.arithmetic.balls import UNIT
 from enumsol.condensation.condensed import (
     Condensation,
-    FloatingCondensation,
     cholesky_factor,
     condensation_of,
     load_unit,
@@ -113,11 +112,11 @@ class ContactSystem:
         S = condensed.S * everywhere[:, None] * everywhere[None, :]
         g = condensed.free_displacements(value) * everywhere
         cholesky = cholesky_factor(S)
-        r = 0 if problem.modes is None else problem.modes.r
+        r = problem.modes.r
         G: Floats = np.zeros((r, len(S)))
         h: Floats = np.zeros(r)
         rigid: Floats = np.zeros((r, r))
-        if isinstance(condensed, FloatingCondensation):
+        if r:
             still, slope = condensed.h
             G = solve_triangular(condensed.mixing, condensed.G * everywhere, lower=True, check_finite=False)
             h = solve_triangular(condensed.mixing, still + float(value) * slope, lower=True, check_finite=False)

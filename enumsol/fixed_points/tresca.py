@@ -186,6 +186,6 @@ def _by_cvxpy(data: TrescaData) -> TrescaSolution:
     normal, tangential, u = reference.solve(data.bound * system.force, data.F, system.problem.load_at(system.alpha))
     # springs at ``held`` would carry nothing (theory, section 14.1)
     modes = system.problem.modes
-    q = np.zeros(0) if modes is None else np.linalg.solve(modes.N[modes.held], u[modes.held])
+    q = np.linalg.solve(modes.N[modes.held], u[modes.held])
     x = system.joined(normal / system.force, tangential / system.force[:, None], system.scaled_rigid(q))
     return TrescaSolution.of(data, x, residual=data.residual(x), solver="cvxpy")

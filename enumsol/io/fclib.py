@@ -66,7 +66,7 @@ def read(path: Path) -> Problem:
 def write(problem: Problem, path: Path) -> None:
     """Write a global problem; node labels, coordinates, areas and meshes have no place in it."""
     h5py = MissingDependencyError.imported("h5py", "fclib files", "fclib")
-    if problem.modes is not None:
+    if not problem.held:
         raise InvalidProblemError(
             "the body is held by nothing, and fclib has no place for rigid_modes; "
             "expected a body that is held, or another format (.npz, MatrixMarket directory)"

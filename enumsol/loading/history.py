@@ -100,7 +100,7 @@ def load_history(file: str | Path, problem: Any) -> history_data.HistoryData:
 
 def _kind(problem: AnyProblem, steps: Any) -> dict[str, Any]:
     """Kinds of what a file holds."""
-    p, shape, modes = problem.p, problem.slip_offset.shape, 0 if problem.modes is None else problem.modes.r
+    p, shape, modes = problem.p, problem.slip_offset.shape, problem.modes.r
     known = {status.value for status in ContactStatus}
     statuses, slips = (known,) * p, Array(*shape)
     vectors = dict(zip(_ARRAYS, (Array(p), slips) * 2, strict=True))

@@ -106,5 +106,5 @@ def map_row(
         limit=uniqueness.limit,
         unique=uniqueness.throughout,
         seconds=time.perf_counter() - started,
-        within=None if problem.modes is None else problem.rigid_reach,
+        within=None if problem.held else problem.rigid_reach,
     )

@@ -63,8 +63,8 @@ class ContactBody(Immutable):
     exact_offset: tuple[Fraction, ...] | None = None
     #: The problem that this one was made from with the same matrices, which computes what rests on them for both.
     _origin: ContactBody | None = None
-    #: The rigid modes of a body that nothing holds.
-    modes: RigidModes | None = None
+    #: The rigid modes of a body that nothing holds; of others there are none of them.
+    modes: RigidModes
     rigid_modes: Floats | None = None
     max_rigid_displacement: float | None = None
     mesh: BodyMesh | None = None
@@ -128,9 +128,14 @@ class ContactBody(Immutable):
 
     def _hold(self, rigid_modes: ArrayLike | None, max_rigid_displacement: float | None) -> None:
         """Take the arguments about a body that nothing holds."""
-        self.modes = None if rigid_modes is None else RigidModes.of(rigid_modes, self.A)
-        self.rigid_modes = None if self.modes is None else self.modes.N
+        self.modes = RigidModes.of(rigid_modes, self.A)
+        self.rigid_modes = None if self.held else self.modes.N
         self.max_rigid_displacement = largest_displacement(max_rigid_displacement, self.modes)
+
+    @property
+    def held(self) -> bool:
+        """True if supports or springs hold the body: it has no rigid modes."""
+        return self.modes.r == 0
 
     @cached_property
     def on_springs(self) -> Self:
@@ -141,7 +146,7 @@ class ContactBody(Immutable):
         InvalidProblemError
             Springs there do not hold it: A is singular not only on the rigid modes.
         """
-        if self.modes is None:
+        if self.held:
             return self
         # pictures of it are of no use, nor are bounds of a rigid displacement
         without = {"A", *self._rows, "coordinates", "areas", "mesh", "rigid_modes", "max_rigid_displacement"}
@@ -162,7 +167,7 @@ class ContactBody(Immutable):
     @cached_property
     def rigid_reach(self) -> float:
         """How far the body may move as a whole: ``max_rigid_displacement`` or its default; 0 if it is held [length]."""
-        if self.modes is None:
+        if self.held:
             return 0.0
         if self.max_rigid_displacement is not None:
             return self.max_rigid_displacement
@@ -189,7 +194,7 @@ class ContactBody(Immutable):
         NotHeldError
             Nothing holds the body: A is singular, and what needs its inverse is not there.
         """
-        if self.modes is not None:
+        if not self.held:
             raise NotHeldError(
                 f"{what} cannot take a body that nothing holds (rigid_modes is given){why and f', {why}'}; "
                 f"expected a body held by supports or springs{instead}"
@@ -293,7 +298,7 @@ class ContactBody(Immutable):
         known: dict[str, Any] = {}
         if len(kept) == len(matrices) and "rigid_modes" not in changes:
             known["_origin"] = self._origin or self
-        elif "A" in kept and self.modes is None:
+        elif "A" in kept and self.held:
             known["factorization"] = self.factorization
         if "slip_offset" not in changes:
             known |= {"offset_radius": self.offset_radius, "exact_offset": self.exact_offset}
@@ -334,7 +339,7 @@ class ContactBody(Immutable):
         vectors = [self.f, self.gap, *friction, slope, self.slip_offset.ravel()]
         if self.offset_radius is not None:
             kind, vectors = kind + b", from a ball", [*vectors, self.offset_radius.ravel()]
-        if self.modes is not None:
+        if not self.held:
             kind, vectors = kind + b", held by nothing", [*vectors, self.modes.N.ravel(), np.array([self.rigid_reach])]
         digest = hashlib.sha256(kind)
         parts: list[Any] = [np.array([self.n, self.p])]
@@ -357,7 +362,7 @@ class ContactBody(Immutable):
             f"  load                {load},  max |f| = {np.max(np.abs(self.f)):.4g}\n"
             f"  gap                 {span(self.gap)}"
         )
-        if self.modes is not None:
+        if not self.held:
             text += f"\n  rigid modes         {self.modes.r}, of displacements up to {self.rigid_reach:g}"
         return "\n".join([text, *(f"  note                {note}" for note in self.notes)])
 

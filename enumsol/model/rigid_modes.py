@@ -44,7 +44,7 @@ class RigidModes(Sealed):
 
     @classmethod
     def of(cls, N: Any, A: sp.csc_array) -> RigidModes:
-        """Modes as they are given, with springs to hold the body.
+        """Modes as they are given, with springs to hold the body; none of a body that is held (N is None).
 
         Raises
         ------
@@ -52,6 +52,8 @@ class RigidModes(Sealed):
             They are no modes of A, or not independent.
         """
         n = A.shape[0]
+        if N is None:
+            return cls(sealed(np.zeros((n, 0))), sealed(np.zeros(0, dtype=np.intp)), sealed(np.zeros(0)))
         array = real_array(N, "rigid_modes")
         array = array[:, None] if array.ndim == 1 else array
         if array.ndim != 2 or array.shape[0] != n or not 0 < array.shape[1] <= n:
@@ -92,7 +94,7 @@ class RigidModes(Sealed):
         return np.where(low, np.nextafter(nearest, np.inf), nearest)
 
 
-def largest_displacement(value: float | None, modes: RigidModes | None) -> float | None:
+def largest_displacement(value: float | None, modes: RigidModes) -> float | None:
     """The bound of rigid displacements, if it is given.
 
     Raises
@@ -102,7 +104,7 @@ def largest_displacement(value: float | None, modes: RigidModes | None) -> float
     """
     if value is None:
         return None
-    if modes is None:
+    if modes.r == 0:
         raise InvalidProblemError("max_rigid_displacement is given without rigid_modes; expected both")
     try:
         return positive_number(value, "max_rigid_displacement")

@@ -73,7 +73,7 @@ class BodyShape:
         size.
         """
         problem, found, free = root.problem, self.displacements(root.u), self.size
-        if problem.modes is None:
+        if problem.held:
             none = np.zeros(problem.contact_rows.shape[0])
             free = largest_length(self.displacements(problem.condensed.displacement(root.alpha, none)))
         return found if largest_length(found) > _LEAST_MOVED * free else np.zeros_like(found)

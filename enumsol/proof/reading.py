@@ -59,7 +59,14 @@ def data_of(header: Any, problem: ContactProblem, kind: str | None) -> Data:
         raise RefusedError("the header does not fit the problem")
     if ("kind" in header) != (kind is not None) or header.get("kind") != kind:
         raise RefusedError(f"the header names an unknown kind of proof, {quoted(header.get('kind'))}")
-    return "problem" if header["data"] == "problem" else "condensed"
+    if problem.held:
+        return "problem" if header["data"] == "problem" else "condensed"
+    if header["data"] != "problem":
+        raise RefusedError("a proof about S and g as computed, of a body that nothing holds")
+    found, reach = header.get("max_rigid_displacement"), problem.rigid_reach
+    if not same(found, reach):
+        raise RefusedError(f"its bound of the rigid displacement is {quoted(found)}; the problem's is {reach:g}")
+    return "problem"
 
 
 def same(found: Any, expected: Any) -> bool:

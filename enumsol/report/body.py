@@ -39,7 +39,7 @@ def body_record(problem: AnyProblem, scene: Scene | None = None) -> tuple[dict[s
             return None, why
         still = [0] * (3 * problem.p)
         return body | {"u0": still, "u1": still, "c": [[]] * len(still), "acts": [[]] * len(still)}, why
-    if problem.modes is not None:
+    if not problem.held:
         return None, "Nothing holds the body, and arcs do not say how far it moves as a whole; roots_at(alpha) does"
     shape = body_shape(problem)
     d = shape.points.shape[1]

@@ -211,7 +211,7 @@ def enumerate_roots(
                     _ = in_space.enclosed  # before a file is begun
                     search = SpaceEnumeration(in_space, progress, proof_path, resumed=resume, started=started)
                 else:
-                    kind = Solvers if problem.modes is None else _floating_solvers()
+                    kind = Solvers if problem.held else _floating_solvers()
                     solvers = kind(problem, value, arithmetic, tolerance, engine)
                     _ = solvers.enclosed  # as above
                     search = _Enumeration(solvers, progress, proof_path, method=method, resumed=resume, started=started)
@@ -366,7 +366,7 @@ class _Enumeration(Enumeration[Solvers]):
         """Components of the root set with the solver whose points they hold."""
         solutions, closed, self.doubtful = apart(self.outcome.solutions)
         exact, floats = [s for s in solutions if s.exact], [s for s in solutions if not s.exact]
-        degree = None if self.problem.modes is not None else partial(local_degree, self.solvers.floats)
+        degree = partial(local_degree, self.solvers.floats) if self.problem.held else None
         parts: list[tuple[list[RootComponent], SelectionSolver]] = []
         if floats or closed:
             components = connected_components(floats, self.solvers.floats, degree)
@@ -413,7 +413,7 @@ def roots_of_selections(problem: ContactProblem, alpha: Alpha, selections: Seque
     selections : codes of complete selections
     whole : no others hold
     """
-    kind = Solvers if problem.modes is None else _floating_solvers()
+    kind = Solvers if problem.held else _floating_solvers()
     solvers = kind(problem, alpha, "verified", SIGN_TOLERANCE)
     return _Selected(solvers, None, None, method="graph").select(selections, whole=whole)
 

@@ -14,8 +14,9 @@ from enumsol.proof.writer import ProofWriter
 from enumsol.roots.root_set import RigidBound, RootSet, SearchStats, Undecided
 from enumsol.search.certifiers.protocol import UndecidedPart
 from enumsol.search.outcome import AWAY, HOLD, SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
-from enumsol.search.parallel import Searchable, Spread
+from enumsol.search.parallel import SpreadSearch
 from enumsol.search.resume import resume
+from enumsol.search.setup import SearchSetup
 from enumsol.support.deadlines import Deadline, within
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Alpha, Codes
     from enumsol.support.keeping import Ending
 
-_Solvers = TypeVar("_Solvers", bound=Searchable)
+_Solvers = TypeVar("_Solvers", bound=SearchSetup)
 
 
 class Enumeration(ABC, Generic[_Solvers]):
@@ -37,7 +38,7 @@ class Enumeration(ABC, Generic[_Solvers]):
 
     Parameters
     ----------
-    solvers : Searchable
+    solvers : SearchSetup
     progress : callable or None
     proof_path : path or None
         Where to write the proof (arithmetic "verified"); None keeps it in memory.
@@ -114,7 +115,7 @@ class Enumeration(ABC, Generic[_Solvers]):
         earlier = () if self._begun is None or self.writer is None else (self._begun, self.writer.replace)
         self.outcome = search.outcome
         search.at_limit = solvers.at_limit
-        search.otherwise = AWAY if search.at_limit is not None else "" if self.problem.modes is None else HOLD
+        search.rest.otherwise = AWAY if search.at_limit is not None else "" if self.problem.held else HOLD
         search.continua = self._continua
         if solvers.unloaded():
             self.certifier.unloaded()
@@ -125,7 +126,7 @@ class Enumeration(ABC, Generic[_Solvers]):
             self.certifier.skipped(codes, reason)
             self.outcome.undecided.append(UndecidedPart(codes, reason, "hold the body better, or scale the data"))
         else:
-            spread = None if executor is None else Spread(executor, solvers, search)
+            spread = None if executor is None else SpreadSearch(executor, solvers, search)
             if spread is not None:
                 search.loop = spread.run
             try:
@@ -179,7 +180,7 @@ class Enumeration(ABC, Generic[_Solvers]):
             at_least=at_least,
             certified_data=certified_data,
             proof=self._proof(**counts),
-            rigid_bound=None if modes is None else RigidBound(self.problem.rigid_reach, needed, beyond),
+            rigid_bound=None if modes.r == 0 else RigidBound(self.problem.rigid_reach, needed, beyond),
         )
 
     def _stats(self) -> SearchStats:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.condensation.condensed import Condensation, FloatingCondensation, condensation_of
+from enumsol.condensation.condensed import Condensation, condensation_of
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK, ContactStatus
 from enumsol.support.immutable import Sealed
@@ -80,8 +80,6 @@ class SelectionTangent(Sealed):
 
     def _bordered(self, floats: FloatSelections, matrix: Floats, E: Floats) -> Floats:
         """The matrix of the selection with q and equilibrium as a whole."""
-        if not isinstance(self.condensed, FloatingCondensation):
-            return matrix
         system, rows = floats.system, floats.reduced(self.codes)[0]
         G = np.asarray(self.condensed.moves * self.condensed.node_scale * np.sqrt(system.force / system.length))
         size = 1.0 / np.sqrt(np.diagonal(system.S))
@@ -99,7 +97,7 @@ class SelectionTangent(Sealed):
         scale, matrix = condensed.node_scale, condensed.bordered
         g1, J = condensed.g1 / scale, np.eye(len(matrix))
         right: Floats = np.zeros(len(matrix))
-        if isinstance(condensed, FloatingCondensation):
+        if len(matrix) > m:
             J[m:], right[m:] = matrix[m:], np.linalg.solve(condensed.mixing, condensed.h[1])
         for i, code in enumerate(self.codes):
             if code == OPEN:
@@ -170,10 +168,10 @@ class SlipSigns:
         """All signs in rationals; None when the problem is too large for them."""
         if self.problem.n > EXACT_DOF_LIMIT or not self.problem.known_exactly:
             return None
-        from enumsol.condensation.exact import exact_system  # python-flint, not for fast arithmetic
+        from enumsol.condensation.exact import ExactSystem  # python-flint, not for fast arithmetic
         from enumsol.selections.rational_selections import ExactSelections
 
-        solver = ExactSelections(exact_system(self.problem, self.alpha))
+        solver = ExactSelections(ExactSystem.from_problem(self.problem, self.alpha))
         solution = solver.solve(self.codes)
         return None if solution is None else solver.slip_signs(solution.vertices[0])
 

@@ -10,8 +10,8 @@ import numpy as np
 from enumsol.search.certifiers.float_certifier import FastCertifier
 from enumsol.search.outcome import SearchLimits
 from enumsol.search.reduction import Reduction
+from enumsol.search.solvers import plane_search
 from enumsol.search.splitting import PlaneSplitting
-from enumsol.search.tree import TreeSearch
 from enumsol.selections.float_selections import FloatSelections
 from enumsol.support.deadlines import current
 
@@ -78,7 +78,7 @@ def _perturbed(solver: FloatSelections, active: ActiveSets, push: Floats) -> dic
     system = replace(solver.system, g=solver.system.g + push if loaded else push / _STEPS[-1])
     splitting, limits = PlaneSplitting(system.F, active), SearchLimits(max_nodes=_MAX_NODES, deadline=current())
     certifier = FastCertifier(FloatSelections(system, solver.tolerance))
-    outcome = TreeSearch(system, certifier, splitting=splitting, limits=limits).run()
+    outcome = plane_search(system, certifier, splitting, limits).run()
     if outcome.stopped is not None or any(not s.strict or s.det_sign == 0 for s in outcome.solutions):
         return None
     return {solution.codes: solution.det_sign for solution in outcome.solutions}

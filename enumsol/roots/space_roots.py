@@ -12,8 +12,7 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, Ball
 from enumsol.condensation.condensed import Condensation, condensation_of
-from enumsol.condensation.floating import moved_by_modes
-from enumsol.condensation.space_condensed import FloatingSpace
+from enumsol.condensation.enclosure import moved_by_modes
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, STICK, UNDECIDED, ContactStatus, space_status
 from enumsol.roots.enumeration import Enumeration
@@ -151,7 +150,7 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
 
     @property
     def _rigid_unit(self) -> Floats:
-        return self.solvers.enclosed.rows.unit if isinstance(self.solvers.enclosed, FloatingSpace) else np.ones(0)
+        return self.solvers.enclosed.rows.unit if not self.solvers.enclosed.held else np.ones(0)
 
     @cached_property
     def _moved(self) -> Ball:
@@ -201,7 +200,7 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
                 ball.mid[k * p + occurs] = product.mid * unit[occurs]
                 ball.rad[k * p + occurs] = np.where(zero, 0.0, product.rad * unit[occurs])
         computed, moves = g - (S @ forces[:, None])[:, 0], None
-        if isinstance(exact, FloatingSpace):
+        if not exact.held:
             rigid = self._in_units(Ball(0.0 * exact.reach, exact.reach) if rigid is None else rigid)
             computed = computed + (self._moved @ rigid[:, None])[:, 0]
             moves = np.stack([rigid.mid - rigid.rad * SAFE, rigid.mid + rigid.rad * SAFE], axis=1)
@@ -291,7 +290,7 @@ def _around(middle: float, radius: float) -> Floats:
 
 def solvers_in_space(problem: ContactProblem3D, alpha: Alpha, arithmetic: str) -> SpaceSolvers:
     """Solvers for a body that is held, or that nothing holds."""
-    if problem.modes is None:
+    if problem.held:
         return SpaceSolvers(problem, alpha, arithmetic)
     from enumsol.search.space.space_floating import FloatingSpaceSolvers  # for such bodies only
 

@@ -10,7 +10,7 @@ from enumsol.trusted.selection import PENETRATION, SLIP_BACKWARD, SLIP_FORWARD
 from enumsol.trusted.status_rows import FORBIDDEN, FREE, row_signs
 
 if TYPE_CHECKING:
-    from enumsol.condensation.floating import FloatingSystem
+    from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.support.array_types import Codes, Floats, Indices
 
 #: Weight of multipliers that are zero, relative to the largest: they change only where the others cannot do it.
@@ -19,7 +19,7 @@ _SPARE = 2.0**-20
 _ROUNDS = 8
 
 
-def in_balance(system: FloatingSystem, codes: Codes, rows: Indices, values: Floats) -> tuple[Indices, Floats]:
+def in_balance(system: EnclosedSystem, codes: Codes, rows: Indices, values: Floats) -> tuple[Indices, Floats]:
     """Multipliers next to given ones with G y = h, up to rounding, or these where there are none.
 
     Those of the body on weak springs satisfy this up to the springs only, times the rigid displacement.

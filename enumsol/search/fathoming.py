@@ -22,16 +22,15 @@ from enumsol.model.statuses import (
     STICK,
     UNDECIDED,
 )
+from enumsol.search.closing import TreeCloser
 from enumsol.search.fathoming_in_contact import KnownRoot, Lone, LoneProposal
 from enumsol.search.reduction import NEAR, Reduction, WeightSource
 from enumsol.selections.solution import ActiveSets, SelectionSolution
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.relaxation.engine import Relaxation
-    from enumsol.search.certifiers.protocol import Bound, Led
+    from enumsol.search.certifiers.protocol import Bound
     from enumsol.support.array_types import Codes, Floats
 
     #: lambda and w, (2p,) arrays each.
@@ -125,7 +124,7 @@ class Closing(Protocol):
         """
 
 
-class Closer:
+class Closer(TreeCloser):
     """Which nodes of the tree are worth a try: all where tries succeed, fewer and fewer where they fail.
 
     The whole problem comes first, before there is a tree. Where plain numbers fail and nodes are few, numbers are
@@ -138,7 +137,8 @@ class Closer:
     """
 
     def __init__(self, system: ScaledSystem, certifier: Closing) -> None:
-        self._system, self._certifier = system, certifier
+        super().__init__()
+        self._system, self._certifier, self.sliding = system, certifier, certifier.sliding
         self._alert = self._began_again = False
         self._touching = 0
         self._wait = self._pause = 0
@@ -151,13 +151,6 @@ class Closer:
         self._regular: KnownRoot | None = None
         self.known: KnownRoot | None = None
         self._told, self._bound = 1, 0.0
-        #: The relaxation of an assignment with the energy, if it is solved; a search tells it.
-        self.relaxed: Callable[[Codes], Relaxation | None] = lambda _: None
-
-    @property
-    def sliding(self) -> dict[int, int]:
-        """Those of the certifier."""
-        return self._certifier.sliding
 
     def whole(self) -> list[SelectionSolution] | None:
         """All solutions of the problem, if one certificate proves that there is one only."""
@@ -175,13 +168,6 @@ class Closer:
         if found is None and lone and self._regular is not None:
             found = self._alone(codes, self._regular, self.relaxed(codes), descent=True)
         return found
-
-    leads = False
-
-    def led(self, codes: Codes) -> Led | None:
-        """No node of the tree is decided, or split, before its relaxation is solved."""
-        del codes
-        return None
 
     def begins_again(self, nodes: int) -> bool:
         """Whether so much has become known after some nodes that a search had better begin again."""

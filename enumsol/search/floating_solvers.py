@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.condensation.condensed import ScaledSystem
-from enumsol.condensation.enclosure import NotEnclosedError
-from enumsol.condensation.floating import FloatingSystem, RigidRows
+from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, RigidRows, enclosure_of
 from enumsol.proof import records
 from enumsol.search.balance import in_balance
 from enumsol.search.certifiers.protocol import NO_BOUND, Bound, Certifier, UndecidedPart
 from enumsol.search.certifiers.rational_certifier import ExactCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier, proven
-from enumsol.search.reference_closer import ReferenceCloser, reference_numbers
+from enumsol.search.closing import TreeCloser
+from enumsol.search.reference_closer import LeadingCloser, reference_numbers
 from enumsol.search.resume import PlaneReader, Reader
 from enumsol.search.setup import HeldByNothing
 from enumsol.search.solvers import Solvers
@@ -66,12 +66,12 @@ class FloatingSolvers(HeldByNothing, Solvers):
     @cached_property
     def exact(self) -> ExactSelections | None:
         """Selections in rationals; None when the problem is too large for them."""
-        from enumsol.condensation.exact import FloatingExactSystem, check_definite  # python-flint
+        from enumsol.condensation.exact import ExactSystem, check_definite  # python-flint
         from enumsol.selections.rational_selections import ExactSelections  # python-flint
 
         if self.arithmetic != "exact" and not self._in_rationals:
             return None
-        system = FloatingExactSystem.of(self.problem, self.alpha)
+        system = ExactSystem.from_problem(self.problem, self.alpha)
         if self.enclosed is None:
             check_definite(system.contact_compliance)
         return ExactSelections(system)
@@ -100,10 +100,9 @@ class FloatingSolvers(HeldByNothing, Solvers):
         return self._rounding_decides or self.exact is None or self.exact.rests_on_reach(codes, None)
 
     @cached_property
-    def _enclosed(self) -> tuple[FloatingSystem | None, str]:
+    def _enclosed(self) -> tuple[EnclosedSystem | None, str]:
         try:
-            held = self.problem.on_springs.enclosure.at(self.alpha, self.scaled.force, self.scaled.length)
-            enclosed = FloatingSystem.on(held, self.rows)
+            enclosed = enclosure_of(self.problem).at(self.alpha, self.scaled.force, self.scaled.length)
             definite = enclosed.smallest_eigenvalue > 0
         except NotEnclosedError:
             return None, "problem"
@@ -131,8 +130,8 @@ class FloatingSolvers(HeldByNothing, Solvers):
     def _splitting(self, certifier: Certifier) -> PlaneSplitting:
         return PlaneSplitting(self.scaled.F)
 
-    def _closer(self, certifier: Certifier) -> Any:
-        return ReferenceCloser(certifier, lambda: self.known_root)
+    def _closer(self, certifier: Certifier) -> TreeCloser:
+        return LeadingCloser(certifier, lambda: self.known_root)
 
     def reader(self) -> FloatingReader:
         """Understands the records of an earlier proof."""
@@ -189,18 +188,18 @@ class Exclusions:
 
     Parameters
     ----------
-    enclosed : FloatingSystem
+    enclosed : EnclosedSystem
     rests_on_reach : of a complete selection without a solution, whether it may have one beyond the bound
     within : whether exclusions may use the bound from the beginning
 
     Attributes
     ----------
-    system, free : FloatingSystem
+    system, free : EnclosedSystem
         With its bound, and with one beyond which there are no solutions.
     """
 
     def __init__(
-        self, enclosed: FloatingSystem, rests_on_reach: Callable[[Codes], bool], *, within: bool = False
+        self, enclosed: EnclosedSystem, rests_on_reach: Callable[[Codes], bool], *, within: bool = False
     ) -> None:
         self.rests_on_reach, self._within = rests_on_reach, within
         self.system, self.free = enclosed, without_bound(enclosed)
@@ -390,7 +389,7 @@ def _between(codes: Codes, ball: VerifiedSelection) -> dict[int, int] | None:
     return slips
 
 
-def _holds_none(system: FloatingSystem, codes: Codes) -> bool:
+def _holds_none(system: EnclosedSystem, codes: Codes) -> bool:
     return holds_no_root(system, codes, solve_selection(system, codes))
 
 

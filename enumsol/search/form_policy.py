@@ -18,6 +18,8 @@ from enumsol.relaxation.active_set import ActiveSetEngine, ActiveSetRelaxation, 
 from enumsol.search.splitting import ImposedRows, PlaneSplitting
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.relaxation.engine import Engine
     from enumsol.relaxation.interval_relaxation import IntervalSystem
@@ -37,20 +39,26 @@ MORE, TIMES = 0.1, 3.0
 
 
 class Forms:
-    """The form of one search.
+    """The form of one search, in 2D and 3D.
 
     Parameters
     ----------
-    scaled : ScaledSystem
-    enclosed : EnclosedSystem
-        Balls for the same system.
+    better : callable
+        Gives a form that is clearly tighter than the energy over a partial assignment, or None; from an engine with the
+        energy, the status codes, and numbers and modes of the rows of the assignment.
+    bounding : callable
+        Gives an engine with a form in place of the energy, or None; from an engine and a form that is proven convex.
+    nodes : int
+        Nodes examined with the energy before a form is tried.
     """
 
-    def __init__(self, scaled: ScaledSystem, enclosed: EnclosedSystem) -> None:
-        self._scaled, self._enclosed = scaled, enclosed
-        #: Relaxations with the form in use, and that form; None for the energy.
+    def __init__(
+        self, better: Callable[[Any, Codes, Rows], Any], bounding: Callable[[Any, Any], Engine | None], nodes: int
+    ) -> None:
+        self._better, self._bounding, self._nodes = better, bounding, nodes
+        #: Relaxations with the form in use, and that form, an EnclosedForm or SlipForm; None for the energy.
         self.engine: Engine | None = None
-        self.form: EnclosedForm | None = None
+        self.form: Any = None
 
     def due(self, nodes: int, covered: float) -> bool:
         """Whether it is time to try a form."""
@@ -58,25 +66,34 @@ class Forms:
 
     def tried(self, nodes: int) -> bool:
         """Whether a search of so many nodes has tried a form."""
-        return nodes >= NODES
+        return nodes >= self._nodes
 
-    def use(self, engine: Any, form: EnclosedForm | None) -> None:
+    def use(self, engine: Engine, form: Any) -> None:
         """Go on with a form that is known already, or with the energy."""
         if form is not None and form is self.form:
             return
-        self.form, self.engine = form, None
-        if form is not None and isinstance(engine, ActiveSetEngine) and form.smallest_eigenvalue > 0:
-            self.engine = FormEngine(engine, self._scaled, form)
+        convex = form is not None and form.smallest_eigenvalue > 0
+        self.form, self.engine = form, self._bounding(engine, form) if convex else None
 
-    def pay(self, engine: Any, codes: Codes, rows: ImposedRows) -> bool:
+    def pay(self, engine: Engine, codes: Codes, rows: ImposedRows) -> bool:
         """Whether a form at the root of the search is clearly tighter than the energy; if so it is in use."""
-        if not isinstance(engine, ActiveSetEngine):
-            return False
-        form = ascended(self._scaled, self._enclosed, engine, codes, rows.over(codes, range(len(codes))))
+        form = self._better(engine, codes, rows.over(codes, range(len(codes))))
         if form is None or not form.smallest_eigenvalue > 0:
             return False
         self.use(engine, form)
         return True
+
+
+def plane_forms(scaled: ScaledSystem, enclosed: EnclosedSystem) -> Forms:
+    """Forms for a system in 2D and balls for it."""
+
+    def better(engine: Engine, codes: Codes, rows: Rows) -> EnclosedForm | None:
+        return ascended(scaled, enclosed, engine, codes, rows) if isinstance(engine, ActiveSetEngine) else None
+
+    def bounding(engine: Engine, form: EnclosedForm) -> Engine | None:
+        return FormEngine(engine, scaled, form) if isinstance(engine, ActiveSetEngine) else None
+
+    return Forms(better, bounding, NODES)
 
 
 def ascended(

@@ -54,7 +54,6 @@ def load_limit(problem: AnyProblem, alpha: Alpha) -> LoadLimit | None:
     alpha : float or Fraction
     """
     modes, f, p = problem.modes, problem.load_at(alpha), problem.p
-    assert modes is not None
     N, f = modes.N / np.max(np.abs(modes.N), axis=0), f / max(float(np.max(np.abs(f))), np.finfo(float).tiny)
     load = N.T @ f
     if np.all(np.abs(load) <= LIMIT_TOLERANCE * (np.abs(N).T @ np.abs(f))):

@@ -9,32 +9,45 @@ from typing import TYPE_CHECKING, Any
 from enumsol.errors import InvalidArgumentError
 from enumsol.search.certifiers.protocol import Refine, UndecidedPart, Unrecorded
 from enumsol.search.load_limit import LoadLimit, load_limit
+from enumsol.search.nodes import Relaxations
 from enumsol.search.tree import TreeSearch
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from enumsol.proof.writer import Recorder
+    from enumsol.relaxation.engine import Engine
     from enumsol.search.certifiers.protocol import Certifier
+    from enumsol.search.closing import TreeCloser
+    from enumsol.search.form_policy import Forms
     from enumsol.search.outcome import SearchLimits, SearchProgress
-    from enumsol.support.array_types import Codes
+    from enumsol.search.resume import Reader
+    from enumsol.search.splitting import Splitting
+    from enumsol.support.array_types import Alpha, Codes
 
 #: Stiffness of the springs by which a solution of a body that nothing holds is approached, relative to the body's own.
 _SPRINGS = tuple(2.0**-k for k in range(0, 21, 4))
 
 
 class SearchSetup(ABC):
-    """Base of the solvers of one problem at one alpha: a search is made of their parts.
-
-    Attributes
-    ----------
-    relaxed : ScaledSystem or SpaceSystem
-        What the relaxations are about.
-    """
+    """Base of the solvers of one problem at one alpha in one arithmetic: a search is made of their parts."""
 
     #: There is a solution for certain (theory, sections 6.7 and 12.6).
     has_solution = True
-    relaxed: Any
+    problem: Any
+    alpha: Alpha
+    arithmetic: Any
     _engine: Any
+
+    @property
+    @abstractmethod
+    def relaxed(self) -> Any:
+        """Scaled system that the relaxations are about."""
+
+    @property
+    @abstractmethod
+    def undecidable(self) -> str | None:
+        """Reason why nothing can be proven about this problem, or None."""
 
     def search(
         self,
@@ -43,15 +56,13 @@ class SearchSetup(ABC):
         progress: Callable[[SearchProgress], object] | None = None,
     ) -> TreeSearch:
         """A search of the tree with a certifier made here."""
+        splitting, p = self._splitting(certifier), self.problem.p
         return TreeSearch(
-            self.relaxed,
+            Relaxations(self._engine, splitting, p, self._forms(), self._fallback),
             certifier,
-            engine=self._engine,
-            splitting=self._splitting(certifier),
             limits=limits,
             progress=progress,
             closer=self._closer(certifier),
-            forms=self._forms(),
             known_root=lambda: self.known_root,
         )
 
@@ -61,8 +72,34 @@ class SearchSetup(ABC):
         return None
 
     @abstractmethod
-    def certifier(self, recorder: Any) -> Certifier:
+    def certifier(self, recorder: Recorder | None) -> Certifier:
         """The certifier of this arithmetic, which writes to a recorder."""
+
+    @abstractmethod
+    def remake(self) -> Callable[[], SearchSetup]:
+        """Makes the same again, also in another process."""
+
+    def fresh(self) -> SearchSetup:
+        """The same without anything that searches leave behind and others would depend on: nothing here."""
+        return self
+
+    @abstractmethod
+    def unloaded(self) -> bool:
+        """True if g = 0, so that only lambda = 0 solves."""
+
+    @abstractmethod
+    def reader(self) -> Reader:
+        """Understands the records of an earlier proof."""
+
+    @abstractmethod
+    def proof_header(self) -> dict[str, Any]:
+        """First record of a proof (see enumsol.proof.proof_file).
+
+        Raises
+        ------
+        InvalidArgumentError
+            alpha is a fraction of more digits than a proof may hold.
+        """
 
     @cached_property
     def known_root(self) -> Codes | None:
@@ -87,16 +124,21 @@ class SearchSetup(ABC):
         """Selections, one of which holds at a solution of a system in floats, and that solution, near another one."""
 
     @abstractmethod
-    def _splitting(self, certifier: Certifier) -> Any:
+    def _splitting(self, certifier: Certifier) -> Splitting:
         """How a partial assignment is split, and which rows it imposes."""
 
-    @abstractmethod
-    def _closer(self, certifier: Certifier) -> Any:
-        """What decides the problem, or subtrees, by an only solution; None where nothing does."""
+    @property
+    def _fallback(self) -> Callable[[], Engine] | None:
+        """Makes a slower engine for relaxations that stall; None where there is none."""
+        return None
 
     @abstractmethod
-    def _forms(self) -> Any:
-        """What a long search may bound with in place of the energy, or None."""
+    def _closer(self, certifier: Certifier) -> TreeCloser | None:
+        """Proposals of an only solution of the problem, or of subtrees."""
+
+    @abstractmethod
+    def _forms(self) -> Forms | None:
+        """Forms with which a long search may bound in place of the energy."""
 
 
 class HeldByNothing:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from fractions import Fraction
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Literal, cast
@@ -10,18 +11,23 @@ import numpy as np
 
 from enumsol.condensation.data import EXACT_DOF_LIMIT, exactly_at
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
-from enumsol.errors import InvalidArgumentError
+from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.model.statuses import UNDECIDED
 from enumsol.proof.writer import Recorder, point_header, unit_exponents
+from enumsol.relaxation.active_set import ActiveSetEngine
+from enumsol.relaxation.engine import Engine, not_compiled
+from enumsol.relaxation.interior_point import InteriorPointEngine
 from enumsol.search.certifiers.float_certifier import FastCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier
+from enumsol.search.closing import TreeCloser
 from enumsol.search.fathoming import Closer, Closing, propose
-from enumsol.search.form_policy import Forms
+from enumsol.search.form_policy import Forms, plane_forms
+from enumsol.search.nodes import Relaxations
 from enumsol.search.reduction import WeightSource
 from enumsol.search.resume import PlaneReader, Reader
 from enumsol.search.setup import SearchSetup
 from enumsol.search.splitting import PlaneSplitting
-from enumsol.search.tree import make_engine
+from enumsol.search.tree import TreeSearch
 from enumsol.selections.float_selections import FloatSelections
 
 if TYPE_CHECKING:
@@ -29,16 +35,49 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.model.problem import ContactProblem
-    from enumsol.relaxation.engine import Engine
     from enumsol.search.certifiers.protocol import Certifier
     from enumsol.search.certifiers.rational_certifier import ExactCertifier
     from enumsol.search.fathoming import Point
+    from enumsol.search.outcome import SearchLimits
     from enumsol.selections.rational_selections import ExactSelections
     from enumsol.support.array_types import Alpha, Codes, Floats
     from enumsol.trusted.at_alpha import VerifiedSelection
     from enumsol.trusted.precise_at_alpha import PreciseAtAlpha
 
 Arithmetic = Literal["fast", "verified", "exact"]
+
+
+def make_engine(system: ScaledSystem, name: str | None = None) -> Engine:
+    """The relaxation engine of that name; by default the compiled one, or the fallback with a warning.
+
+    Raises
+    ------
+    MissingDependencyError
+        The compiled one was asked for and cannot be imported.
+    """
+    if name == InteriorPointEngine.name:
+        return InteriorPointEngine(system)
+    try:
+        return ActiveSetEngine(system)
+    except ImportError as error:
+        missing = not_compiled(error)
+        if name is not None:
+            raise MissingDependencyError(missing) from error
+        warnings.warn(f"{missing}; the much slower interior-point solver is used", RuntimeWarning, stacklevel=2)
+        return InteriorPointEngine(system)
+
+
+def plane_search(
+    system: ScaledSystem,
+    certifier: Certifier,
+    splitting: PlaneSplitting | None = None,
+    limits: SearchLimits | None = None,
+    engine: Engine | None = None,
+) -> TreeSearch:
+    """A search of the tree of a system, by default with the best engine and all statuses."""
+    engine, splitting = engine or make_engine(system), splitting or PlaneSplitting(system.F)
+    relaxations = Relaxations(engine, splitting, system.p, fallback=partial(InteriorPointEngine, system))
+    return TreeSearch(relaxations, certifier, limits=limits)
 
 
 class Solvers(SearchSetup):
@@ -193,6 +232,10 @@ class Solvers(SearchSetup):
     def _engine(self) -> Engine:
         return make_engine(self.relaxed, self.engine)
 
+    @property
+    def _fallback(self) -> Callable[[], Engine]:
+        return partial(InteriorPointEngine, self.relaxed)
+
     def _solved(self, system: ScaledSystem, near: Point | None) -> tuple[list[Codes], Point] | None:
         codes, none = (UNDECIDED,) * system.p, (np.zeros(2 * system.p), system.g)
         for start in (none, None) if near is None else (near, none, None):
@@ -204,7 +247,7 @@ class Solvers(SearchSetup):
     def _splitting(self, certifier: Certifier) -> PlaneSplitting:
         return PlaneSplitting(self.scaled.F, sliding=certifier.sliding)
 
-    def _closer(self, certifier: Certifier) -> Closer | None:
+    def _closer(self, certifier: Certifier) -> TreeCloser | None:
         return Closer(self.scaled, cast("Closing", certifier))
 
     def _forms(self) -> Forms | None:
@@ -216,15 +259,11 @@ class Solvers(SearchSetup):
         scaled = self.scaled
         fast = self.arithmetic == "fast"
         system = EnclosedSystem.as_computed(scaled.S, scaled.g, scaled.F) if fast else self.enclosed
-        return None if self.arithmetic == "exact" or system is None else Forms(scaled, system)
+        return None if self.arithmetic == "exact" or system is None else plane_forms(scaled, system)
 
     def remake(self) -> Callable[[], Solvers]:
         """Makes the same again, also in another process."""
         return partial(type(self), self.problem, self.alpha, self.arithmetic, self.floats.tolerance, self.engine)
-
-    def fresh(self) -> Solvers:
-        """The same without anything that searches leave behind and others would depend on: nothing here."""
-        return self
 
     def unloaded(self) -> bool:
         """True if g = 0, so that only lambda = 0 solves: in the data (verified, exact) or as computed (fast)."""
@@ -232,7 +271,7 @@ class Solvers(SearchSetup):
             return not np.any(self.scaled.g)
         if self.arithmetic == "exact":
             return not any(_present(self.exact).system.g)
-        return self.problem.is_unloaded(self.alpha)
+        return bool(self.problem.is_unloaded(self.alpha))
 
     def reader(self) -> Reader:
         """Understands the records of an earlier proof."""

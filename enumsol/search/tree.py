@@ -12,34 +12,27 @@ that everything below knows them.
 from __future__ import annotations
 
 import time
-import warnings
-from dataclasses import dataclass, replace
-from functools import partial
+from contextlib import suppress
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from enumsol.condensation.condensed import ScaledSystem
-from enumsol.errors import MissingDependencyError
-from enumsol.model.statuses import UNDECIDED
 from enumsol.proof.writer import KeptRecords
-from enumsol.relaxation.active_set import ActiveSetEngine
-from enumsol.relaxation.engine import Engine, Relaxation, not_compiled
-from enumsol.relaxation.interior_point import InteriorPointEngine
 from enumsol.search.certifiers.protocol import NO_BOUND, Bound, Certifier, Refine, UndecidedPart
-from enumsol.search.form_policy import Forms
+from enumsol.search.closing import TreeCloser
+from enumsol.search.nodes import Relaxations, TreeNode
 from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
-from enumsol.search.splitting import ImposedRows, PlaneSplitting, Splitting, branching_node
+from enumsol.search.remainder import Remainder
+from enumsol.search.splitting import branching_node
 from enumsol.support.deadlines import Deadline, Limited, TimeOverError, over, tell, within
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from enumsol.condensation.space_condensed import SpaceSystem
-    from enumsol.search.fathoming import Closer
+    from enumsol.relaxation.engine import Relaxation
     from enumsol.search.fathoming_in_contact import LoneProposal
+    from enumsol.search.form_policy import Forms
     from enumsol.search.load_limit import LoadLimit
-    from enumsol.search.reference_closer import ReferenceCloser
-    from enumsol.search.space.space_fathoming import SpaceCloser
-    from enumsol.search.space.space_forms import SpaceForms
+    from enumsol.search.parts import Answer
     from enumsol.support.array_types import Codes
 
 #: Progress is reported and limits on time are looked at after this many nodes.
@@ -51,41 +44,13 @@ _MANY, _LATE = 24, 1.0
 _AT_LIMIT = 2000
 
 
-@dataclass(slots=True)
-class TreeNode:
-    """A node of the tree that waits to be examined: its parent's relaxation and what it adds."""
+def depth_first(waiting: list[Any], examine: Callable[[Any], Sequence[Any]], ended: Callable[[], bool]) -> None:
+    """Examine what waits, the last first, until that is all or the search has ended.
 
-    parent: Relaxation | None
-    codes: Codes
-    changed: int  # the contact node decided last, or -1
-    last: bool  # the last of its siblings: may take over the parent's state
-    weight: float
-    #: Presolve: nodes with one child that is not excluded, to be branched on first; None once there were no more.
-    forced: tuple[int, ...] | None = None
-
-    def sent(self) -> TreeNode:
-        """Node as it is sent to a worker, where it begins without its parent."""
-        return replace(self, parent=None, last=False)
-
-
-def make_engine(system: ScaledSystem, name: str | None = None) -> Engine:
-    """The relaxation engine of that name; by default the compiled one, or the fallback with a warning.
-
-    Raises
-    ------
-    MissingDependencyError
-        The compiled one was asked for and cannot be imported.
+    Where ``examine`` raises an error, its item waits as before; otherwise what it gives takes the item's place.
     """
-    if name == InteriorPointEngine.name:
-        return InteriorPointEngine(system)
-    try:
-        return ActiveSetEngine(system)
-    except ImportError as error:
-        missing = not_compiled(error)
-        if name is not None:
-            raise MissingDependencyError(missing) from error
-        warnings.warn(f"{missing}; the much slower interior-point solver is used", RuntimeWarning, stacklevel=2)
-        return InteriorPointEngine(system)
+    while waiting and not ended():
+        waiting[-1:] = examine(waiting[-1])
 
 
 class TreeSearch:
@@ -93,18 +58,12 @@ class TreeSearch:
 
     Parameters
     ----------
-    system : ScaledSystem
+    relaxations : Relaxations
     certifier : Certifier
-    engine : str, Engine or None
-        "active-set", "clarabel", an engine ready for use, or None for the best available.
-    splitting : Splitting, optional
-        How a status splits and which rows it imposes; by default those of the plane at one alpha.
     limits : SearchLimits
     progress : called with a SearchProgress now and then
-    closer : Closer, SpaceCloser or ReferenceCloser, optional
+    closer : TreeCloser, optional
         Closes subtrees by their only possible solution.
-    forms : Forms or SpaceForms, optional
-        What a long search may bound with in place of the energy.
     known_root : callable, optional
         Gives the codes of a complete selection that is known to hold a root, or None. Where the search is stopped
         before it came there, this root is proven by itself.
@@ -118,41 +77,27 @@ class TreeSearch:
 
     def __init__(
         self,
-        system: ScaledSystem | SpaceSystem,
+        relaxations: Relaxations,
         certifier: Certifier,
         *,
-        engine: str | Engine | None = None,
-        splitting: Splitting | None = None,
         limits: SearchLimits | None = None,
         progress: Callable[[SearchProgress], object] | None = None,
-        closer: Closer | SpaceCloser | ReferenceCloser | None = None,
-        forms: Forms | SpaceForms | None = None,
+        closer: TreeCloser | None = None,
         known_root: Callable[[], Codes | None] | None = None,
     ) -> None:
-        self.system = system
-        self.certifier = certifier
-        if isinstance(system, ScaledSystem) and (engine is None or isinstance(engine, str)):
-            engine = make_engine(system, engine)
-        self.engine: Any = engine
+        self.relaxations, self.certifier = relaxations, certifier
+        self.splitting, self.forms = relaxations.splitting, relaxations.forms
         self.limits = limits or SearchLimits()
         self.progress = progress
-        self.closer = closer
-        if closer is not None:
-            closer.relaxed = self.relaxed
-        self.forms = forms
+        self.closer = closer or TreeCloser()
+        self.closer.relaxed = relaxations.energy
         self._known_root = known_root
         self.continua: Callable[[], Sequence[Codes]] = list
-        #: Subtrees that were left because the search was stopped, and the records that follow each of them.
-        self._left: list[tuple[Codes, KeptRecords]] = []
         self._recorder = certifier.recorder
         self.outcome = SearchOutcome()
-        #: Advice if limits are reached, besides raising them.
-        self.otherwise = ""
+        self.rest = Remainder(certifier, self.splitting, self.outcome, self._settle_late)
         #: The limit of what contact can hold, if the load is there: what stays undecided is what rounding decides.
         self.at_limit: LoadLimit | None = None
-        self._fallback: InteriorPointEngine | None = None
-        self.splitting: Splitting = splitting or PlaneSplitting(system.F)
-        self._rows = ImposedRows(self.splitting, system.p)
         self.covered = 0.0
         #: Examines what waits, the last first, until it is time to stop, and gives what still waits then; another one
         #: than this spreads it over workers.
@@ -163,14 +108,14 @@ class TreeSearch:
 
     def first(self) -> TreeNode:
         """The root of the tree: nothing decided."""
-        return TreeNode(None, (UNDECIDED,) * self.system.p, -1, last=False, weight=1.0, forced=())
+        return TreeNode(None, self.relaxations.nothing, -1, last=False, weight=1.0, forced=())
 
     def run(self) -> SearchOutcome:
         """Examine the whole tree."""
         start = [self.first()]
         if self._one(start[0]):
             return self.outcome
-        if self.system.p >= _MANY:
+        if len(start[0].codes) >= _MANY:
             self.known(self.limits)
         if self.forms is not None:
             held = self.certifier.recorder = KeptRecords()
@@ -185,7 +130,7 @@ class TreeSearch:
 
     def _one(self, item: TreeNode) -> bool:
         """True if one certificate proves that the problem has one solution."""
-        if self.closer is None or self.limits.max_nodes == 0:
+        if self.limits.max_nodes == 0:
             return False
         try:
             with within(self.limits):
@@ -195,18 +140,18 @@ class TreeSearch:
         if found is not None:
             self.outcome.nodes += 1
             self._close(item, found)
-            self.report(self.covered)
+            self.report()
         return found is not None
 
-    def _begin(self, start: list[TreeNode], held: KeptRecords, forms: Forms | SpaceForms) -> list[Any]:
+    def _begin(self, start: list[TreeNode], held: KeptRecords, forms: Forms) -> list[Any]:
         """Search until it is known how the search goes on: from the beginning, if that is better; what still waits."""
 
         def due() -> bool:
             return forms.due(self.outcome.nodes, self.covered)
 
-        closer, stack = self.closer, list[Any](start)
+        stack = list[Any](start)
         while stack:
-            stack = self.loop(stack, lambda: due() or (closer is not None and closer.begins_again(self.outcome.nodes)))
+            stack = self.loop(stack, lambda: due() or self.closer.begins_again(self.outcome.nodes))
             if not stack or due():
                 break
             self._forget(held)
@@ -216,11 +161,11 @@ class TreeSearch:
             return list(start)
         return stack
 
-    def _pays(self, forms: Forms | SpaceForms) -> bool:
+    def _pays(self, forms: Forms) -> bool:
         """True if a form is found that is better than the energy, before the time is over."""
         try:
             with within(self.limits):
-                return forms.pay(self.engine, self.first().codes, self._rows)
+                return forms.pay(self.relaxations.engine, self.relaxations.nothing, self.relaxations.rows)
         except TimeOverError:
             return False
 
@@ -234,11 +179,11 @@ class TreeSearch:
         """Examine subtrees, the last first, with a form that is known to hold for them; or on trial with a new one."""
         forms = self.forms
         if forms is not None:
-            forms.use(self.engine, form)
+            forms.use(self.relaxations.engine, form)
         if self.outcome.stopped is not None:
-            self._leave(items)
+            self.leave(items)
             return
-        stack: list[Any] = self._planted(items)
+        stack: list[Any] = self.relaxations.planted(items)
         if forms is not None and trial and form is None:
             stack = self.loop(stack, lambda: forms.due(self.outcome.nodes, self.covered))
             if stack and self._pays(forms):
@@ -246,88 +191,76 @@ class TreeSearch:
                 stack = [replace(item, parent=None) if isinstance(item, TreeNode) else item for item in stack]
         self.loop(stack, None)
 
-    def examined(self, items: Sequence[TreeNode], nodes: int, deadline: float | None = None) -> list[TreeNode]:
-        """Examine so many nodes of subtrees, the last first; what still waits then, or at the deadline."""
-        stack, last = self._planted(items), self.outcome.nodes + nodes
-        with within(Deadline(deadline)):
-            while stack and self.outcome.nodes < last and not over() and self._go_on(stack):
-                pass
+    def examined(self, items: Sequence[TreeNode], nodes: int) -> list[TreeNode]:
+        """Examine so many nodes of subtrees, the last first; what still waits then, or when the time is over."""
+        stack, last = self.relaxations.planted(items), self.outcome.nodes + nodes
+        with suppress(TimeOverError):
+            depth_first(stack, self.examine, lambda: self.outcome.nodes >= last or over())
         return stack
-
-    def _go_on(self, stack: list[TreeNode]) -> bool:
-        """Examine what waits last; whether there was time for it, and otherwise it waits as before."""
-        item = stack.pop()
-        try:
-            stack += self.examine(item)
-        except TimeOverError:
-            stack.append(item)
-            return False
-        return True
-
-    def _planted(self, items: Sequence[TreeNode]) -> list[TreeNode]:
-        """Subtrees of one search, the first one last, with the relaxations from which each of them begins."""
-        if len(items) < 2 or any(item.changed < 0 for item in items):
-            return list(items)
-        planted, codes, relaxation = list[TreeNode](), self.first().codes, None
-        for k, item in enumerate(items):
-            node = item.changed
-            over = self.splitting.above(item.codes[node], [deeper.codes[node] for deeper in items[k + 1 :]])
-            above = (*item.codes[:node], over, *item.codes[node + 1 :])
-            moved = [i for i, (one, other) in enumerate(zip(codes, above, strict=True)) if one != other]
-            if relaxation is None:
-                relaxation = self._root(above)
-            elif moved and not (relaxation.stalled or relaxation.pruned):
-                relaxation = relaxation.child(*self._rows.over(above, moved), last=False)
-            usable = not (relaxation.stalled or relaxation.pruned)
-            # the first of those with this parent is examined last
-            last = bool(moved) or not planted
-            planted.append(replace(item, parent=relaxation if usable else None, last=last))
-            codes = above
-        return planted
 
     def _run(self, stack: Sequence[TreeNode], until: Callable[[], bool] | None) -> list[TreeNode]:
         """Examine what waits, depth first; what still waits when it is time to stop."""
-        stack = list(stack)
+        stack, stopping = list(stack), False
+
+        def ended() -> bool:
+            nonlocal stopping
+            stopping = until is not None and self.is_time_to(until)
+            return stopping or self.must_stop(len(stack))
+
         with within(self.limits):
-            while stack:
-                if until is not None and self._time_to(until):
-                    break
-                if self.must_stop(len(stack)):
-                    self._leave(stack)
-                    return []
-                self._go_on(stack)
-        return stack
+            while stack and not stopping and self.outcome.stopped is None:
+                try:
+                    depth_first(stack, self.examine, ended)
+                except TimeOverError:
+                    continue  # what was examined waits again, and the limits are looked at
+        if stopping:
+            return stack
+        self.leave(stack)
+        return []
 
     @staticmethod
-    def _time_to(until: Callable[[], bool]) -> bool:
+    def is_time_to(until: Callable[[], bool]) -> bool:
         """True if it is time to stop, as far as there is time to find out."""
         try:
             return until()
         except TimeOverError:
             return False
 
-    def _leave(self, items: Sequence[TreeNode]) -> None:
-        for item in reversed(items):
-            self.skip(item.codes)
+    # -- what a search spread over workers asks for -----------------------------------------------------------------
 
-    def skip(self, codes: Codes) -> None:
-        """Leave a subtree to `finish`, because the search was stopped."""
-        # which continua reach into it is known once everything is found, also what comes after it
-        self._left.append((codes, KeptRecords(packed=True)))
-        self.certifier.recorder = self._left[-1][1]
+    @property
+    def left(self) -> int | None:
+        """Number of nodes that may still be examined; None for any number."""
+        return None if self.limits.max_nodes is None else self.limits.max_nodes - self.outcome.nodes
+
+    @property
+    def stopped(self) -> StopReason | None:
+        """Reason for an early end."""
+        return None if self.outcome.stopped is None else self.outcome.stopped.reason
+
+    def stop_for_time(self) -> None:
+        """Take note that the time is over."""
+        self.outcome.stopped = Stop(StopReason.TIME_LIMIT, unexamined=0)
+
+    def take(self, answer: Answer) -> None:
+        """Take in what a worker found below some subtrees."""
+        outcome, certified, records = answer.found
+        self.outcome.add(outcome)
+        self.certifier.add(certified)
+        if records is not None:
+            self.certifier.recorder.add(records)
+
+    # -- what is left when the search is stopped --------------------------------------------------------------------
+
+    def leave(self, items: Sequence[TreeNode]) -> None:
+        """Leave subtrees to `finish`, because the search was stopped."""
+        for item in reversed(items):
+            self.rest.add(item.codes)
 
     def finish(self) -> None:
         """Leave what was skipped undecided, except for the known root and the selections of continua in it."""
-        left, self._left = self._left, []
-        if not left:
-            return
-        self.certifier.recorder = self._recorder
         with within(Deadline(self.limits.deadline).extended(self._start)):
-            wanted = self._wanted()
-            for codes, after in left:
-                self._leave_but(codes, wanted)
-                after.release(self._recorder)
-        self.outcome.count_unexamined()
+            self.rest.finish(self._wanted)
 
     def _wanted(self) -> list[Codes]:
         """Complete selections that are decided although the search was stopped."""
@@ -341,33 +274,9 @@ class TreeSearch:
             self.outcome.late = True
         return wanted
 
-    def _leave_but(self, codes: Codes, wanted: Sequence[Codes]) -> None:
-        """Leave a subtree undecided, except for complete selections."""
-        stack = [(codes, wanted)]
-        while stack:
-            codes, wanted = stack.pop()
-            wanted = [final for final in wanted if all(map(self.splitting.holds, codes, final))]
-            if not wanted:
-                self._skip(codes)
-                continue
-            node = next((i for i, code in enumerate(codes) if code != wanted[0][i]), -1)
-            if node < 0:
-                self._settle_late(codes)
-                continue
-            final, before, after = wanted[0][node], codes[:node], codes[node + 1 :]
-            # the one that holds the selection comes last: what is beside it is left behind at once
-            children = self.splitting.towards(codes, node, final)
-            children.sort(key=partial(self.splitting.holds, final=final))
-            self.certifier.branching(node, children)
-            stack += [((*before, code, *after), wanted) for code in reversed(children)]
-
     def _settle_late(self, codes: Codes) -> None:
-        """Have the certifier decide a complete selection after the search was stopped, if there is time."""
-        try:
-            self._settle(TreeNode(None, codes, -1, last=False, weight=0.0))
-        except TimeOverError:
-            self.outcome.late = True
-            self._skip(codes)
+        """Have the certifier decide a complete selection after the search was stopped."""
+        self._settle(TreeNode(None, codes, -1, last=False, weight=0.0))
 
     def known(self, limits: Limited) -> Codes | None:
         """Codes of a selection that holds a root, if one is found within limits."""
@@ -384,27 +293,20 @@ class TreeSearch:
         """Add the root that is known, in a search that was interrupted before it came there."""
         root = self.known(Deadline.after(time.perf_counter(), _LATE))
         if root is not None and root not in self.certifier.certified.verified:
-            self._settle(TreeNode(None, root, -1, last=False, weight=0.0))
-
-    def _skip(self, codes: Codes) -> None:
-        stop = self.outcome.stopped
-        assert stop is not None
-        self.certifier.skipped(codes, str(stop))
-        hint = f"{stop.remedy}, or {self.otherwise}" if stop.limited and self.otherwise else stop.remedy
-        self.outcome.undecided.append(UndecidedPart(codes, "the search was stopped before it got here", hint))
+            self._settle_late(root)
 
     def examine(self, item: TreeNode) -> list[TreeNode]:
         """Settle one node of the tree, or give its children, the one that is examined first last."""
         outcome = self.outcome
         outcome.nodes += 1
         codes = item.codes
-        led = None if self.closer is None else self.closer.led(codes)
+        led = self.closer.led(codes)
         if isinstance(led, list):
             self._close(item, led)
             return []
         if led is not None:
             return self._split(item, None, *led)
-        if self.closer is not None and self.closer.leads and item.parent is None and self.excluded(item, NO_BOUND):
+        if self.closer.leads and item.parent is None and self.excluded(item, NO_BOUND):
             return []
         relaxation: Relaxation | None
         relaxation = solved = self.relax(item)
@@ -412,13 +314,14 @@ class TreeSearch:
             # the fallback costs more than a try
             if self.closed(item, None):
                 return []
-            relaxation = self._fall_back(codes)
+            outcome.fallback_qps += 1
+            relaxation = self.relaxations.fallen_back(codes)
         if relaxation is not None and relaxation.pruned and self.excluded(item, relaxation):
             return []
         usable = relaxation if relaxation is not None and not relaxation.pruned else None
         if self.closed(item, usable):
             return []
-        node, forced = branching_node(codes, item.forced, usable, () if self.closer is None else self.closer.sliding)
+        node, forced = branching_node(codes, item.forced, usable, self.closer.sliding)
         if node < 0:
             node = self._settle(item)
         if node < 0:
@@ -454,8 +357,6 @@ class TreeSearch:
 
     def closed(self, item: TreeNode, relaxation: Relaxation | None, *, again: bool = False) -> bool:
         """True if the subtree is closed by its only possible solution; ``again``: it was, in an earlier search."""
-        if self.closer is None:
-            return False
         found = (self.closer.again if again else self.closer.closed)(item.codes, relaxation)
         if found is None:
             return False
@@ -464,7 +365,7 @@ class TreeSearch:
 
     def alone(self, item: TreeNode, proposal: LoneProposal, bound: Bound) -> bool:
         """True if the subtree is closed by a root that is proven to be the only one."""
-        found = None if self.closer is None else self.closer.alone(item.codes, proposal, bound)
+        found = self.closer.alone(item.codes, proposal, bound)
         if found is None:
             return False
         self._close(item, found)
@@ -484,8 +385,7 @@ class TreeSearch:
         outcome = self.outcome
         outcome.selections += 1
         answer = self.certifier.selection(item.codes)
-        if self.closer is not None:
-            self.closer.met(answer)
+        self.closer.met(answer)
         if isinstance(answer, Refine):
             return answer.node
         if isinstance(answer, UndecidedPart):
@@ -495,7 +395,7 @@ class TreeSearch:
         self.covered += item.weight
         return -1
 
-    def must_stop(self, waiting: int) -> bool:
+    def must_stop(self, waiting: int = 0) -> bool:
         """Look at the limits and report progress."""
         outcome, limits = self.outcome, self.limits
         if limits.max_nodes is not None and outcome.nodes >= limits.max_nodes:
@@ -507,7 +407,7 @@ class TreeSearch:
         elif limits.over:
             outcome.stopped = Stop(StopReason.TIME_LIMIT, unexamined=waiting)
         elif outcome.nodes % _REPORT_EVERY == 0:
-            self.report(self.covered)
+            self.report()
         return outcome.stopped is not None
 
     def _rounding_decides(self) -> bool:
@@ -517,54 +417,17 @@ class TreeSearch:
         endless = self.limits.max_nodes is None and self.limits.deadline is None
         return bool(self.outcome.undecided) or (endless and self.outcome.nodes >= _AT_LIMIT)
 
-    def report(self, covered: float) -> None:
-        """Call the progress callback; without one, tell how many nodes were examined."""
+    def report(self, share: float = 0.0) -> None:
+        """Tell that so much more of the tree is done, and how many nodes were examined."""
         outcome = self.outcome
+        self.covered += share
         if self.progress is None:
             tell(f"{outcome.nodes:,} nodes")
         else:
             seconds = time.perf_counter() - self._start
-            self.progress(SearchProgress(outcome.nodes, covered, len(outcome.solutions), seconds, outcome.resumed))
-
-    # -- relaxations -----------------------------------------------------------------------------------------------
+            self.progress(SearchProgress(outcome.nodes, self.covered, len(outcome.solutions), seconds, outcome.resumed))
 
     def relax(self, item: TreeNode) -> Relaxation:
         """The relaxation, solved or stalled."""
-        codes = item.codes
         self.outcome.qps += 1
-        if item.parent is not None:
-            return item.parent.child(*self._rows.of(item.changed, codes[item.changed]), last=item.last)
-        relaxation = self._root(codes)
-        return self._by_steps(codes) if relaxation.stalled and item.changed >= 0 else relaxation
-
-    def _by_steps(self, codes: Codes) -> Relaxation:
-        """The relaxation of a partial assignment, its nodes one after the other."""
-        relaxation = self._root(self.first().codes)
-        for node, code in enumerate(codes):
-            if relaxation.stalled or relaxation.pruned:
-                break
-            if code != UNDECIDED:
-                relaxation = relaxation.child(*self._rows.of(node, code), last=True)
-        return relaxation
-
-    def _root(self, codes: Codes, engine: Any = None) -> Relaxation:
-        """The relaxation of a partial assignment without a parent; by default with the form in use, if there is one."""
-        if engine is None:
-            engine = (None if self.forms is None else self.forms.engine) or self.engine
-        relaxation: Relaxation = engine.root(*self._rows.over(codes, range(len(codes))))
-        return relaxation
-
-    def relaxed(self, codes: Codes) -> Relaxation | None:
-        """The relaxation of a partial assignment with the energy, if it is solved and leaves a minimiser."""
-        relaxation = self._root(codes, self.engine)
-        return None if relaxation.stalled or relaxation.pruned else relaxation
-
-    def _fall_back(self, codes: Codes) -> Relaxation | None:
-        """The relaxation by the slower engine; None when that gives no answer either."""
-        self.outcome.fallback_qps += 1
-        if not isinstance(self.system, ScaledSystem):
-            return None  # the node is branched on
-        if self._fallback is None:
-            self._fallback = InteriorPointEngine(self.system)
-        relaxation = self._fallback.root(*self._rows.over(codes, range(len(codes))))
-        return None if relaxation.stalled else relaxation
+        return self.relaxations.of(item)

@@ -20,7 +20,7 @@ from enumsol.trusted.status_rows import BACKWARD, FORWARD, FRICTIONLESS, OPEN, S
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.condensation.floating import FloatingSystem
+    from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.support.array_types import Floats
 
 #: Cells that are looked at before it is left open, and how narrow they may become.
@@ -33,7 +33,7 @@ _SIDES = {SLIP_PLUS: (1,), FORWARD: (1,), SLIP_MINUS: (-1,), BACKWARD: (-1,), FR
 _WIDER = 1e-6
 
 
-def without_bound(system: FloatingSystem) -> FloatingSystem:
+def without_bound(system: EnclosedSystem) -> EnclosedSystem:
     """The system with bounds of the rigid displacement beyond which it is proven that there is no solution.
 
     They are some multiple of its own; infinite where none was found to serve.
@@ -47,7 +47,7 @@ def without_bound(system: FloatingSystem) -> FloatingSystem:
     return system.reaching(np.full_like(system.reach, np.inf))
 
 
-def is_confined(system: FloatingSystem) -> bool:
+def is_confined(system: EnclosedSystem) -> bool:
     """Whether it is proven that no solution has a coordinate of its rigid displacement beyond its bound."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):
@@ -56,7 +56,7 @@ def is_confined(system: FloatingSystem) -> bool:
         return False
 
 
-def motion_against(system: FloatingSystem, codes: Sequence[int]) -> Floats:
+def motion_against(system: EnclosedSystem, codes: Sequence[int]) -> Floats:
     """A rigid motion against which the load works, and no forces of an assignment do, nor any that are near these.
 
     What is left of the load after its projection onto the cone of resultants G lambda, which is made wider by a share.
@@ -65,7 +65,7 @@ def motion_against(system: FloatingSystem, codes: Sequence[int]) -> Floats:
     return motion_beside(system, _rays(system, codes))
 
 
-def motion_beside(system: FloatingSystem, resultants: Sequence[Floats]) -> Floats:
+def motion_beside(system: EnclosedSystem, resultants: Sequence[Floats]) -> Floats:
     """As ``motion_against``, for forces whose resultants are combinations of these with positive coefficients."""
     h = system.rows.h.mid
     size = float(np.linalg.norm(h))
@@ -86,7 +86,7 @@ def motion_beside(system: FloatingSystem, resultants: Sequence[Floats]) -> Float
     return rest / length if length > 0 else rest
 
 
-def _rays(system: FloatingSystem, codes: Sequence[int]) -> list[Floats]:
+def _rays(system: EnclosedSystem, codes: Sequence[int]) -> list[Floats]:
     """Resultants that span those of all forces of an assignment."""
     G, F, p = system.rows.G.mid, system.F, system.p
     return [
@@ -102,10 +102,10 @@ class _Cells:
 
     Parameters
     ----------
-    system : FloatingSystem
+    system : EnclosedSystem
     """
 
-    def __init__(self, system: FloatingSystem) -> None:
+    def __init__(self, system: EnclosedSystem) -> None:
         self._system, self._p, self._reach = system, system.p, system.reach
         self._known: dict[tuple[int, ...], bool] = {}
         G, k = system.rows.G, gamma(len(self._reach) + 8)

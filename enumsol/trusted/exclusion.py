@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, NamedTuple, Self, cast
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, gamma
-from enumsol.condensation.floating import FloatingSystem
+from enumsol.condensation.enclosure import EnclosedSystem
 from enumsol.trusted.energy_bounds import energy_bounds, form_bounds
 from enumsol.trusted.floating_bounds import floating_bounds
 from enumsol.trusted.over_interval import EnclosedPiece
@@ -154,8 +154,8 @@ def _margins(
         # where friction is constant a cone row may be an equation, and its coefficient must be the exact one
         c_rad[:, :p] += np.max([end.F_rad for end in ends], axis=0) * (low == high) * cone_size
         c_rad *= SAFE
-        if isinstance(ends[0], FloatingSystem):
-            least = floating_bounds(cast("Sequence[FloatingSystem]", ends), y, c, c_rad, errors)
+        if isinstance(ends[0], EnclosedSystem) and not ends[0].held:
+            least = floating_bounds(cast("Sequence[EnclosedSystem]", ends), y, c, c_rad, errors)
         else:
             least = np.min([_bounds(end, y, c, c_rad, errors) for end in ends], axis=0)
     return np.where(refused | ~np.isfinite(least), -np.inf, least)

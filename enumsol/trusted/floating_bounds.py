@@ -21,11 +21,11 @@ from enumsol.trusted.status_rows import BACKWARD, FORWARD, OPEN, SLIP_MINUS, SLI
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.condensation.floating import FloatingSystem
+    from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.support.array_types import Floats, Mask
 
 
-def floating_bounds(ends: Sequence[FloatingSystem], y: Floats, c: Floats, c_rad: Floats, errors: float = 1.0) -> Floats:
+def floating_bounds(ends: Sequence[EnclosedSystem], y: Floats, c: Floats, c_rad: Floats, errors: float = 1.0) -> Floats:
     """Lower bounds on e - h'q for multipliers y (m, 2p) and c, a ball; as energy_bounds.
 
     At one alpha, or for all between two, at which g and h are those of the ends (theory, section 14.8).
@@ -50,7 +50,7 @@ def floating_bounds(ends: Sequence[FloatingSystem], y: Floats, c: Floats, c_rad:
     return np.asarray(np.fmax(first, np.where(sure & np.isfinite(second), second, -np.inf)))
 
 
-def _bend(found: Sequence[tuple[FloatingSystem, Floats, Floats, Mask]], z: Sequence[Floats]) -> Floats:
+def _bend(found: Sequence[tuple[EnclosedSystem, Floats, Floats, Mask]], z: Sequence[Floats]) -> Floats:
     """How far the bound may sag between two ends, (m,), for multipliers that are affine in alpha."""
     (one, y0, change0, _), (other, y1, change1, _) = found
     k = gamma(len(one.g) + len(one.reach) + 8)
@@ -61,7 +61,7 @@ def _bend(found: Sequence[tuple[FloatingSystem, Floats, Floats, Mask]], z: Seque
     return np.asarray(0.25 * work * (1 + k) * SAFE * SAFE + TINY)
 
 
-def balancing(system: FloatingSystem, y: Floats, c: Floats) -> Floats:
+def balancing(system: EnclosedSystem, y: Floats, c: Floats) -> Floats:
     """Multipliers z of G lambda - h, (m, r), that are good for these y and c; any z is a choice."""
     G, h = system.rows.G.mid, system.rows.h.mid
     z = (2 * h - (system.g + c) @ system.inverse.T @ G.T - y @ G.T) @ system.mode_inverse
@@ -69,7 +69,7 @@ def balancing(system: FloatingSystem, y: Floats, c: Floats) -> Floats:
 
 
 def bounds_within(
-    system: FloatingSystem,
+    system: EnclosedSystem,
     y: Floats,
     y_rad: Floats,
     c: Floats,
@@ -138,7 +138,7 @@ def balanced(G: Ball, h: Ball, y: Floats, errors: float = 1.0) -> tuple[Floats, 
     return y, y_abs * share * SAFE + TINY * (y_abs > 0), sure
 
 
-def is_unbalanced(system: FloatingSystem, codes: Sequence[int], z: Floats) -> bool:
+def is_unbalanced(system: EnclosedSystem, codes: Sequence[int], z: Floats) -> bool:
     """Whether no forces below a partial assignment are in balance with the load, by z (r,); see theory, (14.7).
 
     z'h > 0, and z'G lambda <= 0 for the forces that span those of every node: (1, F) or (1, -F), or (1, 0) where F = 0.

@@ -18,7 +18,6 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, factor_above, gamma, upper_norm
 from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem
-from enumsol.condensation.floating import FloatingSystem, RigidRows
 from enumsol.trusted.quadratic_forms import EnclosedForm
 from enumsol.trusted.status_rows import BACKWARD, FORWARD, ROW_KINDS, STILL, UNDECIDED, row_table
 
@@ -83,24 +82,6 @@ class EnclosedPiece:
         elif enclosure.problem.load_slope is None:
             systems = systems[:1]
         return cls(tuple(systems), low, high)
-
-    @classmethod
-    def floating(
-        cls, problem: ContactProblem, a: Fraction, b: Fraction, force: Floats, length: Floats
-    ) -> EnclosedPiece:
-        """A piece [a, b] of a body that nothing holds (theory, section 14.8).
-
-        Raises
-        ------
-        NotEnclosedError
-            Something over- or underflows.
-        """
-        held = cls.from_enclosure(problem.on_springs.enclosure, a, b, force, length, None)
-        ends = tuple(
-            FloatingSystem.on(end, RigidRows.of(problem, alpha, force, length))
-            for end, alpha in zip(held.ends, (a, b), strict=False)
-        )
-        return replace(held, ends=ends)
 
     def with_form(self, multipliers: Floats) -> EnclosedPiece:
         """Piece with a form for all of its alpha: with F_lo in place of F (theory, section 7.9).

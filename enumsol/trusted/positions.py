@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, Ball, hull, smaller
-from enumsol.condensation.floating import FloatingSystem, RigidRows, moved_by_modes
+from enumsol.condensation.enclosure import enclosure_of, moved_by_modes
 from enumsol.trusted.at_alpha import displacements
 from enumsol.trusted.status_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
@@ -96,17 +96,17 @@ def tangential_positions(
     NotEnclosedError
         The step's data cannot be enclosed.
     """
-    enclosure, p = problem.on_springs.enclosure, problem.p
+    enclosure, p = enclosure_of(problem), problem.p
     S = Ball(enclosure.S, enclosure.S_rad)
     forces = _pressing(forces, p)
     with np.errstate(over="ignore", invalid="ignore"):
         moved = (enclosure.moved_freely(alpha) - (S @ forces[:, None])[:, 0])[p:]
         if rigid is not None:
             moved = moved + (moved_by_modes(problem)[p:] @ rigid[:, None])[:, 0]
-        elif problem.modes is not None:
+        elif not problem.held:
             moved = Ball(moved.mid, np.full_like(moved.rad, np.inf))
     well_known, found = np.max(moved.rad) <= share * _WELL_KNOWN * np.max(np.abs(moved.mid)), None
-    if len(moved.mid) == p and problem.modes is not None:
+    if len(moved.mid) == p and not problem.held:
         selections = [codes] if codes is not None else product(*among) if among is not None else ()
         found = _by_selections(problem, alpha, selections, before)
     elif codes is not None and not well_known:
@@ -129,11 +129,10 @@ def _by_selections(problem: Any, alpha: Fraction, selections: Iterable[Sequence[
     None where there are none, or one may be singular.
     """
     units, p, found = problem.on_springs.condensed.at(alpha).proposals, problem.p, list[Ball]()
-    rows, length = RigidRows.of(problem, alpha, units.force, units.length), units.length[p:]
+    length = units.length[p:]
     for codes in selections:
         moves = np.array(codes) != STICK
-        held = problem.on_springs.enclosure.without_offsets(moves).at(alpha, units.force, units.length)
-        w = displacements(FloatingSystem.on(held, rows), codes)
+        w = displacements(enclosure_of(problem).without_offsets(moves).at(alpha, units.force, units.length), codes)
         if w is None:
             return None
         mid, rad = w.mid[p:] * length, w.rad[p:] * length

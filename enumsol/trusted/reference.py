@@ -17,7 +17,7 @@ from enumsol.trusted.uniqueness_weights import Components, Weights
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.condensation.floating import FloatingSystem
+    from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.root_forms import Product
 
@@ -32,7 +32,7 @@ class Reference:
 
     Attributes
     ----------
-    system : FloatingSystem
+    system : EnclosedSystem
     selection : final codes
     root : VerifiedSelection
     at : Unknowns
@@ -40,19 +40,19 @@ class Reference:
     form : RootForm
     """
 
-    system: FloatingSystem
+    system: EnclosedSystem
     selection: Codes
     root: VerifiedSelection
     at: Unknowns
     form: RootForm
 
     @classmethod
-    def of(cls, system: FloatingSystem, selection: Codes, weights: Floats, balance: float, share: float) -> Self | None:
+    def of(cls, system: EnclosedSystem, selection: Codes, weights: Floats, balance: float, share: float) -> Self | None:
         """None where the selection holds no strict root, or its form is not proven definite where G d = 0.
 
         Parameters
         ----------
-        system : FloatingSystem
+        system : EnclosedSystem
         selection : final codes
         weights : mu of all nodes, then kappa, nu and theta / F of those with friction
         balance : factor of |G d|^2

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 from enumsol.proof.writer import ProofWriter
 from enumsol.search.outcome import SearchLimits
-from enumsol.search.solvers import Solvers
-from enumsol.search.tree import TreeSearch
+from enumsol.search.solvers import Solvers, plane_search
 from enumsol.selections.float_selections import SIGN_TOLERANCE
 
 if TYPE_CHECKING:
@@ -30,4 +29,4 @@ def search(
     solvers = Solvers(problem, alpha, arithmetic, SIGN_TOLERANCE)
     certifier = solvers.certifier(ProofWriter() if arithmetic == "verified" else None)
     engine = make_engine(solvers.scaled)
-    return TreeSearch(solvers.scaled, certifier, engine=engine, limits=SearchLimits(max_nodes=max_nodes)).run()
+    return plane_search(solvers.scaled, certifier, limits=SearchLimits(max_nodes=max_nodes), engine=engine).run()

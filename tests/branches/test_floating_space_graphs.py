@@ -13,7 +13,7 @@ from problems3d import cross
 from proof_tools import proof_of, put, records_of, replaced, why_refused
 
 import enumsol
-from enumsol.condensation.floating import enclosed_over_alpha
+from enumsol.condensation.enclosure import enclosure_of
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import SECTORS, direction, nearest
 from enumsol.search.space.piece_multipliers import AlphaPoint
@@ -243,7 +243,7 @@ def test_what_holds_a_solution_somewhere_in_a_piece_is_not_excluded():
         known, rng = known_body(seed), np.random.default_rng(seed)
         problem = known.problem.replace(load_slope=0.3 * rng.normal(size=known.problem.n))
         ones = np.ones(problem.p)
-        space = AlphaSpace(enclosed_over_alpha(problem), Fraction(1, 8), (ones, ones))
+        space = AlphaSpace(enclosure_of(problem), Fraction(1, 8), (ones, ones))
         piece = AlphaPiece(space, Fraction(-1, 8), Fraction(int(rng.integers(0, 3)), 8))
         for _ in range(6):
             codes = tuple(_status(known, node, rng) for node in range(problem.p))

@@ -27,7 +27,8 @@ from rational_forms import Refused
 from trusted.test_confinement import enclosed, final_codes
 
 import enumsol
-from enumsol.condensation.space_condensed import FloatingSpace
+from enumsol.condensation.enclosure import enclosure_of
+from enumsol.condensation.space_condensed import EnclosedSpace
 from enumsol.model import sectors
 from enumsol.model.sectors import SECTORS, nearest
 from enumsol.trusted.exclusion import exclusion_margin
@@ -293,7 +294,7 @@ def test_what_holds_a_solution_is_not_excluded():
     for seed in range(6):
         known, rng = known_body(seed), np.random.default_rng(seed)
         ones = np.ones(known.problem.p)
-        system = FloatingSpace.of(known.problem, Fraction(0), ones, ones)
+        system = EnclosedSpace.of_problem(enclosure_of(known.problem), Fraction(0), ones, ones)
         free = system.reaching(np.full_like(system.reach, np.inf))
         for _ in range(12):
             codes = [_status(known, system, node, rng) for node in range(known.problem.p)]

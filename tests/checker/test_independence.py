@@ -21,7 +21,7 @@ def inside(room, *modules):
     return [f"enumsol.{room}.{module}" for module in modules]
 
 
-CHECKERS = inside("checker", "verify", "plane_checker", "floating", "graph_checker", "history_checker", "space_graph")
+CHECKERS = inside("checker", "verify", "plane_checker", "graph_checker", "history_checker", "space_graph")
 IN_SPACE = {
     *("enumsol.checker.space_checker", "enumsol.condensation.space_condensed", "enumsol.model.sectors"),
     *inside("trusted.space", "resultants", "sector_rows", "slip_forms", "leaves", "boxed_solution"),
@@ -40,10 +40,11 @@ SHARED = {
         *("as_objects", "is_positive_definite", "rational", "rational_matrix", "simplest", "to_fraction")
     },
     "condensation.data": {"Data", "EXACT_DOF_LIMIT", "ProblemData", "exactly_at"},
-    "condensation.enclosure": {"CondensedEnclosure", "EnclosedSystem", "NotEnclosedError"},
+    "condensation.enclosure": {
+        *("CondensedEnclosure", "EnclosedSystem", "NotEnclosedError", "RigidRows", "enclosure_of", "moved_by_modes")
+    },
     "condensation.free_displacements": {"solved"},
-    "condensation.floating": {"FloatingSystem", "RigidRows", "enclosed_over_alpha", "moved_by_modes"},
-    "condensation.space_condensed": {"AlphaSpace", "EnclosedSpace", "FloatingPiece", "FloatingSpace", "SpaceSystem"},
+    "condensation.space_condensed": {"AlphaSpace", "EnclosedSpace", "PieceSpace", "SpaceSystem"},
     "condensation.unloaded": {"CondensedData", "never_loaded", "vanishing_alpha"},
     "trusted.arcs.only_branch": {"only_roots"},
     "trusted.arcs.selection_balls": None,

@@ -10,14 +10,14 @@ from proof_tools import copied
 
 from enumsol.arithmetic.algebraic import real_roots
 from enumsol.arithmetic.rationals import rational
-from enumsol.condensation.exact import exact_condensed
+from enumsol.condensation.exact import ExactCondensed
 
 
 class ArcOracle:
     """The truth about selections of one problem."""
 
     def __init__(self, problem):
-        exact = exact_condensed(problem)
+        exact = ExactCondensed.from_problem(problem)
 
         @cache
         def truth(codes, side):

@@ -8,7 +8,7 @@ from enumsol.branches.enclosed.single_branches import ClosedPieces
 from enumsol.search import fathoming as closing
 from enumsol.search.fathoming import Closer
 from enumsol.search.reduction import WeightSource
-from enumsol.search.space import space_fathoming, space_forms
+from enumsol.search.space import space_fathoming, space_setup
 from enumsol.search.space.known_boxes import KnownBoxes
 from enumsol.search.space.space_fathoming import SpaceCloser
 
@@ -76,4 +76,4 @@ def products_at_once():
 
 def forms_at_once():
     """In this context searches in 3D look for a form after one node, and use the best one that there is."""
-    return _with((space_forms, "NODES", 1), (space_forms, "_SHARE", 1.0))
+    return _with((space_setup, "NODES", 1), (space_setup, "_SHARE", 1.0))

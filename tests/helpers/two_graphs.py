@@ -12,7 +12,7 @@ from enumsol.branches.exact.gluing import glue
 from enumsol.branches.exact.known_selections import KnownSelections
 from enumsol.branches.exact.make_elements import make_arcs, make_vertices
 from enumsol.branches.ways import ByAlgebra
-from enumsol.condensation.exact import exact_condensed
+from enumsol.condensation.exact import ExactCondensed
 
 
 @dataclass
@@ -39,10 +39,10 @@ class TwoGraphs:
 def two_graphs(problem, interval):
     """Both graphs from one search."""
     a, b = (Fraction(end) for end in interval)
-    exact = exact_condensed(problem)
+    exact = ExactCondensed.from_problem(problem)
     traced = TracedProblem(problem, (a, b), exact.zero)
-    way = ByAlgebra.of(problem, exact, "verified")
-    search = way.search((a, b), None, None, None)
+    way = ByAlgebra.of(problem, (a, b), exact, "verified")
+    search = way.begin()
     search.run()
     followed = follow_selections(traced, search.pieces, cut_short=search.stopped is not None)
     gluing = glue(KnownSelections(exact, rational(a), rational(b), cut_short=False), search.selections)

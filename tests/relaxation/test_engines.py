@@ -19,7 +19,7 @@ import enumsol
 from enumsol import MissingDependencyError, enumerate_roots, gallery
 from enumsol.relaxation import active_set, interior_point as fallback
 from enumsol.search.certifiers.float_certifier import FastCertifier
-from enumsol.search.tree import TreeSearch
+from enumsol.search.solvers import plane_search
 from enumsol.selections.float_selections import FloatSelections
 
 
@@ -45,7 +45,7 @@ def searched(problem, alpha, **options):
     """Outcome of the fast tree search with an engine that has these options."""
     system = problem.condensed.at(alpha).scaled
     certifier = FastCertifier(FloatSelections(system))
-    return TreeSearch(system, certifier, engine=active_set.ActiveSetEngine(system, **options)).run()
+    return plane_search(system, certifier, engine=active_set.ActiveSetEngine(system, **options)).run()
 
 
 @pytest.mark.parametrize("options", [{"candidates": 1}, {"candidates": 4}, {"candidates": 1000}, {"slow": True}])

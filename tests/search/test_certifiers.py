@@ -8,8 +8,7 @@ from generators import named
 
 import enumsol
 from enumsol.search.certifiers.protocol import Certified, Escalations
-from enumsol.search.solvers import Solvers
-from enumsol.search.tree import TreeSearch
+from enumsol.search.solvers import Solvers, plane_search
 from enumsol.selections.float_selections import SIGN_TOLERANCE
 
 
@@ -21,7 +20,7 @@ def searched(arithmetic):
     """The certifier after a search, and the records that it wrote."""
     solvers, records = Solvers(*named("two-node-6.4"), arithmetic, SIGN_TOLERANCE), Records()
     certifier = solvers.certifier(records)
-    outcome = TreeSearch(solvers.scaled, certifier).run()
+    outcome = plane_search(solvers.scaled, certifier).run()
     assert len(outcome.solutions) == 5
     return certifier, records
 

@@ -11,7 +11,7 @@ from problems3d import random_over_alpha
 from proof_tools import bytes_of
 
 from enumsol import branch_graph
-from enumsol.search.space import piece_parallel, piece_tree
+from enumsol.search.space import known_curves, piece_parallel, piece_tree
 
 
 @pytest.fixture(scope="module")
@@ -32,15 +32,15 @@ def small_tasks(monkeypatch):
 @pytest.fixture
 def curves_met_late(monkeypatch):
     """No solutions are sampled, so that every curve but the first one is met at a leaf; gives what the tasks wanted."""
-    monkeypatch.setattr(piece_tree, "_SAMPLED", ())
-    wanted, examined = [], piece_parallel._examined
+    monkeypatch.setattr(known_curves, "_SAMPLED", ())
+    wanted, examined = [], piece_parallel.PieceWorker.examined
 
     def noted(*arguments):
         answer = examined(*arguments)
         wanted.append(answer.wanted)
         return answer
 
-    monkeypatch.setattr(piece_parallel, "_examined", noted)
+    monkeypatch.setattr(piece_parallel.PieceWorker, "examined", noted)
     return wanted
 
 

@@ -46,21 +46,21 @@ def test_no_part_is_long_and_no_worker_waits(small_parts, monkeypatch, wedge):
 
     def watched(self, seconds=None):
         # when the search waits either the workers have enough to do, or there is no more
-        seen.append((self.room, len(spread._crew._waiting)))
+        seen.append((self.room, len(spread._waiting)))
         return before(self, seconds)
 
     def made(*arguments):
         nonlocal spread
-        spread = parallel.Spread(*arguments)
+        spread = parallel.SpreadSearch(*arguments)
         return spread
 
     spread = None
     monkeypatch.setattr(Crew, "next", watched)
-    monkeypatch.setattr("enumsol.roots.enumeration.Spread", made)
+    monkeypatch.setattr("enumsol.roots.enumeration.SpreadSearch", made)
     with Watched(2) as executor:
         found = enumerate_roots(problem, alpha, executor=executor)
     assert not differences(found, whole, rtol=1e-12)
-    nodes = [part.outcome.nodes for part in executor.parts if part is not None]
+    nodes = [part.nodes for part in executor.parts if part is not None]
     assert max(nodes) <= 16
     assert sum(nodes) == found.stats.nodes - 8
     assert found.stats.nodes == pytest.approx(whole.stats.nodes, rel=0.05)

@@ -10,15 +10,14 @@ from complete import all_roots
 from helpers.floating_oracle import Oracle, block_on_table, random_body
 
 import enumsol
-from enumsol.condensation.floating import FloatingSystem, RigidRows
+from enumsol.condensation.enclosure import enclosure_of
 from enumsol.trusted.confinement import is_confined, motion_against, without_bound
 from enumsol.trusted.floating_bounds import is_unbalanced
 
 
 def enclosed(problem):
     system = problem.on_springs.condensed.at(0).scaled
-    held = problem.on_springs.enclosure.at(0, system.force, system.length)
-    return FloatingSystem.on(held, RigidRows.of(problem, Fraction(0), system.force, system.length))
+    return enclosure_of(problem).at(0, system.force, system.length)
 
 
 def final_codes(codes, oracle):

@@ -9,7 +9,7 @@ from floating_oracle import Oracle, block_on_table, rational
 from history_oracle import exact_history
 
 import enumsol
-from enumsol.condensation.floating import FloatingSystem, RigidRows
+from enumsol.condensation.enclosure import enclosure_of
 from enumsol.model.restart import SlipStart, restarted
 from enumsol.trusted.joint_roots import MOST_BETWEEN, joint_root
 from enumsol.trusted.status_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
@@ -20,10 +20,7 @@ CODES = {"open": OPEN, "stick": STICK, "slip+": SLIP_PLUS, "slip-": SLIP_MINUS}
 def system_of(problem, alpha):
     """Balls of a problem in units of one."""
     ones = np.ones(2 * problem.p)
-    held = problem.on_springs.enclosure.at(alpha, ones, ones)
-    return (
-        held if problem.modes is None else FloatingSystem.on(held, RigidRows.of(problem, Fraction(alpha), ones, ones))
-    )
+    return enclosure_of(problem).at(alpha, ones, ones)
 
 
 def held_again(problem, alpha, offset=None):

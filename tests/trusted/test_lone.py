@@ -11,8 +11,8 @@ from touching import problem_of_any_kind
 
 from enumsol.condensation.enclosure import CondensedEnclosure
 from enumsol.search.fathoming_in_contact import KnownRoot, Lone as Proposed
+from enumsol.search.solvers import make_engine
 from enumsol.search.splitting import ImposedRows, PlaneSplitting
-from enumsol.search.tree import make_engine
 from enumsol.trusted import uniqueness as lone
 from enumsol.trusted.at_alpha import solve_selection
 from enumsol.trusted.uniqueness import gaps, lone_root

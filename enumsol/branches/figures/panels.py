@@ -36,12 +36,12 @@ def drawn_range(vertices: Iterable[Vertex], quantity: Quantity) -> Floats:
 def family_states(problem: ContactProblem, alpha: float, family: RootFamily) -> tuple[Floats, Floats]:
     """Forces and displacements at the vertices of a family, (k, 2p) each."""
     points, modes = family.vertices, problem.modes
-    if modes is not None:
+    if modes.r:
         points = np.concatenate([part.vertices for part in family.polytopes])
     condensed = problem.on_springs.condensed
     forces = points.transpose(0, 2, 1).reshape(len(points), 2 * problem.p)
     moves = condensed.g0 + alpha * condensed.g1 - forces @ condensed.S
-    if modes is not None:
+    if modes.r:
         rigid = [part.rigid_coordinates for part in family.polytopes if part.rigid_coordinates is not None]
         moves = moves + np.concatenate(rigid) @ (problem.contact_rows @ modes.N).T
     return forces, moves

@@ -125,7 +125,7 @@ def chain_through(
 def skeleton_through(problem: ContactProblem3D, x: Array, span: tuple[float, float]) -> Skeleton | None:
     """Skeleton that continuation finds, a little longer than the interval; None if it does not start."""
     p = problem.p
-    start = float(x[-1]), x[:p], x[p : 3 * p].reshape(2, p).T, *([] if problem.modes is None else [x[3 * p : -1]])
+    start = float(x[-1]), x[:p], x[p : 3 * p].reshape(2, p).T, *([] if problem.held else [x[3 * p : -1]])
     try:
         ahead = _path(problem, start, 1, span)
         closed = ahead.status == PathStatus.CLOSED

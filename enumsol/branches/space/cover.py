@@ -13,14 +13,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.branches.space.chains import chain_through
-from enumsol.condensation.floating import enclosed_over_alpha
+from enumsol.condensation.enclosure import enclosure_of
 from enumsol.proof.proof_file import Proof
 from enumsol.proof.records import UndecidedRecord
 from enumsol.proof.space_records import CurveBoxRecord
 from enumsol.proof.writer import ProofWriter, unit_exponents
 from enumsol.roots.enumerate import enumerate_roots
+from enumsol.search.space.known_curves import Curves, joined
 from enumsol.search.space.piece_parallel import spread_over
-from enumsol.search.space.piece_tree import OpenLeaf, PieceTree, joined
+from enumsol.search.space.piece_tree import OpenLeaf, PieceTree
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.support.deadlines import look, remaining
 from enumsol.trusted.space.curve_chains import apart
@@ -102,7 +103,7 @@ class SpaceCover:
     @cached_property
     def enclosure(self) -> CondensedEnclosure:
         """Balls for all alpha; NotEnclosedError where there are none."""
-        return enclosed_over_alpha(self.problem)
+        return enclosure_of(self.problem)
 
     def _units(self) -> tuple[Array, Array]:
         system = SpaceSolvers(self.problem, sum(self.interval) / 2, "verified").system
@@ -111,10 +112,10 @@ class SpaceCover:
     def search(
         self,
         max_nodes: int | None = None,
-        progress: Callable[[str, float], object] | None = None,
+        tick: Callable[[float], object] | None = None,
         executor: Executor | None = None,
     ) -> None:
-        """Search the tree; ``progress`` and ``executor`` as in ``branch_graph``.
+        """Search the tree; ``tick`` is called with the share that is done, ``executor`` as in ``branch_graph``.
 
         Raises
         ------
@@ -122,7 +123,6 @@ class SpaceCover:
             The data cannot be enclosed.
         """
         given = AlphaProblem.of(self.enclosure)
-        tick = None if progress is None else lambda share: progress("search", share)
 
         def more(x: Array) -> CurveChain | None:
             chain = chain_through(given, self.problem, x, self.interval, self._take)
@@ -130,11 +130,11 @@ class SpaceCover:
                 chain = None
             # what is left open costs as much at every further point of the same curve
             self.failed += chain is None or not self._is_of_use(chain)
-            tree.more = more if self.failed < _FAILURES else None
+            curves.more = more if self.failed < _FAILURES else None
             return chain
 
-        tree = PieceTree(self.enclosure, self.interval, self._units(), more, max_nodes, tick, solutions=self._solutions)
-        tree.more = more if self.failed < _FAILURES else None
+        curves = Curves(self.enclosure, self.interval, more if self.failed < _FAILURES else None, self._solutions)
+        tree = PieceTree(self.enclosure, self.interval, self._units(), curves, max_nodes, tick)
         try:
             tree.run(None if executor is None else partial(spread_over, executor))
         finally:
@@ -176,7 +176,7 @@ class SpaceCover:
                 "interval": [str(end) for end in self.interval],
                 "p": self.problem.p,
                 "data": "problem",
-                **({} if self.problem.modes is None else {"max_rigid_displacement": self.problem.rigid_reach}),
+                **({} if self.problem.held else {"max_rigid_displacement": self.problem.rigid_reach}),
                 **unit_exponents(*self._units()),
                 "steps": AlphaProblem.of(self.enclosure).steps.tolist(),
             }

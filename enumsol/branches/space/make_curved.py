@@ -12,7 +12,7 @@ import numpy as np
 from enumsol.arithmetic.algebraic import EnclosedAlpha
 from enumsol.arithmetic.rationals import rational
 from enumsol.branches.elements import Arc, ArcValues, VertexKind, make_vertex, sides_of, tangential, with_exact_zeros
-from enumsol.branches.remedies import END_ELSEWHERE, TOLD_APART
+from enumsol.branches.unfinished import END_ELSEWHERE, TOLD_APART
 from enumsol.model.statuses import ContactStatus, space_status
 from enumsol.trusted.space.curve_parts import Run, Turn, ends_of, side_of
 from enumsol.trusted.space.solution_curve import AlphaProblem, curve_point
@@ -90,7 +90,7 @@ def state_of(problem: ContactProblem3D, x: Floats, active: Sequence[Set[int]]) -
     m, condensed = 3 * problem.p, problem.on_springs.condensed
     forces = x[:m]
     w = condensed.free_displacements(float(x[-1])) - condensed.S @ forces
-    if problem.modes is not None:
+    if not problem.held:
         w = w + problem.contact_rows @ (problem.modes.N @ x[m:-1])
     return with_exact_zeros((forces + 0.0, w), active)
 

@@ -45,7 +45,7 @@ def roots_on_arcs(
     """
     numbers = {v.number for v in vertices}
     arcs = [*arcs, *(arc for arc in data.arcs if numbers & {arc.tail, arc.head})]
-    made = SpaceSolvers if data.problem.modes is None else FloatingSpaceSolvers
+    made = SpaceSolvers if data.problem.held else FloatingSpaceSolvers
     solvers = made(data.problem, alpha, "verified")
     enumeration = SpaceEnumeration(solvers, None, None)
     leaves: list[tuple[Codes, SpaceRoot]] = []
@@ -77,7 +77,7 @@ def roots_on_arcs(
         stats=SearchStats(selections=len(arcs)),
         node_ids=data.problem.node_ids,
         # others beyond it were not looked for
-        rigid_bound=None if data.problem.modes is None else RigidBound(data.problem.rigid_reach, needed=True),
+        rigid_bound=None if data.problem.held else RigidBound(data.problem.rigid_reach, needed=True),
         at_least=None if whole else max(len(roots) - len(doubtful), data.claims.multiplicity(data.inside(alpha)).count),
     )
 

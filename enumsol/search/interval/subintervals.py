@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.condensation.enclosure import NotEnclosedError, enclosure_of
 from enumsol.model.statuses import UNDECIDED
 from enumsol.relaxation.interval_relaxation import IntervalSystem
 from enumsol.search.floating_solvers import WEAK
@@ -343,7 +343,7 @@ _MARGIN = 1e-12
 def on_weak_springs(problem: ContactProblem) -> CondensedProblem:
     """What the relaxations are about: the body on weak springs at the degrees of freedom where springs hold it."""
     modes = problem.modes
-    if modes is None:
+    if modes.r == 0:
         raise AssertionError("the body is held")
     condensed: CondensedProblem = problem.on_springs.replace(A=problem.A + WEAK * modes.springs()).condensed
     return condensed
@@ -375,7 +375,8 @@ class FloatingIntervalCertifier(IntervalCertifier):
     def _on(self, piece: Piece, system: IntervalSystem) -> Margin | None:
         units = system.scaled
         try:
-            within = EnclosedPiece.floating(self._problem, piece.a, piece.b, units.force, units.length)
+            enclosure = enclosure_of(self._problem)
+            within = EnclosedPiece.from_enclosure(enclosure, piece.a, piece.b, units.force, units.length, None)
         except NotEnclosedError:
             return None
         if not all(end.smallest_eigenvalue > 0 for end in within.ends):

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 from scipy.optimize import nnls
 
-from enumsol.condensation.space_condensed import EnclosedSpace, FloatingPiece, FloatingSpace, SpaceSystem
+from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.proof.records import Unbalanced
 from enumsol.proof.space_records import ExcludedOverPiece
 from enumsol.relaxation.space_relaxation import SpaceEngine
@@ -56,7 +56,7 @@ class AlphaPoint:
 
     def __init__(self, space: AlphaSpace, alpha: Fraction) -> None:
         self.alpha = alpha
-        self.system, self._floats = _relaxed(space, alpha), space.floats
+        self.system, self._floats = _relaxed(space, alpha), not space.fixed.held
         self.engine = SpaceEngine(self.system, _ROWS)
         self.splitting = SpaceSplitting(self.engine)
         self.rows = ImposedRows(self.splitting, self.system.p)
@@ -99,22 +99,17 @@ class AlphaPoint:
 
 def _relaxed(space: AlphaSpace, alpha: Fraction) -> SpaceSystem:
     """The problem at one alpha, of a body that nothing holds on weak springs (theory, section 14.5)."""
-    if not space.floats:
-        return SpaceSystem.in_middle(EnclosedSpace.of_problem(space.enclosure, alpha, *space.units), space.units)
-    enclosed = FloatingSpace.of(space.enclosure.problem, alpha, *space.units)
-    S, g = weakly_held(enclosed.S, enclosed.g, enclosed.rows)
+    enclosed = EnclosedSpace.of_problem(space.enclosure, alpha, *space.units)
+    S, g = _held(enclosed)
     return replace(SpaceSystem.in_middle(enclosed, space.units), S=S, g=g)
 
 
 def unbalanced(piece: AlphaPiece, codes: Codes) -> Unbalanced | None:
     """A record that no forces below an assignment are in balance with the load over a piece; or None."""
-    if not piece.space.floats:
-        return None
-    for end in (*piece.ends, piece.whole):
-        if isinstance(end, FloatingPiece):
-            z = motion_beside(end, resultants(end, codes))
-            if piece.is_unbalanced(codes, z):
-                return Unbalanced(z)
+    for end in () if piece.whole.held else (*piece.ends, piece.whole):
+        z = motion_beside(end, resultants(end, codes))
+        if piece.is_unbalanced(codes, z):
+            return Unbalanced(z)
     return None
 
 
@@ -211,7 +206,7 @@ def _columns(system: EnclosedSpace, rows: Sequence[Row]) -> tuple[Floats, Floats
 
 def _held(system: EnclosedSpace) -> tuple[Floats, Floats]:
     """S and g, of a body that nothing holds on weak springs."""
-    if not isinstance(system, FloatingPiece):
+    if system.held:
         return system.S, system.g
     S, g = weakly_held(system.S, system.g, system.rows)
     return S, g

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
-from itertools import pairwise, product
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.arithmetic.balls import Ball
 from enumsol.arithmetic.rationals import simplest
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of, parts_around, places, span, width_level, width_of
@@ -21,31 +20,31 @@ from enumsol.proof.records import Branching, NoRoot
 from enumsol.proof.space_records import CutPiece, ExcludedOverPiece, InCurveBoxes, OnlyOnCurve, ThroughCurveBox
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.outcome import StopReason
+from enumsol.search.space.known_curves import Curves, middle_of
 from enumsol.search.space.piece_arcs import beside, points_on, slides
 from enumsol.search.space.piece_certificates import ERRORS, Passage, PieceProposals, runs_over
 from enumsol.search.space.piece_multipliers import COUNTED, AlphaPoint, exclusion, unbalanced
 from enumsol.search.space.space_fathoming import without_sectors
+from enumsol.search.tree import depth_first
 from enumsol.support.deadlines import TimeOverError, look
 from enumsol.trusted.space.curve_runs import CurveParts, KnownCurve, Run
 from enumsol.trusted.space.leaves import Open, SpaceRoot
-from enumsol.trusted.space.pieces import AlphaPiece, lie_along
+from enumsol.trusted.space.pieces import AlphaPiece
 from enumsol.trusted.space.sector_rows import sector_children
-from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Callable, Sequence
 
     from numpy.typing import NDArray
 
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.relaxation.space_relaxation import SpaceRelaxation
+    from enumsol.search.parts import Answer
     from enumsol.selections.solution import Codes
-    from enumsol.trusted.space.curve_chains import CurveChain
-    from enumsol.trusted.space.solution_curve import SolutionCurve
 
     Array = NDArray[np.float64]
-    #: A subtree: its piece, partial assignment, what is known from above and how often it was cut; and its share.
-    Waiting = tuple[tuple[Any, ...], float]
+    #: The record of a node, and its children.
+    Done = tuple[Any, list["PieceNode"]]
 
 #: Pieces, and points with their relaxations, that are kept.
 _KEPT = 256
@@ -56,17 +55,10 @@ _CUTS = 2
 #: Around the directions of known curves sectors get more room by this share of what these turn by, and are no narrower
 #: than those of a level; a sector is cut so if no more than this share of it is left.
 _ROOM, _NARROWEST, _LEFT = 0.5, 9, 0.5
-#: Boxes of a curve in a row in which a leaf may lie, and how many such rows are tried.
-_LONGEST, _RUNS = 64, 4
-#: From the ends of curves inside the interval so far, as a share of it, nothing is searched.
-_AROUND_ENDS = 2.0**-14
 #: Longer pieces are cut where statuses occur along one curve over a part of them.
 _SHORT = 2.0**-6
 #: At these shares of a piece it is asked how often a curve passes it.
 _PASSED = (2.0 * np.arange(4) + 1.0) / 8
-#: Pieces of undecided statuses at most at which a first curve is sought; where solutions are sampled, as shares of the
-#: interval, if more than one curve may be needed.
-_SOUGHT, _SAMPLED = 8, (Fraction(15, 16), Fraction(1, 2), Fraction(1, 16))
 #: By so many times their lengths pieces are made longer on both sides for arcs.
 _FACTORS = 0, 1
 #: Arcs are sought where a known curve has directions in a leaf, or beside it by this factor.
@@ -99,29 +91,36 @@ class OpenLeaf:
     forces: Array | None
 
 
-@dataclass(frozen=True)
-class Known:
-    """All that the search of a subtree depends on where no further curve is looked for.
+@dataclass(frozen=True, slots=True)
+class PieceNode:
+    """A node of the tree: a subtree that waits.
 
     Attributes
     ----------
-    problem : (enclosure, interval, units, smallest), as PieceTree takes them
-    chains : sequence of CurveChain
-    sampled : whether solutions were sampled
-    sought : how often a curve through the middle of a piece was looked for
-    final : no further curve is to be followed
+    low, high : Fraction
+        The piece of alpha.
+    codes : the partial assignment
+    share : float
+        Its share of the tree, every child of a node being as large as the others.
+    parent : (AlphaPoint, SpaceRelaxation) or None
+        The relaxation from which it goes on.
+    changed : the contact node that is new in it, or -1
+    last : the last of its siblings: may take over the parent's state
+    cuts : how often its piece was cut since the last branching
     """
 
-    problem: tuple[CondensedEnclosure, tuple[Fraction, Fraction], tuple[Array, Array], float]
-    chains: tuple[CurveChain, ...]
-    sampled: bool
-    sought: int
-    final: bool
+    low: Fraction
+    high: Fraction
+    codes: Codes
+    share: float = 1.0
+    parent: tuple[AlphaPoint, SpaceRelaxation] | None = None
+    changed: int = -1
+    last: bool = False
+    cuts: int = 0
 
-    @property
-    def state(self) -> tuple[object, ...]:
-        """What of it changes during a search."""
-        return len(self.chains), self.sampled, self.sought == _SOUGHT, self.final
+    def sent(self) -> PieceNode:
+        """Node as it is sent to a worker, where it begins without its parent."""
+        return replace(self, parent=None, changed=-1, last=False)
 
 
 def _kept(known: OrderedDict[Any, Any], key: Any, make: Callable[[], Any]) -> Any:
@@ -132,17 +131,6 @@ def _kept(known: OrderedDict[Any, Any], key: Any, make: Callable[[], Any]) -> An
             known.popitem(last=False)
     known.move_to_end(key)
     return known[key]
-
-
-def joined(ranges: Iterable[tuple[Fraction, Fraction]]) -> list[tuple[Fraction, Fraction]]:
-    """Ranges in their order, those that touch as one."""
-    found: list[tuple[Fraction, Fraction]] = []
-    for low, high in sorted(ranges):
-        if found and low <= found[-1][1]:
-            found[-1] = found[-1][0], max(high, found[-1][1])
-        else:
-            found.append((low, high))
-    return found
 
 
 def _is_excluded(relaxation: SpaceRelaxation) -> bool:
@@ -192,30 +180,24 @@ class PieceTree:
     Parameters
     ----------
     enclosure : CondensedEnclosure
-        See ``enclosed_over_alpha``.
+        The problem's own.
     interval : (a, b), Fractions
     units : force and length, (p,) arrays of powers of two
-    more : callable, optional
-        Called with a solution (forces and alpha, in the units of the problem) that lies in no known box; gives the
-        curve through it, as far as it is proven, if it is new.
+    curves : Curves
+        Those that are known, and where others are looked for.
     max_nodes : int, optional
     tick : callable, optional
         Called with the share of the tree that is done, every child of a node being as large as the others.
     smallest : pieces are cut down to this share of the interval
-    solutions : callable, optional
-        Called with an alpha; gives forces of solutions there, in the units of the problem, not necessarily all.
 
     Attributes
     ----------
-    curves : list of KnownCurve
     records : list
         Of the tree, in the order of a walk; what is open is an OpenLeaf.
     nodes : int
     covered : float
         The share of the tree that is done.
     stopped : StopReason or None
-    more : as given
-        None once no further curve is to be followed.
     """
 
     def __init__(
@@ -223,18 +205,15 @@ class PieceTree:
         enclosure: CondensedEnclosure,
         interval: tuple[Fraction, Fraction],
         units: tuple[Array, Array],
-        more: Callable[[Array], CurveChain | None] | None = None,
+        curves: Curves,
         max_nodes: int | None = None,
         tick: Callable[[float], object] | None = None,
         smallest: float = 2.0**-30,
-        solutions: Callable[[Fraction], Sequence[Array]] | None = None,
     ) -> None:
-        self._solutions, self._sampled = solutions, False
-        self._enclosure, self.interval = enclosure, interval
+        self.interval, self.curves = interval, curves
         self._space = AlphaSpace(enclosure, sum(interval, Fraction(0)) / 2, units)
-        self._problem = enclosure, interval, units, smallest
-        self._given = AlphaProblem.of(enclosure)
-        self.more, self._most, self._tick = more, max_nodes, tick
+        self.problem = enclosure, interval, units, smallest
+        self._most, self._tick = max_nodes, tick
         self._least = Fraction(smallest) * (interval[1] - interval[0])
         self._pieces: OrderedDict[tuple[Fraction, Fraction], _Examined] = OrderedDict()
         self._points: OrderedDict[Fraction, AlphaPoint] = OrderedDict()
@@ -246,57 +225,6 @@ class PieceTree:
         self.settled = False
         #: Why the search ended early, if it did.
         self.stopped: StopReason | None = None
-        #: How often a curve through the middle of a piece was looked for.
-        self._sought = 0
-        self.curves: list[KnownCurve] = []
-        #: The curve of every box, numbered as in a proof.
-        self._boxes: list[SolutionCurve] = []
-        self._owner: list[int] = []
-        #: Ranges of alpha around the ends of curves, in their order.
-        self._ends_of_curves: list[tuple[Fraction, Fraction]] = []
-
-    def known(self) -> Known:
-        """What the search of a subtree depends on."""
-        chains = tuple(known.chain for known in self.curves)
-        return Known(self._problem, chains, self._sampled, self._sought, self.more is None)
-
-    def _follow(self, x: Array) -> bool:
-        """True if a new curve through a solution was followed; none is where a known one seems to pass through it."""
-        chain = None if self.more is None or self._is_known(x) else self.more(x)
-        if chain is not None:
-            self._take(KnownCurve(self._given, chain))
-        return chain is not None
-
-    def _take(self, known: KnownCurve) -> None:
-        """Add a curve to those that are known."""
-        chain = known.chain
-        self._boxes += [link.curve for link in chain.links]
-        self._owner += [len(self.curves)] * len(chain.links)
-        self.curves.append(known)
-        boxes = [curve.box for curve in self._boxes]
-        self._c, self._d, self._e = (
-            np.array([getattr(box, name) for box in boxes]) for name in ("centre", "direction", "border")
-        )
-        self._b = np.array([curve.reach for curve in self._boxes])
-        self._h = np.array([box.half for box in boxes])
-        room = Fraction(_AROUND_ENDS) * (self.interval[1] - self.interval[0])
-        ends = [end for known in self.curves for end in known.chain.gaps]
-        whole = joined((low - room, high + room) for low, high in ends)
-        self._ends_of_curves = [(simplest(low, low + room / 2), simplest(high - room / 2, high)) for low, high in whole]
-
-    def _is_known(self, x: Array) -> bool:
-        """True if a solution seems to lie on a known curve; no claim."""
-        if not self._boxes:
-            return False
-        return bool(np.any(self._around(self._given.placed(x), np.zeros_like(x), slice(None))))
-
-    def _around(self, x: Array, rad: Array, boxes: Any) -> NDArray[np.bool_]:
-        """Which of some boxes seem to hold a point, and all that is within a radius of it along t; no claim."""
-        off = x - self._c[boxes]
-        t = np.sum(self._e[boxes] * off, axis=1)
-        beside = np.abs(off - t[:, None] * self._d[boxes])
-        along = np.abs(t) + np.abs(self._e[boxes]) @ rad
-        return np.asarray((along <= self._h[boxes]) & np.all(beside <= self._b[boxes], axis=1))
 
     def _examined(self, low: Fraction, high: Fraction) -> _Examined:
         found: _Examined = _kept(self._pieces, (low, high), lambda: _Examined(AlphaPiece(self._space, low, high)))
@@ -306,53 +234,71 @@ class PieceTree:
         found: AlphaPoint = _kept(self._points, alpha, lambda: AlphaPoint(self._space, alpha))
         return found
 
-    def run(self, spread: Callable[[PieceTree, list[Waiting]], object] | None = None) -> None:
-        """Search the tree; ``spread`` takes the place of ``examined`` for what waits after some nodes.
+    def run(self, spread: Callable[[PieceTree, list[PieceNode]], object] | None = None) -> None:
+        """Search the tree; ``spread`` examines what waits after some nodes.
 
         Raises
         ------
         KeyboardInterrupt, MemoryError
             The records then say that what was not examined is open.
         """
-        waiting = [((*self.interval, (UNDECIDED,) * self._enclosure.problem.p, None, -1, False, 0), 1.0)]
+        waiting = [PieceNode(*self.interval, (UNDECIDED,) * self._space.enclosure.problem.p)]
         try:
-            self.examined(waiting, None if spread is None else FIRST)
+            self.examine(waiting, None if spread is None else FIRST)
             if spread is not None and waiting:
                 spread(self, waiting)
         finally:
             self.leave(waiting)
             self.settled = not self.away
 
-    def examined(self, waiting: list[Waiting], most: int | None = None) -> None:
-        """Examine what waits, the last first, until a limit is reached or so many nodes more are; the rest still waits.
+    def examined(self, items: Sequence[PieceNode], nodes: int | None = None) -> list[PieceNode]:
+        """Examine so many nodes of subtrees, the last first, or until a limit is reached; the rest still waits."""
+        waiting = list(items)
+        self.examine(waiting, nodes)
+        return waiting
 
-        Where a step raises an error, it waits as before.
-        """
+    def examine(self, waiting: list[PieceNode], most: int | None) -> None:
+        """Examine so many nodes of what waits, in place: where a step raises an error, its node waits as before."""
         last = None if most is None else self.nodes + most
-        while waiting and self.stopped is None and (last is None or self.nodes < last):
-            if self.left == 0:
-                self.stopped = StopReason.NODE_LIMIT
-                break
-            (low, high, codes, *others), share = waiting[-1]
-            try:
-                look()
-                record, below = self._step(low, high, codes, *others)
-            except TimeOverError:
-                self.stopped = StopReason.TIME_LIMIT
-                break
-            self.nodes += 1
-            self.records.append(record)
-            waiting[-1:] = [(item, share / len(below)) for item in reversed(below)]
-            self.report(0.0 if below else share)
+        try:
+            depth_first(waiting, self._taken, lambda: self.nodes == last or self.must_stop())
+        except TimeOverError:
+            self.stop_for_time()
+
+    def _taken(self, node: PieceNode) -> list[PieceNode]:
+        """Examine one node and take note of it; gives its children, the first one last."""
+        look()
+        record, below = self._step(node)
+        self.nodes += 1
+        self.records.append(record)
+        share = node.share / max(len(below), 1)
+        waiting = [replace(child, share=share) for child in reversed(below)]
+        self.report(0.0 if below else share)
+        return waiting
 
     @property
     def left(self) -> int | None:
-        """How many nodes may still be examined; None for any number."""
+        """Number of nodes that may still be examined; None for any number."""
         return None if self._most is None else max(self._most - self.nodes, 0)
 
-    def leave(self, waiting: Sequence[Waiting]) -> None:
+    def must_stop(self) -> bool:
+        """Look at the limit of nodes."""
+        if self.stopped is None and self.left == 0:
+            self.stopped = StopReason.NODE_LIMIT
+        return self.stopped is not None
+
+    def stop_for_time(self) -> None:
+        """Take note that the time is over."""
+        self.stopped = StopReason.TIME_LIMIT
+
+    def take(self, answer: Answer) -> None:
+        """Take in what a worker found below some subtrees."""
+        self.records += answer.found
+        self.nodes += answer.nodes
+
+    def leave(self, items: Sequence[PieceNode]) -> None:
         """Leave open what still waits."""
-        self.records += [OpenLeaf(low, high, codes, None) for (low, high, codes, *_), _ in reversed(waiting)]
+        self.records += [OpenLeaf(item.low, item.high, item.codes, None) for item in reversed(items)]
 
     def report(self, share: float) -> None:
         """Note that this share of the tree is done."""
@@ -360,24 +306,25 @@ class PieceTree:
         if self._tick is not None:
             self._tick(min(self.covered, 1.0))
 
-    def _step(
-        self, low: Fraction, high: Fraction, codes: Codes, parent: Any, changed: int, last: bool, cuts: int
-    ) -> tuple[Any, list[Any]]:
+    def _step(self, node: PieceNode) -> Done:
+        """The record of a node, and its children."""
+        low, high, codes, cuts = node.low, node.high, node.codes, node.cuts
         at = self._examined(low, high)
         if (done := self._beside_ends(at, codes)) is not None:
             return done
-        if parent is None:
+        if node.parent is None:
             third = (high - low) / 3
             point = self._point(simplest(low + third, high - third))
             relaxation = point.root(codes)
         else:
-            point, relaxation = parent
-            if changed >= 0:
-                relaxation = relaxation.child(*point.rows.of(changed, codes[changed]), last=last)
+            point, relaxation = node.parent
+            if node.changed >= 0:
+                rows = point.rows.of(node.changed, codes[node.changed])
+                relaxation = relaxation.child(*rows, last=node.last)
         if _is_excluded(relaxation):
             return self._excluded(at, codes, (point, relaxation), cuts)
         done = self._certified(at, codes)
-        if done is None and not self._sampled and self._sample():
+        if done is None and not self.curves.sampled and self.curves.sample():
             done = self._beside_ends(at, codes) or self._certified(at, codes)
         if done is not None:
             return done
@@ -387,12 +334,12 @@ class PieceTree:
                 return done
             if (parts := self._around_curve(at, codes)) is not None:
                 return self._branched(at, codes, parts[0], (point, relaxation), children=parts[1])
-            node = self._widest(codes)
+            split = self._widest(codes)
         else:
-            node = self._promising(codes, relaxation)
-        if node < 0:
+            split = self._promising(codes, relaxation)
+        if split < 0:
             return self._leaf(at, codes) or self._halved(at, codes)
-        return self._branched(at, codes, node, (point, relaxation))
+        return self._branched(at, codes, split, (point, relaxation))
 
     @staticmethod
     def _is_due(codes: Codes) -> bool:
@@ -401,9 +348,7 @@ class PieceTree:
         final = not {CONTACT, UNDECIDED} & set(codes)
         return final and (not levels or min(levels) >= _TRIED[len(levels) > 2])
 
-    def _excluded(
-        self, at: _Examined, codes: Codes, parent: tuple[AlphaPoint, SpaceRelaxation], cuts: int
-    ) -> tuple[Any, list[Any]]:
+    def _excluded(self, at: _Examined, codes: Codes, parent: tuple[AlphaPoint, SpaceRelaxation], cuts: int) -> Done:
         """An assignment that one alpha excludes: over all of the piece, if possible, or it is cut or branched."""
         point, relaxation = parent
         rows, values = point.multipliers(relaxation)
@@ -451,7 +396,7 @@ class PieceTree:
     def _around_curve(self, at: _Examined, codes: Codes) -> tuple[int, Sequence[int]] | None:
         """A node in a sector, and the part of that around the directions of known curves, then what is left of it."""
         nodes = [i for i, code in enumerate(codes) if code > SECTORS]
-        towards = [parts.thetas[0][slides(parts, codes)][:, nodes] for _, parts in at.along(self.curves)]
+        towards = [parts.thetas[0][slides(parts, codes)][:, nodes] for _, parts in at.along(self.curves.known)]
         where = np.concatenate([places(theta) for theta in towards]) if nodes and towards else np.zeros((0, 0))
         spans = np.array([span(codes[i] - SECTORS) for i in nodes], dtype=float).reshape(-1, 2)
         where = where[np.all((where >= spans[:, 0]) & (where < spans[:, 1]), axis=1)] if len(where) else where
@@ -480,7 +425,7 @@ class PieceTree:
         node: int,
         parent: tuple[AlphaPoint, SpaceRelaxation] | None,
         children: Sequence[int] | None = None,
-    ) -> tuple[Any, list[Any]]:
+    ) -> Done:
         """Children of a node, by default as the relaxation has them, which go on from that."""
         if children is None and parent is not None:
             children = parent[0].splitting.children(codes, node, parent[1])
@@ -490,24 +435,25 @@ class PieceTree:
         for k, child in enumerate(children):
             there = (*codes[:node], child, *codes[node + 1 :])
             changed = -1 if parent is None else node
-            below.append((at.piece.low, at.piece.high, there, parent, changed, k + 1 == len(children), 0))
+            last = k + 1 == len(children)
+            below.append(PieceNode(at.piece.low, at.piece.high, there, parent=parent, changed=changed, last=last))
         return Branching(node, list(children)), below
 
-    def _halved(self, at: _Examined, codes: Codes, forces: Array | None = None, cuts: int = 0) -> tuple[Any, list[Any]]:
+    def _halved(self, at: _Examined, codes: Codes, forces: Array | None = None, cuts: int = 0) -> Done:
         low, high = at.piece.low, at.piece.high
         if high - low <= self._least:
             return self._open(at, codes, forces), []
         return self._cut(at, codes, at.piece.middle, cuts)
 
     @staticmethod
-    def _cut(at: _Examined, codes: Codes, alpha: Fraction, cuts: int = 0) -> tuple[Any, list[Any]]:
+    def _cut(at: _Examined, codes: Codes, alpha: Fraction, cuts: int = 0) -> Done:
         ends = at.piece.low, alpha, at.piece.high
-        return CutPiece(str(alpha)), [(*both, codes, None, -1, False, cuts) for both in pairwise(ends)]
+        return CutPiece(str(alpha)), [PieceNode(*both, codes, cuts=cuts) for both in pairwise(ends)]
 
-    def _beside_ends(self, at: _Examined, codes: Codes) -> tuple[Any, list[Any]] | None:
+    def _beside_ends(self, at: _Examined, codes: Codes) -> Done | None:
         """Where curves end, what stays open is cut off from what has to be searched."""
         low, high = at.piece.low, at.piece.high
-        for begin, end in self._ends_of_curves:
+        for begin, end in self.curves.ends:
             if begin <= low and high <= end:
                 return self._open(at, codes, None), []
             alpha = next((alpha for alpha in (begin, end) if low < alpha < high), None)
@@ -518,28 +464,12 @@ class PieceTree:
     def _open(self, at: _Examined, codes: Codes, forces: Array | None) -> OpenLeaf:
         return OpenLeaf(at.piece.low, at.piece.high, codes, forces)
 
-    def _met(self, piece: AlphaPiece, root: SpaceRoot) -> int | None:
-        """The box of a root in a point of alpha, along whose curve new ones are put if there is none."""
-        number = self._box(piece, root)
-        if number is None and self._follow(self._middle(piece, root)):
-            number = self._box(piece, root)
-        return number
-
-    @staticmethod
-    def _middle(piece: AlphaPiece, root: SpaceRoot) -> Array:
-        """Forces and alpha of a root in the middle of a piece, in the units of the problem.
-
-        Of a body that nothing holds the forces are followed by its rigid displacement.
-        """
-        y = root.y if root.rigid is None else Ball.joined(root.y, -root.rigid)
-        return np.concatenate([piece.forces(y).mid, piece.rigid(y).mid, [float(piece.middle)]])
-
-    def _certified(self, at: _Examined, codes: Codes) -> tuple[Any, list[Any]] | None:
+    def _certified(self, at: _Examined, codes: Codes) -> Done | None:
         """One certificate for all that is below an assignment, or the piece is cut since it is too long for that.
 
         None of a body that nothing holds: the form says nothing about its rigid displacement.
         """
-        if self._space.floats:
+        if not self._space.fixed.held:
             return None
         piece, statuses = at.piece, without_sectors(codes)
         passages = [passage for passage in self._passages(at, statuses) if passage.parts.allowed(statuses)]
@@ -549,10 +479,10 @@ class PieceTree:
         if len(passages) != 1 or statuses in at.hopeless:
             return None
         (passage,) = passages
-        known, run = self.curves[passage.curve], passage.run
+        known, run = self.curves.known[passage.curve], passage.run
         numbers = at.proposals.numbers(statuses, passage.parts)
         if numbers is not None and piece.lies_on(known, run, statuses, numbers, ERRORS):
-            before = sum(len(other.chain.links) for other in self.curves[: passage.curve])
+            before = sum(len(other.chain.links) for other in self.curves.known[: passage.curve])
             return OnlyOnCurve(numbers, before + run.first, before + run.last), []
         longer = self._is_longer(piece, _ALONE)
         if longer and at.proposals.is_hopeful(statuses, known.over(run, piece.middle, piece.middle)):
@@ -561,15 +491,6 @@ class PieceTree:
             return self._halved(at, codes) if done is None or isinstance(done[0], OpenLeaf) else done
         at.hopeless.add(statuses)
         return None
-
-    def _sample(self) -> bool:
-        """True if there are new curves through the solutions at some alphas."""
-        self._sampled, known = True, len(self.curves)
-        low, high = self.interval
-        for alpha in (low + share * (high - low) for share in _SAMPLED):
-            for forces in () if self._solutions is None else self._solutions(alpha):
-                self._follow(np.append(forces, float(alpha)))
-        return len(self.curves) > known
 
     def _is_longer(self, piece: AlphaPiece, share: float) -> bool:
         """Than a share of the interval."""
@@ -581,7 +502,7 @@ class PieceTree:
         Not where that run turns back and passes no alpha just once: with two solutions at one no form is definite.
         """
         runs = 0
-        for _, parts in at.along(self.curves):
+        for _, parts in at.along(self.curves.known):
             held = parts.held(statuses)
             if len(held):
                 runs += int(held[0]) + int(np.sum(held[1:] & ~held[:-1]))
@@ -591,21 +512,17 @@ class PieceTree:
     def _passages(self, at: _Examined, statuses: tuple[int, ...]) -> list[Passage]:
         """Runs of known curves that pass a piece; the first ones are sought where no status is assigned."""
         low, high = at.piece.low, at.piece.high
-        for number in range(at.curves, len(self.curves)):
-            known = self.curves[number]
+        curves = self.curves.known
+        for number in range(at.curves, len(curves)):
+            known = curves[number]
             at.passages += [Passage(number, run, known.over(run, low, high)) for run in runs_over(known, low, high)]
-        at.curves = len(self.curves)
-        if at.passages or self._sought == _SOUGHT or set(statuses) != {UNDECIDED}:
+        at.curves = len(curves)
+        if at.passages or self.curves.sought_enough or set(statuses) != {UNDECIDED}:
             return at.passages
-        return self._passages(at, statuses) if self._seek(at) else []
+        found = self.curves.seek(lambda: self._point(at.piece.middle))
+        return self._passages(at, statuses) if found else []
 
-    def _seek(self, at: _Examined) -> bool:
-        """True if there is a new curve through a solution in the middle of a piece."""
-        self._sought += 1
-        forces = self._point(at.piece.middle).solution()
-        return forces is not None and self._follow(np.append(forces, float(at.piece.middle)))
-
-    def _leaf(self, at: _Examined, codes: Codes) -> tuple[Any, list[Any]] | None:
+    def _leaf(self, at: _Examined, codes: Codes) -> Done | None:
         """A leaf that is decided, or halved; None where statuses are to be split further."""
         piece = at.piece
         narrowed, found = piece.narrowed(codes)
@@ -615,38 +532,34 @@ class PieceTree:
             return None
         there = piece.point.held(codes)
         if isinstance(there, SpaceRoot):
-            number = self._met(piece.point, there)
-            if number is None and not self._is_known(self._middle(piece, there)):
+            number = self.curves.met(piece.point, there)
+            if number is None and not self.curves.is_known(middle_of(piece, there)):
                 return self._open(at, codes, piece.forces(there.y).mid), []
             passed = narrowed.low <= piece.middle <= narrowed.high and found is not None
-            passed = passed and number is not None and self._runs_through(number, narrowed)
+            passed = passed and number is not None and self.curves.runs_through(number, narrowed)
             arc = narrowed.arc(codes, 2.0, found) if passed else None
             if number is not None and arc is not None and self._has(narrowed, codes, found, there, codes):
                 return ThroughCurveBox(number, str(narrowed.low), str(narrowed.high), str(piece.middle), codes), []
-        elif self._is_wide(piece, codes) and (there is None or self._box(piece.point, there) is None):
+        elif self._is_wide(piece, codes) and (there is None or self.curves.box(piece.point, there) is None):
             return None
         return self._halved(at, codes)
 
-    def _settled(
-        self, at: _Examined, codes: Codes, settled: tuple[AlphaPiece, SpaceRoot | Open | None]
-    ) -> tuple[Any, list[Any]] | None:
+    def _settled(self, at: _Examined, codes: Codes, settled: tuple[AlphaPiece, SpaceRoot | Open | None]) -> Done | None:
         """The record of a leaf that has no root, or none that is not known."""
         piece, found = settled
         if found is None:
             return NoRoot(), []
         if (without := unbalanced(at.piece, codes)) is not None:
             return without, []
-        run = self._run(piece, found)
+        run = self.curves.run(piece, found)
         return self._on_arc(at, codes, (piece, found)) if run is None else (InCurveBoxes(*run), [])
 
-    def _on_arc(
-        self, at: _Examined, codes: Codes, settled: tuple[AlphaPiece, SpaceRoot | Open]
-    ) -> tuple[Any, list[Any]] | None:
+    def _on_arc(self, at: _Examined, codes: Codes, settled: tuple[AlphaPiece, SpaceRoot | Open]) -> Done | None:
         """The record of a leaf whose roots lie on an arc that has a point of a known curve."""
         centre, half = settled[1].centre, np.abs(settled[1].angle) + settled[1].angle_rad
         for factor in _FACTORS:
             whole = settled[0].wider(factor, self.interval)
-            runs = at.along(self.curves, whole)
+            runs = at.along(self.curves.known, whole)
             if not any(len(beside(parts, codes, centre, 0.0, _BESIDE * half)) for _, parts in runs):
                 continue
             found = whole.held(codes) if factor else settled[1]
@@ -656,8 +569,8 @@ class PieceTree:
             for known, parts in runs:
                 for point in points_on(arc, known, parts, codes):
                     there, root = whole.root_at(*point)
-                    number = None if root is None else self._box(there, root)
-                    if root is None or number is None or not self._runs_through(number, whole):
+                    number = None if root is None else self.curves.box(there, root)
+                    if root is None or number is None or not self.curves.runs_through(number, whole):
                         continue
                     if not arc.has(root, point[1]):
                         continue
@@ -665,10 +578,6 @@ class PieceTree:
                         ends = str(whole.low), str(whole.high)
                         return ThroughCurveBox(number, *ends, str(point[0]), point[1]), []
         return None
-
-    def _runs_through(self, number: int, piece: AlphaPiece) -> bool:
-        """True if the curve of a box has no end over a piece."""
-        return self.curves[self._owner[number]].chain.runs_through(piece.low, piece.high)
 
     @staticmethod
     def _has(piece: AlphaPiece, codes: Codes, found: SpaceRoot | Open | None, root: SpaceRoot, there: Codes) -> bool:
@@ -678,19 +587,3 @@ class PieceTree:
         """
         arc = piece.arc(codes, found=found)
         return arc is not None and arc.has(root, there)
-
-    def _run(self, piece: AlphaPiece, found: SpaceRoot | Open) -> tuple[int, int] | None:
-        """The first and the last of the boxes in which forces lie."""
-        for ends in piece.places(found, self._given) if self._boxes else ():
-            sides = [np.flatnonzero(self._around(end.mid, end.rad, slice(None))).tolist() for end in ends]
-            runs = {(min(pair), max(pair)) for pair in product(sides[0], sides[-1])}
-            for first, last in sorted(runs, key=lambda run: run[1] - run[0])[:_RUNS]:
-                near = last - first < _LONGEST and self._owner[first] == self._owner[last]
-                if near and lie_along(ends, self._boxes[first : last + 1], 2.0):
-                    return first, last
-        return None
-
-    def _box(self, piece: AlphaPiece, found: SpaceRoot | Open) -> int | None:
-        """The box in which a root in a point of alpha lies."""
-        run = self._run(piece, found)
-        return None if run is None or run[0] != run[1] else run[0]

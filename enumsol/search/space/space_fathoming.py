@@ -14,6 +14,7 @@ import scipy.linalg
 
 from enumsol.model.sectors import SECTORS, nearest, start_of
 from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
+from enumsol.search.closing import TreeCloser
 from enumsol.search.space.product_search import ProductSearch
 from enumsol.search.space.space_newton import Isotropic
 from enumsol.support.deadlines import look
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
     from enumsol.relaxation.engine import Relaxation
-    from enumsol.search.certifiers.protocol import Led
-    from enumsol.search.fathoming_in_contact import KnownRoot
     from enumsol.search.space.product_search import Branched, Enclosed, Missed
     from enumsol.support.array_types import Codes, Floats, Mask
 
@@ -80,7 +79,7 @@ class SpaceClosing(Protocol):
         """The solutions of boxes in a tree below an assignment that is proven already, which is written."""
 
 
-class SpaceCloser:
+class SpaceCloser(TreeCloser):
     """Tries once before the tree, and then at every assignment that allows the statuses of a regular solution.
 
     Parameters
@@ -92,6 +91,7 @@ class SpaceCloser:
     """
 
     def __init__(self, system: SpaceSystem, certifier: SpaceClosing, *, regular: bool = False) -> None:
+        super().__init__()
         self._system, self._certifier, self._regular = system, certifier, regular
         #: Smallest eigenvalue of Q relative to S, and slack of a solution, that are asked for.
         self._enough, self._least = (_CLEAR, _CLEAR) if regular else (_DEFINITE, NEAR)
@@ -99,10 +99,6 @@ class SpaceCloser:
         self._tried: set[Codes] = set()
         #: Assignments of final statuses that were met, and that pass before products are tried again.
         self._met = self._wait = self._pause = 0
-        #: No node slides without load in a part of the tree, and no root is tried there.
-        self.sliding: dict[int, int] = {}
-        self.known: KnownRoot | None = None
-        self.relaxed: object = None
 
     def whole(self) -> list[Any] | None:
         """The only solution, as a list; None where that is not proven."""
@@ -165,24 +161,6 @@ class SpaceCloser:
         if found is None:
             self._tried.add(statuses)
         return found
-
-    def alone(self, codes: Codes, proposal: object, bound: object) -> None:
-        """Nothing else is proposed below an assignment."""
-
-    def met(self, answer: object) -> None:
-        """Nothing follows from what a leaf holds."""
-
-    leads = False
-
-    def led(self, codes: Codes) -> Led | None:
-        """No node of the tree is decided, or split, before its relaxation is solved."""
-        del codes
-        return None
-
-    def begins_again(self, nodes: int) -> bool:
-        """A search in 3D does not begin again."""
-        del nodes
-        return False
 
     @cached_property
     def _point(self) -> Point | None:

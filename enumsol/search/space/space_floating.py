@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.condensation.space_condensed import EnclosedSpace, FloatingSpace, SpaceSystem
+from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.proof.records import Exclusion, NoRoot, Unbalanced
 from enumsol.proof.space_records import (
@@ -21,10 +21,11 @@ from enumsol.proof.space_records import (
     OnlySpaceReference,
 )
 from enumsol.relaxation.engine import PRUNE_MARGIN
-from enumsol.search.certifiers.protocol import Bound, Certified, Refine, UndecidedPart, Unrecorded
+from enumsol.search.certifiers.protocol import Bound, Certified, Certifier, Refine, UndecidedPart, Unrecorded
+from enumsol.search.closing import TreeCloser
 from enumsol.search.floating_solvers import WEAK, FloatingReader, weakly_held
 from enumsol.search.setup import HeldByNothing
-from enumsol.search.space.space_references import SpaceReferenceCloser, reference_numbers
+from enumsol.search.space.space_references import reference_numbers, space_closer
 from enumsol.search.space.space_search import SpaceCertifier
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.confinement import motion_beside
@@ -34,11 +35,10 @@ from enumsol.trusted.space.space_reference import SpaceReference
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-    from fractions import Fraction
 
     from enumsol.proof.writer import Recorder
     from enumsol.relaxation.space_relaxation import SpaceEngine
-    from enumsol.search.space.space_references import OnlyRoot
+    from enumsol.search.reference_closer import OnlyRoot
     from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.space.boxed_solution import BoxedSolution
     from enumsol.trusted.space.sector_rows import Row
@@ -49,16 +49,13 @@ class FloatingSpaceSolvers(HeldByNothing, SpaceSolvers):
 
     offered = '"verified"'
 
-    def _in_balls(self, alpha: Fraction, force: Floats, length: Floats) -> FloatingSpace:
-        return FloatingSpace.of(self.problem, alpha, force, length)
-
     @cached_property
     def relaxed(self) -> SpaceSystem:
         """The body on weak springs (theory, section 14.5)."""
         return self._on_springs(WEAK)
 
     def _on_springs(self, stiffness: float) -> SpaceSystem:
-        if not isinstance(self.enclosed, FloatingSpace):
+        if self.enclosed.held:
             return self.system
         S, g = weakly_held(self.system.S, self.system.g, self.enclosed.rows, stiffness)
         return replace(self.system, S=S, g=g)
@@ -66,20 +63,18 @@ class FloatingSpaceSolvers(HeldByNothing, SpaceSolvers):
     @cached_property
     def exclusions(self) -> SpaceExclusions | None:
         """What excludes assignments; None without balls."""
-        return SpaceExclusions(self.enclosed) if isinstance(self.enclosed, FloatingSpace) else None
+        return SpaceExclusions(self.enclosed) if not self.enclosed.held else None
 
     def certifier(self, recorder: Recorder | None) -> FloatingSpaceCertifier:
         """The certifier of this arithmetic."""
         return FloatingSpaceCertifier(self._engine, self.enclosed, self.exclusions, recorder or Unrecorded())
 
-    def _closer(self, certifier: FloatingSpaceCertifier) -> SpaceReferenceCloser | None:  # type: ignore[override]
-        if self.exclusions is None:
-            return None
-        return SpaceReferenceCloser(certifier, self._engine, lambda: self.known_root)
+    def _closer(self, certifier: Certifier) -> TreeCloser | None:
+        return None if self.exclusions is None else space_closer(certifier, self._engine, lambda: self.known_root)
 
     def reader(self) -> FloatingReader:
         """Understands the records of an earlier proof."""
-        modes = len(self.problem.modes.held) if self.problem.modes else 0
+        modes = self.problem.modes.r
         return FloatingReader(super().reader(), FLOATING_LEAVES, modes)
 
 
@@ -88,15 +83,15 @@ class SpaceExclusions:
 
     Parameters
     ----------
-    enclosed : FloatingSpace
+    enclosed : EnclosedSpace
 
     Attributes
     ----------
-    system, free : FloatingSpace
+    system, free : EnclosedSpace
         With its bound, and with one beyond which there are no solutions.
     """
 
-    def __init__(self, enclosed: FloatingSpace) -> None:
+    def __init__(self, enclosed: EnclosedSpace) -> None:
         self.system, self.free = enclosed, unbounded(enclosed)
         self._references: dict[Codes, SpaceReference | None] = {}
         #: How the forms of roots are declared, but for enclosures, by their leaves.

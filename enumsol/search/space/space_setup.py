@@ -9,14 +9,16 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from enumsol.condensation.enclosure import NotEnclosedError
+from enumsol.condensation.enclosure import NotEnclosedError, enclosure_of
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.proof.writer import Recorder, point_header, unit_exponents
+from enumsol.relaxation.space_convex_forms import SpaceFormAscent
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.certifiers.protocol import Certifier, Unrecorded
+from enumsol.search.closing import TreeCloser
+from enumsol.search.form_policy import Forms
 from enumsol.search.setup import SearchSetup
 from enumsol.search.space.space_fathoming import SpaceCloser, SpaceClosing, solved
-from enumsol.search.space.space_forms import SpaceForms
 from enumsol.search.space.space_search import SpaceCertifier, SpaceReader, SpaceSplitting
 
 if TYPE_CHECKING:
@@ -25,9 +27,14 @@ if TYPE_CHECKING:
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.search.resume import Reader
     from enumsol.support.array_types import Alpha, Codes, Floats
+    from enumsol.trusted.space.slip_forms import SlipForm
 
 #: Level of the sectors in which a root that floats suggest is sought: they are three degrees wide.
 _WIDE = 7
+#: Nodes examined with the energy before a form that knows where the body slides is tried (theory, section 12.2).
+NODES = 256
+#: It is used where it leaves no more than this share of the gap to the pruning bound at the root of the tree.
+_SHARE = 0.25
 
 
 class SpaceSolvers(SearchSetup):
@@ -75,7 +82,7 @@ class SpaceSolvers(SearchSetup):
 
     def _in_balls(self, alpha: Fraction, force: Floats, length: Floats) -> EnclosedSpace:
         """The problem in balls; NotEnclosedError where that cannot be."""
-        return EnclosedSpace.of_problem(self.problem.enclosure, alpha, force, length)
+        return EnclosedSpace.of_problem(enclosure_of(self.problem), alpha, force, length)
 
     @property
     def enclosed(self) -> EnclosedSpace:
@@ -102,12 +109,20 @@ class SpaceSolvers(SearchSetup):
     def _splitting(self, certifier: Certifier) -> SpaceSplitting:
         return SpaceSplitting(self._engine)
 
-    def _closer(self, certifier: Certifier) -> SpaceCloser | None:
+    def _closer(self, certifier: Certifier) -> TreeCloser | None:
         return SpaceCloser(self.system, cast("SpaceClosing", certifier), regular=self.arithmetic == "fast")
 
-    def _forms(self) -> SpaceForms | None:
+    def _forms(self) -> Forms | None:
         """Forms with which a long search may bound in place of the energy."""
-        return SpaceForms(self.enclosed)
+        return Forms(self._better, SpaceEngine.bounding, NODES)
+
+    def _better(self, engine: SpaceEngine, codes: Codes, rows: tuple[list[int], list[int]]) -> SlipForm | None:
+        """A form that is clearly tighter than the energy over a partial assignment, or None."""
+        plain = engine.root(*rows)
+        if plain.stalled or plain.pruned:
+            return None
+        found = SpaceFormAscent(engine, self.enclosed).ascended(rows)
+        return None if found is None or not found[1].bound > _SHARE * plain.bound else found[0]
 
     def remake(self) -> Callable[[], SpaceSolvers]:
         """Makes the same again, also in another process."""
@@ -121,7 +136,7 @@ class SpaceSolvers(SearchSetup):
 
     def unloaded(self) -> bool:
         """True if g = 0 for the data as given, so that only lambda = 0 solves."""
-        return self.problem.is_unloaded(self.alpha)
+        return bool(self.problem.is_unloaded(self.alpha))
 
     def reader(self) -> Reader:
         """Understands the records of an earlier proof."""

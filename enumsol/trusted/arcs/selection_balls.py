@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, Ball, solution
-from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
-from enumsol.condensation.floating import FloatingSystem, RigidRows
+from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem, NotEnclosedError, RigidRows
 from enumsol.support.array_types import Floats
 from enumsol.trusted.confinement import motion_against
 from enumsol.trusted.floating_bounds import is_unbalanced
@@ -53,16 +52,15 @@ class ArcSystem:
         With ``side`` 1 or -1 for the constant load +-g1 (see trusted.over_interval).
         """
         with np.errstate(over="ignore", invalid="ignore"):  # what overflows proves nothing
-            held = cls._of(enclosure, force, length, side)
-            return held if problem.modes is None else held._bordered(*RigidRows.along(problem, force, length))
+            return cls._of(enclosure, force, length, side)._bordered(RigidRows.along(problem, force, length))
 
-    def _bordered(self, rows: RigidRows, slope: Ball | None) -> ArcSystem:
-        """System of the body that nothing holds, from the one on springs."""
-        G, none = rows.G, Ball.exact(np.zeros_like(rows.h.mid))
+    def _bordered(self, rows: RigidRows) -> ArcSystem:
+        """System with the rows of the body as a whole."""
+        G = rows.G
         corner = Ball.exact(np.zeros((len(G.mid),) * 2))
         border = Ball(-G.mid.T, G.rad.T)
         S = Ball.joined(Ball.beside(self.S, border), Ball.beside(G, corner))
-        g0, g1 = Ball.joined(self.g0, rows.h), Ball.joined(self.g1, none if slope is None else slope)
+        g0, g1 = Ball.joined(self.g0, rows.h), Ball.joined(self.g1, rows.slope)
         return ArcSystem(S, g0, g1, self.F0, self.F1, rows.reach)
 
     @classmethod
@@ -142,7 +140,7 @@ class ArcSelection:
         z = motion_against(ends[0], self.rows.codes) if ends else None
         return z is not None and all(is_unbalanced(end, self.rows.codes, z) for end in ends)
 
-    def _at_end(self, alpha: float) -> FloatingSystem:
+    def _at_end(self, alpha: float) -> EnclosedSystem:
         system, contact = self.system, slice(2 * self.system.p)
         F = _affine(Ball.exact(system.F0), Ball.exact(system.F1), alpha)
         g = _affine(system.g0, system.g1, alpha)
@@ -154,7 +152,7 @@ class ArcSelection:
             np.ones(len(system.reach)),
             system.reach,
         )
-        return FloatingSystem(S.mid, S.rad, g.mid[contact], g.rad[contact], F.mid, F.rad, rows=rows)
+        return EnclosedSystem(S.mid, S.rad, g.mid[contact], g.rad[contact], F.mid, F.rad, rows=rows)
 
     @cached_property
     def forms(self) -> tuple[Floats, Floats, Floats, Floats]:

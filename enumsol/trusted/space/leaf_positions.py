@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, Ball, upper_norm, upper_sum
-from enumsol.condensation.space_condensed import EnclosedSpace, FloatingSpace, SpaceSystem
+from enumsol.condensation.enclosure import enclosure_of
+from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.restart import SlipStart, restarted
 from enumsol.model.sectors import DEEPEST, SECTORS, places
 from enumsol.trusted.space.leaves import ROUNDED_ANGLE, Leaf, SpaceRoot, State, turned
@@ -44,7 +45,7 @@ def leaf_positions(problem: Any, alpha: Fraction, forces: Ball, codes: Sequence[
     codes : p status codes
         Statuses that hold for certain: open, stick, any other one for slip.
     """
-    enclosure = problem.on_springs.enclosure
+    enclosure = enclosure_of(problem)
     enclosed, length = _scaled(problem, enclosure, alpha)
     p = enclosed.p
     pairs = forces[p:].mid.reshape(2, p).T, forces[p:].rad.reshape(2, p).T
@@ -68,7 +69,7 @@ def leaf_positions(problem: Any, alpha: Fraction, forces: Ball, codes: Sequence[
     # no force and no direction depends on the offsets of components that move: without these w is where they move to
     moves = np.array([code != STICK for code in codes])
     middle = problem if problem.offset_radius is None else restarted(problem, SlipStart(problem.slip_offset))
-    known = middle.on_springs.enclosure
+    known = enclosure_of(middle)
     without = known.without_offsets(np.concatenate([moves, moves]))
     near, beside = (Leaf(_scaled(problem, balls, alpha)[0], codes) for balls in (known, without))
     w = leaf.moved(root, near, beside, _spread(problem, enclosed, length))
@@ -154,9 +155,7 @@ def _scaled(problem: Any, enclosure: CondensedEnclosure, alpha: Fraction) -> tup
     """The problem as balls, in units of forces and displacements of its own; the latter, (p,)."""
     system = SpaceSystem.scaled(enclosure.S, enclosure.moved_freely(alpha).mid, problem.friction_at(alpha))
     units = alpha, system.force, system.length
-    if problem.modes is None:
-        return EnclosedSpace.of_problem(enclosure, *units), system.length
-    return FloatingSpace.of(problem, *units, enclosure), system.length
+    return EnclosedSpace.of_problem(enclosure, *units), system.length
 
 
 def _code(code: int, tau: Sequence[int], force: Sequence[float], angle: float) -> int:

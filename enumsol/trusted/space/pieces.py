@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
-from enumsol.condensation.space_condensed import FloatingPiece
+from enumsol.condensation.space_condensed import PieceSpace
 from enumsol.trusted.space.leaf_arcs import LeafArc, arc_of
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
 from enumsol.trusted.space.piece_forms import only_on_curve
@@ -77,7 +77,7 @@ class AlphaPiece:
         ``values`` are the multipliers of rows at both ends, between which they are affine in alpha.
         """
         (low, high), middle = self.ends, self.space.at(self.middle)
-        if isinstance(low, FloatingPiece) and isinstance(high, FloatingPiece) and isinstance(middle, FloatingPiece):
+        if not middle.held:
             return swept_floating_margin((low, high), middle, codes, rows, values, errors)
         return swept_margin(self.ends, middle, codes, rows, values, errors)
 
@@ -86,7 +86,7 @@ class AlphaPiece:
 
         Of a body that nothing holds.
         """
-        return all(isinstance(end, FloatingPiece) and is_unbalanced_in_space(end, codes, z) for end in self.ends)
+        return all(not end.held and is_unbalanced_in_space(end, codes, z) for end in self.ends)
 
     def forces(self, y: Ball) -> Ball:
         """Forces in the units of the problem, (3p,), all normals first, of scaled ones."""
@@ -118,7 +118,7 @@ class AlphaPiece:
             S, g0, g1 = Ball(data.S, data.S_rad), Ball(data.g0, data.g0_rad), Ball(data.g1, data.g1_rad)
             pushed = (S[missing] @ self.forces(y)[:, None])[:, 0]
             found[missing] = g0[missing] + alpha * g1[missing] - pushed
-            if self.space.floats:
+            if not system.held:
                 found[missing] = found[missing] + (self.space.moved[missing] @ self.rigid(y)[:, None])[:, 0]
         return found
 
@@ -244,7 +244,7 @@ class AlphaPiece:
 
     def rigid(self, y: Ball) -> Ball:
         """Coordinates q of the rigid displacement, (r,), in the problem's units, of y with -q behind its forces."""
-        if not isinstance(self.whole, FloatingPiece):
+        if self.whole.held:
             return y[:0]
         q, unit = -y[len(self.whole.g) :], self.whole.rows.unit
         return Ball(q.mid * unit, q.rad * unit + TINY)

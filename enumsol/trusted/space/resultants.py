@@ -14,8 +14,8 @@ from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SL
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.condensation.floating import FloatingSystem
-    from enumsol.condensation.space_condensed import FloatingPiece, FloatingSpace
+    from enumsol.condensation.enclosure import EnclosedSystem
+    from enumsol.condensation.space_condensed import EnclosedSpace, PieceSpace
     from enumsol.support.array_types import Floats
 
 #: A disc of forces lies in a polygon of so many corners.
@@ -27,7 +27,7 @@ _HALF = Ball.exact(np.array(0.5))
 
 @np.errstate(over="ignore", invalid="ignore")
 def floating_margin(
-    system: FloatingSpace, codes: Sequence[int], lines: Sequence[Row], multipliers: Floats, errors: float = 1.0
+    system: EnclosedSpace, codes: Sequence[int], lines: Sequence[Row], multipliers: Floats, errors: float = 1.0
 ) -> float:
     """Proven lower bound on e - h'q over a partial assignment, as ``sector_margin``; the better one of both of (14.6).
 
@@ -43,8 +43,8 @@ def floating_margin(
 
 @np.errstate(over="ignore", invalid="ignore")
 def swept_floating_margin(
-    ends: tuple[FloatingPiece, FloatingPiece],
-    middle: FloatingPiece,
+    ends: tuple[PieceSpace, PieceSpace],
+    middle: PieceSpace,
     codes: Sequence[int],
     lines: Sequence[Row],
     multipliers: tuple[Floats, Floats],
@@ -71,8 +71,8 @@ def swept_floating_margin(
 
 
 def _swept(
-    ends: tuple[FloatingPiece, FloatingPiece],
-    middle: FloatingPiece,
+    ends: tuple[PieceSpace, PieceSpace],
+    middle: PieceSpace,
     y: Sequence[Ball],
     rows: Sequence[Multiplied],
     between: Ball,
@@ -103,7 +103,7 @@ def _rounded(z: Floats) -> Floats:
 
 
 def _bound(
-    system: FloatingSystem, y: Ball, c: Ball, errors: float, z: Floats | None = None, *, at_balance: bool = False
+    system: EnclosedSystem, y: Ball, c: Ball, errors: float, z: Floats | None = None, *, at_balance: bool = False
 ) -> float:
     """See ``bounds_within``; -inf where there is none."""
     return _finite(
@@ -120,7 +120,7 @@ def _bound(
     )
 
 
-def _at_balance(system: FloatingSystem, rows: Multiplied, errors: float) -> Ball | None:
+def _at_balance(system: EnclosedSystem, rows: Multiplied, errors: float) -> Ball | None:
     """The y of multipliers of the same signs next to those given for which G y = h; None where none are shown to exist.
 
     What changes is the multipliers of the rows on w: each y belongs to several of them.
@@ -142,7 +142,7 @@ def _finite(bounds: Floats) -> float:
     return float(bounds[0]) if np.isfinite(bounds[0]) else -np.inf
 
 
-def is_unbalanced_in_space(system: FloatingSpace | FloatingPiece, codes: Sequence[int], z: Floats) -> bool:
+def is_unbalanced_in_space(system: EnclosedSpace | PieceSpace, codes: Sequence[int], z: Floats) -> bool:
     """Whether no forces below a partial assignment are in balance with the load, by z (r,); see theory, (14.7).
 
     z'h > 0, and z'G y <= 0 for all y of every node: (1, tau) with tau in the disc, or on the arc of its sector. Proven
@@ -190,12 +190,12 @@ def _most_friction(code: int, across: Floats, length: float, spread: float) -> f
     return length + spread
 
 
-def unbounded(system: FloatingSpace) -> FloatingSpace:
+def unbounded(system: EnclosedSpace) -> EnclosedSpace:
     """The system without bounds of the rigid displacement."""
     return system.reaching(np.full_like(system.reach, np.inf))
 
 
-def resultants(system: FloatingSpace | FloatingPiece, codes: Sequence[int]) -> list[Floats]:
+def resultants(system: EnclosedSpace | PieceSpace, codes: Sequence[int]) -> list[Floats]:
     """Resultants G y, (r,) each, whose cone holds all that the forces of an assignment can have, but for rounding."""
     G, discs = system.rows.G.mid / system.unit, system.discs.mid.tolist()
     found = []

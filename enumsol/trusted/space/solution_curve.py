@@ -17,8 +17,7 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, determinant_sign, solution, upper_norm
 from enumsol.condensation.condensed import node_units
-from enumsol.condensation.enclosure import NotEnclosedError
-from enumsol.condensation.floating import RigidRows
+from enumsol.condensation.enclosure import NotEnclosedError, RigidRows
 from enumsol.model.sectors import SECTORS
 from enumsol.trusted.space.natural_map import (
     MARGIN,
@@ -132,7 +131,7 @@ class AlphaProblem:
 
     @classmethod
     def of(cls, enclosure: CondensedEnclosure, steps: Array | None = None) -> AlphaProblem:
-        """Map of a problem whose nodes have coefficients of one ratio for all alpha (see ``enclosed_over_alpha``).
+        """Map of a problem whose nodes have coefficients of one ratio for all alpha.
 
         ``steps``: positive, (m,), rho in the units of the problem (force / length); by default some that serve.
 
@@ -156,12 +155,12 @@ class AlphaProblem:
                 Ball(enclosure.g0 / length, enclosure.g0_rad / length + TINY),
                 Ball(enclosure.g1 / length, enclosure.g1_rad / length + TINY),
             ]
-            ratio, rows = _ratios(problem, occurs), None
-            if problem.modes is not None:
-                rows = RigidRows.of(problem, Fraction(0), force, length)
-                data, work = _bordered(data, rows), float(force[0] * length[0])
-                ratio = Ball.joined(ratio, Ball.exact(np.ones(len(rows.unit))))
-                force, length = np.append(force, rows.unit), np.append(length, work / rows.unit)
+            rows, work = RigidRows.of(problem, Fraction(0), force, length), float(force[0] * length[0])
+            data, ratio = (
+                _bordered(data, rows),
+                Ball.joined(_ratios(problem, occurs), Ball.exact(np.ones(len(rows.unit)))),
+            )
+            force, length = np.append(force, rows.unit), np.append(length, work / rows.unit)
             S, g0, g1 = (part * ratio if part.mid.ndim == 1 else ratio[:, None] * part for part in data)
             inverse = Ball(1.0 / ratio.mid, (2.0 * ratio.rad / ratio.mid + 2 * UNIT) / ratio.mid * SAFE)
             inverse = Ball(inverse.mid, np.where((ratio.mid == 1) & (ratio.rad == 0), 0.0, inverse.rad))
@@ -177,7 +176,7 @@ class AlphaProblem:
         if found is None:
             raise NotEnclosedError("forces and displacements of the condensed problem cannot be told apart")
         part, offset = found[:, : m + 1], found[:, m + 1]
-        F0, F1, reach = coefficients[first], slopes[first], np.zeros(0) if rows is None else rows.reach * rows.unit
+        F0, F1, reach = coefficients[first], slopes[first], rows.reach * rows.unit
         return cls(S, g0, g1, F0, F1, ratio, inverse, tau, force, length, rho, turned, part, offset, reach)
 
     @property

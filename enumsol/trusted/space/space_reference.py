@@ -31,7 +31,7 @@ from enumsol.trusted.space.space_uniqueness import SpaceWeights, in_range, is_co
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.condensation.space_condensed import FloatingSpace
+    from enumsol.condensation.space_condensed import EnclosedSpace
     from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.space.sector_rows import Row
 
@@ -45,24 +45,24 @@ class SpaceReference:
 
     Attributes
     ----------
-    system : FloatingSpace
+    system : EnclosedSpace
     leaf : final codes
     root : SpaceRoot
     form : RootForm
     """
 
-    system: FloatingSpace
+    system: EnclosedSpace
     leaf: Codes
     root: SpaceRoot
     form: RootForm
 
     @classmethod
-    def of(cls, system: FloatingSpace, leaf: Codes, numbers: Floats, balance: float, share: float) -> Self | None:
+    def of(cls, system: EnclosedSpace, leaf: Codes, numbers: Floats, balance: float, share: float) -> Self | None:
         """None where the leaf holds no strict root, or its form is not proven definite where G d = 0.
 
         Parameters
         ----------
-        system : FloatingSpace
+        system : EnclosedSpace
         leaf : final codes
         numbers : see ``SpaceWeights.of``; no node serves any theta
         balance : factor of |G d|^2
@@ -140,7 +140,7 @@ class SpaceReference:
 
 
 def _multipliers(
-    system: FloatingSpace, weights: SpaceWeights, root: SpaceRoot, loaded: np.ndarray, share: float
+    system: EnclosedSpace, weights: SpaceWeights, root: SpaceRoot, loaded: np.ndarray, share: float
 ) -> Multipliers | None:
     """None where it is not known which theta serves."""
     turn, push, p, y = weights.turn(system), weights.push(system), len(system.tau), root.y
@@ -159,7 +159,7 @@ def _multipliers(
     return Multipliers(form, _cross(system, weights, turn, push, share), lost, cost)
 
 
-def _cross(system: FloatingSpace, weights: SpaceWeights, turn: Ball, push: Floats, share: float) -> Ball:
+def _cross(system: EnclosedSpace, weights: SpaceWeights, turn: Ball, push: Floats, share: float) -> Ball:
     """C = -G (D - c), without radius where nothing is left of it."""
     G, p = system.rows.G, len(system.tau)
     C = Ball.exact(np.zeros(G.shape))
