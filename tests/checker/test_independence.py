@@ -59,7 +59,6 @@ SHARED = {
     "trusted.arcs.taylor": {"ShortExpansion"},
     "trusted.positions": {"certain_statuses", "tangential_positions"},
     "trusted.reference": {"Reference"},
-    "trusted.root_forms": {"Product"},
     "trusted.selection": None,
     "trusted.uniqueness": {
         *("ClosedSolution", "closed_solution", "lone_root", "numbers_of", "only_solution", "same_solution")
