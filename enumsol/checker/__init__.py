@@ -46,8 +46,9 @@ What checker and search share
       form of ``trusted.over_interval``;
     - for problems in 3D, and loaded for their proofs only: ``trusted.space.sector_rows``, the rows and branchings
       and the exclusion inequality; ``trusted.space.slip_forms``, forms other than the energy;
-      ``trusted.space.leaves`` and ``trusted.space.turning``, what a complete assignment holds and which leaves
-      share a root; ``trusted.space.space_uniqueness``, the test that a whole problem has one solution only;
+      ``trusted.space.leaves``, what a complete assignment holds and which leaves share a root, by
+      ``trusted.space.leaf_equations``, ``trusted.space.leaf_conditions`` and ``trusted.space.turning``;
+      ``trusted.space.space_uniqueness``, the test that a whole problem has one solution only;
       ``trusted.space.product_forms``, the ellipsoids of forms of products;
       ``trusted.space.boxed_solution``, the test that a box holds exactly one, and which of these are
       the same, with the derivatives of ``trusted.space.natural_map``; over an interval of alpha

@@ -20,10 +20,11 @@ from enumsol.roots.linearisation import SelectionTangent
 from enumsol.roots.root import Enclosure, Root
 from enumsol.roots.root_set import RootSet, Undecided
 from enumsol.roots.space_regions import loose_angles, regions_of, slip_angles, with_zeros
+from enumsol.search.space.open_leaves import Cause
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.support.immutable import sealed
 from enumsol.trusted.space.boxed_solution import BoxedSolution, apart_in_boxes
-from enumsol.trusted.space.leaves import Cause, SpaceRoot, distinct_roots
+from enumsol.trusted.space.leaves import SpaceRoot, distinct_roots
 from enumsol.trusted.space.space_uniqueness import LooseSolution, OnlySolution
 
 if TYPE_CHECKING:

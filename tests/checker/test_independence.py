@@ -26,6 +26,7 @@ IN_SPACE = {
     *("enumsol.checker.space_checker", "enumsol.condensation.space_condensed", "enumsol.model.sectors"),
     *inside("trusted.space", "resultants", "sector_rows", "slip_forms", "leaves", "boxed_solution"),
     *inside("trusted.space", "product_forms", "natural_map", "space_reference", "space_uniqueness", "turning"),
+    *inside("trusted.space", "leaf_conditions", "leaf_equations"),
 }
 #: The search: its rooms, and what it alone uses of rooms that it shares with the checkers.
 SEARCH = (
@@ -35,7 +36,9 @@ SEARCH = (
 )
 #: What may write a false proof and accept it: of these modules the search uses no more than these names; None: all.
 SHARED = {
-    "arithmetic.balls": {*("Ball", "SAFE", "TINY", "UNIT", "factor_above", "smaller", "solution", "upper_norm")},
+    "arithmetic.balls": {
+        *("Ball", "SAFE", "TINY", "UNIT", "factor_above", "nearly_singular", "smaller", "solution", "upper_norm")
+    },
     "arithmetic.rationals": {
         *("as_objects", "is_positive_definite", "rational", "rational_matrix", "simplest", "to_fraction")
     },
@@ -70,6 +73,7 @@ SHARED = {
     "trusted.space.sector_rows": None,
     "trusted.space.slip_forms": {"SlipForm"},
     "trusted.space.leaf_arcs": {"LeafArc"},
+    "trusted.space.leaf_equations": {"with_free_bounds"},
     "trusted.space.leaves": None,
     "trusted.space.resultants": None,
     "trusted.space.space_reference": {"SpaceProduct", "SpaceReference"},

@@ -22,7 +22,7 @@ def _with(*changes):
         yield
 
 
-def _nothing(*_):
+def _nothing(*_, **__):
     """Takes the place of methods that prove something."""
 
 

@@ -13,7 +13,7 @@ from space_proofs import random_problem
 from trees import by_the_tree
 
 from enumsol import enumerate_roots, verify
-from enumsol.trusted.space.leaves import Cause
+from enumsol.search.space.open_leaves import Cause
 
 
 def settled(problem):

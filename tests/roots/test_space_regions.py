@@ -17,8 +17,8 @@ from enumsol import enumerate_roots, gallery
 from enumsol.cli import root_report
 from enumsol.model.sectors import SECTORS
 from enumsol.roots.space_regions import _hull, regions_of
+from enumsol.search.space.open_leaves import Cause
 from enumsol.search.space.space_setup import SpaceSolvers
-from enumsol.trusted.space.leaves import Cause
 
 pytestmark = pytest.mark.usefixtures("tree_only", "no_boxes")
 LOADED = (np.eye(3), [1, 3, 2])

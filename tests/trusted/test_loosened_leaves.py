@@ -10,8 +10,9 @@ from enumsol import enumerate_roots
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import DEEPEST, SECTORS, direction, end_number, places
 from enumsol.search.space.space_setup import SpaceSolvers
-from enumsol.trusted.space import leaves
-from enumsol.trusted.space.leaves import Leaf, Open, SpaceRoot
+from enumsol.trusted.space import leaf_equations
+from enumsol.trusted.space.leaf_equations import Leaf
+from enumsol.trusted.space.leaves import Open, SpaceRoot, contents
 from enumsol.trusted.space.pieces import AlphaPiece
 
 #: Seeds of nodes whose normal force a direction of slip does not determine at some solution, and whether load changes.
@@ -70,7 +71,7 @@ def test_no_solution_is_missed_where_the_equations_are_singular(seed, load):
     settled = open_before = seen = 0
     for _, problem, piece, codes, points in cases(seed, load):
         narrowed, found = piece.narrowed(codes)
-        before = Leaf(piece.whole, codes).settle()
+        before = contents(Leaf(piece.whole, codes))
         open_before += isinstance(before, Open) and before.y is None
         settled += not isinstance(found, Open) or found.y is not None
         seen += len(points)
@@ -93,11 +94,11 @@ def test_a_root_there_is_one_with_its_index(seed, load, monkeypatch):
     """A leaf that has exactly one root over its piece has it at every alpha, with the index of an enumeration."""
     compared = 0
     # narrow sectors, too
-    monkeypatch.setattr(leaves, "_COUPLED", 0.0)
+    monkeypatch.setattr(leaf_equations, "_COUPLED", 0.0)
     for _, problem, piece, codes, _ in cases(seed, load, ((9, 1e-4), (11, 1e-5))):
         leaf = Leaf(piece.whole, codes).loosened()
         with np.errstate(all="ignore"):
-            found = None if leaf is None else leaf.settle()
+            found = None if leaf is None else contents(leaf)
         if not isinstance(found, SpaceRoot):
             continue
         compared += 1

@@ -14,7 +14,8 @@ from enumsol.condensation.space_condensed import AlphaSpace, EnclosedSpace, Piec
 from enumsol.model.sectors import SECTORS, nearest, start_of
 from enumsol.search.space.piece_multipliers import PieceBounds
 from enumsol.search.space.space_setup import SpaceSolvers
-from enumsol.trusted.space.leaves import Leaf, Open, SpaceRoot
+from enumsol.trusted.space.leaf_equations import Leaf, slopes_by_second
+from enumsol.trusted.space.leaves import Open, SpaceRoot
 from enumsol.trusted.space.pieces import AlphaPiece, lie_along
 from enumsol.trusted.space.sector_rows import CONTACT, OPEN, STICK, UNDECIDED, row_sign, sector_margin, sector_row_terms
 from enumsol.trusted.space.solution_curve import AlphaProblem
@@ -207,17 +208,17 @@ def test_second_derivatives_over_a_piece_hold_differences(p, seed, loose):
             np.append(np.zeros(p), 0.5 * np.ones(len(loose))),
             np.append(leaf.half, 0.3 * np.ones(len(loose))),
         )
-        state = leaf._state(angle, radius)
+        state = leaf.over(angle, radius)
         if state is None:
             continue
-        point = leaf._state(angle, 0.0 * radius, still=True)
+        point = leaf.over(angle, 0.0 * radius, still=True)
         Y = rng.standard_normal((n, n))
-        second = leaf._second(Y, (state, point), angle, radius)
+        second = leaf.second(Y, (state, point), angle, radius)
         half = (piece.high - piece.low) / 2
 
         def at(z, codes=codes, half=half, Y=Y, angle=angle):
             alpha, there = piece.middle + Fraction(float(z[-1])) * half, angle + z[:-1]
-            return Y @ Leaf(piece.space.at(alpha), codes, loose)._state(there, 0.0 * there, still=True).G.mid
+            return Y @ Leaf(piece.space.at(alpha), codes, loose).over(there, 0.0 * there, still=True).G.mid
 
         steps = np.diag(np.append(0.4 * radius, 0.4))
         z = np.append(rng.uniform(-0.2, 0.2, n) * radius, rng.uniform(-0.2, 0.2))
@@ -237,14 +238,14 @@ def test_values_and_slopes_over_a_piece_hold_those_at_its_alphas(seed):
         for _ in range(8):
             leaf = Leaf(piece.whole, [SECTORS + int(rng.integers(64, 512)) for _ in range(2)])
             angle, radius = rng.uniform(-0.5, 0.5, 2) * leaf.half, leaf.half * 10.0 ** -rng.uniform(0, 4)
-            state = leaf._state(angle, radius)
+            state = leaf.over(angle, radius)
             if state is None:
                 continue
             seen += 1
 
             def at(psi, s, leaf=leaf, piece=piece):
                 alpha = piece.middle + Fraction(float(s)) * (piece.high - piece.low) / 2
-                return Leaf(piece.space.at(alpha), leaf.codes)._state(psi, np.zeros(2))
+                return Leaf(piece.space.at(alpha), leaf.codes).over(psi, np.zeros(2))
 
             for s in (-1.0, rng.uniform(-1, 1), 1.0):
                 psi = angle + 0.999 * radius * rng.choice([-1.0, 1.0, rng.uniform(-1, 1)], 2)
@@ -438,13 +439,13 @@ def test_what_changes_along_a_piece_lies_in_its_balls(p, loose, share):
         radius = np.append(leaf.half * 10.0 ** -rng.uniform(0, 3, p), 10.0 ** -rng.uniform(0, 3, loose))
         angle = np.append(np.zeros(p), rng.uniform(-1, 2, loose))
         with np.errstate(all="ignore"):
-            state, point = leaf._state(angle, radius), leaf._state(angle, 0.0 * radius, still=True)
+            state, point = leaf.over(angle, radius), leaf.over(angle, 0.0 * radius, still=True)
         if state is None or point is None:
             continue
         known += 1
         Y = np.linalg.inv(point.J.mid) if seed % 2 else rng.normal(size=(p + loose, p + loose))
-        second = leaf._second(Y, (state, point), angle, radius)
-        slope = leaf._preconditioned(Ball.exact(Y), point.whole_J, state.whole_J, second, np.append(radius, 1.0))
+        second = leaf.second(Y, (state, point), angle, radius)
+        slope = slopes_by_second(Ball.exact(Y), point.whole_J, state.whole_J, second, np.append(radius, 1.0))
         held = Ball.beside(state.box.slope, state.box.lone)
         for _ in range(20):
             z = np.append(radius, 1.0) * rng.choice([-1, 1, rng.uniform(-1, 1)], p + loose + 1)

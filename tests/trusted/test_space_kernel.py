@@ -17,7 +17,8 @@ from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.sectors import DEEPEST, RUN, SECTORS, contains, cut, end_number, is_sector, run_of, start_of
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space import sector_rows as sr
-from enumsol.trusted.space.leaves import Leaf, SpaceRoot, _cut, distinct_roots, same_root, settle
+from enumsol.trusted.space.leaf_equations import Leaf
+from enumsol.trusted.space.leaves import SpaceRoot, _cut, distinct_roots, same_root, settle
 
 TAU_ONE = np.array([[1, 2]])
 

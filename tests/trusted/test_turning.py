@@ -9,7 +9,7 @@ from flint import fmpq, fmpq_mat
 
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.sectors import SECTORS
-from enumsol.trusted.space.leaves import Leaf
+from enumsol.trusted.space.leaf_equations import Leaf
 from enumsol.trusted.space.sector_rows import OPEN, STICK
 
 
@@ -107,13 +107,13 @@ def test_values_and_slopes_lie_in_their_balls(seed):
         size = len(leaf.turning)
         radius = leaf.half * 10.0 ** -rng.uniform(0, 6, size=size)
         angle = leaf.half * rng.uniform(-0.5, 0.5, size=size)
-        state = leaf._state(angle, radius)
+        state = leaf.over(angle, radius)
         if state is None:
             continue
         # as they are, or with much that cancels
-        point, last = leaf._state(angle, 0.0 * radius), None
+        point, last = leaf.over(angle, 0.0 * radius), None
         Y = np.linalg.inv(point.J.mid) if seed % 2 and abs(np.linalg.det(point.J.mid)) > 0 else np.eye(size)
-        bends = leaf._bends(Y, (state, point), angle, radius)
+        bends = leaf.bends(Y, (state, point), angle, radius)[1]
         for _ in range(3):
             there = Exactly(leaf, system, angle + 0.999 * radius * rng.choice([-1, 1, rng.uniform(-1, 1)], size=size))
             w = [fmpq(0) if row in leaf.rows else there.w[row, 0] for row in range(len(system.g))]
@@ -140,6 +140,6 @@ def test_weak_springs_widen_nothing():
         g = S @ np.array([1.0, 2.0, 1.5, 0.1, 0.2, 0.1, 0.0, 0.1, 0.2])
         system = SpaceSystem.scaled(S, g, np.full((3, 2), 0.25))
         leaf = Leaf(EnclosedSpace.of_floats(system), (STICK, SECTORS + 64, SECTORS + 70))
-        state = leaf._state(np.zeros(2), leaf.half)
+        state = leaf.over(np.zeros(2), leaf.half)
         wide.append([np.max(ball.rad) / np.max(np.abs(ball.mid)) for ball in state[:4]])
     assert np.allclose(wide, wide[0], rtol=0.02)

@@ -46,21 +46,21 @@ class KnownBoxes:
     def _problem(self) -> Isotropic:
         return Isotropic.of(self._system)
 
-    def holding(self, leaf: Open) -> BoxedSolution | None:
-        """The one solution that an open leaf can have, if that is proven."""
+    def holding(self, leaf: Open, *, halved: bool) -> BoxedSolution | None:
+        """The one solution that an open leaf can have, which is ``halved`` otherwise, if that is proven."""
         y, w = leaf.y, leaf.w
         if y is None or w is None:
             return None
         for known in self._found:
             if is_inside(y, w, known.box, _ERRORS):
                 return known
-        if leaf.node is not None:
+        if halved:
             if not np.max(y.rad) <= _ROUGH * np.max(np.abs(y.mid) + y.rad):
                 return None
             if self._wait > 0:
                 self._wait -= 1
                 return None
-        found = self._sought(y.mid, halved=leaf.node is not None)
+        found = self._sought(y.mid, halved=halved)
         self._pause = 2 * self._pause + 1 if found is None else 0
         self._wait = self._pause
         return found if found is not None and is_inside(y, w, found.box, _ERRORS) else None

@@ -19,6 +19,7 @@ from enumsol.proof.space_records import CutPiece, ExcludedOverPiece, OnlyOnCurve
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.outcome import StopReason
 from enumsol.search.space.known_curves import Curves, middle_of
+from enumsol.search.space.open_leaves import is_swept
 from enumsol.search.space.piece_certificates import ERRORS, ExaminedPiece, Passage, runs_over
 from enumsol.search.space.piece_leaves import PieceLeaves, around_curves
 from enumsol.search.space.piece_multipliers import COUNTED, AlphaPoint, exclusion, unbalanced
@@ -431,7 +432,7 @@ class PieceTree:
         narrowed, found = piece.narrowed(codes)
         if (record := self._leaves.settled(at, codes, narrowed, found)) is not None:
             return record, []
-        if isinstance(found, Open) and not found.swept and self._widest(codes) >= 0:
+        if isinstance(found, Open) and not is_swept(found) and self._widest(codes) >= 0:
             return None
         there = piece.point.held(codes)
         if isinstance(there, SpaceRoot):

@@ -209,5 +209,5 @@ class FloatingSpaceCertifier(SpaceCertifier):
             self.bounded |= not isinstance(settle(self._exclusions.free, codes), type(answer))
         return answer
 
-    def _boxed(self, leaf: Open) -> None:
+    def _boxed(self, leaf: Open, *, halved: bool) -> None:
         """Boxes rest on a stiffness that is positive definite."""

@@ -36,8 +36,9 @@ from enumsol.search.certifiers.protocol import (
 )
 from enumsol.search.outcome import HOLD
 from enumsol.search.space.known_boxes import KnownBoxes
+from enumsol.search.space.open_leaves import Cause, obstacle, sector_to_halve
 from enumsol.search.space.product_search import Branched, Enclosed, Missed
-from enumsol.trusted.space.leaves import Cause, Open, SpaceRoot, settle
+from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
 from enumsol.trusted.space.product_forms import Ellipsoid, refines
 from enumsol.trusted.space.sector_rows import is_sector_covering, sector_margin, sector_row_terms
 from enumsol.trusted.space.slip_forms import SlipForm
@@ -241,13 +242,15 @@ class SpaceCertifier(RecordingCertifier):
         if answer is None:
             self._leaf(NoRoot())
         elif isinstance(answer, Open):
-            if (boxed := self._boxed(answer)) is not None:
+            node = sector_to_halve(answer)
+            if (boxed := self._boxed(answer, halved=node is not None)) is not None:
                 return self._in_box(codes, boxed, space_records.BoxedRoot)
-            if answer.node is not None and level_of(codes[answer.node] - SECTORS) < DEEPEST:
-                return Refine(answer.node)
-            reason = answer.cause.value if answer.mode is None else f"{answer.cause.value} (rigid mode {answer.mode})"
+            if node is not None and level_of(codes[node] - SECTORS) < DEEPEST:
+                return Refine(node)
+            cause, mode = obstacle(answer)
+            reason = cause.value if mode is None else f"{cause.value} (rigid mode {mode})"
             self._leaf(UndecidedRecord(reason))
-            hint = {Cause.ROUNDING: _HOLD, Cause.RIGID: HOLD}.get(answer.cause, _PERTURB)
+            hint = {Cause.ROUNDING: _HOLD, Cause.RIGID: HOLD}.get(cause, _PERTURB)
             return UndecidedPart(codes, reason, hint, examined=True)
         else:
             self._leaf(RegularRoot(self._ball(answer)))
@@ -300,9 +303,9 @@ class SpaceCertifier(RecordingCertifier):
                 self._leaf(space_records.MissedByProducts())
         return found
 
-    def _boxed(self, leaf: Open) -> BoxedSolution | None:
-        """The one solution that an open leaf can have, if that is proven."""
-        return self._boxes.holding(leaf)
+    def _boxed(self, leaf: Open, *, halved: bool) -> BoxedSolution | None:
+        """The one solution that an open leaf can have, which is ``halved`` otherwise, if that is proven."""
+        return self._boxes.holding(leaf, halved=halved)
 
     def _placed(self, codes: Codes, root: SpaceRoot) -> SpaceRoot:
         """The same root from sectors around it: its numbers then do not depend on how the search came to its leaf."""

@@ -12,7 +12,8 @@ from enumsol.condensation.enclosure import enclosure_of
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.restart import SlipStart, restarted
 from enumsol.model.sectors import DEEPEST, SECTORS, places
-from enumsol.trusted.space.leaves import ROUNDED_ANGLE, Leaf, SpaceRoot, State, turned
+from enumsol.trusted.space.leaf_equations import ROUNDED_ANGLE, Leaf, State, turned
+from enumsol.trusted.space.leaves import SpaceRoot, contents
 from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.trusted.space.turning import held_by
 
@@ -20,7 +21,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from fractions import Fraction
 
-    from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.support.array_types import Floats, Indices
 
 #: The level of the sectors around directions of slip, or that at which they are so many times as wide as these are
@@ -46,7 +46,9 @@ def leaf_positions(problem: Any, alpha: Fraction, forces: Ball, codes: Sequence[
         Statuses that hold for certain: open, stick, any other one for slip.
     """
     enclosure = enclosure_of(problem)
-    enclosed, length = _scaled(problem, enclosure, alpha)
+    system = SpaceSystem.scaled(enclosure.S, enclosure.moved_freely(alpha).mid, problem.friction_at(alpha))
+    units, length = (alpha, system.force, system.length), system.length
+    enclosed = EnclosedSpace.of_problem(enclosure, *units)
     p = enclosed.p
     pairs = forces[p:].mid.reshape(2, p).T, forces[p:].rad.reshape(2, p).T
     tau = Ball(*pairs) * enclosed.inverse_friction * Ball.exact(enclosed.tau_scale)
@@ -58,8 +60,8 @@ def leaf_positions(problem: Any, alpha: Fraction, forces: Ball, codes: Sequence[
     # along one axis the force's sign is known where its angle is
     if np.any(angle[along] >= _ANY):
         return None
-    leaf = _StartedLeaf(enclosed, codes)
-    root = leaf.settle()
+    leaf = Leaf(enclosed, codes)
+    root = contents(leaf)
     if not isinstance(root, SpaceRoot):
         return None
     # the root's directions lie where the leaf has no other one
@@ -71,8 +73,8 @@ def leaf_positions(problem: Any, alpha: Fraction, forces: Ball, codes: Sequence[
     middle = problem if problem.offset_radius is None else restarted(problem, SlipStart(problem.slip_offset))
     known = enclosure_of(middle)
     without = known.without_offsets(np.concatenate([moves, moves]))
-    near, beside = (Leaf(_scaled(problem, balls, alpha)[0], codes) for balls in (known, without))
-    w = leaf.moved(root, near, beside, _spread(problem, enclosed, length))
+    near, beside = (Leaf(EnclosedSpace.of_problem(balls, *units), codes) for balls in (known, without))
+    w = _moved(leaf, root, near, beside, _spread(problem, enclosed, length))
     if w is None:
         return None
     found = Ball(np.zeros(2 * p), np.full(2 * p, np.inf))
@@ -93,69 +95,61 @@ def _spread(problem: Any, enclosed: EnclosedSpace, length: Floats) -> Floats:
     return spread
 
 
-class _StartedLeaf(Leaf):
-    """A leaf for all slip offsets in a ball."""
+def _moved(leaf: Leaf, root: SpaceRoot, middle: Leaf, beside: Leaf, spread: Floats) -> Ball | None:
+    """Displacements w of ``beside`` at the root, for every offset in a ball (theory, section 13.2), or None.
 
-    def moved(self, root: SpaceRoot, middle: Leaf, beside: Leaf, spread: Floats) -> Ball | None:
-        """w of ``beside`` at the root, for every offset in the ball (theory, section 13.2); None if it is not known.
+    Parameters
+    ----------
+    leaf : Leaf
+        For all slip offsets in the ball.
+    root : SpaceRoot
+        Of this leaf.
+    middle, beside : Leaf
+        The same for the middle of the ball, and without the offsets of components that move.
+    spread : (m,) array
+        How far offsets are from there at most.
+    """
+    angle, reach, m = root.angle, root.angle_rad, len(leaf.system.g)
+    if root.rigid is not None:
+        # coordinates of modes that are left free are unknowns beside the directions, of the other sign
+        free = -root.rigid[np.array(leaf.free, dtype=np.intp) - m]
+        angle, reach = np.r_[angle, free.mid], np.r_[reach, free.rad]
+    over, point, start = leaf.over(angle, reach), middle.over(angle, 0.0 * reach), beside.over(angle, 0.0 * reach)
+    by_load = _by_load(leaf, angle, load := np.flatnonzero(spread))
+    if over is None or by_load is None or point is None or start is None or not over.J.finite:
+        return None
+    try:
+        Y = Ball.exact(_slopes(point).mid @ np.linalg.inv(point.J.mid))
+    except np.linalg.LinAlgError:
+        return None
+    (w, G), own = by_load, ~np.isin(load, leaf.rows)
+    w[:, own] = 0.0
+    found = start.w + (_slopes(over) - Y @ over.J) @ Ball(0.0 * reach, reach) - Y @ point.G
+    wide = upper_sum((w - Y @ G).size * spread[load], axis=1)
+    return Ball(found.mid, (found.rad + wide) * SAFE)[:m]
 
-        Parameters
-        ----------
-        root : SpaceRoot
-            Of this leaf.
-        middle, beside : Leaf
-            The same for the middle of the ball, and without the offsets of components that move.
-        spread : (m,) array
-            How far offsets are from there at most.
-        """
-        angle, reach, m = root.angle, root.angle_rad, len(self.system.g)
-        if root.rigid is not None:
-            # coordinates of modes that are left free are unknowns beside the directions, of the other sign
-            free = -root.rigid[np.array(self.free, dtype=np.intp) - m]
-            angle, reach = np.r_[angle, free.mid], np.r_[reach, free.rad]
-        over, states = self._state(angle, reach), [leaf._state(angle, 0.0 * reach) for leaf in (middle, beside)]
-        by_load = self._by_load(angle, load := np.flatnonzero(spread))
-        if over is None or by_load is None or states[0] is None or states[1] is None or not over.J.finite:
-            return None
-        point, start = states[0], states[1]
-        try:
-            Y = Ball.exact(_slopes(point).mid @ np.linalg.inv(point.J.mid))
-        except np.linalg.LinAlgError:
-            return None
-        (w, G), own = by_load, ~np.isin(load, self.rows)
-        w[:, own] = 0.0
-        found = start.w + (_slopes(over) - Y @ over.J) @ Ball(0.0 * reach, reach) - Y @ point.G
-        wide = upper_sum((w - Y @ G).size * spread[load], axis=1)
-        return Ball(found.mid, (found.rad + wide) * SAFE)[:m]
 
-    def _by_load(self, angle: Floats, load: Indices) -> tuple[Ball, Ball] | None:
-        """Changes by one unit more of some rows of the load to w and to G, (m, k) and (q, k), directions held."""
-        turning, q = self._turning(angle), len(self.turning)
-        if turning is None:
-            return None
-        E, columns = Ball.exact(self.E.copy()), np.zeros((len(self.E), len(load)))
-        columns[load, np.arange(len(load))] = 1.0
-        at = self.t, np.array(self.column, dtype=np.intp)[:, None]
-        E.mid[at], E.rad[at] = turning.d, turning.off[:, None]
-        SE = self.system.balls[0] @ E
-        found = held_by(SE[self.rows], SE, Ball.exact(columns), self.rows)
-        if found is None:
-            return None
-        w, (d, _) = found[1], self._directions(angle, np.zeros(q))
-        v1, v2 = self._slips(w)
-        return w, Ball.joined(v1 * d[:, 1][:, None] - v2 * d[:, 0][:, None], w[self.free])
+def _by_load(leaf: Leaf, angle: Floats, load: Indices) -> tuple[Ball, Ball] | None:
+    """Changes by one unit more of some rows of the load to w and to G, (m, k) and (q, k), directions held."""
+    turning, q = leaf.equations(angle), len(leaf.turning)
+    if turning is None:
+        return None
+    E, columns = Ball.exact(leaf.E.copy()), np.zeros((len(leaf.E), len(load)))
+    columns[load, np.arange(len(load))] = 1.0
+    at = leaf.t, np.array(leaf.column, dtype=np.intp)[:, None]
+    E.mid[at], E.rad[at] = turning.d, turning.off[:, None]
+    SE = leaf.system.balls[0] @ E
+    found = held_by(SE[leaf.rows], SE, Ball.exact(columns), leaf.rows)
+    if found is None:
+        return None
+    w, (d, _) = found[1], leaf.directions(angle, np.zeros(q))
+    v1, v2 = leaf.slips(w)
+    return w, Ball.joined(v1 * d[:, 1][:, None] - v2 * d[:, 0][:, None], w[leaf.free])
 
 
 def _slopes(state: State) -> Ball:
     """Derivatives of w by all unknowns beside x."""
     return Ball.beside(state.box.dw, state.box.ds)
-
-
-def _scaled(problem: Any, enclosure: CondensedEnclosure, alpha: Fraction) -> tuple[EnclosedSpace, Floats]:
-    """The problem as balls, in units of forces and displacements of its own; the latter, (p,)."""
-    system = SpaceSystem.scaled(enclosure.S, enclosure.moved_freely(alpha).mid, problem.friction_at(alpha))
-    units = alpha, system.force, system.length
-    return EnclosedSpace.of_problem(enclosure, *units), system.length
 
 
 def _code(code: int, tau: Sequence[int], force: Sequence[float], angle: float) -> int:

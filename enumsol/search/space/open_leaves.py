@@ -1,0 +1,126 @@
+"""What stands in the way of a leaf in 3D that is not settled, as computed, and what is halved for it.
+
+Nothing here is trusted.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.arithmetic.balls import nearly_singular
+from enumsol.trusted.space.leaf_equations import with_free_bounds
+from enumsol.trusted.space.turning import turned_by
+
+if TYPE_CHECKING:
+    from enumsol.support.array_types import Floats
+    from enumsol.trusted.space.leaves import LastBox, Open
+
+#: Boxes of directions narrower than this hold a point, and forces known no better are not known; neither is halved for.
+_POINT = 2.0**-24
+#: Directions that change no G by more (scaled) are not halved, nor for a linear system that they change by no more.
+_NEGLIGIBLE, _SINGULAR = 2.0**-44, 2.0**-36
+
+
+class Cause(Enum):
+    """Why a leaf is not settled."""
+
+    EQUALITY = "a condition holds with equality, or nearly so, at what may be a root"
+    DIRECTIONS = "slip directions are not isolated, or hardly so, at what may be a root: a fold or a continuum is near"
+    EQUATIONS = "the equations of its statuses are singular, or nearly so, for some slip directions: the body may wedge"
+    RIGID = "the equations of its statuses leave the body free to move as a whole, or nearly so"
+    ROUNDING = "rounding leaves the forces there open: the body is almost free to move"
+
+
+def obstacle(found: Open) -> tuple[Cause, int | None]:
+    """The cause in the middle of the leaf's last box, and the rigid mode that is free for it, if one is."""
+    last = found.last
+    if last is None:
+        return Cause.EQUALITY, None
+    leaf, angle, modes = last.leaf, last.angle, len(last.leaf.system.reach)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        point = leaf.over(angle, np.zeros(len(angle)))
+        if last.state is None or point is None:
+            return (Cause.RIGID, _free_mode(last)) if modes else (Cause.EQUATIONS, None)
+        if modes and leaf.free and nearly_singular(point.J.mid):
+            return Cause.RIGID, _free_mode(last)
+        if not np.all(point.y.rad <= _POINT):
+            return Cause.ROUNDING, None
+        return (Cause.DIRECTIONS if len(angle) and nearly_singular(point.J.mid) else Cause.EQUALITY), None
+
+
+def _free_mode(last: LastBox) -> int:
+    """The rigid mode that moves most along what the equations in the middle leave free."""
+    leaf, angle = last.leaf, last.angle
+    point, q = leaf.over(angle, np.zeros(len(angle))), len(leaf.turning)
+    if leaf.free and point is not None and point.J.finite:
+        along = np.linalg.svd(point.J.mid)[2][-1][q:]
+        return leaf.free[int(np.argmax(np.abs(along)))] - len(leaf.system.g)
+    _, _, rows = np.linalg.svd(leaf.middle_matrix(turned_by(leaf.centre, angle[:q])[0]))
+    return int(np.argmax(np.abs(rows[-1][-len(leaf.system.reach) :])))
+
+
+def sector_to_halve(found: Open) -> int | None:
+    """The node whose sector is to be halved, the widest; None where that is not expected to help."""
+    last = found.last
+    if last is None:
+        return None
+    q = len(last.leaf.turning)
+    if not q or (last.state is not None and np.all(last.radius[:q] < _POINT)):
+        return None
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        worth = _worth_halving(last)
+    return last.leaf.turning[int(np.argmax(worth))] if np.any(worth) else None
+
+
+def _worth_halving(last: LastBox) -> Floats:
+    """Gains expected of halving each sector; 0 where smaller ones would be left open, too."""
+    leaf, angle, radius, state = last.leaf, last.angle, last.radius, last.state
+    point, q = leaf.over(angle, np.zeros(len(angle))), len(leaf.half)
+    if state is not None and point is not None and np.all(point.y.rad <= _POINT):
+        # the width, where it changes more than what is not known anyway
+        known = np.maximum(_NEGLIGIBLE, point.G.rad)[:, None]
+        moves = np.any(state.J.size * radius > known, axis=0)
+        # what free unknowns may be depends on all directions
+        return np.where(moves[:q] | np.any(moves[q:]), leaf.half, 0.0)
+    # the change of the linear system, where it keeps that from being regular
+    if not leaf.rows:
+        return leaf.half
+    widths = leaf.directions(angle, radius)[0].rad / leaf.system.unit[leaf.t]
+    changes = np.max(np.sum(np.abs(leaf.system.balls[0].mid[leaf.rows][:, leaf.t]) * widths, axis=2), axis=0)
+    turning = leaf.equations(angle)
+    worth = changes if turning is None else np.max(turning.coupling(radius[:q]), axis=0)
+    return worth if changes[int(np.argmax(worth))] > _SINGULAR else np.zeros_like(worth)
+
+
+def is_swept(found: Open) -> bool:
+    """True if rather the piece of alpha stands in the way than the widths of sectors."""
+    last = found.last
+    if last is None or not last.leaf.piece:
+        return False
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        return _changes_along_piece(last)
+
+
+def _changes_along_piece(last: LastBox) -> bool:
+    """True if dG/dpsi changes more along the piece than over the angles."""
+    leaf, angle, radius, state = last.leaf, last.angle, last.radius, last.state
+    if not np.all(np.isfinite(radius)):
+        # whether a free unknown would be bounded in the middle of the piece
+        cut = with_free_bounds(leaf, angle, radius, still=True)
+        return cut is None or bool(np.all(np.isfinite(cut[1])))
+    point = leaf.over(angle, 0.0 * radius, still=True)
+    if point is None or not len(angle):
+        return True
+    if state is None or not state.J.finite:
+        return leaf.over(angle, radius, still=True) is not None
+    try:
+        Y = np.asarray(np.linalg.inv(point.J.mid), dtype=np.float64)
+    except np.linalg.LinAlgError:
+        return False
+    second = leaf.second(Y, (state, point), angle, radius).size
+    bends, mixed = second[:, :-1, :-1] @ radius, second[:, :-1, -1]
+    turned, swept = (np.max(part @ radius / radius) for part in (bends, mixed))
+    return bool(swept > turned)

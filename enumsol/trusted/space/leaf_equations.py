@@ -1,0 +1,321 @@
+"""The equations of a leaf in 3D and their derivatives, over boxes of directions and pieces of alpha.
+
+See theory, sections 12.3 and 12.9.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple, Self
+
+import numpy as np
+from scipy.linalg import qr
+
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, smaller, solution, upper_sum
+from enumsol.model.sectors import SECTORS, direction, end_number
+from enumsol.trusted.space.sector_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.trusted.space.turning import LIBRARY, Box, Combined, Turning, turned_by
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from enumsol.condensation.space_condensed import EnclosedSpace
+    from enumsol.support.array_types import Codes, Floats
+
+#: A sector's box of directions is this share of its width wider on both sides: a root on an end lies inside two boxes.
+_WIDENED = 0.125
+#: What is rounded of an angle between two directions.
+ROUNDED_ANGLE = 1e-12
+#: Rigid modes that move what the equations fix by no more than this, relatively, are left free by them.
+_DEPENDENT = 1e-9
+#: A normal force is left free where the linear equations change by this share over a sector.
+_COUPLED = 0.0625
+
+
+class State(NamedTuple):
+    """y, w, G and dG/dpsi over a box of angles, and what they are made of."""
+
+    y: Ball
+    w: Ball
+    G: Ball
+    J: Ball
+    box: Box
+    #: Derivatives of G along a piece of alpha.
+    G_turn: Ball | None = None
+
+    @property
+    def whole_J(self) -> Ball:  # noqa: N802 (as J)
+        """Derivatives with respect to (psi, s), over a piece of alpha."""
+        assert self.G_turn is not None
+        return Ball.beside(self.J, self.G_turn[:, None])
+
+
+class Leaf:
+    """Equations of a leaf: y = E(psi) x with x = (lambda_n of the nodes in contact, tau of the sticking ones).
+
+    psi are angles of the slip directions d = cos psi c + sin psi c' from a direction c in every sector, c' a quarter
+    turn further. P picks w_n of the nodes in contact and the slips of the sticking ones: P (g - S E x) = 0. The
+    directions are zeros of G_i = v_i1 d_i2 - v_i2 d_i1.
+
+    Of a body that nothing holds S and g are bordered (theory, (14.3)): -q is part of x and y, and P picks the rows of
+    its equilibrium, too; but for rigid modes that move neither w_n nor the slips that P picks. Theirs are unknowns s
+    beside psi, and their rows of equilibrium are zeros beside G (theory, section 14.6).
+
+    Over a piece of alpha the normal force of a node in a sector may be left free, too, its w_n being a zero beside G:
+    where P S E is singular, both together determine it (theory, section 12.9).
+
+    In what follows ``angle`` and ``radius`` are a box of psi and of the free unknowns after them; ``still`` is in the
+    middle of a piece of alpha, otherwise all of it is meant.
+
+    Parameters
+    ----------
+    system : EnclosedSpace
+    codes : complete
+    loose : nodes in sectors whose normal forces are left free
+    """
+
+    def __init__(self, system: EnclosedSpace, codes: Sequence[int], loose: Sequence[int] = ()) -> None:
+        self.system, self.codes, self.loose = system, codes, list(loose)
+        tau, turn = system.tau, system.turn
+        self.open = [i for i, code in enumerate(codes) if code == OPEN]
+        self.closed = [i for i, code in enumerate(codes) if code != OPEN]
+        sticking = [(i, [int(t) for t in tau[i] if t >= 0]) for i, code in enumerate(codes) if code == STICK]
+        #: Nodes that stick and rub, with the places of their tau.
+        self.stick = [(i, t) for i, t in sticking if t]
+        self.sliding = [i for i in self.closed if codes[i] in (SLIP_PLUS, SLIP_MINUS)]
+        #: Which tau is that of a node that slips along one axis, and its sign.
+        self.slid = np.array([int(np.max(tau[i])) for i in self.sliding], dtype=np.intp)
+        self.way = np.array([1.0 if codes[i] == SLIP_PLUS else -1.0 for i in self.sliding])
+        self.turning = [i for i, code in enumerate(codes) if code > SECTORS]
+        size, modes = len(system.g), len(system.reach)
+        solved = [i for i in self.closed if i not in self.loose]
+        self.rows = [*solved, *(t for _, places in self.stick for t in places)]
+        free = self._free_modes() if modes else []
+        self.free = [*self.loose, *(size + mode for mode in free)]
+        #: How far the free unknowns may be from 0.
+        self.room = np.append(np.full(len(self.loose), np.inf), system.reach[np.array(free, dtype=np.intp)])
+        self.rows += [size + mode for mode in range(modes) if mode not in free]
+        self.column = [-1 if i in self.loose else solved.index(i) for i in self.turning]
+        self.t = tau[self.turning].reshape(-1, 2)
+        self.piece = turn is not None
+        self.discs: tuple[Ball, Ball | None] = system.discs[self.turning], None
+        if turn is not None:
+            self.discs = turn.disc[self.turning], turn.disc_turn[self.turning]
+        # v = w / unit; slips as ``slips`` of FrictionUnits has them, which have the same directions
+        self.slip_scale = system.slip_scale[self.turning][:, None] / system.unit[self.t]
+        E = np.zeros((size + modes, len(self.rows)))
+        E[self.rows, np.arange(len(self.rows))] = 1.0
+        normals = np.array([solved.index(i) for i in self.sliding], dtype=np.intp)
+        E[self.slid, normals] = self.way / system.unit[self.slid]
+        self.E = E
+        self.centre, self.half = _sector_boxes([codes[i] - SECTORS for i in self.turning])
+        #: Angles up to which a root of the leaf is looked for.
+        self.widened = (1.0 + 2.0 * _WIDENED) * self.half
+        self._last: tuple[bytes, Turning | None] | None = None
+        self._known: dict[tuple[bytes, bytes, bool], State | None] = {}
+
+    def loosened(self) -> Self | None:
+        """Over a piece of alpha, the leaf with the normal force left free that its equations determine least.
+
+        None where they hardly change over the sectors.
+        """
+        if not self.piece or not self.turning or self.free:
+            return None
+        turning = self.equations(np.zeros(len(self.turning)))
+        if turning is not None and np.max(np.sum(turning.coupling(self.widened), axis=1)) < _COUPLED:
+            return None
+        try:
+            left, _, right = np.linalg.svd(self.middle_matrix(self.centre))
+        except np.linalg.LinAlgError:
+            return None
+        # the minor without its row and column is largest
+        least = int(np.argmax(np.abs(left[self.column, -1] * right[-1, self.column])))
+        return type(self)(self.system, self.codes, [self.turning[least]])
+
+    def middle_matrix(self, directions: Floats) -> Floats:
+        """P S E for directions, (q, 2), as floats have it."""
+        E = self.E.copy()
+        E[self.t, np.array(self.column, dtype=np.intp)[:, None]] = directions / self.system.unit[self.t]
+        return np.asarray((self.system.balls[0].mid @ E)[self.rows])
+
+    def _free_modes(self) -> list[int]:
+        """Rigid modes that the equations leave free, one of those that are no other ones' combinations there."""
+        if not self.rows:
+            return []
+        moved = self.system.balls[0].mid[self.rows][:, len(self.system.g) :]
+        _, R, order = qr(moved, mode="economic", pivoting=True)
+        sizes = np.abs(np.diagonal(R))
+        rank = int(np.sum(sizes > _DEPENDENT * np.max(np.abs(moved))))
+        return sorted(order[rank:].tolist())
+
+    # -- evaluation over a box -------------------------------------------------------------------------------------
+
+    def directions(self, angle: Floats, radius: Floats) -> tuple[Ball, Ball]:
+        """d (q, 2) and d' (q, 2) over a box of angles."""
+        q = len(self.turning)
+        mid_d, mid_turned = turned_by(self.centre, angle[:q])
+        # |d(psi + r) - d(psi)| <= min(|d'(psi)| r + r^2 / 2, r), and d' likewise; libraries are off by a few units
+        r = np.minimum(radius[:q], 2.0)[:, None]
+        bent = 0.5 * r * r
+        d = Ball(mid_d, np.minimum(np.abs(mid_turned) * r + bent, r) * SAFE + LIBRARY)
+        return d, Ball(mid_turned, np.minimum(np.abs(mid_d) * r + bent, r) * SAFE + LIBRARY)
+
+    def slips(self, w: Ball) -> tuple[Ball, Ball]:
+        """Both components of v at the nodes in sectors, times ``slip_scale`` of FrictionUnits; ``w`` by rows."""
+        first, second = (w[self.t[:, k]] for k in (0, 1))
+        scales = (self.slip_scale[:, k].reshape(-1, *[1] * (w.mid.ndim - 1)) for k in (0, 1))
+        pairs = zip((first, second), scales, strict=True)
+        one, other = (Ball(part.mid * scale, part.rad * scale) for part, scale in pairs)
+        return one, other
+
+    def equations(self, angle: Floats) -> Turning | None:
+        """The linear equations with the directions at these angles in the middle; None if not proven regular there."""
+        angle = angle[: len(self.turning)]
+        key = angle.tobytes()
+        if self._last is None or self._last[0] != key:
+            directions = turned_by(self.centre, angle)
+            at = self.rows, self.column, self.t
+            loose = [self.turning.index(i) for i in self.loose]
+            self._last = key, Turning.of(self.system, self.E, at, directions, self.discs, self.free, loose)
+        return self._last[1]
+
+    def over(self, angle: Floats, radius: Floats, *, still: bool = False) -> State | None:
+        """y, w, G and dG/dpsi over a box; None where the linear system is not proven regular in it."""
+        key = angle.tobytes(), radius.tobytes(), still
+        if key not in self._known:
+            self._known[key] = self._evaluated(angle, radius, still=still)
+        return self._known[key]
+
+    def _evaluated(self, angle: Floats, radius: Floats, *, still: bool) -> State | None:
+        turning = self.equations(angle)
+        q = len(self.turning)
+        free = Ball(angle[q:], radius[q:])
+        if self.piece:
+            free = Ball.joined(free, Ball(np.zeros(1), np.full(1, 0.0 if still else 1.0)))
+        box = None if turning is None else turning.over(radius[:q], free)
+        if box is None:
+            return None
+        (v1, v2), (dv1, dv2) = self.slips(box.w), self.slips(box.dw)
+        d, turned = self.directions(angle, radius)
+        d1, d2 = d[:, 0], d[:, 1]
+        J = dv1 * d2[:, None] - dv2 * d1[:, None]
+        diagonal = np.arange(q)
+        J[diagonal, diagonal] = J[diagonal, diagonal] + (v1 * turned[:, 1] - v2 * turned[:, 0])
+        G = v1 * d2 - v2 * d1
+        if self.free or self.piece:
+            (s1, s2), w = self.slips(box.ds), box.w[self.free]
+            G = Ball.joined(G, w)
+            across = Ball.joined(s1 * d2[:, None] - s2 * d1[:, None], box.ds[self.free])
+            along = Ball.joined(J, box.dw[self.free])
+            J = Ball.beside(along, across)
+        w = box.w.copy()
+        w[self.loose] = 0.0
+        return State(box.y, w, G, J[:, :-1], box, J[:, -1]) if self.piece else State(box.y, w, G, J, box)
+
+    def bends(self, Y: Floats, over: tuple[State, State], angle: Floats, radius: Floats) -> tuple[Combined, Ball]:
+        """Rows of w that Y G has for directions that are held, and Y times second derivatives of G by the angles.
+
+        ``over``: the states over the box and in its middle.
+        """
+        (state, point), (d, turned), own = over, self.directions(angle, radius), np.arange(len(self.turning))
+        # v_i1 d_i2 - v_i2 d_i1
+        rows = Ball(np.zeros((len(Y), len(state.box.w.mid))), np.zeros((len(Y), len(state.box.w.mid))))
+        scale = Ball.exact(Y[:, : len(own)]), Ball.exact(self.slip_scale)
+        rows[:, self.free] = Ball.exact(Y[:, len(own) :])
+        for k, part in enumerate((d[:, 1], -d[:, 0])):
+            rows[:, self.t[:, k]] = scale[0] * (scale[1][:, k] * part)
+        w = state.box.combined(rows, point.box, radius[: len(own)])
+        bends = w.bends()
+        # psi_i turns d_i itself, in both orders, and d_i'' = -d_i
+        (dv1, dv2), (v1, v2) = (self.slips(part) for part in (state.box.dw, state.box.w))
+        turn = scale[0][:, :, None] * (dv1 * turned[:, 1][:, None] - dv2 * turned[:, 0][:, None])
+        bent = scale[0] * (v2 * d[:, 0] - v1 * d[:, 1])
+        bends = bends + turn + Ball(turn.mid.transpose(0, 2, 1), turn.rad.transpose(0, 2, 1))
+        bends[:, own, own] = bends[:, own, own] + bent
+        return w, bends
+
+    def second(self, Y: Floats, over: tuple[State, State], angle: Floats, radius: Floats) -> Ball:
+        """Y times second derivatives over a box and a piece by all n unknowns and s, (n, n + 1, n + 1)."""
+        (w, bends), n, q = self.bends(Y, over, angle, radius), len(angle), len(self.turning)
+        (s1, s2), (_, turned) = self.slips(over[0].box.ds), self.directions(angle, radius)
+        turn = Ball.exact(Y[:, :q])[:, :, None] * (s1 * turned[:, 1][:, None] - s2 * turned[:, 0][:, None])
+        second = Ball(np.zeros((n, n + 1, n + 1)), np.zeros((n, n + 1, n + 1)))
+        (by_angle, swept), mixed = w.loosened(), w.mixed() + turn[:, :, -1]
+        second[:, :q, :q], second[:, n, n] = bends, w.twice()
+        second[:, :q, q:n] = by_angle + turn[:, :, :-1]
+        second[:, :q, n], second[:, q:n, n] = mixed, swept
+        # the same on the other side of the diagonal
+        for part in (second.mid, second.rad):
+            part[:, q:, :q], part[:, n, q:n] = part[:, :q, q:].transpose(0, 2, 1), part[:, q:n, n]
+        return second
+
+
+def _sector_boxes(numbers: Sequence[int]) -> tuple[Floats, Floats]:
+    """A direction in the middle of every sector, and an angle on both sides that covers it."""
+    centres, halves = [], []
+    for number in numbers:
+        a, b = (np.array(direction(n)) for n in (number, end_number(number)))
+        c = a + b
+        c /= np.hypot(*c)
+        # the angle to an end is 2 arcsin(|a - c| / 2), at most 1.12 |a - c| for sectors of a quarter
+        halves.append(1.12 * max(np.hypot(*(a - c)), np.hypot(*(b - c))) + 1e-14)
+        centres.append(c)
+    return np.array(centres).reshape(-1, 2), np.array(halves)
+
+
+def patterns(codes: Sequence[int]) -> Codes:
+    """Statuses, one code for all sectors."""
+    return tuple(min(code, SECTORS) for code in codes)
+
+
+def turned(one: Floats, other: Floats) -> Floats:
+    """Angles from directions to others, (q,), for which ``ROUNDED_ANGLE`` has room."""
+    return np.asarray(np.arctan2(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0], np.sum(one * other, axis=1)))
+
+
+def slopes_by_second(inverse: Ball, point: Ball, box: Ball, second: Ball, reach: Floats) -> Ball:
+    """Y dG over a box, by dG there, or by that in its middle and Y times the second derivatives over the box."""
+    middle = inverse @ point
+    beside = upper_sum(second.size * reach, axis=2)
+    return smaller(Ball(middle.mid, (middle.rad + beside) * SAFE), inverse @ box)
+
+
+def around_middle(
+    leaf: Leaf, Y: Floats, k: int, box: tuple[Floats, Floats], over: tuple[State, State]
+) -> tuple[Ball, Ball, Ball]:
+    """I - Y J_u, -Y J_k and -Y G(c) of (12.22d) over a box and a piece, u being all z = (psi, s) but z_k.
+
+    For all zeros in the box u is in (I - Y J_u) u + z_k (-Y J_k) - Y G(c). ``over``: see ``Leaf.bends``.
+    """
+    (angle, radius), (state, point), q = box, over, len(box[0])
+    if not q:
+        return Ball.exact(np.zeros((0, 0))), Ball.exact(np.zeros(0)), Ball.exact(np.zeros(0))
+    inverse, second = Ball.exact(Y), leaf.second(Y, over, angle, radius)
+    slope = slopes_by_second(inverse, point.whole_J, state.whole_J, second, np.r_[radius, 1.0])
+    others = np.delete(np.arange(q + 1), k)
+    return Ball.exact(np.eye(q)) - slope[:, others], -slope[:, k], -(inverse @ point.G)
+
+
+def with_free_bounds(leaf: Leaf, angle: Floats, radius: Floats, *, still: bool = False) -> tuple[Floats, Floats] | None:
+    """The box with the free unknowns that its angles leave; None if there are none.
+
+    G and the rows beside it are affine in them: G = G_0 + R s, so that (Y R) s = -Y G_0 with any Y.
+    """
+    q = len(leaf.turning)
+    none = np.r_[angle[:q], 0.0 * angle[q:]]
+    state = leaf.over(none, np.r_[radius[:q], 0.0 * angle[q:]], still=still)
+    if state is None or not (state.G.finite and state.J.finite):
+        return angle, radius
+    R = state.J[:, q:]
+    Y = Ball.exact(np.asarray(np.linalg.pinv(R.mid), dtype=np.float64))
+    found = solution(Y @ R, Y @ -state.G[:, None])
+    if found is None:
+        return angle, radius
+    low = np.maximum((found.mid - found.rad)[:, 0], angle[q:] - radius[q:])
+    high = np.minimum((found.mid + found.rad)[:, 0], angle[q:] + radius[q:])
+    known = np.where(np.isfinite(radius[q:]), np.abs(angle[q:]) + radius[q:], 0.0)
+    slack = 8 * UNIT * (found.size[:, 0] + known)
+    if np.any(low - slack > high + slack):
+        return None
+    middle = 0.5 * (low + high)
+    wide = np.maximum(high - middle, middle - low) * SAFE + slack + TINY
+    return np.r_[angle[:q], middle], np.r_[radius[:q], np.maximum(wide, 0.0)]
