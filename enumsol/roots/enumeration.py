@@ -115,7 +115,7 @@ class Enumeration(ABC, Generic[_Solvers]):
         earlier = () if self._begun is None or self.writer is None else (self._begun, self.writer.replace)
         self.outcome = search.outcome
         search.at_limit = solvers.at_limit
-        search.otherwise = AWAY if search.at_limit is not None else "" if self.problem.held else HOLD
+        search.rest.otherwise = AWAY if search.at_limit is not None else "" if self.problem.held else HOLD
         search.continua = self._continua
         if solvers.unloaded():
             self.certifier.unloaded()
@@ -139,12 +139,12 @@ class Enumeration(ABC, Generic[_Solvers]):
                     spread.cancel()
 
     def _examined(self) -> int:
-        """What an interruption says was done."""
+        """Number of selections that an interruption says were done."""
         return self.outcome.nodes
 
     @abstractmethod
     def _enough(self, stop_after: int) -> Callable[[list[Any]], bool]:
-        """Whether solutions of leaves are so many roots and families."""
+        """True if solutions of leaves are so many roots and families."""
 
     def _continua(self) -> list[Codes]:
         """Complete selections that hold on the families of which solutions were found; in 3D there are none."""

@@ -19,7 +19,8 @@ from enumsol.search.balance import in_balance
 from enumsol.search.certifiers.protocol import NO_BOUND, Bound, Certifier, UndecidedPart
 from enumsol.search.certifiers.rational_certifier import ExactCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier, proven
-from enumsol.search.reference_closer import ReferenceCloser, reference_numbers
+from enumsol.search.closing import TreeCloser
+from enumsol.search.reference_closer import LeadingCloser, reference_numbers
 from enumsol.search.resume import PlaneReader, Reader
 from enumsol.search.setup import HeldByNothing
 from enumsol.search.solvers import Solvers
@@ -129,8 +130,8 @@ class FloatingSolvers(HeldByNothing, Solvers):
     def _splitting(self, certifier: Certifier) -> PlaneSplitting:
         return PlaneSplitting(self.scaled.F)
 
-    def _closer(self, certifier: Certifier) -> Any:
-        return ReferenceCloser(certifier, lambda: self.known_root)
+    def _closer(self, certifier: Certifier) -> TreeCloser:
+        return LeadingCloser(certifier, lambda: self.known_root)
 
     def reader(self) -> FloatingReader:
         """Understands the records of an earlier proof."""

@@ -15,7 +15,8 @@ from enumsol.model.statuses import CONTACT, SLIDING, UNDECIDED
 from enumsol.proof import records
 from enumsol.search.certifiers.protocol import RecordedBound
 from enumsol.search.fathoming_in_contact import LoneProposal
-from enumsol.search.tree import TreeNode, TreeSearch
+from enumsol.search.nodes import TreeNode
+from enumsol.search.tree import TreeSearch
 from enumsol.trusted.quadratic_forms import EnclosedForm
 
 if TYPE_CHECKING:
@@ -207,6 +208,6 @@ class Replay:
         if issubclass(kind, records.OnlyReference):
             return search.closed(item, None, again=True)
         if issubclass(kind, records.ClosingRecord):
-            return search.closed(item, search.relaxed(item.codes), again=True)
+            return search.closed(item, search.relaxations.energy(item.codes), again=True)
         partial = any(code in (CONTACT, UNDECIDED, *SLIDING) for code in item.codes)
         return issubclass(kind, records.Solved) and not partial and search.settled(item)

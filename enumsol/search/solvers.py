@@ -19,8 +19,10 @@ from enumsol.relaxation.engine import Engine, not_compiled
 from enumsol.relaxation.interior_point import InteriorPointEngine
 from enumsol.search.certifiers.float_certifier import FastCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier
+from enumsol.search.closing import TreeCloser
 from enumsol.search.fathoming import Closer, Closing, propose
 from enumsol.search.form_policy import Forms, plane_forms
+from enumsol.search.nodes import Relaxations
 from enumsol.search.reduction import WeightSource
 from enumsol.search.resume import PlaneReader, Reader
 from enumsol.search.setup import SearchSetup
@@ -74,8 +76,8 @@ def plane_search(
 ) -> TreeSearch:
     """A search of the tree of a system, by default with the best engine and all statuses."""
     engine, splitting = engine or make_engine(system), splitting or PlaneSplitting(system.F)
-    fallback = partial(InteriorPointEngine, system)
-    return TreeSearch(system.p, certifier, engine, splitting, fallback=fallback, limits=limits)
+    relaxations = Relaxations(engine, splitting, system.p, fallback=partial(InteriorPointEngine, system))
+    return TreeSearch(relaxations, certifier, limits=limits)
 
 
 class Solvers(SearchSetup):
@@ -245,7 +247,7 @@ class Solvers(SearchSetup):
     def _splitting(self, certifier: Certifier) -> PlaneSplitting:
         return PlaneSplitting(self.scaled.F, sliding=certifier.sliding)
 
-    def _closer(self, certifier: Certifier) -> Closer | None:
+    def _closer(self, certifier: Certifier) -> TreeCloser | None:
         return Closer(self.scaled, cast("Closing", certifier))
 
     def _forms(self) -> Forms | None:

@@ -112,10 +112,10 @@ class SpaceCover:
     def search(
         self,
         max_nodes: int | None = None,
-        progress: Callable[[str, float], object] | None = None,
+        tick: Callable[[float], object] | None = None,
         executor: Executor | None = None,
     ) -> None:
-        """Search the tree; ``progress`` and ``executor`` as in ``branch_graph``.
+        """Search the tree; ``tick`` is called with the share that is done, ``executor`` as in ``branch_graph``.
 
         Raises
         ------
@@ -123,7 +123,6 @@ class SpaceCover:
             The data cannot be enclosed.
         """
         given = AlphaProblem.of(self.enclosure)
-        tick = None if progress is None else lambda share: progress("search", share)
 
         def more(x: Array) -> CurveChain | None:
             chain = chain_through(given, self.problem, x, self.interval, self._take)

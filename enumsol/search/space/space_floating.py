@@ -21,10 +21,11 @@ from enumsol.proof.space_records import (
     OnlySpaceReference,
 )
 from enumsol.relaxation.engine import PRUNE_MARGIN
-from enumsol.search.certifiers.protocol import Bound, Certified, Refine, UndecidedPart, Unrecorded
+from enumsol.search.certifiers.protocol import Bound, Certified, Certifier, Refine, UndecidedPart, Unrecorded
+from enumsol.search.closing import TreeCloser
 from enumsol.search.floating_solvers import WEAK, FloatingReader, weakly_held
 from enumsol.search.setup import HeldByNothing
-from enumsol.search.space.space_references import SpaceReferenceCloser, reference_numbers
+from enumsol.search.space.space_references import reference_numbers, space_closer
 from enumsol.search.space.space_search import SpaceCertifier
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.confinement import motion_beside
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
 
     from enumsol.proof.writer import Recorder
     from enumsol.relaxation.space_relaxation import SpaceEngine
-    from enumsol.search.space.space_references import OnlyRoot
+    from enumsol.search.reference_closer import OnlyRoot
     from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.space.boxed_solution import BoxedSolution
     from enumsol.trusted.space.sector_rows import Row
@@ -68,10 +69,8 @@ class FloatingSpaceSolvers(HeldByNothing, SpaceSolvers):
         """The certifier of this arithmetic."""
         return FloatingSpaceCertifier(self._engine, self.enclosed, self.exclusions, recorder or Unrecorded())
 
-    def _closer(self, certifier: FloatingSpaceCertifier) -> SpaceReferenceCloser | None:  # type: ignore[override]
-        if self.exclusions is None:
-            return None
-        return SpaceReferenceCloser(certifier, self._engine, lambda: self.known_root)
+    def _closer(self, certifier: Certifier) -> TreeCloser | None:
+        return None if self.exclusions is None else space_closer(certifier, self._engine, lambda: self.known_root)
 
     def reader(self) -> FloatingReader:
         """Understands the records of an earlier proof."""

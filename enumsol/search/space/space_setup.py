@@ -15,6 +15,7 @@ from enumsol.proof.writer import Recorder, point_header, unit_exponents
 from enumsol.relaxation.convex_forms import SlipFormAscent
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.certifiers.protocol import Certifier, Unrecorded
+from enumsol.search.closing import TreeCloser
 from enumsol.search.form_policy import Forms
 from enumsol.search.setup import SearchSetup
 from enumsol.search.space.space_fathoming import SpaceCloser, SpaceClosing, solved
@@ -108,7 +109,7 @@ class SpaceSolvers(SearchSetup):
     def _splitting(self, certifier: Certifier) -> SpaceSplitting:
         return SpaceSplitting(self._engine)
 
-    def _closer(self, certifier: Certifier) -> SpaceCloser | None:
+    def _closer(self, certifier: Certifier) -> TreeCloser | None:
         return SpaceCloser(self.system, cast("SpaceClosing", certifier), regular=self.arithmetic == "fast")
 
     def _forms(self) -> Forms | None:
