@@ -71,14 +71,14 @@ def draw_history(data: HistoryData, x: Any, y: Any, ax: Any, units: tuple[str, s
     return figure_of(ax)
 
 
-def _label(quantity: Any, units: tuple[str, str] | None) -> str:
+def _label(quantity: object, units: tuple[str, str] | None) -> str:
     if not isinstance(quantity, str):
         return getattr(quantity, "__name__", "")
     return in_units(LABELS[quantity], _DIMENSIONS.get(quantity), units)
 
 
 def _colours(data: HistoryData) -> dict[tuple[Node, Node], str]:
-    """Of every edge: that of the one history it belongs to, grey where there are several or too many."""
+    """Colour of every edge: that of the one history it belongs to, grey where there are several or too many."""
     ways = _ways(data)
     colours: dict[tuple[Node, Node], str] = {}
     for number, path in enumerate(data.paths() if ways[START] <= _COLOURED else ()):
@@ -88,7 +88,7 @@ def _colours(data: HistoryData) -> dict[tuple[Node, Node], str]:
 
 
 def _ways(data: HistoryData) -> dict[Node, int]:
-    """How many histories lead on from every node."""
+    """Number of histories that lead on from every node."""
     ways: dict[Node, int] = {}
     for node in reversed(list(data.graph)):
         ways[node] = sum(ways[other] for other in data.graph.successors(node)) or 1
@@ -151,7 +151,7 @@ def _name_ends(data: HistoryData, across: dict[Node, float], up: dict[Node, floa
         names.append(label.get_window_extent())
 
 
-def _values(data: HistoryData, quantity: Any, name: str) -> dict[Node, float]:
+def _values(data: HistoryData, quantity: object, name: str) -> dict[Node, float]:
     """The quantity at the nodes, and at the start where it is known there."""
     nodes = [node for node in data.graph if node != START]
     if quantity == "step":

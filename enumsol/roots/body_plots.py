@@ -106,13 +106,13 @@ def _scale_words(scale: float) -> str:
     return f"displacements times {scale:g}"
 
 
-def _strongest(roots: Sequence[Any], problem: Any, shape: BodyShape) -> float:
+def _strongest(roots: Sequence[Any], problem: object, shape: BodyShape) -> float:
     """The largest nodal contact force of several roots [force]."""
     return max(largest_length(shape.contact_forces(problem, root.lambda_n, root.lambda_t)) for root in roots)
 
 
 def _factors(
-    roots: Sequence[Any], problem: Any, shape: BodyShape, scale: float | None
+    roots: Sequence[Any], problem: object, shape: BodyShape, scale: float | None
 ) -> tuple[tuple[float, ...], float]:
     """By what the displacements of each root are multiplied, and the forces of all."""
     arrows = arrow_scale(_strongest(roots, problem, shape), shape.size)
@@ -163,7 +163,7 @@ def _draw(ax: Any, root: Any, problem: Any, shape: BodyShape, scale: float, arro
 
 
 def _same_view(axes: Sequence[Any]) -> None:
-    """The same limits for bodies that are compared."""
+    """Set the same limits for bodies that are compared."""
     for direction in "xyz":
         limits = [getattr(ax, f"get_{direction}lim")() for ax in axes]
         for ax in axes:
@@ -193,7 +193,7 @@ def _solid(ax: Any, shape: BodyShape, points: Floats) -> None:
     ax.add_collection3d(Line3DCollection(list(edges), colors=_BEFORE_IN_SPACE, **_BEFORE_LINE, zorder=3))
 
 
-def _name_axes(ax: Any, dimension: int, units: tuple[str, str] | None) -> None:
+def _name_axes(ax: object, dimension: int, units: tuple[str, str] | None) -> None:
     """Directions with the unit of lengths; without units a picture needs no names of axes."""
     for direction in "xyz"[: dimension if units is not None else 0]:
         getattr(ax, f"set_{direction}label")(in_units(direction, "length", units), fontsize=8)
@@ -221,7 +221,7 @@ def _legend(place: Any, roots: Sequence[Any], strongest: float, units: tuple[str
     place.legend(handles=handles, fontsize=8, frameon=False, **where)
 
 
-def draw_root(root: Any, problem: ContactProblem3D, ax: Any, units: tuple[str, str] | None = None) -> Any:
+def draw_root(root: object, problem: ContactProblem3D, ax: object, units: tuple[str, str] | None = None) -> Any:
     """See Root.plot."""
     if axes_or_none(ax) is not None or problem.mesh is None:
         return draw_slips(root, problem, ax, units)

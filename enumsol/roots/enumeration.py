@@ -139,12 +139,12 @@ class Enumeration(ABC, Generic[_Solvers]):
                     spread.cancel()
 
     def _examined(self) -> int:
-        """What an interruption says was done."""
+        """Number of selections that an interruption says were done."""
         return self.outcome.nodes
 
     @abstractmethod
     def _enough(self, stop_after: int) -> Callable[[list[Any]], bool]:
-        """Whether solutions of leaves are so many roots and families."""
+        """True if solutions of leaves are so many roots and families."""
 
     def _continua(self) -> list[Codes]:
         """Complete selections that hold on the families of which solutions were found; in 3D there are none."""

@@ -59,7 +59,7 @@ def _figure_class() -> Any:
     return NotebookFigure
 
 
-def checked_units(units: Any, name: str = "units") -> tuple[str, str] | None:
+def checked_units(units: object, name: str = "units") -> tuple[str, str] | None:
     """Units of forces and lengths, of a pair or a text such as "N,mm"; None for None.
 
     Raises
@@ -143,7 +143,7 @@ def kept(figure: Any, file: Any) -> Any:
     return figure
 
 
-def axes_or_none(ax: Any) -> Any:
+def axes_or_none(ax: object) -> Any:
     """The axes that a picture is drawn into; None for those of a new figure.
 
     Raises

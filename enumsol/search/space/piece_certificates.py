@@ -5,6 +5,7 @@ Nothing here is trusted: what is proposed is proven, or the tree goes on.
 
 from __future__ import annotations
 
+from functools import cached_property
 from itertools import combinations_with_replacement, pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -36,6 +37,8 @@ _DEFINITE, _MANY = 1e-9, 8
 _WEIGHT, _SHARED = 1024.0, 0.5
 #: How often large distances get more weight in the fit of psi, and by how little the least ones count.
 _ROUNDS, _LEAST = 4, 1e-3
+#: At these shares of a piece it is asked how often a curve passes it.
+_PASSED = (2.0 * np.arange(4) + 1.0) / 8
 #: By how much more a writer of proofs has theta vary.
 ERRORS = 1.0 + 2.0**-6
 
@@ -147,3 +150,54 @@ class PieceProposals:
         shrunk = [np.where(apart & (x > 1.0), (1.0 - 4e-16) / np.maximum(x, 1.0), 1.0) for x in size]
         places = self._system.tau >= 0
         return [np.where(places, theta * by[:, None], 0.0) for theta, by in zip(fitted, shrunk, strict=True)], apart
+
+
+def _only_turns(alpha: Array, piece: AlphaPiece) -> bool:
+    """True if a run along a curve, given by alphas, passes some alphas of a piece twice, but none just once."""
+    low, high = float(piece.low), float(piece.high)
+    beyond = alpha > (low + (high - low) * _PASSED)[:, None]
+    passed = np.sum(beyond[:, 1:] != beyond[:, :-1], axis=1)
+    return bool(np.any(passed > 1) and not np.any(passed == 1))
+
+
+class ExaminedPiece:
+    """A piece with what the search needs of it."""
+
+    def __init__(self, piece: AlphaPiece) -> None:
+        self.piece = piece
+        #: Runs of known curves that pass the piece, of so many curves.
+        self.passages: list[Passage] = []
+        self.curves = 0
+        #: Parts of known curves over the piece, and over longer ones.
+        self.parts: dict[tuple[Fraction, Fraction], list[CurveParts]] = {}
+        #: Assignments of statuses for which no form is definite.
+        self.hopeless: set[tuple[int, ...]] = set()
+
+    @cached_property
+    def proposals(self) -> PieceProposals:
+        """Forms that may be definite over the piece."""
+        return PieceProposals(self.piece)
+
+    def along(
+        self, curves: Sequence[KnownCurve], piece: AlphaPiece | None = None
+    ) -> list[tuple[KnownCurve, CurveParts]]:
+        """Known curves and their parts over the piece, or over a longer one."""
+        piece = self.piece if piece is None else piece
+        parts = self.parts.setdefault((piece.low, piece.high), [])
+        for known in curves[len(parts) :]:
+            whole = Run(0, len(known.chain.links) - 1)
+            parts.append(known.over(whole, piece.low, piece.high))
+        return list(zip(curves, parts, strict=True))
+
+    def ends_within(self, curves: Sequence[KnownCurve], statuses: tuple[int, ...]) -> bool:
+        """True if in one run along the known curves, and in no other, these statuses hold over a part of a piece.
+
+        Not where that run turns back and passes no alpha just once: with two solutions at one no form is definite.
+        """
+        runs = 0
+        for _, parts in self.along(curves):
+            held = parts.held(statuses)
+            if len(held):
+                runs += int(held[0]) + int(np.sum(held[1:] & ~held[:-1]))
+                runs += int(_only_turns(parts.alpha.mid[held], self.piece))
+        return runs == 1
