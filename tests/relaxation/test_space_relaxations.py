@@ -130,8 +130,8 @@ def begun(seed, p=2):
     F[0, 1] = 0.0 if seed % 2 else F[0, 1]
     solvers = SpaceSolvers(from_compliance(S, g, (F[:, 0], F[:, 1])), 0.0, "verified")
     search = solvers.search(solvers.certifier(None))
-    rows = search._rows.over((UNDECIDED,) * p, range(p))
-    return solvers, SlipFormAscent(search.engine, solvers.enclosed, rows), rows
+    rows = search.relaxations.rows.over((UNDECIDED,) * p, range(p))
+    return solvers, SlipFormAscent(search.relaxations.engine, solvers.enclosed, rows), rows
 
 
 @pytest.mark.parametrize("seed", range(2))
