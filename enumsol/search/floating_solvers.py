@@ -22,7 +22,6 @@ from enumsol.search.certifiers.verified import VerifiedCertifier, proven
 from enumsol.search.closing import TreeCloser
 from enumsol.search.reference_closer import LeadingCloser, reference_numbers
 from enumsol.search.resume import PlaneReader, Reader
-from enumsol.search.setup import HeldByNothing
 from enumsol.search.solvers import Solvers
 from enumsol.search.splitting import PlaneSplitting
 from enumsol.selections.solution import SelectionSolution
@@ -50,7 +49,7 @@ _SLIPS = {2: SLIP_PLUS, 5: SLIP_PLUS, 3: SLIP_MINUS, 6: SLIP_MINUS}
 WEAK = 2.0**-20
 
 
-class FloatingSolvers(HeldByNothing, Solvers):
+class FloatingSolvers(Solvers):
     """Solvers and certifier for a body that nothing holds, at one alpha; parameters as of Solvers."""
 
     @cached_property
