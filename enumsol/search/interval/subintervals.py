@@ -44,8 +44,6 @@ SMALLEST_PIECE = 2.0**-40
 #: Trees are given up over pieces longer than this part of the interval, which only have to be cut, where friction
 #: varies: a block with p = 64 takes a quarter of the nodes then, and under a varying load 1.6 times as many.
 LONG_PIECE = 2.0**-9
-#: Into how many trees what a tree of the largest size left is divided.
-FURTHER_TREES = 8
 
 
 @dataclass(frozen=True)
@@ -133,7 +131,8 @@ class Task:
 
     def further(self, result: TreeResult) -> list[Task]:
         """The trees over the same piece for what this one did not examine."""
-        size = -(-len(result.rest) // FURTHER_TREES) or 1
+        # eight trees, which workers share
+        size = -(-len(result.rest) // 8) or 1
         return [Task(self.piece, tuple(result.rest[k : k + size])) for k in range(0, len(result.rest), size)]
 
     @staticmethod
