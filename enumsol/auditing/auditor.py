@@ -123,7 +123,7 @@ class _Tally:
         self._branch_of = {arc.number: branch.number for branch in chart.graph.branches for arc in branch.arcs}
 
     def add(self, run: PointRun) -> None:
-        """One run of points."""
+        """Take in a run of points."""
         equation = self.chart.equation
         points = [
             equation.point(float(a), forces, rigid)

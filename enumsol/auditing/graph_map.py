@@ -1,4 +1,4 @@
-"""Where points lie on a branch graph: distances to arcs and vertices, and ways along the graph from one to another."""
+"""Places of points on a branch graph: distances to arcs and vertices, and ways along the graph from one to another."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def checked_graph(graph: Any) -> BranchGraph:
 
 
 class GraphPlaceKind(TextEnum):
-    """What a point lies on; members compare with their texts."""
+    """Kind of the place of a point; members compare with their texts."""
 
     #: An arc, or a sheet.
     ARC = "arc"
@@ -71,7 +71,7 @@ class GraphPlaceKind(TextEnum):
 
 @dataclass(frozen=True)
 class GraphPlace:
-    """Where a point lies.
+    """Place of a point on the graph.
 
     Attributes
     ----------
@@ -134,13 +134,13 @@ class GraphMap:
     # -- distances ---------------------------------------------------------------------------------------------------
 
     def outside(self, alpha: float) -> bool:
-        """Whether an alpha is outside the graph's interval, by more than the tolerance."""
+        """True if an alpha is outside the graph's interval, by more than the tolerance."""
         low, high = (float(end) for end in self.graph.interval)
         slack = self.tolerance * self.equation.alpha_scale
         return not low - slack <= alpha <= high + slack
 
     def beyond(self, rigid: Floats) -> bool:
-        """Whether the body has moved farther than the graph asks for, by more than the tolerance."""
+        """True if the body has moved farther than the graph asks for, by more than the tolerance."""
         return bool(np.any(np.abs(rigid) > self.equation.reach * (1 + self.tolerance)))
 
     def place(self, x: Floats, near: GraphPlace | None = None) -> GraphPlace:

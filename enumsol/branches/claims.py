@@ -1,4 +1,4 @@
-"""What a branch graph may claim: the one place that knows how far its statements reach (theory, section 7.13).
+"""Claims of a branch graph: the one place that knows how far its statements reach (theory, section 7.13).
 
 Arcs and settled vertices of any graph are solutions, whatever cut the search short: each arc is one of regular roots,
 and no two of them meet between their ends. So a graph that is not complete gives lower bounds, which are counted here,
@@ -42,7 +42,7 @@ _NARROW = 0.005
 
 @dataclass
 class _Tally:
-    """What is known at one alpha, or at all alphas between two neighbouring floats.
+    """Solutions found at one alpha, or at all alphas between two neighbouring floats.
 
     Attributes
     ----------
@@ -248,7 +248,7 @@ def _degree(v: Vertex) -> int | None:
 
 
 class Standing(enum.Enum):
-    """How far the statements of a branch graph reach."""
+    """Reach of the statements of a branch graph."""
 
     PROVEN = "proven"
     NOT_PROVEN = "not proven"
@@ -427,7 +427,7 @@ class Uniqueness:
 
 
 class Claims:
-    """What the arcs and vertices that were found prove.
+    """Statements that the arcs and vertices found prove.
 
     Parameters
     ----------

@@ -111,7 +111,7 @@ def _ends(followed: Followed) -> Iterator[float | Fraction]:
 
 
 def _write_arcs(writer: ProofWriter, followed: Followed) -> dict[str, int]:
-    """Where every selection holds, box by box; the counts for the footer."""
+    """Write the traces of all selections, box by box; gives the counts for the footer."""
     writer.write({"traces": len(followed.traces), **unit_exponents(followed.force, followed.length)})
     for trace in followed.traces:
         ends = [_number(end) for end in (trace.low, trace.high)]

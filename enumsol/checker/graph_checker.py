@@ -174,7 +174,7 @@ class GraphChecker:
             self._fail("pieces are said to be decided by their arcs, but there are none")
         self._check_end(record, claim, "pieces", records)
 
-    def _check_end(self, record: Any, claim: Mapping[str, int | None], what: str, records: Iterator[Any]) -> None:
+    def _check_end(self, record: object, claim: Mapping[str, int | None], what: str, records: Iterator[Any]) -> None:
         """Compare the counts in the last record with those of what was read."""
         if not reading.same(record, claim):
             found = reading.quoted(record) if isinstance(record, (dict, list)) else "missing"
@@ -209,7 +209,9 @@ class GraphChecker:
 
     # -- pieces ----------------------------------------------------------------------------------------------------
 
-    def _piece(self, record: Any, records: Iterator[Any], due: tuple[Fraction, Fraction, Codes]) -> tuple[Codes, Any]:
+    def _piece(
+        self, record: object, records: Iterator[Any], due: tuple[Fraction, Fraction, Codes]
+    ) -> tuple[Codes, Any]:
         """Check the piece that begins with this record; gives what it leaves to its halves, and the record after it."""
         number = self.pieces + 1
         try:
@@ -250,7 +252,7 @@ class GraphChecker:
             self.progress(self.leaves)
         return piece.leaves("c"), record
 
-    def _begin(self, record: Any) -> Piece:
+    def _begin(self, record: object) -> Piece:
         if not isinstance(record, dict):
             raise ValueError("no piece begins here")  # noqa: TRY004 (as in reading)
         reading.names_only(record, ("piece", "force", "length", "roots"))
@@ -321,7 +323,7 @@ class GraphChecker:
         return EnclosedPiece.from_enclosure(self.enclosure, piece.a, piece.b, piece.force, piece.length, origin)
 
 
-def interval_from(ends: Any) -> tuple[Fraction, Fraction]:
+def interval_from(ends: object) -> tuple[Fraction, Fraction]:
     """Both ends of an interval."""
     if not isinstance(ends, list) or len(ends) != 2:
         raise ValueError(f"{reading.quoted(ends)} is not an interval")
@@ -343,7 +345,7 @@ def _sorted(codes: Codes) -> Codes:
 
 
 def covers(roots: Codes, leaves: Codes, friction: Sequence[bool]) -> bool:
-    """Whether the leaves that refine one of the roots together cover every selection in the roots.
+    """True if the leaves that refine one of the roots together cover every selection in the roots.
 
     Both are sets of partial assignments, (k, p) arrays of codes. They come from trees, so that in every cell that holds
     some of them there is a node at which all of them refine it; splitting there gives smaller cells. A list that is not

@@ -127,7 +127,7 @@ class TracedProblem:
         return found
 
     def trace(self, where: Mapping[Codes, Iterable[Bounds]], found: list[Trace]) -> None:
-        """Where selections hold on pieces of the interval, of every selection its own.
+        """Trace selections over pieces of the interval, of every selection its own.
 
         ``found`` takes the traces; on Ctrl-C those of the selections that are finished.
         """
@@ -325,7 +325,7 @@ def follow_selections(
 
 
 def _taken_over(traced: TracedProblem, where: dict[Codes, list[Bounds]], known: Sequence[Trace]) -> list[Trace]:
-    """Of the known traces those of selections that have all of theirs; these are taken out of ``where``."""
+    """Known traces of selections that have all of theirs; these are taken out of ``where``."""
     found: dict[Codes, list[Trace]] = {}
     for one in known:
         found.setdefault(one.selection.rows.codes, []).append(one)

@@ -112,7 +112,7 @@ def _stretches(proposals: Sequence[_Proposed]) -> list[list[_Proposed]]:
 
 
 def _is_chain(joined: Joined) -> bool:
-    """Whether the arcs follow each other from one end to the other."""
+    """True if the arcs follow each other from one end to the other."""
     doubtful = joined.reasons or joined.unordered or joined.open
     if doubtful or not joined.arcs or len(joined.places) != len(joined.arcs) + 1:
         return False
@@ -122,7 +122,7 @@ def _is_chain(joined: Joined) -> bool:
 
 
 def _was_tested(joined: Joined, proposed: _Proposed) -> bool:
-    """Whether every arc was tested wherever it may run in a piece."""
+    """True if every arc was tested wherever it may run in a piece."""
     a, b = proposed.piece.a, proposed.piece.b
     spans = {codes: (low, high) for codes, low, high in proposed.spans}
     for arc in joined.arcs:
@@ -134,7 +134,7 @@ def _was_tested(joined: Joined, proposed: _Proposed) -> bool:
 
 
 class _Proposals:
-    """What is proposed for one side of an alpha at which g vanishes, or for the whole interval.
+    """Proposals for one side of an alpha at which g vanishes, or for the whole interval.
 
     Parameters
     ----------

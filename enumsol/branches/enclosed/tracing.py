@@ -1,4 +1,4 @@
-"""Where selections hold over intervals of alpha, found by the polynomials of the trusted core (theory, section 7.14).
+"""Traces of selections over intervals of alpha, by the polynomials of the trusted core (theory, section 7.14).
 
 An interval is cut into boxes, on each of which the conditions are known with bounds of their errors, and the boxes into
 parts: the selection holds throughout, or nowhere, or exactly one condition changes its sign. What is left stays open.
@@ -107,7 +107,7 @@ def _answers(questions: list[Question]) -> list[Any]:
 
 
 class _Tracing:
-    """One selection being traced."""
+    """A selection being traced."""
 
     def __init__(self, found: Trace, precise: Precise, *, sharpened: bool) -> None:
         self._sharpened = sharpened

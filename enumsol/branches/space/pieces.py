@@ -55,7 +55,7 @@ def runs_and_turns(
     found: list[Run | Turn] | None = None,
     records: list[CurvePart] | None = None,
 ) -> list[Run | Turn]:
-    """Those of a curve, in its order; see ``in_order``.
+    """Runs and turns of a curve, in its order; see ``in_order``.
 
     ``found`` is filled on the way, so that it has what there is when the time is over, and ``records`` with those of a
     proof.
@@ -167,7 +167,7 @@ class LinkCutter(LinkParts):
     def _smooth(
         self, own: SolutionCurve | None, motion: CurveMotion, start: Place, end: Place, codes: Codes
     ) -> list[Run | Turn] | None:
-        """Where the statuses do not change: one run, or two with a fold between them."""
+        """Parts without a change of statuses: one run, or two with a fold between them."""
         run = self.run(motion, start, end, codes)
         if run is not None:
             self._told("s", own)
@@ -189,7 +189,7 @@ class LinkCutter(LinkParts):
         nodes: Sequence[int],
         times: int,
     ) -> list[Run | Turn] | None:
-        """Where nodes change their statuses, each of them once: the first change, and what follows."""
+        """Parts in which nodes change their statuses, each of them once: the first change, and what follows."""
         one = start.codes
         mine = [one[i] for i in nodes]
         sides = self._beside(start, end, lambda point: status_margin(self.problem, point.z, nodes, mine), _BESIDE)
@@ -265,7 +265,7 @@ class LinkCutter(LinkParts):
 
     @staticmethod
     def _tells(one: Place, other: Place) -> bool:
-        """Whether two places are proven to be on different sides."""
+        """True if two places are proven to be on different sides."""
         return one.codes != other.codes or one.rises * other.rises < 0
 
     def _between(self, start: Place, end: Place) -> SolutionCurve | None:

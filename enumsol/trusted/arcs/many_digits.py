@@ -119,7 +119,7 @@ _MOST_PRODUCTS = 2**24
 
 
 def affordable(problem: ContactProblem) -> bool:
-    """Whether a problem is small enough for balls of many digits: by the entries of A and the number of rows."""
+    """True if a problem is small enough for balls of many digits: by the entries of A and the number of rows."""
     return bool(problem.A.nnz * (problem.contact_rows.shape[0] + 2) <= _MOST_PRODUCTS)
 
 

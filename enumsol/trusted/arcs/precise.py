@@ -122,7 +122,7 @@ class PreciseSystem:
 
 
 class PreciseSelection(AlphaFunctions):
-    """One selection as a function of alpha.
+    """A selection as a function of alpha, in balls of many digits.
 
     Parameters
     ----------

@@ -87,7 +87,7 @@ class ArcSystem:
 
 
 class ArcSelection:
-    """One selection as a function of alpha.
+    """A selection as a function of alpha, in balls of double arithmetic.
 
     Parameters
     ----------

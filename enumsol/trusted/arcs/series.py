@@ -188,7 +188,7 @@ class _Stack:
         ]
 
     def _one(self, b: int, sums: Floats, values: Floats, slopes: Floats, *, truncated: bool) -> Series | None:
-        """One of them, without what was filled up."""
+        """A series, without what was filled up."""
         size, m = self._sizes[b]
         rows, kept = [*range(m), -1], [*range(size), self._k - 1]
         if not np.max(np.abs(sums)) < _LARGEST:

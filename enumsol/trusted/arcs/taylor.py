@@ -106,7 +106,7 @@ class Smooth:
         return Smooth(terms, turned * self.left, C1 * self.left + turned * self.left_slope, self.shift)
 
     def entry(self, i: int) -> Smooth:
-        """One of them."""
+        """A single function among them."""
         return Smooth(
             [column([x[i, 0]]) for x in self.terms], *(column([x[i, 0]]) for x in (self.left, self.left_slope))
         )
@@ -216,7 +216,7 @@ class AlphaFunctions:
     def newton(
         self, k: int, low: Fraction, high: Fraction, width: Fraction, steps: int = _NEWTON_STEPS
     ) -> Fraction | None:
-        """Where a function seems to vanish between two alphas, to a part of ``width``; no claim rests on it."""
+        """Alpha between two at which a function seems to vanish, to a part of ``width``; no claim rests on it."""
         with precision():
             alpha, unit = (low + high) / 2, width / 2**8
             for _ in range(steps):
@@ -318,7 +318,7 @@ class ShortExpansion:
         return self.low + Fraction(1 + tau) * (self.high - self.low) / 2 if abs(tau) < 1.0 else None
 
     def over(self, low: Number, high: Number) -> OverInterval:
-        """What is known over a part of the interval."""
+        """Knowledge of a part of the interval."""
         signs, unknown = self._whole.copy(), np.zeros_like(self._whole)
         found = [self._functions.signs_at(Fraction(alpha)) for alpha in (low, high)]
         first, last = (unknown if end is None else end for end in found)
@@ -333,7 +333,7 @@ class ShortExpansion:
         return OverInterval(signs, bool(index), none, index, (first, last), rises * abs(sign))
 
     def near(self, condition: int, low: Number, high: Number) -> tuple[Number, Number]:
-        """As in ``over_parts.Expansion``; bounds are found at once, by ``zero_bounds``."""
+        """Nothing yet: bounds are found at once, by ``zero_bounds``; see ``over_parts.Expansion``."""
         return low, low
 
     def zeros(self, condition: int) -> list[Fraction]:
@@ -344,7 +344,7 @@ class ShortExpansion:
         return [] if found is None or not self.low < found < self.high else [found]
 
     def flat(self, condition: int) -> bool:
-        """Whether a condition, or last det M, cannot be distinguished from zero."""
+        """True if a condition, or last det M, cannot be distinguished from zero."""
         return self._small[condition]
 
     def zero_bounds(self, condition: int, slope: int, low: Number, high: Number) -> Bounds:
