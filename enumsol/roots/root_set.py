@@ -19,6 +19,7 @@ from enumsol.support.plotting import checked_units, kept
 
 if TYPE_CHECKING:
     from pathlib import Path
+
     import pandas as pd
 
     from enumsol.model.statuses import ContactStatus

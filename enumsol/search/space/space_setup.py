@@ -12,7 +12,7 @@ import numpy as np
 from enumsol.condensation.enclosure import NotEnclosedError, enclosure_of
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.proof.writer import Recorder, point_header, unit_exponents
-from enumsol.relaxation.space_convex_forms import SpaceFormAscent
+from enumsol.relaxation.convex_forms import SlipFormAscent
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.certifiers.protocol import Certifier, Unrecorded
 from enumsol.search.closing import TreeCloser
@@ -121,7 +121,7 @@ class SpaceSolvers(SearchSetup):
         plain = engine.root(*rows)
         if plain.stalled or plain.pruned:
             return None
-        found = SpaceFormAscent(engine, self.enclosed).ascended(rows)
+        found = SlipFormAscent(engine, self.enclosed, rows).ascended()
         return None if found is None or not found[1].bound > _SHARE * plain.bound else found[0]
 
     def remake(self) -> Callable[[], SpaceSolvers]:
