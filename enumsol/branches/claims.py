@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 _SHOWN, _SINGLE = 6, 3
 #: Numbers of solutions in words.
 _WORDS = ("none", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
-#: Ranges narrower than this share of the interval are no place to begin in: a slider hardly finds them again.
-_NARROW = 0.005
 
 
 @dataclass
@@ -308,7 +306,8 @@ class MultiplicitySteps:
     def busiest(self) -> float:
         """The middle of the widest range with most solutions, or beside it where it is a critical alpha itself."""
         ends = [float(alpha) for alpha in self.alphas]
-        ranges = self.ranges(_NARROW * (ends[-1] - ends[0])) or self.ranges()
+        # ranges narrower than this share of the interval are no place to begin in: a slider hardly finds them again
+        ranges = self.ranges(0.005 * (ends[-1] - ends[0])) or self.ranges()
         if not ranges:
             return ends[0]
         low, high, _ = max(ranges, key=lambda span: (span[2], span[1] - span[0]))

@@ -46,10 +46,6 @@ if TYPE_CHECKING:
     Codes = NDArray[np.uint8]
 
 
-#: Leaves read and checked together.
-_BATCH = 256
-#: Leaves of a piece after which repetitions are first looked for; then whenever their number has doubled.
-_LOOK = 1024
 #: Entries of a leaf's record, by its kind, and those of a form's.
 _ENTRIES = {"x": 4, "f": 4, "s": 2, "c": 2}
 #: Kinds that do not rest on a stiffness that is positive definite.
@@ -72,7 +68,8 @@ class Piece:
     #: of every leaf its kind, and its p codes as bytes
     kinds: bytearray = field(default_factory=bytearray)
     codes: bytearray = field(default_factory=bytearray)
-    look: int = _LOOK
+    # leaves of a piece after which repetitions are first looked for; then whenever their number has doubled
+    look: int = 1024
     #: made when there is something to exclude
     enclosed: EnclosedPiece | None = None
     #: multipliers of the form declared last, and the piece with it
@@ -224,9 +221,8 @@ class GraphChecker:
         record = next(records, END)
         while isinstance(record, list):
             batch: list[list[Any]] = []
-            while (
-                isinstance(record, list) and len(batch) < _BATCH and not (batch and record[:1] in ([_FORM], [_CLOSED]))
-            ):
+            # leaves read and checked together
+            while isinstance(record, list) and len(batch) < 256 and not (batch and record[:1] in ([_FORM], [_CLOSED])):
                 batch.append(record)
                 record = next(records, END)
             try:

@@ -26,9 +26,6 @@ if TYPE_CHECKING:
 
     Bounds = tuple[Fraction, Fraction]
 
-#: What was left open at an end of the interval and is shorter, beside it, would be decided if it were not at the end.
-_AT_END = Fraction(1, 2**30)
-
 
 class EventPlaceKind(enum.StrEnum):
     """Kind of a place at which arcs end."""
@@ -307,7 +304,8 @@ class _Joining:
             low, high = min(found.low for found in group), max(found.high for found in group)
             causes = {found.part.cause for found in group}
             cause = next((cause for cause in OpenCause if cause in causes), OpenCause.PARTNER)
-            if high - low <= _AT_END * (self._interval[1] - self._interval[0]) and any(
+            # what is shorter, beside the interval, and left open at its end would be decided elsewhere
+            if high - low <= Fraction(1, 2**30) * (self._interval[1] - self._interval[0]) and any(
                 low <= end <= high for end in self._interval
             ):
                 cause = OpenCause.END
