@@ -156,7 +156,7 @@ class Chains:
         return None if found is None else tuple(found[1])
 
     def _event(self, curve: SelectionCurve, alpha: float) -> tuple[float, int | None] | None:
-        """Where a condition vanishes next, and which; the end of the interval and None where none does."""
+        """Alpha at which a condition vanishes next, and which; the end of the interval and None where none does."""
         first = alpha
         for _ in range(_STEPS):
             *_, values, _, _, slopes = curve.at(alpha)

@@ -170,7 +170,7 @@ class Closer(TreeCloser):
         return found
 
     def begins_again(self, nodes: int) -> bool:
-        """Whether so much has become known after some nodes that a search had better begin again."""
+        """True if so much has become known after some nodes that a search had better begin again."""
         if nodes >= _TALL and self._system.p >= _FEW:
             self.known = self._regular
         if self._due(nodes):
@@ -187,7 +187,7 @@ class Closer(TreeCloser):
         return bool(self._tries) and nodes >= self._tries[0][0]
 
     def _proposed(self, sought: WeightSource) -> Proposal | None:
-        """What may be the only solution of the whole problem; takes note of where it is degenerate."""
+        """Proposal of the only solution of the whole problem; takes note of where it is degenerate."""
         system, p = self._system, self._system.p
         codes, exactly = (UNDECIDED,) * p, self._certifier.exactly
         proposal = propose(system, codes, (np.zeros(2 * p), system.g), exactly=exactly, sought=sought)
@@ -269,7 +269,7 @@ class Closer(TreeCloser):
 
 
 def _touches(codes: Codes, relaxation: Relaxation | None) -> bool:
-    """Whether undecided nodes touch without load at the minimiser."""
+    """True if undecided nodes touch without load at the minimiser."""
     if relaxation is None:
         return False
     p = len(codes)
@@ -278,7 +278,7 @@ def _touches(codes: Codes, relaxation: Relaxation | None) -> bool:
 
 
 def holds_below(codes: Codes, active: ActiveSets) -> bool:
-    """Whether a solution lies below an assignment: at every node a final code holds that refines its code."""
+    """True if a solution lies below an assignment: at every node a final code holds that refines its code."""
     return all(
         bool(held - {OPEN}) if code == CONTACT else bool(held) if code > FRICTIONLESS else code in held
         for code, held in zip(codes, active, strict=True)
@@ -293,7 +293,7 @@ def propose(
     exactly: bool,
     sought: WeightSource = WeightSource.CENTRES,
 ) -> Proposal | None:
-    """What may close a subtree, or None.
+    """Proposal that may close a subtree, or None.
 
     Parameters
     ----------

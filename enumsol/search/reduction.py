@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
-from enumsol.search.definite import DEFINITE, AnalyticCentres, Nodes
-from enumsol.search.descent import Descent
+from enumsol.search.definite import DEFINITE, AnalyticCentres, Descent, Nodes
 from enumsol.support.deadlines import look
 from enumsol.trusted.selection import Selection, Unknowns
 from enumsol.trusted.status_rows import slip_directions
@@ -74,7 +73,7 @@ class Reduction:
 
     @cached_property
     def sensitivity(self) -> float:
-        """How much a fixed node's force changes at most with a component of w."""
+        """Largest change of a fixed node's force with a component of w."""
         return float(np.max(np.abs(np.linalg.inv(self.M)), initial=0.0))
 
     def forces(self, x: Floats) -> Floats:
@@ -164,7 +163,7 @@ class Reduction:
         return x
 
     def _residual(self, x: Floats, v: Floats, share: float) -> float:
-        """What the point is off at most: its conditions are min(lambda_n, -w_n) = 0, and of the slip likewise."""
+        """Largest error of a point: its conditions are min(lambda_n, -w_n) = 0, and of the slip likewise."""
         m, t = len(self.free), self.tangential[self.rubbing]
         bound = share * self._F * np.maximum(x[:m][self.rubbing], 0.0)
         apart = np.abs(np.minimum(x[:m], -v[:m])), np.abs(x[t] - np.clip(x[t] + v[t], -bound, bound))

@@ -75,7 +75,7 @@ class PieceProposals:
         self._system = SpaceSystem.in_middle(self._middle, piece.space.units)
 
     def numbers(self, codes: Codes, parts: CurveParts) -> Array | None:
-        """Those of a form that seems to serve all over the piece, or None."""
+        """Numbers of a form that seems to serve all over the piece, or None."""
         p, places, whole = self._system.p, self._system.tau >= 0, self._piece.whole
         with np.errstate(all="ignore"):
             thetas, apart = self._thetas(parts)
@@ -92,7 +92,7 @@ class PieceProposals:
         return np.concatenate([mu, kappa, nu[places], *(theta[places] for theta in thetas)])
 
     def is_hopeful(self, codes: Codes, parts: CurveParts) -> bool:
-        """Whether a shorter piece may have such a form: the middle has one, by the parts of the curve there."""
+        """True if a shorter piece may have such a form: the middle has one, by the parts of the curve there."""
         with np.errstate(all="ignore"):
             apart, discs = self._apart(parts), self._middle.discs.mid
             turn, off = self._turn(parts, apart)
@@ -128,7 +128,7 @@ class PieceProposals:
         return np.asarray(np.all(parts.open & (parts.slips[0].mid < 0), axis=0))
 
     def _thetas(self, parts: CurveParts) -> tuple[Sequence[Array], Flags]:
-        """Those at both ends whose psi is near to that of the curve all over the piece, (p, 2) each, and open nodes."""
+        """Thetas at both ends, (p, 2) each, whose psi is near the curve's all over the piece, and open nodes."""
         low, high, reference = float(self._piece.low), float(self._piece.high), self._piece.whole.references
         share = np.clip((parts.alpha.mid - low) / (high - low), 0.0, 1.0)
         r = np.maximum(parts.F.mid, 0.0) / reference

@@ -49,12 +49,12 @@ def _turning(codes: Codes) -> list[int]:
 
 
 def slides(parts: CurveParts, codes: Codes) -> Mask:
-    """In which parts of a curve the statuses of a leaf hold, and those in sectors do not stick all the time, (N,)."""
+    """Mask of the parts of a curve where a leaf's statuses hold and those in sectors do not always stick, (N,)."""
     return np.asarray(parts.held(without_sectors(codes)) & ~np.any(parts.sticking[:, _turning(codes)], axis=1))
 
 
 def beside(parts: CurveParts, codes: Codes, centre: Floats, angle: Floats | float, radius: Floats) -> NDArray[np.intp]:
-    """Which parts of a curve have the statuses of a leaf, and directions within angles from those at its middle."""
+    """Parts of a curve that have the statuses of a leaf, and directions within angles from those at its middle."""
     there = np.flatnonzero(slides(parts, codes))
     if not len(there):
         return there

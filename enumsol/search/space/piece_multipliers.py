@@ -67,7 +67,7 @@ class AlphaPoint:
         return self.engine.root(*self.rows.over(codes, range(self.system.p)))
 
     def multipliers(self, relaxation: SpaceRelaxation) -> tuple[list[Row], Floats]:
-        """Those of a relaxation, in the variables of a space: tau is less there by the discs' radii, v is more."""
+        """Multipliers of a relaxation in the variables of a space: tau is less there by the discs' radii, v is more."""
         numbers, values = relaxation.multipliers()
         rows = [self.engine.rows[number] for number in numbers.tolist()]
         return rows, values * np.array([self._factor(row) for row in rows])
@@ -194,7 +194,7 @@ def exclusion(piece: AlphaPiece, codes: Sequence[int], rows: Sequence[Row]) -> E
 
 
 def _columns(system: EnclosedSpace, rows: Sequence[Row]) -> tuple[Floats, Floats, Floats]:
-    """What each row adds to the load but for discs, by these, and it as a row on w, (m, n) each."""
+    """Parts of the load that rows add: but for discs, by these, and the rows on w, (m, n) each."""
     size, units = len(system.g), system.row_unit
     columns, normals = np.zeros((2 * size, len(rows))), np.zeros((size, len(rows)))
     for k, row in enumerate(rows):

@@ -365,7 +365,7 @@ class PieceTree:
         return CutPiece(str(alpha)), [PieceNode(*both, codes, cuts=cuts) for both in pairwise(ends)]
 
     def _beside_ends(self, at: ExaminedPiece, codes: Codes) -> Done | None:
-        """Where curves end, what stays open is cut off from what has to be searched."""
+        """A cut between places where curves end, which stay open, and what has to be searched; or None."""
         low, high = at.piece.low, at.piece.high
         for begin, end in self.curves.ends:
             if begin <= low and high <= end:
@@ -380,7 +380,7 @@ class PieceTree:
         return OpenLeaf(at.piece.low, at.piece.high, codes, forces)
 
     def _certified(self, at: ExaminedPiece, codes: Codes) -> Done | None:
-        """One certificate for all that is below an assignment, or the piece is cut since it is too long for that.
+        """A certificate for all that is below an assignment, or a cut of a piece that is too long for one; or None.
 
         None of a body that nothing holds: the form says nothing about its rigid displacement.
         """

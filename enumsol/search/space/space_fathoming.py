@@ -138,7 +138,7 @@ class SpaceCloser(TreeCloser):
         return ProductSearch(self._certifier.enclosed)
 
     def _by_products(self, codes: Codes) -> list[Any] | None:
-        """What forms of products leave of an assignment, if that is a few boxes with a solution each."""
+        """Solutions that forms of products leave of an assignment, if these are in a few boxes with one each."""
         tree = None if self._regular else self._products.closed(codes, _PROGRAMS)
         return None if tree is None else self._certifier.fathom(codes, tree)
 
@@ -222,7 +222,7 @@ class Point:
 
     @classmethod
     def of(cls, system: SpaceSystem, problem: Isotropic, y: Floats) -> Point:
-        """Of forces y, (p, 3), which solve the problem up to rounding."""
+        """The solution of forces y, (p, 3), which solve the problem up to rounding."""
         w = problem.displacements(y)
         n, gap, tau, v = np.maximum(y[:, 0], 0.0), np.maximum(-w[:, 0], 0.0), y[:, 1:], w[:, 1:]
         rubs, size, length = np.any(system.tau >= 0, axis=1), np.linalg.norm(v, axis=1), np.linalg.norm(tau, axis=1)

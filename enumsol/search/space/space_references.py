@@ -44,7 +44,7 @@ _MANY, _EASY = 8, 32
 
 
 def space_closer(certifier: Any, engine: SpaceEngine, root: Callable[[], Codes | None]) -> ReferenceCloser:
-    """What ends the tree where only a root is left, unless not even its own statuses leave it alone.
+    """A closer that ends the tree where only a root is left; none if not even its own statuses leave it alone.
 
     Parameters
     ----------
