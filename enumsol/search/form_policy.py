@@ -61,11 +61,11 @@ class Forms:
         self.form: Any = None
 
     def due(self, nodes: int, covered: float) -> bool:
-        """Whether it is time to try a form."""
+        """True if it is time to try a form."""
         return self.tried(nodes) and covered < 1.0 - _LEFT
 
     def tried(self, nodes: int) -> bool:
-        """Whether a search of so many nodes has tried a form."""
+        """True if a search of so many nodes has tried a form."""
         return nodes >= self._nodes
 
     def use(self, engine: Engine, form: Any) -> None:
@@ -76,7 +76,7 @@ class Forms:
         self.form, self.engine = form, self._bounding(engine, form) if convex else None
 
     def pay(self, engine: Engine, codes: Codes, rows: ImposedRows) -> bool:
-        """Whether a form at the root of the search is clearly tighter than the energy; if so it is in use."""
+        """True if a form at the root of the search is clearly tighter than the energy; it is then in use."""
         form = self._better(engine, codes, rows.over(codes, range(len(codes))))
         if form is None or not form.smallest_eigenvalue > 0:
             return False
