@@ -102,7 +102,7 @@ class SpaceGraphChecker(GraphChecker):
         """Limits of records about boxes around curves."""
         return Limits((UNDECIDED,) * self.problem.p, modes=self.problem.modes.r)
 
-    def _curve(self, given: AlphaProblem, count: Any, records: Iterator[Any]) -> None:
+    def _curve(self, given: AlphaProblem, count: object, records: Iterator[Any]) -> None:
         number = len(self.curves) + 1
         if type(count) is not int or not 0 < count <= _MOST_BOXES:
             raise RefusedError(f"curve {number} has {quoted(count)} boxes")
@@ -119,8 +119,8 @@ class SpaceGraphChecker(GraphChecker):
             raise RefusedError(f"curve {number} is not proven to be one from end to end")
         self.curves.append(chain)
 
-    def _cuts(self, given: AlphaProblem, record: Any, records: Iterator[Any]) -> Any:
-        """How the last curve is cut into arcs, if its record says so; the record that follows."""
+    def _cuts(self, given: AlphaProblem, record: object, records: Iterator[Any]) -> Any:
+        """Read the arcs into which the last curve is cut, if its record says so; gives the record that follows."""
         if not same(record, {"parts": True}):
             self.arcs = None
             return record
