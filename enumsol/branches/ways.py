@@ -31,7 +31,6 @@ from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.search.certifiers.interval_certifiers import ExactIntervalCertifier, VerifiedIntervalCertifier
 from enumsol.search.interval.subintervals import (
     FastIntervalCertifier,
-    FloatingIntervalCertifier,
     IntervalSearch,
     on_weak_springs,
     run_parallel,
@@ -248,7 +247,8 @@ class ByAlgebra(PlaneWay):
         """With the certifier of an arithmetic."""
         certifier: IntervalCertifier = FastIntervalCertifier()
         if not problem.held:
-            certifier = FloatingIntervalCertifier(problem, checkable=arithmetic == "verified")
+            certifier = VerifiedIntervalCertifier(problem, None)
+            certifier.checkable = arithmetic == "verified"
         elif arithmetic == "exact":
             certifier = ExactIntervalCertifier(exact)
         elif arithmetic == "verified":
@@ -285,10 +285,7 @@ class ByBalls(PlaneWay):
         self.problem, self.interval, self.traced, self.closed = traced.problem, traced.interval, traced, ClosedPieces()
         self._traces: list[Trace] = []
         self._algebra: ByAlgebra | None = None
-        if self.problem.held:
-            self.certifier = VerifiedIntervalCertifier(traced.problem, None, traced.origin)
-        else:
-            self.certifier = FloatingIntervalCertifier(traced.problem, checkable=True)
+        self.certifier = VerifiedIntervalCertifier(traced.problem, None, traced.origin if self.problem.held else None)
 
     @property
     def origin(self) -> Fraction | None:

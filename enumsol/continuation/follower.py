@@ -171,7 +171,7 @@ class Follower(Generic[_Path]):
         return self._take(step)
 
     def _slide(self) -> _Stop | None:
-        """Where the body moves as a whole at fixed forces: straight to the next transition point, or to the bound.
+        """Go straight to the next transition point, or to the bound, where the body moves as a whole at fixed forces.
 
         All conditions are affine along this line (theory, section 14.7).
         """
@@ -368,7 +368,7 @@ class Follower(Generic[_Path]):
         return None if status is None else self._stop(status, self.equation.alpha(kink.before.x))
 
     def _beyond(self, start: TangentPoint, end: TangentPoint) -> _Stop | None:
-        """Where a body that nothing holds comes to the bound of its rigid displacement."""
+        """The stop where a body that nothing holds comes to the bound of its rigid displacement."""
         equation = self.equation
         here, there = equation.rigid(start.x), equation.rigid(end.x)
         sides = np.where(there < 0, -equation.reach, equation.reach)

@@ -64,7 +64,7 @@ class Kink:
 
 
 def same_curve(equation: ScaledEquation, start: TangentPoint, end: TangentPoint, *, sharp: bool = False) -> bool:
-    """Whether ``end`` lies ahead of ``start`` on one smooth piece of a selection's curve, all of it admissible.
+    """True if ``end`` lies ahead of ``start`` on one smooth piece of a selection's curve, all of it admissible.
 
     The piece is judged by both tangents and by the cubic Hermite interpolants of all conditions: one that dips below
     zero in between shows that the curve was left and entered again. ``sharp`` allows turns up to a right angle.
@@ -88,7 +88,7 @@ def same_curve(equation: ScaledEquation, start: TangentPoint, end: TangentPoint,
 
 
 def _joined(equation: ScaledEquation, start: TangentPoint, end: TangentPoint, length: float) -> bool:
-    """Whether the curve runs near the cubic Hermite interpolant between two of its points, in its middle."""
+    """True if the curve runs near the cubic Hermite interpolant between two of its points, in its middle."""
     chord = end.x - start.x
     middle = start.x + 0.5 * chord + length / 8 * (start.tangent - end.tangent)
     row = equation.metric @ chord / length

@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Codes, Floats, Indices
 
 
-#: mu for all nodes, if kappa is one: what loaded nodes lose by a gap grows with it, the share of the slip falls.
-_FACTORS = (1.0, 3.0, 10.0)
 #: Strength of what vanishes: S has a diagonal near one.
 _STIFF = 1e3
 #: Of the strengths that are allowed: small forces are known to 1e-4 of their size. What is added to squares of gaps.
@@ -110,7 +108,8 @@ class Lone:
         fixed[self.nodes.normal] -= (share * self.nodes.F)[:, None] * tangential
         by_mu = normal.T @ (self.spare[0][:, None] * normal)
         by_mu[:count] += normal
-        for mu in _FACTORS:
+        # what loaded nodes lose by a gap grows with mu, the share of the slip falls
+        for mu in (1.0, 3.0, 10.0):
             form = fixed + mu * by_mu
             if factor_above(0.5 * (form + form.T), DEFINITE) is not None:
                 return np.concatenate([np.full(count, mu), np.ones(b), np.zeros(b), share, np.zeros(b)])

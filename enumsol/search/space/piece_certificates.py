@@ -35,10 +35,6 @@ if TYPE_CHECKING:
 _DEFINITE, _MANY = 1e-9, 8
 #: Weight of the equations of an assignment, by the largest entry of S; what of a gap may serve for its slip.
 _WEIGHT, _SHARED = 1024.0, 0.5
-#: How often large distances get more weight in the fit of psi, and by how little the least ones count.
-_ROUNDS, _LEAST = 4, 1e-3
-#: At these shares of a piece it is asked how often a curve passes it.
-_PASSED = (2.0 * np.arange(4) + 1.0) / 8
 #: By how much more a writer of proofs has theta vary.
 ERRORS = 1.0 + 2.0**-6
 
@@ -138,14 +134,15 @@ class PieceProposals:
         basis = (1.0 - share)[:, None] * ends[0], share[:, None] * ends[1]
         weight = np.ones_like(r)
         fitted = [np.zeros_like(theta[0]), np.zeros_like(theta[0])]
-        for _ in range(_ROUNDS):
+        # large distances get more weight each time, the least ones a little
+        for _ in range(4):
             a, b, c = (np.sum(weight * x * y, axis=0) for x, y in combinations_with_replacement(basis, 2))
             a, c = a + 1e-12 * (a + c) + 1e-300, c + 1e-12 * (a + c) + 1e-300
             one, other = (np.sum((weight * x)[:, :, None] * psi, axis=0) for x in basis)
             det = (a * c - b * b)[:, None]
             fitted = [(c[:, None] * one - b[:, None] * other) / det, (a[:, None] * other - b[:, None] * one) / det]
             missed = np.linalg.norm(psi - sum(x[:, :, None] * y for x, y in zip(basis, fitted, strict=True)), axis=2)
-            weight *= missed / np.maximum(np.max(missed, axis=0), 1e-300) + _LEAST
+            weight *= missed / np.maximum(np.max(missed, axis=0), 1e-300) + 1e-3
         size = [np.linalg.norm(theta, axis=1) for theta in fitted]
         shrunk = [np.where(apart & (x > 1.0), (1.0 - 4e-16) / np.maximum(x, 1.0), 1.0) for x in size]
         places = self._system.tau >= 0
@@ -155,7 +152,8 @@ class PieceProposals:
 def _only_turns(alpha: Array, piece: AlphaPiece) -> bool:
     """True if a run along a curve, given by alphas, passes some alphas of a piece twice, but none just once."""
     low, high = float(piece.low), float(piece.high)
-    beyond = alpha > (low + (high - low) * _PASSED)[:, None]
+    # at four alphas of the piece
+    beyond = alpha > (low + (high - low) * (2.0 * np.arange(4) + 1.0) / 8)[:, None]
     passed = np.sum(beyond[:, 1:] != beyond[:, :-1], axis=1)
     return bool(np.any(passed > 1) and not np.any(passed == 1))
 

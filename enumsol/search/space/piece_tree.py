@@ -51,13 +51,8 @@ _ALONE = 2.0**-5
 _CUTS = 2
 #: Longer pieces are cut where statuses occur along one curve over a part of them.
 _SHORT = 2.0**-6
-#: Leaves are tested from this level of their sectors on; where more than two nodes slip, from the second one on.
-_TRIED = 3, 5
 #: Nodes that are examined before others than this process help.
 FIRST = 16
-#: Sectors above this level are halved, rather than alpha, where a leaf is settled in the middle only; by how many
-#: levels fewer sectors are halved than pieces.
-_WIDE, _NARROW = 6, 8
 
 
 @dataclass(frozen=True)
@@ -280,7 +275,8 @@ class PieceTree:
         """True if a leaf is to be tested: where sectors are wide that is of no use."""
         levels = [width_level(code - SECTORS) for code in codes if code > SECTORS]
         final = not {CONTACT, UNDECIDED} & set(codes)
-        return final and (not levels or min(levels) >= _TRIED[len(levels) > 2])
+        # of wide sectors a test is of no use, the more so where more than two nodes slip
+        return final and (not levels or min(levels) >= (5 if len(levels) > 2 else 3))
 
     def _excluded(self, at: ExaminedPiece, codes: Codes, parent: tuple[AlphaPoint, SpaceRelaxation], cuts: int) -> Done:
         """An assignment that one alpha excludes: over all of the piece, if possible, or it is cut or branched."""
@@ -330,7 +326,8 @@ class PieceTree:
     def _is_wide(self, piece: AlphaPiece, codes: Codes) -> bool:
         """True if a sector is to be halved rather than the piece: those of short pieces may be narrow."""
         share = float((piece.high - piece.low) / (self.interval[1] - self.interval[0]))
-        level = max(_WIDE, -np.log2(share) - _NARROW)
+        # wider sectors are halved rather than alpha; those of short pieces may be narrower, by so many levels less
+        level = max(6, -np.log2(share) - 8)
         return any(code > SECTORS and width_level(code - SECTORS) < min(level, DEEPEST) for code in codes)
 
     def _branched(

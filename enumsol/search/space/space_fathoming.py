@@ -44,8 +44,6 @@ _DEFINITE, _GOOD, _HOPELESS = 1e-9, 1e-2, -4.0
 _CLEAR = 1e-6
 #: Contact nodes from which better numbers than the plain ones are sought; evaluations for that, in rounds of so many.
 _MANY, _EVALUATIONS, _ROUND = 8, 60, 20
-#: How sharply the smallest eigenvalue counts in each round.
-_HARDNESS = 10.0, 20.0, 40.0
 #: Of the gap of an open node, what may serve for its slip.
 _SHARED = 0.5
 #: Weight of the equations of an assignment, by the largest entry of S.
@@ -378,7 +376,8 @@ class DefiniteForm:
         bounds = Bounds(least_x, np.inf)
         # columns in which S is the unit matrix
         columns = np.linalg.inv(np.linalg.cholesky(self._S)).T
-        for hardness in _HARDNESS:
+        # the smallest eigenvalue counts more sharply in each round
+        for hardness in 10.0, 20.0, 40.0:
             if left <= 0 or least > _GOOD:
                 break
             options = {"maxfun": min(_ROUND, left), "maxiter": _ROUND}

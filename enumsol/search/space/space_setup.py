@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Alpha, Codes, Floats
     from enumsol.trusted.space.slip_forms import SlipForm
 
-#: Level of the sectors in which a root that floats suggest is sought: they are three degrees wide.
-_WIDE = 7
 #: Nodes examined with the energy before a form that knows where the body slides is tried (theory, section 12.2).
 NODES = 256
 #: It is used where it leaves no more than this share of the gap to the pruning bound at the root of the tree.
@@ -101,7 +99,8 @@ class SpaceSolvers(SearchSetup):
         with np.errstate(all="ignore"):
             found = solved(system, near)
         # a body on springs has slightly different directions
-        return None if found is None else ([found[0].leaf(_WIDE), found[0].codes], found[1])
+        # from sectors of three degrees on
+        return None if found is None else ([found[0].leaf(7), found[0].codes], found[1])
 
     def _splitting(self, certifier: Certifier) -> SpaceSplitting:
         return SpaceSplitting(self._engine)
