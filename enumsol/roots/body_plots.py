@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.model.problem3d import AnyProblem, ContactProblem3D
+    from enumsol.roots.root import Root
     from enumsol.support.array_types import Floats, Indices
 
 
@@ -49,7 +50,7 @@ _ACROSS, MOST_BODIES = 3, 12
 
 
 def draw_body(
-    root: Any, problem: AnyProblem, ax: Any = None, scale: float | None = None, units: tuple[str, str] | None = None
+    root: Root, problem: AnyProblem, ax: Any = None, scale: float | None = None, units: tuple[str, str] | None = None
 ) -> Any:
     """A figure of one deformed body; see Root.plot_body."""
     axes_or_none(ax)
@@ -71,7 +72,7 @@ def draw_body(
     return figure_of(ax)
 
 
-def draw_bodies(roots: Sequence[Any], scale: float | None = None, units: tuple[str, str] | None = None) -> Any:
+def draw_bodies(roots: Sequence[Root], scale: float | None = None, units: tuple[str, str] | None = None) -> Any:
     """A figure of the deformed bodies of several roots side by side; see RootSet.plot_bodies."""
     if not roots:
         raise InvalidArgumentError("there are no isolated roots to draw; expected at least one")
@@ -98,7 +99,7 @@ def draw_bodies(roots: Sequence[Any], scale: float | None = None, units: tuple[s
     return figure
 
 
-def _index(root: Any) -> str:
+def _index(root: Root) -> str:
     return "index unknown" if root.index is None else f"index {root.index:+d}"
 
 
@@ -106,15 +107,15 @@ def _scale_words(scale: float) -> str:
     return f"displacements times {scale:g}"
 
 
-def _strongest(roots: Sequence[Any], problem: object, shape: BodyShape) -> float:
+def _strongest(roots: Sequence[Root], problem: object, shape: BodyShape) -> float:
     """The largest nodal contact force of several roots [force]."""
     return max(largest_length(shape.contact_forces(problem, root.lambda_n, root.lambda_t)) for root in roots)
 
 
 def _factors(
-    roots: Sequence[Any], problem: object, shape: BodyShape, scale: float | None
+    roots: Sequence[Root], problem: object, shape: BodyShape, scale: float | None
 ) -> tuple[tuple[float, ...], float]:
-    """By what the displacements of each root are multiplied, and the forces of all."""
+    """Factors of the displacements of each root, and one of all forces."""
     arrows = arrow_scale(_strongest(roots, problem, shape), shape.size)
     if scale is not None:
         return (positive_number(scale, "scale"),) * len(roots), arrows
@@ -125,7 +126,7 @@ def _axes(figure: Any, place: tuple[int, int, int], shape: BodyShape) -> Any:
     return figure.add_subplot(*place, projection="3d" if shape.points.shape[1] == 3 else None)
 
 
-def _draw(ax: Any, root: Any, problem: AnyProblem, shape: BodyShape, scale: float, arrows: float) -> None:
+def _draw(ax: Any, root: Root, problem: AnyProblem, shape: BodyShape, scale: float, arrows: float) -> None:
     moves = scale * shape.moves(root)
     points = shape.points + moves
     places = shape.at_rows(points)
@@ -199,7 +200,7 @@ def _name_axes(ax: object, dimension: int, units: tuple[str, str] | None) -> Non
         getattr(ax, f"set_{direction}label")(in_units(direction, "length", units), fontsize=8)
 
 
-def _legend(place: Any, roots: Sequence[Any], strongest: float, units: tuple[str, str] | None) -> None:
+def _legend(place: Any, roots: Sequence[Root], strongest: float, units: tuple[str, str] | None) -> None:
     found = {status for root in roots for status in root.statuses}
     handles = [
         line_entry(status.value, linestyle="", marker=marker, markerfacecolor=face, markeredgecolor="black")
@@ -221,7 +222,7 @@ def _legend(place: Any, roots: Sequence[Any], strongest: float, units: tuple[str
     place.legend(handles=handles, fontsize=8, frameon=False, **where)
 
 
-def draw_root(root: object, problem: ContactProblem3D, ax: object, units: tuple[str, str] | None = None) -> Any:
+def draw_root(root: Root, problem: ContactProblem3D, ax: object, units: tuple[str, str] | None = None) -> Any:
     """See Root.plot."""
     if axes_or_none(ax) is not None or problem.mesh is None:
         return draw_slips(root, problem, ax, units)
@@ -231,7 +232,7 @@ def draw_root(root: object, problem: ContactProblem3D, ax: object, units: tuple[
     return figure
 
 
-def draw_slips(root: Any, problem: ContactProblem3D, ax: Any, units: tuple[str, str] | None = None) -> Any:
+def draw_slips(root: Root, problem: ContactProblem3D, ax: Any, units: tuple[str, str] | None = None) -> Any:
     """Statuses and directions of slip on the contact surface."""
     if problem.coordinates is None:
         raise InvalidArgumentError("the problem has no coordinates; expected a problem made with coordinates=")
