@@ -20,7 +20,7 @@ from enumsol.condensation.data import exactly_at
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.proof.reading import RefusedError, quoted
 from enumsol.proof.records import Branching, Limits, NoRoot, RecordError, Unbalanced, UndecidedRecord, kind_of
-from enumsol.proof.space_records import (
+from enumsol.proof.curve_records import (
     FLOATING_PIECE_LEAVES,
     PIECE_LEAVES,
     CutPiece,

@@ -14,7 +14,7 @@ from enumsol.branches.space.cover import SpaceCover
 from enumsol.branches.space.make_curved import CurvedGraph
 from enumsol.branches.space.pieces import runs_and_turns
 from enumsol.condensation.enclosure import NotEnclosedError
-from enumsol.proof.space_records import CutPiece
+from enumsol.proof.curve_records import CutPiece
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.search.space.known_curves import joined
 from enumsol.support.deadlines import Deadline, TimeOverError, within
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from enumsol.branches.elements import Arc, Vertex
     from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.proof.space_records import CurvePart
+    from enumsol.proof.curve_records import CurvePart
     from enumsol.support.keeping import Ending
     from enumsol.trusted.space.curve_parts import Turn
 

@@ -15,7 +15,7 @@ from scipy.optimize import nnls
 
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.proof.records import Unbalanced
-from enumsol.proof.space_records import ExcludedOverPiece
+from enumsol.proof.curve_records import ExcludedOverPiece
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.floating_solvers import weakly_held
 from enumsol.search.space.space_newton import Isotropic

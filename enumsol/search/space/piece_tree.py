@@ -17,7 +17,7 @@ from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of, parts_around, places, span, width_level, width_of
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.proof.records import Branching, NoRoot
-from enumsol.proof.space_records import CutPiece, ExcludedOverPiece, InCurveBoxes, OnlyOnCurve, ThroughCurveBox
+from enumsol.proof.curve_records import CutPiece, ExcludedOverPiece, InCurveBoxes, OnlyOnCurve, ThroughCurveBox
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.outcome import StopReason
 from enumsol.search.space.known_curves import Curves, middle_of

@@ -14,7 +14,7 @@ import numpy as np
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.proof.records import Exclusion, NoRoot, Unbalanced
-from enumsol.proof.space_records import (
+from enumsol.proof.curve_records import (
     FLOATING_LEAVES,
     DeclaredSpaceReference,
     ExcludedInSpace,
