@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
 from typing import TYPE_CHECKING
 
 from enumsol.branches.graph import BranchGraph
-from enumsol.branches.graph_data import GraphStats
-from enumsol.branches.ways import Arithmetic, Made, Way, way_of
+from enumsol.branches.ways import Arithmetic, Made, PlaneWay, not_condensed, way_of
 from enumsol.condensation.data import exactly_at
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import ContactProblem, check_is_problem
-from enumsol.search.outcome import Stop, StopReason
+from enumsol.search.outcome import StopReason
 from enumsol.support import arguments
 from enumsol.support.deadlines import Deadline, TimeOverError, within
 from enumsol.support.keeping import keeping
@@ -24,16 +23,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from concurrent.futures import Executor
 
-    from enumsol.model.problem3d import AnyProblem, ContactProblem3D
-    from enumsol.search.interval.subintervals import IntervalSearch
-    from enumsol.support.array_types import AlphaLike, Codes
+    from enumsol.branches.space.space_graph import ByCurves
+    from enumsol.model.problem3d import AnyProblem
+    from enumsol.support.array_types import AlphaLike
     from enumsol.support.keeping import Ending
-
-#: Of the time that is left when arcs are begun: for working them out, and for joining them too, where there is a limit.
-#: To join them takes a fifth as long as to work them out by exact algebra, to make a graph of them another tenth.
-_WORKED_OUT, _JOINED = 0.55, 0.75
-#: Alternatives in messages about bodies that nothing holds and that have no graph.
-_AT_SINGLE_ALPHAS = " (weak ones will do), or multiplicity_table, which counts the solutions at single alphas"
 
 
 def branch_graph(
@@ -122,29 +115,27 @@ def branch_graph(
     max_nodes, time_limit = arguments.optional_count(max_nodes, "max_nodes"), arguments.optional_seconds(time_limit)
     started = time.perf_counter()
     limits = Deadline.after(started, time_limit)
-    if not isinstance(problem, ContactProblem):
-        with workers_of(executor, jobs) as pool:
-            return _in_space(problem, (a, b), arithmetic, progress, max_nodes, limits, pool)
-    if not problem.held:
-        _check_floating(problem, arithmetic)
-    _check_friction(problem, a, b)
+    _check_arithmetic(problem, arithmetic)
+    if isinstance(problem, ContactProblem):
+        _check_friction(problem, a, b)
+    for end in (a, b):
+        problem.friction_at(end)
     call = _Construction(problem, (a, b), arithmetic, started)
+    kept = "arcs" if isinstance(problem, ContactProblem) else "curves"
     with workers_of(executor, jobs) as pool:
         work = partial(call.run, progress, max_nodes, limits, pool)
-        return keeping("branch_graph", work, call.cut_short, lambda _: "; the arcs found so far are kept")
+        return keeping("branch_graph", work, call.cut_short, lambda _: f"; the {kept} found so far are kept")
 
 
 @dataclass
 class _Construction:
-    """One call of branch_graph in 2D, and how far it came."""
+    """One call of branch_graph, and how far it came."""
 
-    problem: ContactProblem
+    problem: AnyProblem
     interval: tuple[Fraction, Fraction]
     arithmetic: Arithmetic
     started: float
-    way: Way | None = None
-    search: IntervalSearch | None = None
-    candidates: set[Codes] | None = None
+    way: PlaneWay | ByCurves | None = None
     searched: float | None = None
 
     def run(
@@ -157,46 +148,28 @@ class _Construction:
         """Search, then work out arcs and join them."""
         try:
             with within(limits):
-                way = self.way = way_of(self.problem, self.interval, self.arithmetic)
-                search = way.search(self.interval, max_nodes, limits.deadline, _stage(progress, "search"))
-                self.search = search
+                way = self.way = self._way()
         except TimeOverError:
-            return self._nothing(StopReason.TIME_LIMIT)
-        found = way.candidates(search, executor)
+            return self._graph(not_condensed(StopReason.TIME_LIMIT))
+        way.run(max_nodes, limits, _stage(progress, "search"), executor)
         self.searched = time.perf_counter()
-        self.candidates = found
-        limits = limits.extended(self.started)
-        with within(limits.part(_JOINED)):
-            made = way.made(search, found, _stage(progress, "arcs"), limits.part(_WORKED_OUT))
-        return self._graph(search, found, made)
+        return self._graph(way.made(limits.extended(self.started), _stage(progress, "arcs")))
+
+    def _way(self) -> PlaneWay | ByCurves:
+        if isinstance(self.problem, ContactProblem):
+            return way_of(self.problem, self.interval, self.arithmetic)
+        from enumsol.branches.space.space_graph import ByCurves  # continuation, and what only 3D needs
+
+        return ByCurves(self.problem, self.interval)
 
     def cut_short(self, ending: Ending) -> BranchGraph:
         """The graph of what was found before something ended ``run``, wherever that was."""
-        reason, way, search = StopReason.of(ending), self.way, self.search
-        if way is None or search is None:
-            return self._nothing(reason)
-        if self.candidates is None and (search.stopped is None or not search.stopped.interrupted):
-            search.stopped = Stop(reason, search.nodes)
-        found = search.selections if self.candidates is None else self.candidates
-        return self._graph(search, found, way.made(search, found, ended=reason))
+        reason = StopReason.of(ending)
+        return self._graph(not_condensed(reason) if self.way is None else self.way.ended(reason))
 
-    def _nothing(self, reason: StopReason) -> BranchGraph:
-        """Graph without vertices and arcs, of a call that ended before the body was condensed."""
-        why = f"{Stop(reason)} before the body was condensed to its contact nodes"
-        given = self.problem, None, self.interval, self.arithmetic
-        stats = GraphStats(seconds=time.perf_counter() - self.started)
-        return BranchGraph(*given, vertices=(), arcs=(), undecided=(why,), stats=stats)
-
-    def _graph(self, search: IntervalSearch, candidates: set[Codes], made: Made) -> BranchGraph:
+    def _graph(self, made: Made) -> BranchGraph:
         now = time.perf_counter()
-        stats = GraphStats(
-            pieces=len(search.pieces),
-            closed=sum(found.numbers is not None for found in search.pieces),
-            nodes=search.nodes,
-            selections=len(candidates),
-            search_seconds=(now if self.searched is None else self.searched) - self.started,
-            seconds=now - self.started,
-        )
+        searched = (now if self.searched is None else self.searched) - self.started
         return BranchGraph(
             problem=self.problem,
             exact=made.exact,
@@ -204,35 +177,19 @@ class _Construction:
             arithmetic=self.arithmetic,
             vertices=tuple(made.vertices),
             arcs=tuple(made.arcs),
-            undecided=(*map(str, made.stops), *made.reasons),
-            stats=stats,
-            pieces=tuple(search.pieces),
-            make_proof=made.proof(search, self.problem),
+            undecided=tuple(made.undecided),
+            stats=replace(made.stats, search_seconds=searched, seconds=now - self.started),
+            pieces=tuple(made.pieces),
+            make_proof=made.make_proof,
+            left_open=made.left_open,
         )
 
 
-def _in_space(
-    problem: ContactProblem3D,
-    interval: tuple[Fraction, Fraction],
-    arithmetic: Arithmetic,
-    progress: Callable[[str, float], object] | None,
-    max_nodes: int | None,
-    limits: Deadline,
-    executor: Executor | None,
-) -> BranchGraph:
-    """The graph of a problem in 3D."""
-    from enumsol.branches.space.space_graph import space_graph  # continuation, and what only 3D needs
-
-    if arithmetic != "verified":
+def _check_arithmetic(problem: AnyProblem, arithmetic: Arithmetic) -> None:
+    """Refuse what is not there in 3D, and for a body that nothing holds."""
+    if not isinstance(problem, ContactProblem) and arithmetic != "verified":
         raise InvalidArgumentError(f'arithmetic is "{arithmetic}" for a problem in 3D; expected "verified"')
-    for end in interval:
-        problem.friction_at(end)
-    return space_graph(problem, interval, progress, max_nodes, limits, executor)
-
-
-def _check_floating(problem: ContactProblem, arithmetic: Arithmetic) -> None:
-    """Refuse what is not there for a body that nothing holds."""
-    if arithmetic == "fast":
+    if not problem.held and arithmetic == "fast":
         raise InvalidArgumentError('arithmetic is "fast" for a body that nothing holds; expected "verified" or "exact"')
 
 
@@ -251,5 +208,3 @@ def _check_friction(problem: ContactProblem, a: Fraction, b: Fraction) -> None:
                     f"friction at contact node {node} is negative in the interval: {float(value):g} at "
                     f"alpha = {float(end):g} (it is zero at alpha = {float(zero):.17g}); expected F >= 0"
                 )
-    for end in (a, b):
-        problem.friction_at(end)

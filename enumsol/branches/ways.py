@@ -6,7 +6,7 @@ By balls, where the problem can be enclosed; by algebra in rationals, where that
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Literal
 
@@ -20,7 +20,9 @@ from enumsol.branches.enclosed.single_branches import ClosedPieces
 from enumsol.branches.exact.gluing import glue
 from enumsol.branches.exact.known_selections import KnownSelections
 from enumsol.branches.exact.make_elements import make_arcs, make_vertices
+from enumsol.branches.graph_data import GraphStats
 from enumsol.branches.proof_records import write_graph_proof
+from enumsol.branches.unfinished import Effort
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.condensation.exact import FAST_EXACT_DOF, ExactCondensed, check_definite
@@ -45,140 +47,205 @@ if TYPE_CHECKING:
 
     from enumsol.branches.elements import Arc, Vertex
     from enumsol.branches.enclosed.cutting import Trace
-    from enumsol.condensation.condensed import CondensedProblem
+    from enumsol.branches.unfinished import Tick
     from enumsol.model.problem import ContactProblem
     from enumsol.proof.proof_file import Proof
     from enumsol.search.interval.subintervals import IntervalCertifier, SearchedPiece
     from enumsol.support.array_types import Codes
 
-    #: Told the share of the work that is done.
-    Tick = Callable[[float], object]
-
 Arithmetic = Literal["fast", "verified", "exact"]
 
 #: Exact algebra is not begun where it would take more than this by ``_exact_work``: some five minutes.
 LARGEST_EXACT_WORK = 3 * 10**9
+#: Of the time that is left when arcs are begun: for working them out, and for joining them too, where there is a limit.
+#: To join them takes a fifth as long as to work them out by exact algebra, to make a graph of them another tenth.
+_WORKED_OUT, _JOINED = 0.55, 0.75
 #: Boxes in which arcs are followed when the search was interrupted.
 _BOXES_AFTER_INTERRUPT = 500
 #: Selections whose arcs are then worked out without rounding: 8 at least, or so many by p^2.
 _SELECTIONS_AFTER_INTERRUPT = 4096
 
 
-@dataclass
+@dataclass(frozen=True)
 class Made:
-    """Vertices and arcs, how they were found, and what cut that short."""
+    """Vertices and arcs of a graph, and what is told of them.
+
+    Attributes
+    ----------
+    vertices, arcs : sequences of Vertex and Arc
+    undecided : sequence of str
+    stats : GraphStats
+        Without times.
+    exact : ExactCondensed, optional
+        The problem in rationals, if arcs rest on it.
+    pieces : sequence of SearchedPiece
+    make_proof : callable, optional
+        Makes the proof once it is asked for.
+    left_open : sequence of (Fraction, Fraction), optional
+        Ranges of alpha outside of which nothing is missing.
+    """
 
     vertices: Sequence[Vertex]
     arcs: Sequence[Arc]
-    reasons: Sequence[str]
-    stops: list[Stop]
+    undecided: Sequence[str]
+    stats: GraphStats
     exact: ExactCondensed | None = None
-    followed: Followed | None = None
-
-    def proof(self, search: IntervalSearch, problem: ContactProblem) -> Callable[[], Proof | None] | None:
-        """Function that makes the proof once it is asked for; None when there is none, or the time was over."""
-        if not search.checkable or not search.pieces or any(not stop.interrupted for stop in self.stops):
-            return None
-        if search.stopped is not None:
-            return None
-        if self.exact is None or self.exact.condensed_exactly:
-            return partial(_proof_of_problem, problem, search.interval, search.pieces, self.followed)
-        return partial(write_graph_proof, problem, search.interval, "condensed", search.pieces, None)
+    pieces: Sequence[SearchedPiece] = ()
+    make_proof: Callable[[], Proof | None] | None = None
+    left_open: tuple[tuple[Fraction, Fraction], ...] | None = None
 
 
-class Way:
-    """Base of the ways: the search over the interval, and the selections that it leaves.
+class PlaneWay:
+    """Base of the ways in 2D: the selections that a search over the interval leaves, and their arcs.
 
-    A way keeps the arcs that it has worked out, so that an interruption loses none of them.
+    A way keeps what it has worked out, so that an interruption loses none of it. Those in 3D are in ``space_graph``.
 
     Attributes
     ----------
     problem : ContactProblem
-    condensed : CondensedProblem
-        What the relaxations of the search are about.
+    interval : (Fraction, Fraction)
     certifier : IntervalCertifier
     origin : Fraction or None
         The alpha at which g vanishes.
     exact : ExactCondensed or None
         The problem in rationals, where arcs are worked out by algebra.
+    search : IntervalSearch or None
+        None until it has begun.
+    candidates : set of codes, or None
+        Selections that may hold somewhere; None while they are searched.
     """
 
     problem: ContactProblem
+    interval: tuple[Fraction, Fraction]
     certifier: IntervalCertifier
     exact: ExactCondensed | None
-
-    @property
-    def condensed(self) -> CondensedProblem:
-        """System of the relaxations of the search: the body, or that on weak springs (theory, section 14.8)."""
-        return self.problem.condensed if self.problem.held else on_weak_springs(self.problem)
+    search: IntervalSearch | None = None
+    candidates: set[Codes] | None = None
 
     @property
     def origin(self) -> Fraction | None:
         """The alpha at which g vanishes."""
         raise NotImplementedError
 
-    def search(
-        self,
-        interval: tuple[Fraction, Fraction],
-        max_nodes: int | None,
-        deadline: float | None,
-        progress: Callable[[float], object] | None,
+    def begin(
+        self, max_nodes: int | None = None, limits: Limited | None = None, tick: Tick | None = None
     ) -> IntervalSearch:
-        """The search over the interval, not begun yet."""
-        problem, leaves, origin = self.condensed, self.certifier, self.origin
-        return IntervalSearch(
-            problem, interval, origin, leaves, max_nodes=max_nodes, deadline=deadline, progress=progress
+        """The search over the interval; of what nothing holds, on weak springs (theory, section 14.8)."""
+        problem, deadline = self.problem, None if limits is None else limits.deadline
+        self.search = IntervalSearch(
+            problem.condensed if problem.held else on_weak_springs(problem),
+            self.interval,
+            self.origin,
+            self.certifier,
+            max_nodes=max_nodes,
+            deadline=deadline,
+            progress=tick,
         )
+        return self.search
 
-    def candidates(self, search: IntervalSearch, executor: Executor | None) -> set[Codes]:
-        """The selections that may hold somewhere."""
+    def run(self, max_nodes: int | None, limits: Deadline, tick: Tick | None, executor: Executor | None) -> None:
+        """Search the interval."""
+        try:
+            with within(limits):
+                search = self.begin(max_nodes, limits, tick)
+        except TimeOverError:
+            return
         if self.exact is not None and self.exact.unloaded:
             # lambda = 0 is the only solution at every alpha, and every selection holds there: one is enough
-            return {(OPEN,) * self.exact.p}
+            self.candidates = {(OPEN,) * self.exact.p}
+            return
         self.close(search)
         if executor is None:
             search.run()
         else:
             run_parallel(executor, search)
-        return search.selections
+        self.candidates = search.selections
 
     def close(self, search: IntervalSearch) -> None:
         """Find pieces that need no tree, while there is time; none are known here."""
 
-    def made(
-        self,
-        search: IntervalSearch,
-        candidates: set[Codes],
-        tick: Tick | None = None,
-        limits: Limited | None = None,
-        ended: StopReason | None = None,
-    ) -> Made:
-        """Arcs worked out by the deadline of ``limits``; what is not joined by the one that holds here stays open.
+    def made(self, limits: Deadline, tick: Tick | None) -> Made:
+        """Arcs, worked out and joined by a deadline; what is not joined stays open."""
+        if self.search is None:
+            return not_condensed(StopReason.TIME_LIMIT)
+        with within(limits.part(_JOINED)):
+            return self.worked_out(Effort(tick, limits.part(_WORKED_OUT)))
 
-        After an interruption, ``ended``, they are those that were worked out; some more if the search was interrupted.
-        """
+    def ended(self, reason: StopReason) -> Made:
+        """Arcs that were worked out by then, and some more if the search was ended."""
+        search = self.search
+        if search is None:
+            return not_condensed(reason)
+        if self.candidates is None and (search.stopped is None or not search.stopped.interrupted):
+            search.stopped = Stop(reason, search.nodes)
+        return self.worked_out(Effort(ended=reason))
+
+    def worked_out(self, effort: Effort) -> Made:
+        """Arcs of the selections that were found."""
         raise NotImplementedError
 
+    def _found(self) -> tuple[IntervalSearch, set[Codes]]:
+        """The search and the selections that it left."""
+        assert self.search is not None
+        return self.search, self.search.selections if self.candidates is None else self.candidates
 
-def _some(search: IntervalSearch, ended: StopReason | None, few: int) -> int | None:
-    """Number of arcs, or of boxes of them, to work out (None: all); after an interruption only a few."""
-    if ended is None:
-        return None
-    return few if search.stopped is not None and search.stopped.interrupted else 0
+    def _bounded(self, effort: Effort, few: int) -> Effort:
+        """All arcs; after an interruption only a few, and none if it was not the search that was ended."""
+        search, _ = self._found()
+        if effort.ended is None:
+            return effort
+        return replace(effort, most=few if search.stopped is not None and search.stopped.interrupted else 0)
+
+    def _made(
+        self,
+        elements: tuple[Sequence[Vertex], Sequence[Arc]],
+        reasons: Sequence[str],
+        stopped: Stop | None,
+        followed: Followed | None,
+    ) -> Made:
+        """Vertices and arcs with what is told of them; there is no proof if the time was over."""
+        search, candidates = self._found()
+        stops = [stop for stop in (search.stopped, stopped) if stop is not None]
+        proof: Callable[[], Proof | None] | None = None
+        if search.checkable and search.pieces and search.stopped is None and all(stop.interrupted for stop in stops):
+            given = self.problem, search.interval
+            if self.exact is None or self.exact.condensed_exactly:
+                proof = partial(_proof_of_problem, *given, search.pieces, followed)
+            else:
+                proof = partial(write_graph_proof, *given, "condensed", search.pieces, None)
+        stats = GraphStats(
+            pieces=len(search.pieces),
+            closed=sum(found.numbers is not None for found in search.pieces),
+            nodes=search.nodes,
+            selections=len(candidates),
+        )
+        return Made(*elements, (*map(str, stops), *reasons), stats, self.exact, tuple(search.pieces), proof)
+
+
+def not_condensed(reason: StopReason) -> Made:
+    """Nothing, of a call that ended before the body was condensed."""
+    return Made((), (), (f"{Stop(reason)} before the body was condensed to its contact nodes",), GraphStats())
 
 
 @dataclass
-class ByAlgebra(Way):
+class ByAlgebra(PlaneWay):
     """Arcs as functions of alpha in rationals: nothing stays open but what the time does not suffice for."""
 
     problem: ContactProblem
+    interval: tuple[Fraction, Fraction]
     exact: ExactCondensed
     certifier: IntervalCertifier
     followed: Followed | None = None
     known: KnownSelections | None = None
 
     @classmethod
-    def of(cls, problem: ContactProblem, exact: ExactCondensed, arithmetic: Arithmetic) -> ByAlgebra:
+    def of(
+        cls,
+        problem: ContactProblem,
+        interval: tuple[Fraction, Fraction],
+        exact: ExactCondensed,
+        arithmetic: Arithmetic,
+    ) -> ByAlgebra:
         """With the certifier of an arithmetic."""
         certifier: IntervalCertifier = FastIntervalCertifier()
         if not problem.held:
@@ -187,33 +254,26 @@ class ByAlgebra(Way):
             certifier = ExactIntervalCertifier(exact)
         elif arithmetic == "verified":
             certifier = VerifiedIntervalCertifier(problem, exact)
-        return cls(problem, exact, certifier)
+        return cls(problem, interval, exact, certifier)
 
     @property
     def origin(self) -> Fraction | None:
         """The alpha at which g vanishes."""
         return self.exact.zero
 
-    def made(
-        self,
-        search: IntervalSearch,
-        candidates: set[Codes],
-        tick: Tick | None = None,
-        limits: Limited | None = None,
-        ended: StopReason | None = None,
-    ) -> Made:
-        """See ``Way.made``."""
+    def worked_out(self, effort: Effort) -> Made:
+        """Arcs of the selections that were found."""
+        search, candidates = self._found()
         if self.known is None:
             a, b = (rational(end) for end in search.interval)
             self.known = KnownSelections(self.exact, a, b, cut_short=search.stopped is not None)
         few = max(8, _SELECTIONS_AFTER_INTERRUPT // self.problem.p**2)
-        gluing = glue(self.known, candidates, tick, most=_some(search, ended, few), limits=limits, ended=ended)
-        stops = [stop for stop in (search.stopped, gluing.stopped) if stop is not None]
+        gluing = glue(self.known, candidates, self._bounded(effort, few))
         arcs = make_arcs(gluing)
-        return Made(make_vertices(gluing, arcs), arcs, gluing.reasons, stops, self.exact, self.followed)
+        return self._made((make_vertices(gluing, arcs), arcs), gluing.reasons, gluing.stopped, self.followed)
 
 
-class ByBalls(Way):
+class ByBalls(PlaneWay):
     """Arcs in ball arithmetic; by algebra where balls leave something open and that does not take too long.
 
     Parameters
@@ -224,7 +284,7 @@ class ByBalls(Way):
     exact = None
 
     def __init__(self, traced: TracedProblem) -> None:
-        self.problem, self.traced, self.closed = traced.problem, traced, ClosedPieces()
+        self.problem, self.interval, self.traced, self.closed = traced.problem, traced.interval, traced, ClosedPieces()
         self._traces: list[Trace] = []
         self._algebra: ByAlgebra | None = None
         if self.problem.held:
@@ -245,41 +305,36 @@ class ByBalls(Way):
         with suppress(TimeOverError), within(Deadline(search.deadline)):
             self.closed.find(self.traced)
 
-    def made(
-        self,
-        search: IntervalSearch,
-        candidates: set[Codes],
-        tick: Tick | None = None,
-        limits: Limited | None = None,
-        ended: StopReason | None = None,
-    ) -> Made:
-        """See ``Way.made``."""
-        if self._algebra is not None:
-            return self._algebra.made(search, candidates, tick, limits, ended)
-        problem = self.problem
-        followed = follow_selections(
+    def worked_out(self, effort: Effort) -> Made:
+        """Arcs of the selections that were found."""
+        if self._algebra is None:
+            search, candidates = self._found()
+            problem, followed = self.problem, self._followed(effort)
+            joined = followed.joined
+            stopped = search.stopped is not None or followed.stopped is not None
+            large = over() or problem.n > EXACT_DOF_LIMIT or _exact_work(problem, candidates) > LARGEST_EXACT_WORK
+            if (joined.ordered and not joined.open) or stopped or large:
+                return self._made(make_traced(self.traced, joined), followed.reasons, followed.stopped, followed)
+            # several conditions vanish at one alpha, or a selection is singular
+            algebra = ByAlgebra(problem, self.interval, ExactCondensed.from_problem(problem), self.certifier, followed)
+            algebra.search, algebra.candidates = search, candidates
+            self._algebra = algebra
+        return self._algebra.worked_out(effort)
+
+    def _followed(self, effort: Effort) -> Followed:
+        search, _ = self._found()
+        return follow_selections(
             self.traced,
             search.pieces,
-            tick,
+            self._bounded(effort, _BOXES_AFTER_INTERRUPT),
             known=self.closed.traces,
             done=self._traces,
             cut_short=search.stopped is not None,
-            most=_some(search, ended, _BOXES_AFTER_INTERRUPT),
-            limits=limits,
-            ended=ended,
         )
-        joined = followed.joined
-        stops = [stop for stop in (search.stopped, followed.stopped) if stop is not None]
-        large = over() or problem.n > EXACT_DOF_LIMIT or _exact_work(problem, candidates) > LARGEST_EXACT_WORK
-        if (joined.ordered and not joined.open) or stops or large:
-            return Made(*make_traced(self.traced, joined), followed.reasons, stops, followed=followed)
-        # several conditions vanish at one alpha, or a selection is singular
-        self._algebra = ByAlgebra(problem, ExactCondensed.from_problem(problem), self.certifier, followed)
-        return self._algebra.made(search, candidates, tick, limits)
 
 
-def way_of(problem: ContactProblem, interval: tuple[Fraction, Fraction], arithmetic: Arithmetic) -> Way:
-    """The way for a problem: by algebra where that is fast, and where balls cannot hold the data.
+def way_of(problem: ContactProblem, interval: tuple[Fraction, Fraction], arithmetic: Arithmetic) -> PlaneWay:
+    """The way for a problem in 2D: by algebra where that is fast, and where balls cannot hold the data.
 
     Raises
     ------
@@ -293,7 +348,7 @@ def way_of(problem: ContactProblem, interval: tuple[Fraction, Fraction], arithme
     if large and not at_rest and (traced := _traced(problem, interval)) is not None:
         return ByBalls(traced)
     if held and arithmetic != "exact" and problem.n > (EXACT_DOF_LIMIT if at_rest else FAST_EXACT_DOF):
-        return ByAlgebra.of(problem, ExactCondensed.from_condensed(problem), arithmetic)
+        return ByAlgebra.of(problem, interval, ExactCondensed.from_condensed(problem), arithmetic)
     if large and not held and problem.n > EXACT_DOF_LIMIT:
         raise TooLargeError(
             "the stiffness of the body on springs is positive definite only within rounding, and exact algebra takes "
@@ -302,7 +357,7 @@ def way_of(problem: ContactProblem, interval: tuple[Fraction, Fraction], arithme
     exact, size = ExactCondensed.from_problem(problem), 2 * problem.p
     if not problem.on_springs.condensed.definite:
         check_definite(fmpq_mat([list(row[:size]) for row in exact.rows[:size]]))
-    return ByAlgebra.of(problem, exact, arithmetic)
+    return ByAlgebra.of(problem, interval, exact, arithmetic)
 
 
 def _exact_work(problem: ContactProblem, candidates: set[Codes]) -> float:

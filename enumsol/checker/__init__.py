@@ -14,8 +14,8 @@ What a verified proof says
     excluded.
 
 What checker and search share
-    The checkers (``checker.verify``, ``checker.graph_checker``, ``checker.history_checker``, ``checker.space_checker``,
-    ``checker.floating``) import nothing of the search, neither its trees and relaxations nor its arcs and results, and
+    The checkers (``checker.verify``, ``checker.graph_checker``, ``checker.history_checker``, ``checker.space_checker``)
+    import nothing of the search, neither its trees and relaxations nor its arcs and results, and
     a test guards that. They are not independent of all that it uses. These serve both, and an error in one of them may
     write a false proof and accept it:
 

@@ -25,7 +25,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.checker.arcs import ArcChecker, ArcCount, ClosedPiece
-from enumsol.checker.floating import check_bound
 from enumsol.checker.reports import MAX_FAILURES, GraphVerificationReport
 from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
 from enumsol.condensation.unloaded import vanishing_alpha
@@ -53,6 +52,8 @@ _BATCH = 256
 _LOOK = 1024
 #: Entries of a leaf's record, by its kind, and those of a form's.
 _ENTRIES = {"x": 4, "f": 4, "s": 2, "c": 2}
+#: Kinds that do not rest on a stiffness that is positive definite.
+_OF_ANY_BODY = ("x", "s", "c")
 _FORM, _FORM_ENTRIES = "q", 5
 #: Begins the record of a piece without a tree.
 _CLOSED = "m"
@@ -148,7 +149,7 @@ class GraphChecker:
     @property
     def within(self) -> float | None:
         """Bound of the rigid displacement of a body that nothing holds."""
-        return None
+        return None if self.problem.held else self.problem.rigid_reach
 
     def _check(self, interval: tuple[Fraction, Fraction], records: Iterator[Any]) -> None:
         a, b = interval
@@ -256,20 +257,21 @@ class GraphChecker:
 
     def _read_leaves(self, piece: Piece, batch: list[list[Any]]) -> None:
         """Record some leaves, the first perhaps a form or the piece's numbers, and check those claimed to be empty."""
-        if batch[0][:1] == [_FORM]:
+        kinds = _ENTRIES if self.problem.held else {kind: _ENTRIES[kind] for kind in _OF_ANY_BODY}
+        if batch[0][:1] == [_FORM] and self.problem.held:
             piece.declare(batch[0])
             batch = batch[1:]
-        elif batch[0][:1] == [_CLOSED]:
+        elif batch[0][:1] == [_CLOSED] and self.problem.held:
             if piece.closed is not None:
                 raise ValueError("it is decided by its arcs twice")
             piece.closed = ClosedPiece.read(piece.a, piece.b, batch[0], self.problem.p)
             batch = batch[1:]
         for record in batch:
             kind = record[0] if record else None
-            if not isinstance(kind, str) or kind not in _ENTRIES:
+            if not isinstance(kind, str) or kind not in kinds:
                 raise ValueError(f"unknown kind of record {reading.quoted(kind)}")
-            if len(record) != _ENTRIES[kind]:
-                raise ValueError(f"a record of kind {kind!r} has {len(record)} entries; expected {_ENTRIES[kind]}")
+            if len(record) != kinds[kind]:
+                raise ValueError(f"a record of kind {kind!r} has {len(record)} entries; expected {kinds[kind]}")
         if not batch:
             return
         codes = reading.codes_from([record[1] for record in batch], self.problem.p)
@@ -381,31 +383,3 @@ def _refines(codes: Codes, coarse: int | Codes) -> Mask:
     """Which codes are ``coarse`` or refine it."""
     held = (coarse == CONTACT) & (codes >= STICK) & (codes <= SLIP_MINUS)
     return np.asarray((codes == coarse) | (coarse == UNDECIDED) | held)
-
-
-#: Kinds of leaves: excluded, a surviving selection, left to both halves.
-_KINDS = ("x", "s", "c")
-
-
-class FloatingGraphChecker(GraphChecker):
-    """Checks that every solution within the bound of the rigid displacement lies in one of the surviving selections."""
-
-    @property
-    def within(self) -> float | None:
-        """Bound of the rigid displacement."""
-        reach: float = self.problem.rigid_reach
-        return reach
-
-    def _read_header(self) -> tuple[Fraction, Fraction]:
-        interval = super()._read_header()
-        if self.data != "problem":
-            raise reading.RefusedError("a proof about S and g as computed, of a body that nothing holds")
-        check_bound(self.header, self.problem)
-        return interval
-
-    def _read_leaves(self, piece: Piece, batch: list[list[Any]]) -> None:
-        for record in batch:
-            kind = record[0] if record else None
-            if kind not in _KINDS:
-                raise ValueError(f"unknown kind of record {reading.quoted(kind)}")
-        super()._read_leaves(piece, batch)

@@ -21,15 +21,14 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from enumsol.checker.curve_cuts import parts_of
-from enumsol.checker.floating import check_bound
 from enumsol.checker.piece_tree import PieceTreeChecker
 from enumsol.checker.reports import MAX_FAILURES, GraphVerificationReport
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.proof.curve_records import box_from
 from enumsol.proof.reading import RefusedError, data_of, exponents_from, numbers_from, quoted, rational_from, same
 from enumsol.proof.records import Limits
-from enumsol.proof.curve_records import box_from
 from enumsol.trusted.space.curve_chains import apart, chain_of
 from enumsol.trusted.space.curve_parts import arcs_over
 from enumsol.trusted.space.curve_runs import KnownCurve
@@ -134,14 +133,12 @@ class SpaceGraphChecker:
             self.interval, units, steps = _read(self.header, self.problem)
         except ValueError as error:
             raise RefusedError(f"the header cannot be read: {error}") from None
-        if not self.problem.held:
-            check_bound(self.header, self.problem)
         return units, steps
 
     @property
     def _limits(self) -> Limits:
         """Limits of records about boxes around curves."""
-        return Limits((UNDECIDED,) * self.problem.p, modes=modes_of(self.problem))
+        return Limits((UNDECIDED,) * self.problem.p, modes=self.problem.modes.r)
 
     def _curve(self, given: AlphaProblem, count: Any, records: Iterator[Any]) -> None:
         number = len(self.curves) + 1
@@ -181,11 +178,6 @@ class SpaceGraphChecker:
                     self._fail("two curves may be the same")
 
 
-def modes_of(problem: ContactProblem3D) -> int:
-    """Number of rigid modes."""
-    return problem.modes.r
-
-
 def _read(
     header: dict[str, Any], problem: ContactProblem3D
 ) -> tuple[tuple[Fraction, Fraction], tuple[Any, Any], Array]:
@@ -202,7 +194,7 @@ def _read(
     for pair in zip(problem.friction, problem.friction_slope, strict=True):
         if min(min(exactly_at(end, *pair)) for end in (low, high)) < 0:
             raise ValueError("friction is negative in the interval")
-    steps = numbers_from(header.get("steps"), 3 * problem.p + modes_of(problem))
+    steps = numbers_from(header.get("steps"), 3 * problem.p + problem.modes.r)
     if not np.all(steps > 0):
         raise ValueError("a step is not positive")
     return (low, high), (np.ldexp(1.0, np.array(force)), np.ldexp(1.0, np.array(length))), steps

@@ -7,8 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, cast
 
-from enumsol.checker.floating import FloatingChecker
-from enumsol.checker.graph_checker import FloatingGraphChecker, GraphChecker
+from enumsol.checker.graph_checker import GraphChecker
 from enumsol.checker.plane_checker import Checker
 from enumsol.model.problem import ContactProblem
 from enumsol.proof.proof_file import Proof
@@ -64,12 +63,12 @@ def verify(
     instance_of(proof, Proof, "proof")
     optional_callable(progress, "progress")
     proof.check_integrity()
-    checker: type[TreeChecker] = Checker if problem.held else FloatingChecker
+    checker: type[TreeChecker] = Checker
     if in_space:
         # with its trusted core, for problems in 3D only
-        from enumsol.checker.space_checker import FloatingSpaceChecker, SpaceChecker
+        from enumsol.checker.space_checker import SpaceChecker
 
-        checker = SpaceChecker if problem.held else FloatingSpaceChecker
+        checker = SpaceChecker
     lines = proof.records()
     header = next(lines, None)
     if isinstance(header, dict) and header.get("kind") == "history":
@@ -77,8 +76,7 @@ def verify(
 
         return HistoryChecker(problem, header, checker, progress).run(lines)
     if isinstance(header, dict) and header.get("kind") == "graph" and not in_space:
-        graphs = GraphChecker if problem.held else FloatingGraphChecker
-        return graphs(cast("ContactProblem", problem), header, progress).run(lines)
+        return GraphChecker(cast("ContactProblem", problem), header, progress).run(lines)
     if isinstance(header, dict) and header.get("kind") == "graph":
         from enumsol.checker.space_graph import SpaceGraphChecker  # for graphs in 3D only
 

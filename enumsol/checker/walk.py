@@ -11,7 +11,7 @@ from enumsol.checker.reports import MAX_FAILURES, VerificationReport
 from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.proof.reading import RefusedError, quoted, same
-from enumsol.proof.records import Branching, DeclaredForm, Limits, RecordError, UndecidedRecord, Unloaded, kind_of
+from enumsol.proof.records import Branching, DeclaredForm, Limits, RecordError, Tree, UndecidedRecord, Unloaded, kind_of
 from enumsol.support.deadlines import tell
 from enumsol.trusted.status_rows import UNDECIDED
 
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     Test = Callable[[Codes, Any], str | None]
 
 _REPORT_EVERY = 256
+#: Forms that are kept as they were made: a file that alternates between more has each of them made again.
+_KEPT = 16
 _END = object()
 
 
@@ -83,8 +85,15 @@ class TreeChecker(ABC):
     #: The problem's balls, where whoever asks for the check has made them already.
     enclosure: CondensedEnclosure | None = None
 
-    #: Kinds of leaves, by their letters.
-    kinds: ClassVar[dict[str, type[Record]]]
+    #: Of a body that nothing holds: some leaf rests on the bound of its rigid displacement.
+    bounded: bool = False
+
+    #: What later leaves may refer to, and what was made of the last of these by their places.
+    declared: list[DeclaredForm] = field(default_factory=list)
+    _forms: dict[int, Any] = field(default_factory=dict)
+
+    #: Trees of bodies that are held, and of others.
+    trees: ClassVar[tuple[Tree, Tree]]
 
     def run(self, proof: Proof) -> VerificationReport:
         """Check all records.
@@ -125,7 +134,26 @@ class TreeChecker(ABC):
     @property
     def _within(self) -> float | None:
         """The bound of rigid displacements that the leaves rest on."""
-        return None
+        return self.problem.rigid_reach if self.bounded else None
+
+    @property
+    def tree(self) -> Tree:
+        """What may stand in it: some theorems rest on a stiffness that is positive definite, others on balance."""
+        return self.trees[0 if self.problem.held else 1]
+
+    @cached_property
+    def free(self) -> Any:
+        """The system with bounds of the rigid displacement beyond which there are no solutions."""
+        return self.system if self.problem.held else self._without_bound()
+
+    def _either(self, holds: Callable[[Any], bool]) -> bool:
+        """Whether something holds of the system, if possible without the bound of the rigid displacement."""
+        if holds(self.free):
+            return True
+        if self.problem.held:
+            return False
+        self.bounded = True
+        return holds(self.system)
 
     def enclosed(self) -> CondensedEnclosure:
         """Balls for S and g of the problem's own data."""
@@ -135,6 +163,15 @@ class TreeChecker(ABC):
 
     def _read_header(self, header: Any) -> None:
         raise NotImplementedError
+
+    @property
+    @abstractmethod
+    def system(self) -> Any:
+        """Balls for the data in the proof's units."""
+
+    @abstractmethod
+    def _without_bound(self) -> Any:
+        """See ``free``, for a body that nothing holds."""
 
     @abstractmethod
     def _covers(self, node: int, code: int, children: list[int]) -> bool:
@@ -153,8 +190,8 @@ class TreeChecker(ABC):
         """Count the root of the unloaded body."""
 
     @abstractmethod
-    def _declare(self, record: list[Any]) -> None:
-        """Take note of what later leaves refer to."""
+    def _made(self, said: DeclaredForm) -> Any:
+        """What leaves that refer to a declared form are tested by; None where that is not proven."""
 
     @abstractmethod
     def _flush(self, *, last: bool) -> None:
@@ -218,7 +255,7 @@ class TreeChecker(ABC):
 
     def _leaf(self, codes: Codes, record: list[Any]) -> str | None:
         """Check one leaf; the reason when it proves nothing."""
-        kind = kind_of(record, self.kinds)
+        kind = kind_of(record, self.tree)
         if kind is None:
             return f"unknown kind of record {quoted(record[0])}"
         try:
@@ -242,6 +279,23 @@ class TreeChecker(ABC):
         # g = 0: by the energy bound nothing but lambda = 0 solves
         self._at_rest()
         return None if unloaded else "the problem is not unloaded"
+
+    def _declare(self, record: list[Any]) -> None:
+        """Take note of what later leaves refer to."""
+        try:
+            limits = self._limits((UNDECIDED,) * self.problem.p, DeclaredForm)
+            self.declared.append(DeclaredForm.read(record, limits))
+        except ValueError as error:
+            raise RefusedError(str(error)) from None
+
+    def _form(self, back: int) -> Any:
+        """The form that was declared so many before, as ``_made`` gives it."""
+        place = len(self.declared) - back
+        if place not in self._forms:
+            if len(self._forms) == _KEPT:
+                del self._forms[next(iter(self._forms))]
+            self._forms[place] = self._made(self.declared[place])
+        return self._forms[place]
 
     def locate(self, name: Hashable, found: Located) -> None:
         """Add the place of a root in a leaf to ``located`` if places are collected."""

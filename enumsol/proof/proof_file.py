@@ -21,7 +21,7 @@ import json
 import math
 import stat
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -62,10 +62,10 @@ class ProofFormatError(EnumsolError, ValueError):
 PLANE_ROW, SPACE_ROW = np.dtype("<u4"), np.dtype([("kind", "<u4"), ("node", "<u4"), ("number", "<i8")])
 
 
-def packed(rows: Indices | list[tuple[int, int, int]], values: Floats) -> tuple[str, str]:
-    """Rows, which are a list in 3D, and their multipliers as two texts in base64."""
-    parts = np.array(rows, SPACE_ROW if isinstance(rows, list) else PLANE_ROW), values.astype("<f8")
-    return base64.b64encode(parts[0].tobytes()).decode(), base64.b64encode(parts[1].tobytes()).decode()
+def packed(rows: Indices | Sequence[tuple[int, int, int]], values: Floats) -> tuple[str, str]:
+    """Rows, an array of numbers or in 3D a list, and their multipliers as two texts in base64."""
+    numbers = rows.astype(PLANE_ROW) if isinstance(rows, np.ndarray) else np.array([*map(tuple, rows)], SPACE_ROW)
+    return base64.b64encode(numbers.tobytes()).decode(), base64.b64encode(values.astype("<f8").tobytes()).decode()
 
 
 def coarse(values: Floats) -> Floats:

@@ -52,7 +52,11 @@ def data_of(header: Any, problem: ContactProblem, kind: str | None) -> Data:
     RefusedError
         It does not.
     """
-    if not isinstance(header, dict) or header.get("format") != "enumsol-proof" or not same(header.get("version"), PROOF_VERSION):
+    if (
+        not isinstance(header, dict)
+        or header.get("format") != "enumsol-proof"
+        or not same(header.get("version"), PROOF_VERSION)
+    ):
         raise RefusedError(f"the first record is not the header of an enumsol-proof of version {PROOF_VERSION}")
     if header.get("problem") != problem.fingerprint:
         raise RefusedError("the proof belongs to another problem (its fingerprint is different)")
@@ -60,7 +64,14 @@ def data_of(header: Any, problem: ContactProblem, kind: str | None) -> Data:
         raise RefusedError("the header does not fit the problem")
     if ("kind" in header) != (kind is not None) or header.get("kind") != kind:
         raise RefusedError(f"the header names an unknown kind of proof, {quoted(header.get('kind'))}")
-    return "problem" if header["data"] == "problem" else "condensed"
+    if problem.held:
+        return "problem" if header["data"] == "problem" else "condensed"
+    if header["data"] != "problem":
+        raise RefusedError("a proof about S and g as computed, of a body that nothing holds")
+    found, reach = header.get("max_rigid_displacement"), problem.rigid_reach
+    if not same(found, reach):
+        raise RefusedError(f"its bound of the rigid displacement is {quoted(found)}; the problem's is {reach:g}")
+    return "problem"
 
 
 def same(found: Any, expected: Any) -> bool:
@@ -150,7 +161,7 @@ def multipliers_from(texts: list[Any], most: int | None, ends: int = 1) -> Terms
     """
     if len(texts) != 2 or not all(isinstance(text, str) for text in texts):
         raise ValueError("its multipliers are not two texts")
-    row = np.frombuffer(bytes_from(texts[0]), SPACE_ROW if most is None else PLANE_ROW)
+    row: Any = np.frombuffer(bytes_from(texts[0]), SPACE_ROW if most is None else PLANE_ROW)
     value = np.frombuffer(bytes_from(texts[1]), dtype="<f8").astype(np.float64)
     if ends * len(row) != len(value):
         raise ValueError(f"{len(row)} rows and {len(value)} multipliers")

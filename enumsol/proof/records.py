@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from enum import Flag, auto
 from functools import cache
-from typing import Any, ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 
@@ -229,8 +229,6 @@ class DeclaredForm(Record):
         if bool(enclosure) != (limits.in_space and not limits.held):
             raise RecordError(cls.unfit.format(len(entries) + 1, 4 if enclosure else 7))
         try:
-            if not isinstance(codes, list) or len(codes) != limits.p or not all(type(code) is int for code in codes):
-                raise ValueError(f"its codes are not a list of {limits.p} codes")
             count, further = cls._counts(codes, numbers, limits)
             given = numbers_from(numbers, count), numbers_from(more, further)
         except ValueError as error:
@@ -240,8 +238,10 @@ class DeclaredForm(Record):
         return cls(tuple(codes), *given, EnclosureRecord(*enclosure) if enclosure else None)
 
     @staticmethod
-    def _counts(codes: list[int], numbers: Any, limits: Limits) -> tuple[int, int]:
+    def _counts(codes: Any, numbers: Any, limits: Limits) -> tuple[int, int]:
         """How many numbers there are of both kinds, of codes that a form may have."""
+        if not isinstance(codes, list) or len(codes) != limits.p or not all(type(code) is int for code in codes):
+            raise ValueError(f"its codes are not a list of {limits.p} codes")
         whole = all(code == UNDECIDED for code in codes)
         if not limits.in_space:
             if limits.held:
@@ -328,6 +328,11 @@ class Excluded(Exclusion):
             return cls(*multipliers_from(entries[:2], ROW_KINDS * limits.p), by)
         rows, values = multipliers_from(entries[:2], None, ends=2 if limits.tree & Tree.PIECES else 1)
         return cls([checked_row(row, limits.p) for row in rows], values, by)
+
+    @property
+    def lines(self) -> list[Row]:
+        """Rows in 3D."""
+        return cast("list[Row]", self.rows)
 
     @property
     def terms(self) -> Terms:
@@ -478,7 +483,7 @@ class Closed(ClosingRecord):
 
     selection: Codes
     free: Codes
-    weights: Floats
+    weights: Floats | list[float]
     at: Floats | int
     enclosure: EnclosureRecord | None = None
 

@@ -115,7 +115,7 @@ class Enumeration(ABC, Generic[_Solvers]):
         earlier = () if self._begun is None or self.writer is None else (self._begun, self.writer.replace)
         self.outcome = search.outcome
         search.at_limit = solvers.at_limit
-        search.otherwise = AWAY if search.at_limit is not None else "" if self.problem.held else HOLD
+        search.rest.otherwise = AWAY if search.at_limit is not None else "" if self.problem.held else HOLD
         search.continua = self._continua
         if solvers.unloaded():
             self.certifier.unloaded()

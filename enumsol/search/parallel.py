@@ -14,8 +14,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
     from concurrent.futures import Executor
 
+    from enumsol.search.nodes import TreeNode
     from enumsol.search.setup import SearchSetup
-    from enumsol.search.tree import TreeNode, TreeSearch
+    from enumsol.search.tree import TreeSearch
 
 #: Nodes of a task, and those that are examined here before there are any.
 NODES, FIRST = 512, 64
@@ -42,7 +43,7 @@ class _TreeWorker:
         search = solvers.search(certifier)
         search.closer.known = self.known
         if search.forms is not None:
-            search.forms.use(search.engine, self.form)
+            search.forms.use(search.relaxations.engine, self.form)
         left = [item.sent() for item in search.examined(roots, nodes)]
         found = search.outcome, certifier.certified, records.part()
         return Answer(found, search.outcome.nodes, search.covered, left)

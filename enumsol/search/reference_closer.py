@@ -7,9 +7,8 @@ such assignments first.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -25,10 +24,8 @@ if TYPE_CHECKING:
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.relaxation.engine import Relaxation
     from enumsol.search.certifiers.protocol import Led
-    from enumsol.selections.solution import SelectionSolution
     from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.reference import Reference
-    from enumsol.trusted.root_forms import Product
 
 #: Factors of products that are tried, relative to the compliance.
 _FACTORS = np.geomspace(2.0**-8, 2.0**8, 17)
@@ -38,99 +35,120 @@ _WORTH, _SAMPLE = 0.75, 24
 _NOTHING = 1e-9
 
 
-@dataclass(frozen=True)
-class OnlyRoot:
+class OnlyRoot(NamedTuple):
     """Why no other root lies below an assignment: rows that are equations, and products of rows."""
 
-    rows: list[int]
-    products: list[Product]
+    rows: list[Any]
+    products: list[tuple[Any, Any, float]]
 
 
 class Referring(Protocol):
-    """A certifier that can say that a known root is the only one below an assignment."""
+    """A certifier that can prove that a known root is the only one below an assignment."""
 
-    def reference(self, selection: Codes) -> Reference | None:
-        """The form of a root, if one is proven definite."""
+    def reference(self, selection: Codes) -> Any:
+        """The form of a root, a Reference or SpaceReference, if one is proven definite; or None."""
 
-    def only_root(self, codes: Codes, reference: Reference, proposal: OnlyRoot) -> list[SelectionSolution] | None:
-        """The roots below an assignment, this one or none; None if that is not proven."""
+    def only_root(self, codes: Codes, reference: Any, proposal: OnlyRoot) -> list[Any] | None:
+        """The roots below an assignment, this one if it was not told before, or none; None if not proven."""
 
 
 class ReferenceCloser(TreeCloser):
-    """Ends the tree where only a known root is left, and leads it there.
+    """Ends the tree where only a known root is left, in 2D and 3D.
 
     Parameters
     ----------
     certifier : Referring
-    root : callable giving the selection of a strict root, or None
+    root : callable giving the codes of a leaf with a strict root, or None
+    proposed : callable giving an OnlyRoot for a reference and an assignment
+    worth : callable
+        Whether a reference is of any use.
+    pause : callable
+        After so many tries in vain, how many assignments pass before the next one.
+    easy : int
+        Assignments that pass before the first try.
 
     Attributes
     ----------
-    known : tuple of selections of strict roots
+    known : codes of that leaf, none if there is none, and None if that is not known
     """
 
-    def __init__(self, certifier: Any, root: Callable[[], Codes | None]) -> None:
+    def __init__(
+        self,
+        certifier: Any,
+        root: Callable[[], Codes | None],
+        proposed: Callable[[Any, Codes], OnlyRoot],
+        *,
+        worth: Callable[[Any], bool] = lambda _: True,
+        pause: Callable[[int], int] = lambda vain: 2**vain - 1,
+        easy: int = 0,
+    ) -> None:
         super().__init__()
         self._certifier: Referring = certifier
-        self._root = root
-        self.known: tuple[Codes, ...] | None = None
-        self._wait = self._pause = 0
+        self._root, self._proposed, self._worth, self._pause = root, proposed, worth, pause
+        self._easy, self._wait, self._vain = easy, 0, 0
 
     @cached_property
-    def _references(self) -> list[tuple[Reference, Cover]]:
+    def _reference(self) -> Any:
         if self.known is None:
-            root = self._root()
-            self.known = () if root is None else (root,)
-        found = [self._certifier.reference(selection) for selection in self.known]
-        return [(reference, Cover(reference)) for reference in found if reference is not None]
+            self.known = self._root() or ()
+        found = self._certifier.reference(self.known) if self.known else None
+        return found if found is not None and self._worth(found) else None
 
-    def whole(self) -> list[SelectionSolution] | None:
+    def whole(self) -> list[Any] | None:
         """All solutions of the problem, if one certificate proves that there is one only."""
-        known = self._references
-        return self.again((UNDECIDED,) * known[0][0].system.p, None) if known else None
+        if self._easy or self._reference is None:
+            return None
+        return self.again((UNDECIDED,) * len(self.known), None)
+
+    def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[Any] | None:
+        """The solutions of a subtree that can be closed, None where it has to be searched."""
+        if self._easy or self._wait:
+            self._easy, self._wait = max(self._easy - 1, 0), max(self._wait - 1, 0)
+            return None
+        found = self.again(codes, relaxation)
+        self._vain = 0 if found is not None else self._vain + 1
+        self._wait = self._pause(self._vain)
+        return found
+
+    def again(self, codes: Codes, relaxation: Relaxation | None) -> list[Any] | None:
+        """The solutions of a subtree that was closed in an earlier search."""
+        del relaxation
+        if self._reference is None:
+            return None
+        with np.errstate(all="ignore"):
+            proposal = self._proposed(self._reference, codes)
+        return self._certifier.only_root(codes, self._reference, proposal)
+
+
+class LeadingCloser(ReferenceCloser):
+    """Ends the tree in 2D where only a known root is left, and leads it there."""
+
+    def __init__(self, certifier: Any, root: Callable[[], Codes | None]) -> None:
+        super().__init__(certifier, root, proposed)
+
+    @cached_property
+    def _cover(self) -> Cover | None:
+        """Leads the tree where that pays."""
+        cover = None if self._reference is None else Cover(self._reference)
+        return cover if cover is not None and cover.pays else None
 
     @property
     def leads(self) -> bool:
         """True if the tree is led."""
-        return any(cover.pays for _, cover in self._references)
+        return self._cover is not None
 
     def led(self, codes: Codes) -> Led | None:
         """The roots below an assignment if certificates decide it, or else the node to split and how; or None."""
-        for reference, cover in self._references:
-            if not cover.pays:
-                continue
-            found = self._only(codes, reference) if cover.is_due(codes) else None
-            if found is not None:
-                return found
-            split = cover.split(codes)
-            if split is not None:
-                return split
-        return None
+        if self._cover is None:
+            return None
+        found = self.again(codes, None) if self._cover.is_due(codes) else None
+        return self._cover.split(codes) if found is None else found
 
-    def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
+    def closed(self, codes: Codes, relaxation: Relaxation | None) -> list[Any] | None:
         """The solutions of a subtree that can be closed, None where it has to be searched."""
-        del relaxation
-        for reference, cover in self._references:
-            if cover.pays and cover.is_due(codes):
-                continue
-            if self._wait > 0:
-                self._wait -= 1
-                continue
-            found = self._only(codes, reference)
-            self._pause = 0 if found is not None else 2 * self._pause + 1
-            self._wait = self._pause
-            if found is not None:
-                return found
-        return None
-
-    def again(self, codes: Codes, relaxation: Relaxation | None) -> list[SelectionSolution] | None:
-        """The solutions of a subtree that was closed in an earlier search."""
-        del relaxation
-        found = (self._only(codes, reference) for reference, _ in self._references)
-        return next((solutions for solutions in found if solutions is not None), None)
-
-    def _only(self, codes: Codes, reference: Reference) -> list[SelectionSolution] | None:
-        return self._certifier.only_root(codes, reference, proposed(reference, codes))
+        if self._reference is None or (self._cover is not None and self._cover.is_due(codes)):
+            return None
+        return super().closed(codes, relaxation)
 
 
 #: mu of all nodes where kappa is one, and factors of |G d|^2, that are tried.

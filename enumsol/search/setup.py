@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from enumsol.errors import InvalidArgumentError
 from enumsol.search.certifiers.protocol import Refine, UndecidedPart, Unrecorded
 from enumsol.search.load_limit import LoadLimit, load_limit
+from enumsol.search.nodes import Relaxations
 from enumsol.search.tree import TreeSearch
 
 if TYPE_CHECKING:
@@ -55,16 +56,13 @@ class SearchSetup(ABC):
         progress: Callable[[SearchProgress], object] | None = None,
     ) -> TreeSearch:
         """A search of the tree with a certifier made here."""
+        splitting, p = self._splitting(certifier), self.problem.p
         return TreeSearch(
-            self.relaxed.p,
+            Relaxations(self._engine, splitting, p, self._forms(), self._fallback),
             certifier,
-            self._engine,
-            self._splitting(certifier),
-            fallback=self._fallback,
             limits=limits,
             progress=progress,
             closer=self._closer(certifier),
-            forms=self._forms(),
             known_root=lambda: self.known_root,
         )
 

@@ -13,16 +13,20 @@ from enumsol.condensation.data import EXACT_DOF_LIMIT, exactly_at
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.model.statuses import UNDECIDED
+from enumsol.proof.declared_forms import plane_form
+from enumsol.proof.records import Limits, Tree
 from enumsol.proof.writer import Recorder, point_header, unit_exponents
 from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.relaxation.engine import Engine, not_compiled
 from enumsol.relaxation.interior_point import InteriorPointEngine
 from enumsol.search.certifiers.float_certifier import FastCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier
+from enumsol.search.closing import TreeCloser
 from enumsol.search.fathoming import Closer, Closing, propose
 from enumsol.search.form_policy import Forms, plane_forms
+from enumsol.search.nodes import Relaxations
 from enumsol.search.reduction import WeightSource
-from enumsol.search.resume import PlaneReader, Reader
+from enumsol.search.resume import Reader
 from enumsol.search.setup import SearchSetup
 from enumsol.search.splitting import PlaneSplitting
 from enumsol.search.tree import TreeSearch
@@ -74,8 +78,8 @@ def plane_search(
 ) -> TreeSearch:
     """A search of the tree of a system, by default with the best engine and all statuses."""
     engine, splitting = engine or make_engine(system), splitting or PlaneSplitting(system.F)
-    fallback = partial(InteriorPointEngine, system)
-    return TreeSearch(system.p, certifier, engine, splitting, fallback=fallback, limits=limits)
+    relaxations = Relaxations(engine, splitting, system.p, fallback=partial(InteriorPointEngine, system))
+    return TreeSearch(relaxations, certifier, limits=limits)
 
 
 class Solvers(SearchSetup):
@@ -245,7 +249,7 @@ class Solvers(SearchSetup):
     def _splitting(self, certifier: Certifier) -> PlaneSplitting:
         return PlaneSplitting(self.scaled.F, sliding=certifier.sliding)
 
-    def _closer(self, certifier: Certifier) -> Closer | None:
+    def _closer(self, certifier: Certifier) -> TreeCloser | None:
         return Closer(self.scaled, cast("Closing", certifier))
 
     def _forms(self) -> Forms | None:
@@ -273,7 +277,10 @@ class Solvers(SearchSetup):
 
     def reader(self) -> Reader:
         """Understands the records of an earlier proof."""
-        return PlaneReader((self.scaled.F > 0).tolist(), self.enclosed)
+        system, F = self.enclosed, (self.scaled.F > 0).tolist()
+        tree = Tree.PLANE if self.problem.held else Tree.FLOATING_PLANE
+        limits = Limits((UNDECIDED,) * self.problem.p, tree, F, modes=self.problem.modes.r)
+        return Reader(limits, lambda said: None if system is None else plane_form(system, said))
 
     def proof_header(self) -> dict[str, Any]:
         """First record of a proof (see enumsol.proof.proof_file).

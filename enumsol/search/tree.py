@@ -13,22 +13,22 @@ from __future__ import annotations
 
 import time
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from enumsol.model.statuses import UNDECIDED
 from enumsol.proof.writer import KeptRecords
 from enumsol.search.certifiers.protocol import NO_BOUND, Bound, Certifier, Refine, UndecidedPart
 from enumsol.search.closing import TreeCloser
+from enumsol.search.nodes import Relaxations, TreeNode
 from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
-from enumsol.search.splitting import ImposedRows, Splitting, branching_node
+from enumsol.search.remainder import Remainder
+from enumsol.search.splitting import branching_node
 from enumsol.support.deadlines import Deadline, Limited, TimeOverError, over, tell, within
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from enumsol.relaxation.engine import Engine, Relaxation
+    from enumsol.relaxation.engine import Relaxation
     from enumsol.search.fathoming_in_contact import LoneProposal
     from enumsol.search.form_policy import Forms
     from enumsol.search.load_limit import LoadLimit
@@ -42,23 +42,6 @@ _MANY, _LATE = 24, 1.0
 #: Nodes at the limit of what contact can hold, if nothing else is to end the search: blocks in 3D with 4 contact nodes
 #: take some 1,000 and in 2D with 21 some 1,600; others had not come to an end after 8,000 and 18,000.
 _AT_LIMIT = 2000
-
-
-@dataclass(slots=True)
-class TreeNode:
-    """A node of the tree that waits to be examined: its parent's relaxation and what it adds."""
-
-    parent: Relaxation | None
-    codes: Codes
-    changed: int  # the contact node decided last, or -1
-    last: bool  # the last of its siblings: may take over the parent's state
-    weight: float
-    #: Presolve: nodes with one child that is not excluded, to be branched on first; None once there were no more.
-    forced: tuple[int, ...] | None = None
-
-    def sent(self) -> TreeNode:
-        """Node as it is sent to a worker, where it begins without its parent."""
-        return replace(self, parent=None, last=False)
 
 
 def depth_first(waiting: list[Any], examine: Callable[[Any], Sequence[Any]], ended: Callable[[], bool]) -> None:
@@ -75,20 +58,12 @@ class TreeSearch:
 
     Parameters
     ----------
-    p : int
-        Number of contact nodes.
+    relaxations : Relaxations
     certifier : Certifier
-    engine : Engine
-    splitting : Splitting
-        How a status splits and which rows it imposes.
-    fallback : callable, optional
-        Gives a slower engine for relaxations that stall; without one such a node is branched on.
     limits : SearchLimits
     progress : called with a SearchProgress now and then
     closer : TreeCloser, optional
         Closes subtrees by their only possible solution.
-    forms : Forms, optional
-        What a long search may bound with in place of the energy.
     known_root : callable, optional
         Gives the codes of a complete selection that is known to hold a root, or None. Where the search is stopped
         before it came there, this root is proven by itself.
@@ -102,36 +77,27 @@ class TreeSearch:
 
     def __init__(
         self,
-        p: int,
+        relaxations: Relaxations,
         certifier: Certifier,
-        engine: Engine,
-        splitting: Splitting,
         *,
-        fallback: Callable[[], Engine] | None = None,
         limits: SearchLimits | None = None,
         progress: Callable[[SearchProgress], object] | None = None,
         closer: TreeCloser | None = None,
-        forms: Forms | None = None,
         known_root: Callable[[], Codes | None] | None = None,
     ) -> None:
-        self.p, self.certifier, self.engine, self.splitting = p, certifier, engine, splitting
-        self._make_fallback = fallback
+        self.relaxations, self.certifier = relaxations, certifier
+        self.splitting, self.forms = relaxations.splitting, relaxations.forms
         self.limits = limits or SearchLimits()
         self.progress = progress
         self.closer = closer or TreeCloser()
-        self.closer.relaxed = self.relaxed
-        self.forms = forms
+        self.closer.relaxed = relaxations.energy
         self._known_root = known_root
         self.continua: Callable[[], Sequence[Codes]] = list
-        #: Subtrees that were left because the search was stopped, and the records that follow each of them.
-        self._left: list[tuple[Codes, KeptRecords]] = []
         self._recorder = certifier.recorder
         self.outcome = SearchOutcome()
-        #: Advice if limits are reached, besides raising them.
-        self.otherwise = ""
+        self.rest = Remainder(certifier, self.splitting, self.outcome, self._settle_late)
         #: The limit of what contact can hold, if the load is there: what stays undecided is what rounding decides.
         self.at_limit: LoadLimit | None = None
-        self._rows = ImposedRows(splitting, p)
         self.covered = 0.0
         #: Examines what waits, the last first, until it is time to stop, and gives what still waits then; another one
         #: than this spreads it over workers.
@@ -142,14 +108,14 @@ class TreeSearch:
 
     def first(self) -> TreeNode:
         """The root of the tree: nothing decided."""
-        return TreeNode(None, (UNDECIDED,) * self.p, -1, last=False, weight=1.0, forced=())
+        return TreeNode(None, self.relaxations.nothing, -1, last=False, weight=1.0, forced=())
 
     def run(self) -> SearchOutcome:
         """Examine the whole tree."""
         start = [self.first()]
         if self._one(start[0]):
             return self.outcome
-        if self.p >= _MANY:
+        if len(start[0].codes) >= _MANY:
             self.known(self.limits)
         if self.forms is not None:
             held = self.certifier.recorder = KeptRecords()
@@ -199,7 +165,7 @@ class TreeSearch:
         """True if a form is found that is better than the energy, before the time is over."""
         try:
             with within(self.limits):
-                return forms.pay(self.engine, self.first().codes, self._rows)
+                return forms.pay(self.relaxations.engine, self.relaxations.nothing, self.relaxations.rows)
         except TimeOverError:
             return False
 
@@ -213,11 +179,11 @@ class TreeSearch:
         """Examine subtrees, the last first, with a form that is known to hold for them; or on trial with a new one."""
         forms = self.forms
         if forms is not None:
-            forms.use(self.engine, form)
+            forms.use(self.relaxations.engine, form)
         if self.outcome.stopped is not None:
             self.leave(items)
             return
-        stack: list[Any] = self._planted(items)
+        stack: list[Any] = self.relaxations.planted(items)
         if forms is not None and trial and form is None:
             stack = self.loop(stack, lambda: forms.due(self.outcome.nodes, self.covered))
             if stack and self._pays(forms):
@@ -227,31 +193,10 @@ class TreeSearch:
 
     def examined(self, items: Sequence[TreeNode], nodes: int) -> list[TreeNode]:
         """Examine so many nodes of subtrees, the last first; what still waits then, or when the time is over."""
-        stack, last = self._planted(items), self.outcome.nodes + nodes
+        stack, last = self.relaxations.planted(items), self.outcome.nodes + nodes
         with suppress(TimeOverError):
             depth_first(stack, self.examine, lambda: self.outcome.nodes >= last or over())
         return stack
-
-    def _planted(self, items: Sequence[TreeNode]) -> list[TreeNode]:
-        """Subtrees of one search, the first one last, with the relaxations from which each of them begins."""
-        if len(items) < 2 or any(item.changed < 0 for item in items):
-            return list(items)
-        planted, codes, relaxation = list[TreeNode](), self.first().codes, None
-        for k, item in enumerate(items):
-            node = item.changed
-            over = self.splitting.above(item.codes[node], [deeper.codes[node] for deeper in items[k + 1 :]])
-            above = (*item.codes[:node], over, *item.codes[node + 1 :])
-            moved = [i for i, (one, other) in enumerate(zip(codes, above, strict=True)) if one != other]
-            if relaxation is None:
-                relaxation = self._root(above)
-            elif moved and not (relaxation.stalled or relaxation.pruned):
-                relaxation = relaxation.child(*self._rows.over(above, moved), last=False)
-            usable = not (relaxation.stalled or relaxation.pruned)
-            # the first of those with this parent is examined last
-            last = bool(moved) or not planted
-            planted.append(replace(item, parent=relaxation if usable else None, last=last))
-            codes = above
-        return planted
 
     def _run(self, stack: Sequence[TreeNode], until: Callable[[], bool] | None) -> list[TreeNode]:
         """Examine what waits, depth first; what still waits when it is time to stop."""
@@ -310,26 +255,12 @@ class TreeSearch:
     def leave(self, items: Sequence[TreeNode]) -> None:
         """Leave subtrees to `finish`, because the search was stopped."""
         for item in reversed(items):
-            self.skip(item.codes)
-
-    def skip(self, codes: Codes) -> None:
-        """Leave a subtree to `finish`, because the search was stopped."""
-        # which continua reach into it is known once everything is found, also what comes after it
-        self._left.append((codes, KeptRecords(packed=True)))
-        self.certifier.recorder = self._left[-1][1]
+            self.rest.add(item.codes)
 
     def finish(self) -> None:
         """Leave what was skipped undecided, except for the known root and the selections of continua in it."""
-        left, self._left = self._left, []
-        if not left:
-            return
-        self.certifier.recorder = self._recorder
         with within(Deadline(self.limits.deadline).extended(self._start)):
-            wanted = self._wanted()
-            for codes, after in left:
-                self._leave_but(codes, wanted)
-                after.release(self._recorder)
-        self.outcome.count_unexamined()
+            self.rest.finish(self._wanted)
 
     def _wanted(self) -> list[Codes]:
         """Complete selections that are decided although the search was stopped."""
@@ -343,33 +274,9 @@ class TreeSearch:
             self.outcome.late = True
         return wanted
 
-    def _leave_but(self, codes: Codes, wanted: Sequence[Codes]) -> None:
-        """Leave a subtree undecided, except for complete selections."""
-        stack = [(codes, wanted)]
-        while stack:
-            codes, wanted = stack.pop()
-            wanted = [final for final in wanted if all(map(self.splitting.holds, codes, final))]
-            if not wanted:
-                self._skip(codes)
-                continue
-            node = next((i for i, code in enumerate(codes) if code != wanted[0][i]), -1)
-            if node < 0:
-                self._settle_late(codes)
-                continue
-            final, before, after = wanted[0][node], codes[:node], codes[node + 1 :]
-            # the one that holds the selection comes last: what is beside it is left behind at once
-            children = self.splitting.towards(codes, node, final)
-            children.sort(key=partial(self.splitting.holds, final=final))
-            self.certifier.branching(node, children)
-            stack += [((*before, code, *after), wanted) for code in reversed(children)]
-
     def _settle_late(self, codes: Codes) -> None:
-        """Have the certifier decide a complete selection after the search was stopped, if there is time."""
-        try:
-            self._settle(TreeNode(None, codes, -1, last=False, weight=0.0))
-        except TimeOverError:
-            self.outcome.late = True
-            self._skip(codes)
+        """Have the certifier decide a complete selection after the search was stopped."""
+        self._settle(TreeNode(None, codes, -1, last=False, weight=0.0))
 
     def known(self, limits: Limited) -> Codes | None:
         """Codes of a selection that holds a root, if one is found within limits."""
@@ -386,14 +293,7 @@ class TreeSearch:
         """Add the root that is known, in a search that was interrupted before it came there."""
         root = self.known(Deadline.after(time.perf_counter(), _LATE))
         if root is not None and root not in self.certifier.certified.verified:
-            self._settle(TreeNode(None, root, -1, last=False, weight=0.0))
-
-    def _skip(self, codes: Codes) -> None:
-        stop = self.outcome.stopped
-        assert stop is not None
-        self.certifier.skipped(codes, str(stop))
-        hint = f"{stop.remedy}, or {self.otherwise}" if stop.limited and self.otherwise else stop.remedy
-        self.outcome.undecided.append(UndecidedPart(codes, "the search was stopped before it got here", hint))
+            self._settle_late(root)
 
     def examine(self, item: TreeNode) -> list[TreeNode]:
         """Settle one node of the tree, or give its children, the one that is examined first last."""
@@ -414,7 +314,8 @@ class TreeSearch:
             # the fallback costs more than a try
             if self.closed(item, None):
                 return []
-            relaxation = self._fall_back(codes)
+            outcome.fallback_qps += 1
+            relaxation = self.relaxations.fallen_back(codes)
         if relaxation is not None and relaxation.pruned and self.excluded(item, relaxation):
             return []
         usable = relaxation if relaxation is not None and not relaxation.pruned else None
@@ -526,44 +427,7 @@ class TreeSearch:
             seconds = time.perf_counter() - self._start
             self.progress(SearchProgress(outcome.nodes, self.covered, len(outcome.solutions), seconds, outcome.resumed))
 
-    # -- relaxations -----------------------------------------------------------------------------------------------
-
     def relax(self, item: TreeNode) -> Relaxation:
         """The relaxation, solved or stalled."""
-        codes = item.codes
         self.outcome.qps += 1
-        if item.parent is not None:
-            return item.parent.child(*self._rows.of(item.changed, codes[item.changed]), last=item.last)
-        relaxation = self._root(codes)
-        return self._by_steps(codes) if relaxation.stalled and item.changed >= 0 else relaxation
-
-    def _by_steps(self, codes: Codes) -> Relaxation:
-        """The relaxation of a partial assignment, its nodes one after the other."""
-        relaxation = self._root(self.first().codes)
-        for node, code in enumerate(codes):
-            if relaxation.stalled or relaxation.pruned:
-                break
-            if code != UNDECIDED:
-                relaxation = relaxation.child(*self._rows.of(node, code), last=True)
-        return relaxation
-
-    def _root(self, codes: Codes, engine: Engine | None = None) -> Relaxation:
-        """The relaxation of a partial assignment without a parent; by default with the form in use, if there is one."""
-        if engine is None:
-            engine = (None if self.forms is None else self.forms.engine) or self.engine
-        return engine.root(*self._rows.over(codes, range(len(codes))))
-
-    def relaxed(self, codes: Codes) -> Relaxation | None:
-        """The relaxation of a partial assignment with the energy, if it is solved and leaves a minimiser."""
-        relaxation = self._root(codes, self.engine)
-        return None if relaxation.stalled or relaxation.pruned else relaxation
-
-    @cached_property
-    def _fallback(self) -> Engine | None:
-        return None if self._make_fallback is None else self._make_fallback()
-
-    def _fall_back(self, codes: Codes) -> Relaxation | None:
-        """The relaxation by the slower engine; None when that gives no answer either."""
-        self.outcome.fallback_qps += 1
-        relaxation = None if self._fallback is None else self._root(codes, self._fallback)
-        return None if relaxation is None or relaxation.stalled else relaxation
+        return self.relaxations.of(item)

@@ -14,6 +14,7 @@ import numpy as np
 from enumsol.model.sectors import DEEPEST, SECTORS, around, contains, direction, end_number, nearest, width_level
 from enumsol.model.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
+from enumsol.search.nodes import Relaxations
 from enumsol.search.outcome import SearchLimits
 from enumsol.search.space import space_search as space
 from enumsol.search.space.space_search import SpaceSplitting
@@ -173,9 +174,9 @@ class Search(TreeSearch):
 
     def examine(self, item):
         """Settle one node of the tree, or give its children."""
-        self.engine.examined += 1
+        self.relaxations.engine.examined += 1
         children = super().examine(item)
-        self.engine.branched += len(children) * [sum(code in PARTIAL for code in item.codes)]
+        self.relaxations.engine.branched += len(children) * [sum(code in PARTIAL for code in item.codes)]
         return children
 
 
@@ -193,7 +194,8 @@ class Solvers(SpaceSolvers):
     def search(self, certifier, limits=None, progress=None):
         """A search of the tree."""
         splitting = SpaceSplitting(self._engine)
-        return Search(self.system.p, certifier, self._engine, splitting, limits=limits, progress=progress)
+        relaxations = Relaxations(self._engine, splitting, self.system.p)
+        return Search(relaxations, certifier, limits=limits, progress=progress)
 
     def searched(self, limits):
         """What a search takes, and its engine."""

@@ -22,6 +22,7 @@ from enumsol.relaxation.engine import FEASIBILITY_TOLERANCE, PRUNE_MARGIN
 from enumsol.relaxation.imposed_rows import EQUALITY
 from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation, imposed
 from enumsol.search.certifiers.protocol import Unrecorded
+from enumsol.search.nodes import Relaxations
 from enumsol.search.outcome import SearchLimits
 from enumsol.search.space.space_fathoming import Point
 from enumsol.search.space.space_newton import Isotropic
@@ -265,20 +266,20 @@ class Search(TreeSearch):
         found = super().relax(item)
         if self.every is None or found.pruned or found.stalled:
             return found
-        begun = (UNDECIDED,) * self.p
+        begun = self.relaxations.nothing
         last = found.codes if isinstance(found, FormRelaxation) else None
         if last is not None and decided(item.codes) < decided(last) + self.every:
             return found
         if last is None and item.codes != begun:
             return found
         started = process_time()
-        form = best_form(self.engine.system, item.codes)
+        form = best_form(self.relaxations.engine.system, item.codes)
         self.seconds += process_time() - started
         if form is None:
             return found
         self.made += 1
-        engine = FormEngine(self.engine, item.codes, *form)
-        new = engine.root(*self._rows.over(item.codes, range(len(item.codes)))).inheriting(found)
+        engine = FormEngine(self.relaxations.engine, item.codes, *form)
+        new = engine.root(*self.relaxations.rows.over(item.codes, range(len(item.codes)))).inheriting(found)
         return found if new.stalled else new
 
 
@@ -296,7 +297,8 @@ class Solvers(SpaceSolvers):
     def search(self, certifier, limits=None, progress=None):
         """A search of the tree."""
         splitting = SpaceSplitting(self._engine)
-        return Search(self.system.p, certifier, self._engine, splitting, limits=limits, progress=progress)
+        relaxations = Relaxations(self._engine, splitting, self.system.p)
+        return Search(relaxations, certifier, limits=limits, progress=progress)
 
 
 def forms(run: Run, most: int) -> None:

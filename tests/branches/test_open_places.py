@@ -23,8 +23,8 @@ from enumsol.branches.enclosed.joining import join
 from enumsol.branches.exact import known_selections
 from enumsol.branches.exact.gluing import glue
 from enumsol.branches.exact.known_selections import KnownSelections
-from enumsol.branches.remedies import DEFECT, named
 from enumsol.branches.space import cover
+from enumsol.branches.unfinished import DEFECT, named
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.errors import IncompleteGraphError
 from enumsol.model.statuses import OPEN, SLIP_PLUS, STATUSES

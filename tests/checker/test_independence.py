@@ -21,7 +21,7 @@ def inside(room, *modules):
     return [f"enumsol.{room}.{module}" for module in modules]
 
 
-CHECKERS = inside("checker", "verify", "plane_checker", "floating", "graph_checker", "history_checker", "space_graph")
+CHECKERS = inside("checker", "verify", "plane_checker", "graph_checker", "history_checker", "space_graph")
 IN_SPACE = {
     *("enumsol.checker.space_checker", "enumsol.condensation.space_condensed", "enumsol.model.sectors"),
     *inside("trusted.space", "resultants", "sector_rows", "slip_forms", "leaves", "boxed_solution"),

@@ -8,6 +8,7 @@ from floating_space import lying_block
 from proof_tools import of_kind, put, records_of, why_refused
 
 import enumsol
+from enumsol.search import reference_closer
 from enumsol.search.space import space_references
 
 
@@ -23,7 +24,7 @@ def at_once(monkeypatch):
 
 
 def without_certificates(monkeypatch):
-    monkeypatch.setattr(space_references.SpaceReferenceCloser, "_reference", None)
+    monkeypatch.setattr(reference_closer.ReferenceCloser, "_reference", None)
 
 
 def test_a_pressed_cube_has_one_root(cube):

@@ -15,7 +15,7 @@ from enumsol.arithmetic.algebraic import real_roots
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.gallery import wedge
 from enumsol.trusted.arcs import many_digits as refined
-from enumsol.trusted.arcs.bordered import BorderedExpansion
+from enumsol.trusted.arcs.bordered import BorderedLines
 from enumsol.trusted.arcs.many_digits import PRECISION, ball_of, precision, upper
 from enumsol.trusted.arcs.precise import PreciseSelection, PreciseSystem
 from enumsol.trusted.arcs.taylor import Smooth
@@ -85,7 +85,7 @@ def check_claims_around_poles(count, start):
     for rng, selection, truth in selections(count, start):
         ends = None if truth.det.is_zero() else around_a_pole(rng, truth)
         expansion = ends and selection.expansion(*ends)
-        if not isinstance(expansion, BorderedExpansion):
+        if not (expansion and isinstance(expansion._functions, BorderedLines)):
             continue
         low, high = ends
         made["poles"] += 1
@@ -123,7 +123,7 @@ def test_what_happens_beside_a_zero_of_the_determinant_is_told_apart(off):
     selection = PreciseSelection(system, codes)
     low, high = Fraction(pole) - Fraction(1, 2**12), Fraction(pole) + Fraction(1, 2**13)
     expansion = selection.expansion(low, high)
-    assert isinstance(expansion, BorderedExpansion)
+    assert isinstance(expansion._functions, BorderedLines)
     zeros = sorted(zero for k in range(len(selection.rows.conditions) + 1) for zero in expansion.zeros(k))
     assert len(zeros) == 5
     gaps = [b - a for a, b in pairwise(zeros)]
@@ -204,7 +204,7 @@ def test_conditions_of_a_body_that_moves_almost_freely_are_known_over_long_inter
     known = expansion.over(low, high)
     inside = [selection.signs_at(low + (high - low) * Fraction(k, 16)) for k in range(17)]
     assert np.all(known.conditions != 0)
-    assert all(np.array_equal(signs, known.conditions) for signs in inside)
+    assert all(np.array_equal(signs[:-1], known.conditions) for signs in inside)
 
 
 def test_balls_around_the_smallest_and_largest_numbers():

@@ -18,14 +18,13 @@ from enumsol.arithmetic.rationals import simplest
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator
 
-    from enumsol.trusted.arcs.bordered import BorderedExpansion
     from enumsol.trusted.arcs.over_parts import Expansion, Nowhere, OverInterval
-    from enumsol.trusted.arcs.precise import PreciseExpansion
     from enumsol.trusted.arcs.selection_balls import ArcSelection
+    from enumsol.trusted.arcs.taylor import ShortExpansion
     from enumsol.trusted.selection import Selection
 
     #: Conditions of a selection over an interval, in double arithmetic or in many digits.
-    AlphaExpansion = Expansion | Nowhere | PreciseExpansion | BorderedExpansion
+    AlphaExpansion = Expansion | Nowhere | ShortExpansion
     Shared = frozenset[Any]
 
 

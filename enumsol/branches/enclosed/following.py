@@ -17,24 +17,23 @@ import numpy as np
 from enumsol.branches.enclosed.cutting import ArcPart, OpenCause, Trace
 from enumsol.branches.enclosed.joining import EventPlace, Joined, join
 from enumsol.branches.enclosed.tracing import trace
-from enumsol.branches.remedies import END_ELSEWHERE, SHORT_INTERVAL, TOLD_APART
+from enumsol.branches.unfinished import END_ELSEWHERE, SHORT_INTERVAL, TOLD_APART, Effort
 from enumsol.condensation.data import EXACT_DOF_LIMIT
-from enumsol.search.outcome import Stop, StopReason
-from enumsol.support.deadlines import Deadline, Limited, TimeOverError, over, within
+from enumsol.search.outcome import Stop
+from enumsol.support.deadlines import TimeOverError, over
 from enumsol.support.messages import counted, listed
 from enumsol.trusted.arcs.many_digits import affordable
 from enumsol.trusted.arcs.precise import PreciseSelection, PreciseSystem
 from enumsol.trusted.arcs.selection_balls import ArcSelection, ArcSystem
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from enumsol.model.problem import ContactProblem
     from enumsol.search.interval.subintervals import SearchedPiece
     from enumsol.support.array_types import Codes, Floats
 
     Bounds = tuple[Fraction, Fraction]
-    from collections.abc import Iterable, Mapping
 
 
 #: Events are not sharpened when their bounds are this narrow, relative to alpha.
@@ -279,14 +278,11 @@ def _remedy(cause: OpenCause, problem: ContactProblem) -> str:
 def follow_selections(
     traced: TracedProblem,
     pieces: Sequence[SearchedPiece],
-    tick: Callable[[float], object] | None = None,
+    effort: Effort = Effort(),  # noqa: B008 (frozen)
     *,
     known: Sequence[Trace] = (),
     done: list[Trace] | None = None,
     cut_short: bool = False,
-    most: int | None = None,
-    limits: Limited | None = None,
-    ended: StopReason | None = None,
 ) -> Followed:
     """Trace all surviving selections where they survive; after a search that was cut short, over the whole interval.
 
@@ -294,17 +290,12 @@ def follow_selections(
     ----------
     traced : TracedProblem
     pieces : sequence of SearchedPiece
-    tick : called with the share of the selections done
+    effort : Effort
+        Bounds the number of boxes. Selections that are not finished are left out.
     known : traces of selections that are taken over if they are as long
     done : list of Trace, optional
         Takes the traces, and has those of a call that was interrupted; their selections are not followed again.
     cut_short : the search was stopped before it had looked everywhere
-    most : int, optional
-        No further selections are followed after so many boxes.
-    limits : Limited, optional
-        Selections that are not finished by this deadline are left out.
-    ended : StopReason, optional
-        Why there is a bound of boxes.
     """
     where: dict[Codes, list[Bounds]] = {}
     for found in pieces:
@@ -314,25 +305,14 @@ def follow_selections(
     traces, count = [] if done is None else done, len(where)
     if not cut_short and not traces:
         traces += _taken_over(traced, where, known)
-    followed_before = {trace.selection.rows.codes for trace in traces}
-    waiting = sorted(where.keys() - followed_before)
-    stopped = ended if most == 0 else None
+    waiting = sorted(where.keys() - {trace.selection.rows.codes for trace in traces})
     # their matrices grow with the square of the number of nodes
-    together = min(max(_LEAST, _TOGETHER // traced.problem.p**2), _MOST) if most is None else _FEW
-    for first in range(0, len(waiting), together):
-        group = waiting[first : first + together]
-        if most is not None and sum(len(trace.boxes) for trace in traces) >= most:
-            stopped = ended
-            break
-        places = {codes: [traced.interval] if cut_short else where[codes] for codes in group}
-        try:
-            with within(limits or Deadline()):
-                traced.trace(places, traces)
-        except TimeOverError:
-            stopped = ended or StopReason.TIME_LIMIT
-            break
-        if tick is not None:
-            tick(min(first + together, len(waiting)) / len(waiting))
+    together = min(max(_LEAST, _TOGETHER // traced.problem.p**2), _MOST) if effort.most is None else _FEW
+
+    def work(group: Sequence[Codes]) -> None:
+        traced.trace({codes: [traced.interval] if cut_short else where[codes] for codes in group}, traces)
+
+    stopped = effort.over(waiting, together, work, lambda: sum(len(trace.boxes) for trace in traces))
     finished = len({trace.selection.rows.codes for trace in traces})
     if stopped is not None:
         followed.stopped = Stop(stopped, finished, arcs_of=count)

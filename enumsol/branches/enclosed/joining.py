@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from networkx.utils import UnionFind
 
 from enumsol.branches.enclosed.cutting import ArcPart, ArcPartKind, OpenCause, Trace, parts_between
-from enumsol.branches.remedies import DEFECT, named
+from enumsol.branches.unfinished import DEFECT, named
 from enumsol.model.statuses import ACROSS
 
 if TYPE_CHECKING:

@@ -15,15 +15,15 @@ from networkx.utils import UnionFind
 
 from enumsol.arithmetic.algebraic import CriticalAlpha, merge
 from enumsol.branches.exact.known_selections import KnownSelections
-from enumsol.branches.remedies import TOLD_APART, named
+from enumsol.branches.unfinished import TOLD_APART, Effort, named
 from enumsol.model.statuses import FINAL, OPEN
 from enumsol.roots.components import RootComponent, connected_components
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.selections.rational_selections import FiberSelections
-from enumsol.support.deadlines import Deadline, Limited, TimeOverError, look, tell, within
+from enumsol.support.deadlines import TimeOverError, look, tell
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
+    from collections.abc import Iterable, Sequence
 
     from enumsol.branches.exact.selection_arcs import SelectionArcs, SelectionEvent
     from enumsol.condensation.exact import ExactCondensed
@@ -110,15 +110,7 @@ class Gluing:
     reasons: list[str]
 
 
-def glue(
-    known: KnownSelections,
-    candidates: Iterable[Codes],
-    tick: Callable[[float], object] | None = None,
-    *,
-    most: int | None = None,
-    limits: Limited | None = None,
-    ended: StopReason | None = None,
-) -> Gluing:
+def glue(known: KnownSelections, candidates: Iterable[Codes], effort: Effort = Effort()) -> Gluing:  # noqa: B008 (frozen)
     """Vertices and arcs of the graph, from the selections that the search found.
 
     Parameters
@@ -126,20 +118,17 @@ def glue(
     known : KnownSelections
         Takes them in; or has those of a call that was interrupted, which are not worked out again.
     candidates : codes of the selections that may hold somewhere in [a, b]; all do if g vanishes at every alpha
-    tick : called with the share of the candidates done
-    most : int, optional
-        No further candidates are worked out after so many.
-    limits : Limited, optional
-        Candidates that are not worked out by this deadline are left out. What is not joined by the one that holds where
-        this is called is unsettled.
-    ended : StopReason, optional
-        Why there is a bound of candidates.
+    effort : Effort
+        Bounds the number of candidates that are worked out. What is not joined by the deadline that holds where this is
+        called is unsettled.
     """
     exact = known.exact
     # where all selections hold, with lambda = 0, one arc stands for them
-    waiting = [(OPEN,) * exact.p] if exact.unloaded else sorted(set(candidates))
-    stopped = _work_out(known, waiting, tick, most, limits or Deadline(), ended)
-    known.cut_short = known.cut_short or len(known.added) < len(waiting)
+    wanted = [(OPEN,) * exact.p] if exact.unloaded else sorted(set(candidates))
+    waiting = [codes for codes in wanted if codes not in known.added]
+    reason = effort.over(waiting, 1, lambda group: known.add(*group), lambda: len(known.added))
+    stopped = None if reason is None else Stop(reason, len(known.added), arcs_of=len(wanted))
+    known.cut_short = known.cut_short or len(known.added) < len(wanted)
     for codes in list(known.arcs):
         try:
             known.close(codes)
@@ -151,32 +140,6 @@ def glue(
     if known.late and stopped is None:
         stopped = Stop(StopReason.TIME_LIMIT)
     return Gluing(exact, known.a, known.b, known.arcs, vertices, edges, stopped, known.reasons)
-
-
-def _work_out(
-    known: KnownSelections,
-    candidates: Sequence[Codes],
-    tick: Callable[[float], object] | None,
-    most: int | None,
-    limits: Limited,
-    ended: StopReason | None,
-) -> Stop | None:
-    """Work out where the candidates hold, and leave out those beyond a bound or the deadline as if never found."""
-    reason = ended if most == 0 else None
-    for codes in (codes for codes in candidates if codes not in known.added):
-        if most is not None and len(known.added) >= most:
-            reason = ended
-            break
-        try:
-            with within(limits):
-                look()
-                known.add(codes)
-        except TimeOverError:
-            reason = ended or StopReason.TIME_LIMIT
-            break
-        if tick is not None:
-            tick(len(known.added) / len(candidates))
-    return None if reason is None else Stop(reason, len(known.added), arcs_of=len(candidates))
 
 
 # -- joining events ----------------------------------------------------------------------------------------------------

@@ -13,7 +13,7 @@ from flint import fmpq, fmpq_mat, fmpq_poly
 
 from enumsol.arithmetic import algebraic
 from enumsol.branches.exact.selection_arcs import Cell, SelectionArcs, SelectionEvent, active_sets, selection_arcs
-from enumsol.branches.remedies import DEFECT, FEWER, named
+from enumsol.branches.unfinished import DEFECT, FEWER, named
 from enumsol.selections.functions import SelectionFunctions
 from enumsol.selections.rational_selections import FiberSelections, row_reduce
 from enumsol.selections.solution import MAX_BASES, ActiveSets, VertexLimitError

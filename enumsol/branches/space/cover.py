@@ -14,9 +14,9 @@ import numpy as np
 
 from enumsol.branches.space.chains import chain_through
 from enumsol.condensation.enclosure import enclosure_of
+from enumsol.proof.curve_records import CurveBoxRecord
 from enumsol.proof.proof_file import PROOF_VERSION, Proof
 from enumsol.proof.records import UndecidedRecord
-from enumsol.proof.curve_records import CurveBoxRecord
 from enumsol.proof.writer import ProofWriter, unit_exponents
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.search.space.known_curves import Curves, joined
@@ -112,10 +112,10 @@ class SpaceCover:
     def search(
         self,
         max_nodes: int | None = None,
-        progress: Callable[[str, float], object] | None = None,
+        tick: Callable[[float], object] | None = None,
         executor: Executor | None = None,
     ) -> None:
-        """Search the tree; ``progress`` and ``executor`` as in ``branch_graph``.
+        """Search the tree; ``tick`` is called with the share that is done, ``executor`` as in ``branch_graph``.
 
         Raises
         ------
@@ -123,7 +123,6 @@ class SpaceCover:
             The data cannot be enclosed.
         """
         given = AlphaProblem.of(self.enclosure)
-        tick = None if progress is None else lambda share: progress("search", share)
 
         def more(x: Array) -> CurveChain | None:
             chain = chain_through(given, self.problem, x, self.interval, self._take)
@@ -201,7 +200,7 @@ class SpaceCover:
         for record in self.records:
             is_open = isinstance(record, OpenLeaf)
             gaps += is_open
-            leaves += is_open or record.kind not in ("a", "b")
+            leaves += is_open or record.kind not in ("p", "b")
             writer.write((UndecidedRecord(_OPEN) if is_open else record).write())
         writer.write({"curves": len(self.chains), "arcs": arcs, "leaves": leaves, "gaps": gaps})
         return writer.close()

@@ -12,7 +12,7 @@ import numpy as np
 from enumsol.arithmetic.algebraic import EnclosedAlpha
 from enumsol.arithmetic.rationals import rational
 from enumsol.branches.elements import Arc, ArcValues, VertexKind, make_vertex, sides_of, tangential, with_exact_zeros
-from enumsol.branches.remedies import END_ELSEWHERE, TOLD_APART
+from enumsol.branches.unfinished import END_ELSEWHERE, TOLD_APART
 from enumsol.model.statuses import ContactStatus, space_status
 from enumsol.trusted.space.curve_parts import Run, Turn, ends_of, side_of
 from enumsol.trusted.space.solution_curve import AlphaProblem, curve_point

@@ -2,36 +2,35 @@
 
 from __future__ import annotations
 
-import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from enumsol.branches.graph import BranchGraph
 from enumsol.branches.graph_data import GraphStats
-from enumsol.branches.remedies import ANOTHER_INTERVAL, MORE_NODES, MORE_TIME, SHORT_INTERVAL
 from enumsol.branches.space.cover import SpaceCover
 from enumsol.branches.space.make_curved import CurvedGraph
 from enumsol.branches.space.pieces import runs_and_turns
+from enumsol.branches.unfinished import ANOTHER_INTERVAL, MORE_NODES, MORE_TIME, SHORT_INTERVAL
+from enumsol.branches.ways import Made
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.proof.curve_records import CutPiece
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.search.space.known_curves import joined
-from enumsol.support.deadlines import Deadline, TimeOverError, within
-from enumsol.support.keeping import keeping
+from enumsol.support.deadlines import TimeOverError, within
 from enumsol.support.messages import counted
 from enumsol.trusted.space.curve_parts import Run
 from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Sequence
     from concurrent.futures import Executor
     from fractions import Fraction
 
     from enumsol.branches.elements import Arc, Vertex
+    from enumsol.branches.unfinished import Tick
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.proof.curve_records import CurvePart
-    from enumsol.support.keeping import Ending
+    from enumsol.support.deadlines import Deadline
     from enumsol.trusted.space.curve_parts import Turn
 
     #: The parts into which a curve is cut, and their records.
@@ -41,96 +40,72 @@ if TYPE_CHECKING:
 _NAMED = 5
 
 
-def space_graph(
-    problem: ContactProblem3D,
-    interval: tuple[Fraction, Fraction],
-    progress: Callable[[str, float], object] | None,
-    max_nodes: int | None,
-    limits: Deadline,
-    executor: Executor | None = None,
-) -> BranchGraph:
-    """See ``branch_graph``.
+class ByCurves:
+    """The way in 3D: curves that a tree finds, cut into arcs.
 
-    Raises
-    ------
-    Interrupted, OutOfMemoryError
-        On Ctrl-C, or where the memory does not suffice; ``partial`` has the curves that were found.
-    """
-    call = _Construction(problem, interval, SpaceCover(problem, interval))
-    work = partial(call.run, progress, max_nodes, limits, executor)
-    return keeping("branch_graph", work, call.cut_short, lambda _: "; the curves found so far are kept")
-
-
-@dataclass
-class _Construction:
-    """One call, and how far it came.
+    Parameters
+    ----------
+    problem : ContactProblem3D
+    interval : (Fraction, Fraction)
 
     Attributes
     ----------
+    cover : SpaceCover
     reasons : what ended the search, other than a limit
-    searched : when it ended
+    stop : how far the search came, if a limit ended it
+    searched : whether it was searched
     cuts : by the number of a curve the parts into which it is cut, and their records
     begun : parts of the others
     """
 
-    problem: ContactProblem3D
-    interval: tuple[Fraction, Fraction]
-    cover: SpaceCover
-    started: float = field(default_factory=time.perf_counter)
-    reasons: list[str] = field(default_factory=list)
-    searched: float | None = None
-    cuts: dict[int, _Cut] = field(default_factory=dict)
-    begun: dict[int, list[Run | Turn]] = field(default_factory=dict)
+    def __init__(self, problem: ContactProblem3D, interval: tuple[Fraction, Fraction]) -> None:
+        self.cover, self.interval = SpaceCover(problem, interval), interval
+        self.reasons: list[str] = []
+        self.stop: Stop | None = None
+        self.searched = False
+        self.cuts: dict[int, _Cut] = {}
+        self.begun: dict[int, list[Run | Turn]] = {}
 
-    def run(
-        self,
-        progress: Callable[[str, float], object] | None,
-        max_nodes: int | None,
-        limits: Deadline,
-        executor: Executor | None,
-    ) -> BranchGraph:
-        """Search, then cut the curves into arcs."""
-        cover, stop = self.cover, None
+    def run(self, max_nodes: int | None, limits: Deadline, tick: Tick | None, executor: Executor | None) -> None:
+        """Search the interval."""
+        cover = self.cover
         try:
             with within(limits):
-                cover.search(max_nodes, progress, executor)
-            stop = None if cover.stopped is None else Stop(cover.stopped, cover.nodes)
+                cover.search(max_nodes, tick, executor)
+            self.stop = None if cover.stopped is None else Stop(cover.stopped, cover.nodes)
         except NotEnclosedError as error:
             self.reasons.append(str(error))
         except TimeOverError:
-            stop = Stop(StopReason.TIME_LIMIT, cover.nodes)
-        self.searched = time.perf_counter()
-        with within(limits.extended(self.started)):
-            return self._graph(self._elements(progress, stop), stop)
+            self.stop = Stop(StopReason.TIME_LIMIT, cover.nodes)
+        self.searched = True
 
-    def cut_short(self, ending: Ending) -> BranchGraph:
-        """The graph of what was found before something ended ``run``, wherever that was."""
-        stop = Stop(StopReason.of(ending), self.cover.nodes)
-        return self._graph(self._elements(None, stop), stop)
+    def made(self, limits: Deadline, tick: Tick | None) -> Made:
+        """Arcs into which the curves are cut."""
+        with within(limits):
+            return self._made(self._elements(tick, self.stop), self.stop)
 
-    def _graph(self, made: _Elements, stop: Stop | None) -> BranchGraph:
-        cover, now = self.cover, time.perf_counter()
+    def ended(self, reason: StopReason) -> Made:
+        """Arcs of the curves that were found."""
+        stop = Stop(reason, self.cover.nodes)
+        return self._made(self._elements(None, stop), stop)
+
+    def _made(self, made: _Elements, stop: Stop | None) -> Made:
+        cover = self.cover
         reasons = [*self.reasons, *([] if stop is None else [str(stop)])]
-        return BranchGraph(
-            problem=self.problem,
-            exact=None,
-            exact_interval=self.interval,
-            arithmetic="verified",
-            vertices=tuple(made.vertices),
-            arcs=tuple(made.arcs),
-            undecided=(*reasons, *([] if reasons else _gaps(cover)), *made.reasons),
-            stats=GraphStats(
+        return Made(
+            made.vertices,
+            made.arcs,
+            (*reasons, *([] if reasons else _gaps(cover)), *made.reasons),
+            GraphStats(
                 pieces=1 + sum(isinstance(record, CutPiece) for record in cover.records),
                 nodes=cover.nodes,
                 selections=len({arc.selections for arc in made.arcs}),
-                search_seconds=(now if self.searched is None else self.searched) - self.started,
-                seconds=now - self.started,
             ),
             make_proof=None if reasons else partial(cover.proof, made.cuts),
             left_open=_left_open(cover, made),
         )
 
-    def _elements(self, progress: Callable[[str, float], object] | None, stop: Stop | None) -> _Elements:
+    def _elements(self, tick: Tick | None, stop: Stop | None) -> _Elements:
         """Vertices and arcs of all curves found; after an interruption while they were cut, of those cut by then."""
         # the gaps tell what the tree left open
         cover, remedy = self.cover, None
@@ -141,11 +116,11 @@ class _Construction:
             return _Elements()
         given = AlphaProblem.of(cover.enclosure)
         made = CurvedGraph(cover.problem, given, self.interval)
-        over = stop is not None and stop.interrupted and self.searched is not None
+        over = stop is not None and stop.interrupted and self.searched
         for k, chain in enumerate(curves):
             try:
-                if progress is not None:
-                    progress("arcs", k / len(curves))
+                if tick is not None:
+                    tick(k / len(curves))
                 if k not in self.cuts and not over:
                     found = self.begun.setdefault(k, [])
                     records: list[CurvePart] = []
@@ -159,8 +134,8 @@ class _Construction:
             else:
                 parts = self.begun.get(k, [])
                 made.add(parts, _ends_of(parts), MORE_TIME)
-        if progress is not None:
-            progress("arcs", 1.0)
+        if tick is not None:
+            tick(1.0)
         vertices, arcs = made.made()
         if len(self.cuts) < len(curves):
             return _Elements(vertices, arcs, made.reasons, None, None)

@@ -16,8 +16,8 @@ from enumsol.arithmetic.rationals import simplest
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of, parts_around, places, span, width_level, width_of
 from enumsol.model.statuses import CONTACT, UNDECIDED
-from enumsol.proof.records import Branching, NoRoot
-from enumsol.proof.curve_records import CutPiece, ExcludedOverPiece, InCurveBoxes, OnlyOnCurve, ThroughCurveBox
+from enumsol.proof.curve_records import CutPiece, OnCurve, ThroughCurveBox
+from enumsol.proof.records import Branching, Excluded, NoRoot
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.outcome import StopReason
 from enumsol.search.space.known_curves import Curves, middle_of
@@ -353,7 +353,7 @@ class PieceTree:
         point, relaxation = parent
         rows, values = point.multipliers(relaxation)
         if at.piece.margin(codes, rows, (values, values), COUNTED) > 0:
-            return ExcludedOverPiece(rows, values, values), []
+            return Excluded(rows, np.stack([values, values])), []
         if (without := unbalanced(at.piece, codes)) is not None:
             return without, []
         ends = self._ends(at, codes)
@@ -483,7 +483,7 @@ class PieceTree:
         numbers = at.proposals.numbers(statuses, passage.parts)
         if numbers is not None and piece.lies_on(known, run, statuses, numbers, ERRORS):
             before = sum(len(other.chain.links) for other in self.curves.known[: passage.curve])
-            return OnlyOnCurve(numbers, before + run.first, before + run.last), []
+            return OnCurve(before + run.first, before + run.last, numbers), []
         longer = self._is_longer(piece, _ALONE)
         if longer and at.proposals.is_hopeful(statuses, known.over(run, piece.middle, piece.middle)):
             # a leaf may be decided over a longer piece
@@ -552,7 +552,7 @@ class PieceTree:
         if (without := unbalanced(at.piece, codes)) is not None:
             return without, []
         run = self.curves.run(piece, found)
-        return self._on_arc(at, codes, (piece, found)) if run is None else (InCurveBoxes(*run), [])
+        return self._on_arc(at, codes, (piece, found)) if run is None else (OnCurve(*run), [])
 
     def _on_arc(self, at: _Examined, codes: Codes, settled: tuple[AlphaPiece, SpaceRoot | Open]) -> Done | None:
         """The record of a leaf whose roots lie on an arc that has a point of a known curve."""

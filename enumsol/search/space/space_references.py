@@ -6,15 +6,14 @@ Nothing here is trusted: the certifier proves what is proposed, or the tree is s
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from scipy.optimize import nnls
 
 from enumsol.model.sectors import SECTORS
-from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
-from enumsol.search.closing import TreeCloser
+from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.search.reference_closer import OnlyRoot, ReferenceCloser
 from enumsol.search.space.space_fathoming import DefiniteForm
 from enumsol.trusted.space.sector_rows import ALONG, GAP, LEFT, RIGHT, SLIP
 
@@ -44,25 +43,8 @@ _LITTLE = 1e-3
 _MANY, _EASY = 8, 32
 
 
-class OnlyRoot(NamedTuple):
-    """Why no other root lies below an assignment: rows that are equations, and products of rows."""
-
-    rows: list[Row]
-    products: list[SpaceProduct]
-
-
-class Referring(Protocol):
-    """A certifier that can say that a known root is the only one below an assignment."""
-
-    def reference(self, leaf: Codes) -> SpaceReference | None:
-        """The form of a root, if one is proven definite."""
-
-    def only_root(self, codes: Codes, reference: SpaceReference, proposal: OnlyRoot) -> list[Any] | None:
-        """The root, if it was not told before, as a list; None if it is not proven that no other one lies below."""
-
-
-class SpaceReferenceCloser(TreeCloser):
-    """Tries the whole problem, and then every assignment, unless not even the root's own statuses leave it alone.
+def space_closer(certifier: Any, engine: SpaceEngine, root: Callable[[], Codes | None]) -> ReferenceCloser:
+    """What ends the tree where only a root is left, unless not even its own statuses leave it alone.
 
     Parameters
     ----------
@@ -70,53 +52,19 @@ class SpaceReferenceCloser(TreeCloser):
     engine : SpaceEngine
         Of the relaxations, which decides first whether some nodes are open.
     root : callable giving the codes of a leaf with a strict root, or None
-
-    Attributes
-    ----------
-    known : codes of that leaf, none if there is none, and None if that is not known
     """
 
-    def __init__(self, certifier: Referring, engine: SpaceEngine, root: Callable[[], Codes | None]) -> None:
-        super().__init__()
-        self._certifier, self._engine, self._root = certifier, engine, root
-        #: Assignments that pass before the first try.
-        self._easy = 0 if engine.system.p >= _MANY else _EASY
-        self._wait = self._vain = 0
+    def worth(found: SpaceReference) -> bool:
+        if not found.is_only_root(found.leaf, *proposed(found, found.leaf), found.system.reach):
+            return False
+        engine.first = _far_apart(found)
+        return True
 
-    @cached_property
-    def _reference(self) -> SpaceReference | None:
-        if self.known is None:
-            self.known = self._root() or ()
-        found = self._certifier.reference(self.known) if self.known else None
-        if found is None or not found.is_only_root(self.known, *proposed(found, self.known), found.system.reach):
-            return None
-        self._engine.first = _far_apart(found)
-        return found
+    def pause(vain: int) -> int:
+        return min(vain // _PATIENCE, _LONGEST)
 
-    def whole(self) -> list[Any] | None:
-        """The only root, as a list, if one certificate proves that the problem has no other one."""
-        if self._easy or self._reference is None:
-            return None
-        return self.again((UNDECIDED,) * len(self._reference.leaf), None)
-
-    def closed(self, codes: Codes, relaxation: object) -> list[Any] | None:
-        """The root, if it was not told before, below an assignment that holds no other one; None if not proven."""
-        if self._easy or self._wait:
-            self._easy, self._wait = max(self._easy - 1, 0), max(self._wait - 1, 0)
-            return None
-        found = self.again(codes, relaxation)
-        self._vain = 0 if found is not None else self._vain + 1
-        self._wait = min(self._vain // _PATIENCE, _LONGEST)
-        return found
-
-    def again(self, codes: Codes, relaxation: object) -> list[Any] | None:
-        """The solutions as ``closed`` gives them, whether or not other assignments were tried in vain."""
-        del relaxation
-        if self._reference is None:
-            return None
-        with np.errstate(all="ignore"):
-            proposal = proposed(self._reference, codes)
-        return self._certifier.only_root(codes, self._reference, proposal)
+    easy = 0 if engine.system.p >= _MANY else _EASY
+    return ReferenceCloser(certifier, root, proposed, worth=worth, pause=pause, easy=easy)
 
 
 def _far_apart(reference: SpaceReference) -> list[int]:

@@ -6,57 +6,26 @@ conditions and of det M are then smooth, and known over a whole box around the z
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from fractions import Fraction
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from flint import arb
+from flint import arb, arb_mat
 
-from enumsol.trusted.arcs.many_digits import (
-    ZERO_BITS,
-    ball_of,
-    column,
-    fraction_of,
-    matrix,
-    precision,
-    rounded,
-    sign_of,
-    signs_of,
-    uppers,
-)
-from enumsol.trusted.arcs.over_parts import OverInterval
-from enumsol.trusted.arcs.taylor import Smooth, columns_of, joined
+from enumsol.trusted.arcs.many_digits import ball_of, column, matrix, sign_of, signs_of, uppers
+from enumsol.trusted.arcs.taylor import AlphaFunctions, ShortExpansion, Smooth, columns_of, joined
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from fractions import Fraction
+
     from enumsol.support.array_types import NDArray
 
     Signs = NDArray[np.int8]
-    Number = float | Fraction
-    Bounds = tuple[Fraction, Fraction]
-
-#: Steps of Newton's method to a zero, and enlargements of its bounds.
-_STEPS, _WIDENINGS = 10, 6
 
 
 @dataclass(frozen=True, eq=False)
-class Lines:
-    """Equations M y = g of a selection and its conditions c + C y, all affine in alpha.
-
-    Attributes
-    ----------
-    M, g, C, c : pairs of arb_mat
-        At alpha = 0, and by how much they grow with alpha.
-    """
-
-    M: tuple[Any, Any]
-    g: tuple[Any, Any]
-    C: tuple[Any, Any]
-    c: tuple[Any, Any]
-
-
-@dataclass(frozen=True, eq=False)
-class BorderedLines:
+class BorderedLines(AlphaFunctions):
     """Equations with the column b and the row d: M v + mu b = 0, d v = 1, and M x + rho b = g, d x = 0.
 
     mu (c + C x) - rho C v, of every condition, and mu as the last are what is examined (theory, section 7.14).
@@ -71,42 +40,34 @@ class BorderedLines:
     G: tuple[Any, Any]
     C: tuple[Any, Any]
     c: tuple[Any, Any]
-    _signs: dict[Fraction, Signs | None] = field(default_factory=dict)
 
     @classmethod
-    def near(cls, lines: Lines, alpha: Any, radius: Any) -> BorderedLines | None:
+    def near(cls, lines: Sequence[tuple[Any, Any]], alpha: arb, radius: arb) -> BorderedLines | None:
         """With a border that takes away the zero of det M closest to an alpha; None where none is found.
 
-        No claim rests on how well it does so.
+        No claim rests on how well it does so. ``lines``: M, g, C and c of the equations M y = g of a selection and its
+        conditions c + C y, each as a pair of matrices: at alpha = 0, and by how much they grow with alpha.
         """
-        border = _nearest_pole(lines.M[0] + lines.M[1] * alpha, lines.M[1] * radius)
+        matrices, loads, turns, constants = lines
+        border = _nearest_pole(matrices[0] + matrices[1] * alpha, matrices[1] * radius)
         if border is None:
             return None
-        size = lines.M[0].nrows()
+        size = matrices[0].nrows()
         nothing = [0.0] * size
         B, B1 = (
             matrix([*([*row, arb(x)] for row, x in zip(M.tolist(), b, strict=True)), [*map(arb, d), arb(0)]])
-            for M, (b, d) in zip(lines.M, (border, (nothing, nothing)), strict=True)
+            for M, (b, d) in zip(matrices, (border, (nothing, nothing)), strict=True)
         )
         G, G1 = (
             matrix([*([arb(0), x] for (x,) in g.tolist()), [arb(one), arb(0)]])
-            for g, one in zip(lines.g, (1, 0), strict=True)
+            for g, one in zip(loads, (1, 0), strict=True)
         )
-        C, C1 = (matrix([*([*row, arb(0)] for row in part.tolist()), [arb(0)] * (size + 1)]) for part in lines.C)
-        c, c1 = (column([*part.entries(), arb(one)]) for part, one in zip(lines.c, (1, 0), strict=True))
+        C, C1 = (matrix([*([*row, arb(0)] for row in part.tolist()), [arb(0)] * (size + 1)]) for part in turns)
+        c, c1 = (column([*part.entries(), arb(one)]) for part, one in zip(constants, (1, 0), strict=True))
         return cls((B, B1), (G, G1), (C, C1), (c, c1))
 
-    def signs_at(self, alpha: Fraction) -> Signs | None:
-        """Signs of the functions at an alpha, 0 where they are not proven; None where B is not proven regular."""
-        if alpha not in self._signs:
-            with precision():
-                # the faster way gives wider balls
-                signs = self._signs_by(alpha, "lu")
-                self._signs[alpha] = self._signs_by(alpha, None) if signs is None or not np.all(signs) else signs
-        return self._signs[alpha]
-
-    def _signs_by(self, alpha: Fraction, algorithm: str | None) -> Signs | None:
-        a = ball_of(alpha)
+    def signs_by(self, a: arb, algorithm: str | None) -> Signs | None:
+        """Signs of the functions over a ball; None where B is not proven regular."""
         try:
             X = (self.B[0] + self.B[1] * a).solve(self.G[0] + self.G[1] * a, algorithm=algorithm)
         except ZeroDivisionError:
@@ -114,20 +75,20 @@ class BorderedLines:
         (q, _), (w, _), ((mu, _), (rho, _)) = self._parts(a, X, X)
         return signs_of(q * mu - w * rho)
 
-    def rise(self, alpha: Any, k: int) -> tuple[Any, Any] | None:
+    def rise(self, a: arb, k: int) -> tuple[Any, Any] | None:
         """About the value of a function and its slope; no claim rests on them."""
-        B = self.B[0] + self.B[1] * alpha
+        B = self.B[0] + self.B[1] * a
         try:
-            X = B.solve(self.G[0] + self.G[1] * alpha, algorithm="approx")
+            X = B.solve(self.G[0] + self.G[1] * a, algorithm="approx")
             X1 = B.solve(self.G[1] - self.B[1] * X, algorithm="approx")
         except ZeroDivisionError:
             return None
-        (q, q1), (w, w1), ((mu, mu1), (rho, rho1)) = self._parts(alpha, X, X1)
+        (q, q1), (w, w1), ((mu, mu1), (rho, rho1)) = self._parts(a, X, X1)
         value = q * mu - w * rho
         slope = q1 * mu + q * mu1 - w1 * rho - w * rho1
         return value[k, 0], slope[k, 0]
 
-    def _parts(self, a: Any, X: Any, X1: Any) -> tuple[Any, Any, Any]:
+    def _parts(self, a: arb, X: arb_mat, X1: arb_mat) -> tuple[Any, Any, Any]:
         """Of c + C y and of C v, mu and rho, their values and slopes, from those of both columns."""
         C, last = self.C[0] + self.C[1] * a, X.nrows() - 1
         (v, y), (v1, y1) = ([column([part[i, j] for i in range(last + 1)]) for j in (0, 1)] for part in (X, X1))
@@ -137,7 +98,7 @@ class BorderedLines:
             ((v[last, 0], v1[last, 0]), (y[last, 0], y1[last, 0])),
         )
 
-    def expansion(self, low: Fraction, high: Fraction) -> BorderedExpansion | None:
+    def expansion(self, low: Fraction, high: Fraction) -> ShortExpansion | None:
         """The functions over an interval; None where it is too long. In the precision of many digits."""
         middle, radius = ball_of((low + high) / 2), ball_of((high - low) / 2)
         (B, B1), (G, G1), (C, C1), (c, c1) = (
@@ -159,107 +120,8 @@ class BorderedLines:
         # all solutions of the equations are x + s v; the last row is that of mu
         lines = list(zip(free.values.entries(), turn.values.entries(), strict=True))[:-1]
         nowhere = all(_none_above([(a.upper(), (side * b).upper()) for a, b in lines]) for side in (1, -1))
-        return BorderedExpansion(self, low, high, found, sign_of(B.det()), max(v.shift, y.shift), nowhere=nowhere)
-
-
-class BorderedExpansion:
-    """Conditions of a selection over a short interval in which det M may vanish, like ``arcs.Expansion``.
-
-    Attributes
-    ----------
-    low, high : Fraction
-    apart : Fraction
-        Zeros closer than this are not told apart.
-    shift : float
-        Bound of how much the bordered matrix changes.
-    rough, final : bool
-        A shorter interval gives neither smaller errors, nor does it tell more zeros apart.
-    """
-
-    rough, final = False, True
-
-    def __init__(
-        self,
-        lines: BorderedLines,
-        low: Fraction,
-        high: Fraction,
-        found: Smooth,
-        orientation: int,
-        shift: float,
-        *,
-        nowhere: bool,
-    ) -> None:
-        self.low, self.high, self.shift = low, high, shift
-        self.apart = (high - low) * Fraction(4, 2**ZERO_BITS)
-        self._lines, self._orientation, self._nowhere = lines, orientation, nowhere
-        values = found.values
-        self._whole, self._rises = signs_of(values), signs_of(found.slopes)
-        self._small = [bool(abs(values[k, 0]) < arb(2) ** -ZERO_BITS) for k in range(values.nrows())]
-
-    def split(self) -> None:
-        """Cuts are made around zeros; see precise.PreciseExpansion."""
-
-    def over(self, low: Number, high: Number) -> OverInterval:
-        """What is known over a part of the interval."""
-        signs, unknown = self._whole.copy(), np.zeros_like(self._whole)
-        found = [self._lines.signs_at(Fraction(alpha)) for alpha in (low, high)]
-        first, last = (unknown if end is None else end for end in found)
-        # without a change of the slope's sign, values lie between those at the ends
-        same = (signs == 0) & (first == last) & ((self._rises != 0) | (low == high))
-        signs[same] = first[same]
-        # at a root they are mu times numbers that are not negative, or all of them and mu vanish
-        none = self._nowhere or bool(np.any(signs < 0) and np.any(signs > 0))
-        sign = int(signs[-1])
-        signs, first, last, rises = (part[:-1] * (sign or 1) for part in (signs, first, last, self._rises))
-        return OverInterval(signs, bool(sign), none, sign * self._orientation, (first, last), rises * abs(sign))
-
-    def near(self, condition: int, low: Number, high: Number) -> tuple[Number, Number]:
-        """As in arcs.Expansion; bounds are found at once, by ``zero_bounds``."""
-        return low, low
-
-    def zeros(self, condition: int) -> list[Fraction]:
-        """Alphas inside the interval at which a condition, or last det M, seems to vanish; no claim rests on them."""
-        if not self._rises[condition]:
-            return []
-        found = self._newton(condition, self.low, self.high)
-        return [] if found is None or not self.low < found < self.high else [found]
-
-    def flat(self, condition: int) -> bool:
-        """Whether a condition, or last det M, cannot be distinguished from zero."""
-        return self._small[condition]
-
-    def zero_bounds(self, condition: int, slope: int, low: Number, high: Number) -> Bounds:
-        """Bounds of the only zero of a condition in a part, at whose ends it has opposite signs."""
-        first, last = Fraction(low), Fraction(high)
-        alpha, reach = self._newton(condition, first, last), self.apart / 4
-        if alpha is None:
-            return first, last
-        for _ in range(_WIDENINGS):
-            ends = max(alpha - reach, first), min(alpha + reach, last)
-            below, above = (self._lines.signs_at(end) for end in ends)
-            if below is not None and above is not None and int(below[condition]) * int(above[condition]) < 0:
-                return ends
-            reach *= 2**20
-        return first, last
-
-    def _newton(self, k: int, low: Fraction, high: Fraction) -> Fraction | None:
-        """Where a function seems to vanish between two alphas."""
-        unit = self.apart / 2**10
-        with precision():
-            alpha = (low + high) / 2
-            for _ in range(_STEPS):
-                found = self._lines.rise(ball_of(alpha), k)
-                if found is None:
-                    return None
-                value, slope = (x.mid() for x in found)
-                if not value.is_finite() or not slope.is_finite() or slope == 0:
-                    return None
-                step = fraction_of((value / slope).mid())
-                alpha = rounded(alpha - step, low, high, unit)
-                # the next step is about the square of this one
-                if step * step <= unit * (self.high - self.low):
-                    break
-            return alpha
+        sign, shift = sign_of(B.det()), max(v.shift, y.shift)
+        return ShortExpansion(self, (low, high), found.values, found.slopes, sign, shift=shift, nowhere=nowhere)
 
 
 def _none_above(lines: list[tuple[Any, Any]]) -> bool:
@@ -270,7 +132,7 @@ def _none_above(lines: list[tuple[Any, Any]]) -> bool:
     return any(-a / b < s for a, b in lines if a >= 0 and b < 0 for s in least)
 
 
-def _nearest_pole(M: Any, M1: Any) -> tuple[list[float], list[float]] | None:
+def _nearest_pole(M: arb_mat, M1: arb_mat) -> tuple[list[float], list[float]] | None:
     """A column b = M1 w and a row d, with (M + tau M1) w = 0 and d M^-1 (M + tau M1) = 0 for the tau closest to zero.
 
     The matrix with this border changes with tau as if this zero of det (M + tau M1) were not there.

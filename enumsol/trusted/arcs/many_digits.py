@@ -35,13 +35,13 @@ PRECISION = 320
 ZERO_BITS = 200
 
 
-def upper(value: Any) -> float:
+def upper(value: arb) -> float:
     """At least the size of all numbers in a ball."""
     return float(np.nextafter(float(abs(value).upper()), np.inf))
 
 
-def uppers(values: Any) -> Floats:
-    """The same of all entries of a matrix."""
+def uppers(values: arb_mat) -> Floats:
+    """Upper bounds of the sizes of all entries of a matrix."""
     sizes = np.array([[float(abs(x).upper()) for x in row] for row in values.tolist()])
     bounds: Floats = np.nextafter(sizes, np.inf)
     return bounds
@@ -88,17 +88,17 @@ def ball_of(alpha: Fraction) -> Any:
     return arb(fmpq(alpha.numerator, alpha.denominator))
 
 
-def sign_of(value: Any) -> int:
+def sign_of(value: arb) -> int:
     """Sign of all numbers in a ball, 0 where it is not proven."""
     return int(value > 0) - int(value < 0)
 
 
-def signs_of(values: Any) -> Signs:
+def signs_of(values: arb_mat) -> Signs:
     """Signs of the balls in a column."""
     return np.array([sign_of(values[k, 0]) for k in range(values.nrows())], dtype=np.int8)
 
 
-def fraction_of(value: Any) -> Fraction:
+def fraction_of(value: arb) -> Fraction:
     """The exact value of an arb without radius."""
     mantissa, exponent = (int(part) for part in value.man_exp())
     return Fraction(mantissa) * Fraction(2) ** exponent

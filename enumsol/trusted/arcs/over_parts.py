@@ -168,7 +168,7 @@ class Expansion:
         return low, high
 
     def split(self) -> None:
-        """Cuts are made around zeros; see precise.PreciseExpansion."""
+        """Cuts are made around zeros; see ``taylor.ShortExpansion``."""
 
     def near(self, condition: int, low: float, high: float) -> tuple[float, float]:
         """What should be bounds of the only zero of a condition in a part; no claim rests on them."""

@@ -1,23 +1,40 @@
-"""What depends smoothly on alpha over a short interval, in balls of many digits (theory, section 7.14).
+"""Functions that depend smoothly on alpha over a short interval, in balls of many digits (theory, section 7.14).
 
 Alpha is given by tau in [-1, 1]; the unknowns of linear equations are polynomials in tau, with balls around zero for
-what is left of them and of their slopes.
+what is left of them and of their slopes. Conditions whose slopes have one sign are known from their values at both
+ends.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from flint import arb
+from flint import arb, arb_mat
 
 from enumsol.arithmetic.balls import SAFE, UNIT, upper_sum
-from enumsol.trusted.arcs.many_digits import column, matrix, uppers
+from enumsol.trusted.arcs.many_digits import (
+    ZERO_BITS,
+    ball_of,
+    column,
+    fraction_of,
+    matrix,
+    precision,
+    rounded,
+    signs_of,
+    uppers,
+)
+from enumsol.trusted.arcs.over_parts import OverInterval
 
 if TYPE_CHECKING:
-    from enumsol.support.array_types import Floats
+    from enumsol.support.array_types import Floats, NDArray
+
+    Signs = NDArray[np.int8]
+    Number = float | Fraction
+    Bounds = tuple[Fraction, Fraction]
 
 #: Powers of tau in the unknowns.
 _TERMS = 12
@@ -28,6 +45,12 @@ _LARGEST_SHIFT, _SMALL_SHIFT, _STEPS = 0.5, 0.25, 20
 _NO_RISE = 1e-250
 #: Covers underflow of some products.
 _SUBNORMAL = 2.0**-1070
+#: Steps of Newton's method to a zero, and enlargements of its bounds.
+_NEWTON_STEPS, _WIDENINGS = 10, 6
+#: Intervals shorter than this share of alpha are narrow beside the distances at which conditions bend.
+_NEAR = Fraction(1, 2**30)
+#: Zeros are farther apart (tau), or the rounding of floats hides it.
+_LEAST_SPLIT = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +73,7 @@ class Smooth:
     shift: float = 0.0
 
     @classmethod
-    def solution(cls, y: Any, rise: Any, P: Any, sizes: Floats | None = None) -> Smooth | None:
+    def solution(cls, y: arb_mat, rise: arb_mat, P: arb_mat, sizes: Floats | None = None) -> Smooth | None:
         """The unknowns of M y = g, with y and their slopes ``rise`` at tau = 0 and P = M(0)^{-1} M'.
 
         They are y + tau (I + tau P)^{-1} rise (theory, (7.16)). None where P is too large. ``sizes`` are at least those
@@ -71,7 +94,7 @@ class Smooth:
         left, left_slope = (column([arb(0, float(e)) for e in error]) for error in errors)
         return cls(terms, left, left_slope, k)
 
-    def mapped(self, C: Any, C1: Any, c: Any, c1: Any) -> Smooth:
+    def mapped(self, C: arb_mat, C1: arb_mat, c: arb_mat, c1: arb_mat) -> Smooth:
         """(c + tau c1) + (C + tau C1) times these functions."""
         before = [None, *self.terms]
         terms = [
@@ -150,15 +173,181 @@ def _power(k: int) -> Any:
     return arb(1) if k == 0 else arb(0.5, 0.5) if k % 2 == 0 else arb(0, 1)
 
 
-def joined(*parts: Any) -> Any:
+def joined(*parts: arb_mat) -> Any:
     """Matrices beside one another."""
     return matrix([[x for row in rows for x in row] for rows in zip(*(part.tolist() for part in parts), strict=True)])
 
 
-def columns_of(X: Any, *counts: int) -> list[Any]:
+def columns_of(X: arb_mat, *counts: int) -> list[Any]:
     """A matrix cut into matrices of so many columns."""
     rows, found, first = X.tolist(), [], 0
     for count in counts:
         found.append(matrix([row[first : first + count] for row in rows]))
         first += count
     return found
+
+
+class AlphaFunctions:
+    """Functions of alpha with the signs of a selection's conditions; the last has that of det M times a constant."""
+
+    @cached_property
+    def _signs(self) -> dict[Fraction, Signs | None]:
+        return {}
+
+    def signs_by(self, a: arb, algorithm: str | None) -> Signs | None:
+        """Signs of the functions over a ball; None where the equations are not proven regular."""
+        raise NotImplementedError
+
+    def rise(self, a: arb, k: int) -> tuple[Any, Any] | None:
+        """About the value of a function and its slope; no claim rests on them."""
+        raise NotImplementedError
+
+    def signs_at(self, alpha: Fraction) -> Signs | None:
+        """1 or -1 where a function is positive or negative at an alpha, else 0; None where it is not regular."""
+        if alpha not in self._signs:
+            with precision():
+                # the faster way gives wider balls
+                signs = self.signs_by(ball_of(alpha), "lu")
+                self._signs[alpha] = (
+                    self.signs_by(ball_of(alpha), None) if signs is None or not np.all(signs) else signs
+                )
+        return self._signs[alpha]
+
+    def newton(
+        self, k: int, low: Fraction, high: Fraction, width: Fraction, steps: int = _NEWTON_STEPS
+    ) -> Fraction | None:
+        """Where a function seems to vanish between two alphas, to a part of ``width``; no claim rests on it."""
+        with precision():
+            alpha, unit = (low + high) / 2, width / 2**8
+            for _ in range(steps):
+                found = self.rise(ball_of(alpha), k)
+                if found is None:
+                    return None
+                value, slope = (x.mid() for x in found)
+                if not value.is_finite() or not slope.is_finite() or slope == 0:
+                    return None
+                step = fraction_of((value / slope).mid())
+                alpha = rounded(alpha - step, low, high, unit)
+                # the next step is about the square of this one
+                if step * step <= unit * (high - low):
+                    break
+            return alpha
+
+    def enclosed(self, k: int, low: Fraction, high: Fraction, width: Fraction | None = None) -> Bounds | None:
+        """Bounds of the only zero of a function between two alphas: its signs there are proven to be opposite.
+
+        They are about ``width`` apart, by default as close as zeros are told apart.
+        """
+        width = Fraction(1, 2**ZERO_BITS) * (high - low) if width is None else width
+        # bounds that are narrow already are so near that one step is enough
+        near = high - low <= _NEAR * max(abs(low), abs(high))
+        for steps, widenings in ((1, 1), (_NEWTON_STEPS, _WIDENINGS))[not near :]:
+            alpha = self.newton(k, low, high, width, steps)
+            if alpha is None:
+                return None
+            reach = width
+            for _ in range(widenings):
+                ends = max(alpha - reach, low), min(alpha + reach, high)
+                below, above = (self.signs_at(end) for end in ends)
+                if below is not None and above is not None and int(below[k]) * int(above[k]) < 0:
+                    return ends
+                reach *= 2**20
+        return None
+
+
+class ShortExpansion:
+    """Conditions of a selection over a short interval, like ``over_parts.Expansion``.
+
+    Parameters
+    ----------
+    functions : AlphaFunctions
+    low, high : Fraction
+    values, slopes : columns
+        Those of the functions over the whole interval.
+    orientation : int
+        Sign of det M where the last function is positive.
+    shift : float
+        Bound of how much the matrix of the equations changes.
+    nowhere : bool
+        The selection has no root, whatever the signs of the functions are.
+    near : column, optional
+        Values of the conditions in the middle, where M is regular throughout.
+
+    Attributes
+    ----------
+    apart : Fraction
+        Zeros closer than this are not told apart.
+    rough, final : bool
+        A shorter interval gives neither smaller errors, nor does it tell more zeros apart.
+    """
+
+    rough, final = False, True
+
+    def __init__(
+        self,
+        functions: AlphaFunctions,
+        ends: Bounds,
+        values: arb_mat,
+        slopes: arb_mat,
+        orientation: int,
+        *,
+        shift: float = 0.0,
+        nowhere: bool = False,
+        near: arb_mat | None = None,
+    ) -> None:
+        (self.low, self.high), self.shift = ends, shift
+        self.apart = (self.high - self.low) * Fraction(4, 2**ZERO_BITS)
+        self._functions, self._orientation, self._nowhere = functions, orientation, nowhere
+        self._whole, self._rises = signs_of(values), signs_of(slopes)
+        self._small = [bool(abs(values[k, 0]) < arb(2) ** -ZERO_BITS) for k in range(values.nrows())]
+        #: about where conditions vanish, by tau in [-1, 1], with the signs of their slopes
+        self._crossings: list[tuple[int, float]] = []
+        if near is not None:
+            rises = enumerate(self._rises[: near.nrows()].tolist())
+            self._crossings = [(rise, -float((near[k, 0] / slopes[k, 0]).mid())) for k, rise in rises if rise]
+
+    def split(self) -> Fraction | None:
+        """An alpha below which one condition seems to be negative, and above which another; None where there is none.
+
+        No claim rests on it.
+        """
+        rising, falling = ([tau for rise, tau in self._crossings if rise == sign] for sign in (1, -1))
+        if not rising or not falling or max(rising) - min(falling) < _LEAST_SPLIT:
+            return None
+        tau = 0.5 * (max(rising) + min(falling))
+        return self.low + Fraction(1 + tau) * (self.high - self.low) / 2 if abs(tau) < 1.0 else None
+
+    def over(self, low: Number, high: Number) -> OverInterval:
+        """What is known over a part of the interval."""
+        signs, unknown = self._whole.copy(), np.zeros_like(self._whole)
+        found = [self._functions.signs_at(Fraction(alpha)) for alpha in (low, high)]
+        first, last = (unknown if end is None else end for end in found)
+        # without a change of the slope's sign, values lie between those at the ends
+        same = (signs == 0) & (first == last) & ((self._rises != 0) | (low == high))
+        signs[same] = first[same]
+        # a root has functions that are all positive or zero, or all negative or zero
+        none = self._nowhere or bool(np.any(signs < 0) and np.any(signs > 0))
+        sign = int(signs[-1])
+        index = sign * self._orientation
+        signs, first, last, rises = (part[:-1] * (sign or 1) for part in (signs, first, last, self._rises))
+        return OverInterval(signs, bool(index), none, index, (first, last), rises * abs(sign))
+
+    def near(self, condition: int, low: Number, high: Number) -> tuple[Number, Number]:
+        """As in ``over_parts.Expansion``; bounds are found at once, by ``zero_bounds``."""
+        return low, low
+
+    def zeros(self, condition: int) -> list[Fraction]:
+        """Alphas inside the interval at which a condition, or last det M, seems to vanish; no claim rests on them."""
+        if not self._rises[condition]:
+            return []
+        found = self._functions.newton(condition, self.low, self.high, self.apart / 4)
+        return [] if found is None or not self.low < found < self.high else [found]
+
+    def flat(self, condition: int) -> bool:
+        """Whether a condition, or last det M, cannot be distinguished from zero."""
+        return self._small[condition]
+
+    def zero_bounds(self, condition: int, slope: int, low: Number, high: Number) -> Bounds:
+        """Bounds of the only zero of a condition in a part, at whose ends it has opposite signs."""
+        part = Fraction(low), Fraction(high)
+        return self._functions.enclosed(condition, *part) or part
