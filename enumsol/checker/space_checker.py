@@ -232,9 +232,8 @@ class SpaceChecker(TreeChecker):
         if said.selection:
             found = only_root(self.system, said.numbers, said.selection)
         else:
-            found = only_solution_in_space(
-                self.system, said.numbers, said.enclosure.numbers(len(self.system.g))[0][: self.problem.p]
-            )
+            force, _ = said.enclosure.numbers(len(self.system.g))
+            found = only_solution_in_space(self.system, said.numbers, force[: self.problem.p])
         if found is None:
             return "its solution is not proven to be the only one"
         self.regular += 1

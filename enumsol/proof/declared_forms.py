@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.model.statuses import UNDECIDED
 from enumsol.trusted.quadratic_forms import EnclosedForm
 from enumsol.trusted.reference import Reference
+from enumsol.trusted.status_rows import UNDECIDED
 
 if TYPE_CHECKING:
     from enumsol.condensation.enclosure import EnclosedSystem

@@ -52,11 +52,8 @@ def data_of(header: Any, problem: ContactProblem, kind: str | None) -> Data:
     RefusedError
         It does not.
     """
-    if (
-        not isinstance(header, dict)
-        or header.get("format") != "enumsol-proof"
-        or not same(header.get("version"), PROOF_VERSION)
-    ):
+    known = isinstance(header, dict) and header.get("format") == "enumsol-proof"
+    if not known or not same(header.get("version"), PROOF_VERSION):
         raise RefusedError(f"the first record is not the header of an enumsol-proof of version {PROOF_VERSION}")
     if header.get("problem") != problem.fingerprint:
         raise RefusedError("the proof belongs to another problem (its fingerprint is different)")

@@ -177,5 +177,5 @@ class Replay:
             return search.closed(item, None, again=True)
         boxed = isinstance(leaf, records.BoxedRoot) and leaf.by is None
         if isinstance(leaf, records.ClosingRecord) and not boxed:
-            return search.closed(item, search.relaxations.relaxed(item.codes), again=True)
+            return search.closed(item, search.relaxations.energy(item.codes), again=True)
         return (boxed or isinstance(leaf, records.Solved)) and search.settled(item)

@@ -220,7 +220,8 @@ def test_multipliers_have_to_be_finite():
     k = of_kind(records, "x")[0]
     for value in (np.nan, np.inf, 1e308):
         for rows in (records[k][1], records[k][1] * 3):
-            assert "do not exclude" in changed((k,), with_values(["x", rows, ""], [value] * len(rows)))
+            why = changed((k,), with_values(["x", rows, ""], [value] * len(rows)))
+            assert ("do not exclude" if np.isfinite(value) else "a multiplier is not finite") in why
 
 
 # -- mutants -----------------------------------------------------------------------------------------------------------

@@ -38,12 +38,12 @@ def test_a_pressed_cube_has_one_root(cube):
     report = enumsol.verify(cube, roots.proof)
     assert report.complete
     assert report.roots == 1
-    assert of_kind(records_of(roots.proof), "a")
+    assert of_kind(records_of(roots.proof), "o")
 
 
 def test_what_is_said_of_the_root_is_tested(cube):
     records = records_of(enumsol.enumerate_roots(cube, 0).proof)
-    (form,), (leaf,) = of_kind(records, "q"), of_kind(records, "a")
+    (form,), (leaf,) = of_kind(records, "q"), of_kind(records, "o")
     row = records[leaf][1][0]
 
     def refused(*change):
@@ -111,5 +111,5 @@ def test_a_search_that_was_stopped_goes_on(tmp_path):
     assert roots.complete
     assert len(roots) == 1
     assert roots.stats.resumed
-    assert of_kind(records_of(roots.proof), "a")
+    assert of_kind(records_of(roots.proof), "o")
     assert enumsol.verify(body, roots.proof).complete
