@@ -80,7 +80,7 @@ class CriticalAlpha:
 
     @property
     def is_rational(self) -> bool:
-        """Whether the number is known to be rational."""
+        """True if the number is known to be rational."""
         return self.poly is None
 
     def __float__(self) -> float:
@@ -118,7 +118,7 @@ class CriticalAlpha:
             self.refine()
 
     def _shares_root(self, other: Any) -> bool:
-        """Whether ``other``, a polynomial, vanishes here; then the representation is simplified."""
+        """True if ``other``, a polynomial, vanishes here; then the representation is simplified."""
         common = self.poly.gcd(other)
         # lo and hi are no roots of poly, hence none of the divisor, which has at most one root between them
         if common.degree() == 0 or sign(common(self.lo)) == sign(common(self.hi)):
@@ -210,7 +210,7 @@ class EnclosedAlpha(CriticalAlpha):
 
     @property
     def is_rational(self) -> bool:
-        """Whether the number is known exactly."""
+        """True if the number is known exactly."""
         return bool(self.lo == self.hi)
 
     def compare(self, other: CriticalAlpha) -> int:

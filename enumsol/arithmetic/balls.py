@@ -238,12 +238,12 @@ class Ball(Pair):
 
     @classmethod
     def joined(cls, *parts: Ball) -> Ball:
-        """One below the other."""
+        """Several balls, one below the other."""
         return cls(np.concatenate([part.mid for part in parts]), np.concatenate([part.rad for part in parts]))
 
     @classmethod
     def beside(cls, *parts: Ball) -> Ball:
-        """One to the right of the other, (n, m)."""
+        """Several matrices, one to the right of the other, (n, m)."""
         return cls(np.hstack([part.mid for part in parts]), np.hstack([part.rad for part in parts]))
 
     def _matrix_multiplied(self, other: Ball) -> Ball:
@@ -275,7 +275,7 @@ class Ball(Pair):
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """As of an array."""
+        """Shape of the midpoints."""
         return self.mid.shape
 
     @property
@@ -298,7 +298,7 @@ class Ball(Pair):
 
     @property
     def finite(self) -> bool:
-        """Whether all numbers are bounded."""
+        """True if all numbers are bounded."""
         return bool(np.all(np.isfinite(self.mid)) and np.all(np.isfinite(self.rad)))
 
     @property
@@ -477,7 +477,7 @@ def determinant_sign(M: Ball) -> int:
 
 
 def nearly_singular(M: Array) -> bool:
-    """Whether a finite matrix has a condition number above a million."""
+    """True if a finite matrix has a condition number above a million."""
     return bool(np.all(np.isfinite(M))) and not np.linalg.cond(M) < 1e6
 
 

@@ -48,7 +48,7 @@ def as_objects(values: Sequence[Any]) -> NDArray[Any]:
 
 
 def is_positive_definite(matrix: Any, tell: Callable[[int, int], object] | None = None) -> bool:
-    """Whether all pivots of a symmetric rational matrix, eliminated in order, are positive.
+    """True if all pivots of a symmetric rational matrix, eliminated in order, are positive.
 
     ``tell`` is called with the number of pivots found so far, and of all.
     """

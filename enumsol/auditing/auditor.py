@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 POINT_TOLERANCE = 1e-5
 #: Two points follow each other on the graph when the way along it is at most this many times their distance.
 DETOUR = 10.0
-#: Why a point that lies on no arc of an incomplete graph is not reported as off.
-_UNPLACED = "on no arc that the graph holds, and the graph is not complete"
 
 
 def audit(
@@ -123,7 +121,7 @@ class _Tally:
         self._branch_of = {arc.number: branch.number for branch in chart.graph.branches for arc in branch.arcs}
 
     def add(self, run: PointRun) -> None:
-        """One run of points."""
+        """Take in a run of points."""
         equation = self.chart.equation
         points = [
             equation.point(float(a), forces, rigid)
@@ -149,7 +147,11 @@ class _Tally:
             place = chart.place(x, near)
             verdict, reason = Verdict.ON, ""
             if place.distance > chart.tolerance:
-                verdict, reason = (Verdict.NOT_COMPARED, _UNPLACED) if chart.graph.reasons else (Verdict.OFF, "")
+                verdict, reason = (
+                    (Verdict.NOT_COMPARED, "on no arc that the graph holds, and the graph is not complete")
+                    if chart.graph.reasons
+                    else (Verdict.OFF, "")
+                )
         self.points.append(AuditedPoint(run.path, int(run.rows[k]), alpha, place, self._branch(place), verdict, reason))
         if verdict is not Verdict.ON:
             return None

@@ -249,7 +249,7 @@ def _listed(known: Sequence[str]) -> str:
 
 
 def _numbers(frame: pd.DataFrame, title: str, name: str) -> Floats:
-    """One column as finite floats."""
+    """A column as finite floats."""
     column = frame[title]
     if column.dtype.kind in "iuf":
         values = column.to_numpy(dtype=np.float64, na_value=np.nan)

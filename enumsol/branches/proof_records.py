@@ -22,10 +22,6 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Codes
 
 
-#: Begins the record of a form, which is no leaf.
-_FORM = "q"
-
-
 class GraphLeaf(enum.StrEnum):
     """Kinds of leaves in the proof of a graph (docs/proof_format.md); the checker keeps its own list."""
 
@@ -82,7 +78,8 @@ def write_graph_proof(
             # the same form is another object when it comes from a worker
             if leaf.form is not None and not (declared is not None and np.array_equal(declared, leaf.form)):
                 declared = leaf.form
-                writer.write([_FORM, *declared.tolist()])
+                # begins the record of a form, which is no leaf
+                writer.write(["q", *declared.tolist()])
             writer.write([kind, _text(leaf.codes), *packed(leaf.rows, leaf.values)])
         if found.numbers is not None:
             numbers = found.numbers
@@ -111,7 +108,7 @@ def _ends(followed: Followed) -> Iterator[float | Fraction]:
 
 
 def _write_arcs(writer: ProofWriter, followed: Followed) -> dict[str, int]:
-    """Where every selection holds, box by box; the counts for the footer."""
+    """Write the traces of all selections, box by box; gives the counts for the footer."""
     writer.write({"traces": len(followed.traces), **unit_exponents(followed.force, followed.length)})
     for trace in followed.traces:
         ends = [_number(end) for end in (trace.low, trace.high)]

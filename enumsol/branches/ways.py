@@ -30,12 +30,12 @@ from enumsol.condensation.unloaded import never_loaded, vanishing_alpha
 from enumsol.errors import TooLargeError
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.search.certifiers.interval_certifiers import ExactIntervalCertifier, VerifiedIntervalCertifier
-from enumsol.search.interval.interval_parallel import run_parallel
 from enumsol.search.interval.subintervals import (
     FastIntervalCertifier,
     FloatingIntervalCertifier,
     IntervalSearch,
     on_weak_springs,
+    run_parallel,
 )
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.support.deadlines import Deadline, Limited, TimeOverError, over, within

@@ -69,7 +69,7 @@ What checker and search share
       ``condensation.data``: F(alpha) and f(alpha) without rounding; of ``arithmetic.rationals`` the pivots of a
       definite matrix, and floats as rationals (that the search cuts intervals at simple numbers proves nothing);
     - ``proof.proof_file`` and of ``proof.reading`` what a fraction in a proof may be: the file;
-    - ``proof.records`` and, for problems in 3D, ``proof.space_records``: what a record of each kind may say. The search
+    - ``proof.records`` and, for problems in 3D, ``proof.curve_records``: what a record of each kind may say. The search
       writes records by these classes, the checkers read them by the same ones, strictly, and so does a search that
       resumes from an earlier proof. It takes what ``proof.begun`` finds, and proves it again before ``proof.writer``
       writes it. What a record makes of a leaf is not in these classes: a checker tests it;

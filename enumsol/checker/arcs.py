@@ -63,7 +63,7 @@ class ClaimedEvent:
 
 @dataclass(eq=False)
 class ClaimedArc:
-    """Where a trace shows a root of its selection at every alpha.
+    """Interval over which a trace shows a root of its selection at every alpha.
 
     Attributes
     ----------
@@ -153,21 +153,6 @@ _PAIRS = (
 )
 
 
-@dataclass
-class ArcCount:
-    """What the traces show.
-
-    Attributes
-    ----------
-    arcs : int
-    open : int
-        Intervals that were left open, and events without a partner beside them.
-    """
-
-    arcs: int = 0
-    open: int = 0
-
-
 class ArcChecker:
     """Checks the traces of a graph's proof.
 
@@ -184,6 +169,14 @@ class ArcChecker:
     closed : sequence of ClosedPiece
         Pieces whose solutions are said to lie on the arcs through them.
     fail : called with a sentence for every failure
+
+    Attributes
+    ----------
+    traces : int
+    arcs : list of ClaimedArc
+    events : list of ClaimedEvent
+    open : int
+        Intervals that were left open, and events without a partner beside them.
     """
 
     def __init__(
@@ -201,18 +194,17 @@ class ArcChecker:
         self._due = {(codes, *span) for codes, where in pieces.items() for span in self._spans(where)}
         self._systems: dict[int, ArcSystem] = {}
         self._closed = closed
-        self._events: list[ClaimedEvent] = []
-        self._arcs: list[ClaimedArc] = []
-        self._count = ArcCount()
+        self.events: list[ClaimedEvent] = []
+        self.arcs: list[ClaimedArc] = []
         self._boxes = Boxes(fail)
-        self.traces = 0
+        self.traces = self.open = 0
         # sums of the indices of arcs that begin there
         self._degrees = {"first": 0}
         if origin is not None and interval[0] < origin < interval[1]:
             self._degrees["unloaded"] = 0
 
-    def run(self, head: dict[str, Any], records: Iterator[Any]) -> tuple[ArcCount, Any]:
-        """Check all traces; what they show, and the record after them."""
+    def run(self, head: dict[str, Any], records: Iterator[Any]) -> Any:
+        """Check all traces; gives the record after them."""
         try:
             names_only(head, ("traces", "force", "length"))
             units = units_from(head, self._problem.p)
@@ -236,13 +228,13 @@ class ArcChecker:
             self._fail(f"{len(self._due)} of the surviving selections are not traced")
         self._pair()
         for piece in self._closed:
-            failure = piece.failure(self._arcs, self._systems, self._origin)
+            failure = piece.failure(self.arcs, self._systems, self._origin)
             if failure is not None:
                 self._fail(f"the piece from {float(piece.a)} to {float(piece.b)}: {failure}")
         for place, total in self._degrees.items():
-            if self._problem.held and not self._count.open and total != 1:
+            if self._problem.held and not self.open and total != 1:
                 self._fail(f"the indices at the {place} alpha add up to {total}; expected 1")
-        return self._count, record
+        return record
 
     def _spans(self, pieces: list[tuple[Fraction, Fraction]]) -> Iterator[Span]:
         """Pieces joined where they touch, cut where g vanishes, with the side of that alpha."""
@@ -312,25 +304,16 @@ class ArcChecker:
     # -- all of them -----------------------------------------------------------------------------------------------
 
     def end_at(self, alpha: Fraction, side: int, *, upper: bool) -> bool:
-        """Whether an arc may end there: at an end of the interval, or where g vanishes."""
+        """True if an arc may end there: at an end of the interval, or where g vanishes."""
         if self._origin is not None and side == (-1 if upper else 1):
             return alpha >= self._origin if upper else alpha <= self._origin
         return alpha >= self._interval[1] if upper else alpha <= self._interval[0]
 
     def arc(self, arc: ClaimedArc, index: int, starts: int | None) -> None:
         """Keep an arc; one that begins at an end of the interval, or where g vanishes, with its side."""
-        self._arcs.append(arc)
-        self._count.arcs += 1
+        self.arcs.append(arc)
         if starts is not None:
             self._degrees["unloaded" if starts == 1 and "unloaded" in self._degrees else "first"] += index
-
-    def left_open(self) -> None:
-        """Count an interval that was left open."""
-        self._count.open += 1
-
-    def event(self, event: ClaimedEvent) -> None:
-        """Keep an event for pairing."""
-        self._events.append(event)
 
     @cached_property
     def precise_system(self) -> Any:
@@ -352,9 +335,9 @@ class ArcChecker:
     def _pair(self) -> None:
         """Pair events; each belongs to exactly one other, unless something beside it was left open."""
         by_codes: dict[tuple[Codes, int, tuple[int, int]], list[ClaimedEvent]] = {}
-        for event in self._events:
+        for event in self.events:
             by_codes.setdefault((event.codes, event.side, event.condition), []).append(event)
-        for event in self._events:
+        for event in self.events:
             node, kind = event.condition
             if event.bound:
                 continue
@@ -365,7 +348,7 @@ class ArcChecker:
                 for found in by_codes.get((codes, event.side, (node, other[1])), ()):
                     if inside(event.zero, found.part) or inside(found.zero, event.part):
                         event.partners.append(found)
-        for event in self._events:
+        for event in self.events:
             if len(event.partners) == 1:
                 partner = event.partners[0]
                 # going on the index stays, turning back it changes its sign
@@ -378,7 +361,7 @@ class ArcChecker:
                 where = f"selection {_text(event.codes)} at {float(event.zero[0])}"
                 self._fail(f"an event of {where} has {len(event.partners)} partners")
             else:
-                self._count.open += 1  # bounds too wide to find the partner, or it was left open
+                self.open += 1  # bounds too wide to find the partner, or it was left open
 
 
 class _Follower:
@@ -401,7 +384,7 @@ class _Follower:
         """Go on through a part."""
         if kind == "u":
             if not self._open:  # parts that touch are one interval
-                self._checker.left_open()
+                self._checker.open += 1
             self._arc = None
         elif kind == "n":
             if self._arc is not None:
@@ -418,7 +401,7 @@ class _Follower:
             zero = (alpha_number(part[5]), alpha_number(part[6]))
             condition = self._conditions[part[3]]
             event = ClaimedEvent(self.codes, self._side, condition, ends, zero, part[4] == 1, part[2], [])
-            self._checker.event(event)
+            self._checker.events.append(event)
         rising = event is not None and event.rising
         if rising and self._arc is not None:
             self._checker.fail(self.codes, ends[0])
@@ -447,7 +430,7 @@ class _Follower:
 
 
 def _is_next(value: Fraction, end: Fraction) -> bool:
-    """Whether it is the smallest float that is not smaller than ``end``: what is beyond would not be about it."""
+    """True if it is the smallest float that is not smaller than ``end``: what is beyond would not be about it."""
     return value == end or (value > end and Fraction(np.nextafter(float(value), -np.inf)) < end)
 
 

@@ -29,9 +29,6 @@ if TYPE_CHECKING:
 
     Codes = tuple[int, ...]
 
-#: Parts that are cut more often than this are no honest proof's.
-_DEEPEST = 64
-
 
 def parts_of(problem: AlphaProblem, chain: CurveChain, records: Iterator[Any], limits: Limits) -> list[Run | Turn]:
     """The runs and turns of a curve, each of them proven.
@@ -68,7 +65,8 @@ class LinkCuts(LinkParts):
         """From one joint to another one."""
         if None in start.statuses or None in end.statuses:
             raise RefusedError("at a point of a curve that is cut into arcs a status is not known")
-        return self._read(self.curve, self.place(start), self.place(end), None, _DEEPEST)
+        # parts that are cut more often than this are no honest proof's
+        return self._read(self.curve, self.place(start), self.place(end), None, 64)
 
     def _read(
         self, curve: SolutionCurve | None, start: Place, end: Place, codes: Codes | None, deepest: int

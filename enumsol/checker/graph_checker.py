@@ -17,14 +17,14 @@ is checked by ``enumsol.checker.arcs``, if the proof says it.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.checker.arcs import ArcChecker, ArcCount, ClosedPiece
+from enumsol.checker.arcs import ArcChecker, ClosedPiece
 from enumsol.checker.reports import MAX_FAILURES, GraphVerificationReport
 from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
 from enumsol.condensation.unloaded import vanishing_alpha
@@ -36,7 +36,7 @@ from enumsol.trusted.over_interval import KINDS, EnclosedPiece, as_computed
 from enumsol.trusted.status_rows import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, STICK, UNDECIDED, children_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from fractions import Fraction
 
     from enumsol.condensation.data import Data
@@ -46,10 +46,6 @@ if TYPE_CHECKING:
     Codes = NDArray[np.uint8]
 
 
-#: Leaves read and checked together.
-_BATCH = 256
-#: Leaves of a piece after which repetitions are first looked for; then whenever their number has doubled.
-_LOOK = 1024
 #: Entries of a leaf's record, by its kind, and those of a form's.
 _ENTRIES = {"x": 4, "f": 4, "s": 2, "c": 2}
 #: Kinds that do not rest on a stiffness that is positive definite.
@@ -57,7 +53,7 @@ _OF_ANY_BODY = ("x", "s", "c")
 _FORM, _FORM_ENTRIES = "q", 5
 #: Begins the record of a piece without a tree.
 _CLOSED = "m"
-_END = object()
+END = object()
 
 
 @dataclass
@@ -72,7 +68,8 @@ class Piece:
     #: of every leaf its kind, and its p codes as bytes
     kinds: bytearray = field(default_factory=bytearray)
     codes: bytearray = field(default_factory=bytearray)
-    look: int = _LOOK
+    # leaves of a piece after which repetitions are first looked for; then whenever their number has doubled
+    look: int = 1024
     #: made when there is something to exclude
     enclosed: EnclosedPiece | None = None
     #: multipliers of the form declared last, and the piece with it
@@ -118,47 +115,46 @@ class GraphChecker:
         self._closed: list[ClosedPiece] = []
         self.interval: tuple[Fraction, Fraction] | None = None
         self.data: Data = "problem"
-        self.arcs: ArcCount | None = None
+        self._arcs: ArcChecker | None = None
         self._friction: list[bool] = []
         self._zero: Fraction | None = None
 
     def run(self, records: Iterator[Any]) -> GraphVerificationReport:
         """Check all records after the header."""
         try:
-            self._check(self._read_header(), records)
+            self._check(records)
         except reading.RefusedError as refusal:
             self.failures.append(str(refusal))
         except (NotEnclosedError, InvalidProblemError, InvalidArgumentError) as error:
             self.failures.append(f"the problem's data cannot be enclosed: {error}")
-        failures = tuple(self.failures)
-        selections = frozenset() if failures else frozenset(map(tuple, self.selections))
-        return GraphVerificationReport(
-            not failures,
-            failures,
-            self.interval,
-            self.pieces,
-            self.leaves,
-            selections,
-            self.data,
-            None if self.arcs is None else self.arcs.arcs,
-            0 if self.arcs is None else self.arcs.open,
-            len(self._closed),
-            self.within,
+        return replace(
+            self._report(),
+            ok=not self.failures,
+            failures=tuple(self.failures),
+            interval=self.interval,
+            leaves=self.leaves,
+            within=None if self.problem.held else self.problem.rigid_reach,
         )
 
-    @property
-    def within(self) -> float | None:
-        """Bound of the rigid displacement of a body that nothing holds."""
-        return None if self.problem.held else self.problem.rigid_reach
+    def _report(self) -> GraphVerificationReport:
+        """Counts of what was checked."""
+        return GraphVerificationReport(
+            pieces=self.pieces,
+            selections=frozenset() if self.failures else frozenset(map(tuple, self.selections)),
+            data=self.data,
+            arcs=None if self._arcs is None else len(self._arcs.arcs),
+            open=0 if self._arcs is None else self._arcs.open,
+            closed=len(self._closed),
+        )
 
-    def _check(self, interval: tuple[Fraction, Fraction], records: Iterator[Any]) -> None:
-        a, b = interval
+    def _check(self, records: Iterator[Any]) -> None:
+        a, b = self._read_header()
         self._zero = self._vanishing()
         ends = [a, self._zero, b] if self._zero is not None and a < self._zero < b else [a, b]
         everything = np.full((1, self.problem.p), UNDECIDED, dtype=np.uint8)
         # pieces in the order in which they are searched, the next one last: halves come directly after what was cut
         waiting = [(x, y, everything) for x, y in pairwise(ends)][::-1]
-        record = next(records, _END)
+        record = next(records, END)
         while waiting:
             x, y, roots = waiting.pop()
             tell("per cent of the interval", int(100 * (x - a) / (b - a)), 100)
@@ -169,14 +165,18 @@ class GraphChecker:
         if self.data == "problem" and isinstance(record, dict) and "force" in record and "piece" not in record:
             origin = self._zero if self._zero is not None and a <= self._zero <= b else None
             checker = ArcChecker(self.problem, self.enclosure, (a, b), origin, self._handed, self._closed, self._fail)
-            self.arcs, record = checker.run(record, records)
-            claim |= {"traces": checker.traces, "arcs": self.arcs.arcs}
+            record, self._arcs = checker.run(record, records), checker
+            claim |= {"traces": checker.traces, "arcs": len(checker.arcs)}
         elif self._closed:
             self._fail("pieces are said to be decided by their arcs, but there are none")
+        self._check_end(record, claim, "pieces", records)
+
+    def _check_end(self, record: object, claim: Mapping[str, int | None], what: str, records: Iterator[Any]) -> None:
+        """Compare the counts in the last record with those of what was read."""
         if not reading.same(record, claim):
             found = reading.quoted(record) if isinstance(record, (dict, list)) else "missing"
-            self._fail(f"the counts at the end are {found}; the pieces give {claim!r}")
-        if next(records, _END) is not _END:
+            self._fail(f"the counts at the end are {found}; the {what} give {claim!r}")
+        if next(records, END) is not END:
             self._fail("records follow after the end of the proof")
 
     @cached_property
@@ -191,7 +191,7 @@ class GraphChecker:
     def _read_header(self) -> tuple[Fraction, Fraction]:
         self.data = reading.data_of(self.header, self.problem, "graph")
         try:
-            a, b = _interval_from(self.header.get("interval"))
+            a, b = interval_from(self.header.get("interval"))
             ends = [reading.friction_at(self.problem, end) for end in (a, b)]
         except ValueError as error:
             raise reading.RefusedError(f"the header cannot be read: {error}") from None
@@ -206,7 +206,9 @@ class GraphChecker:
 
     # -- pieces ----------------------------------------------------------------------------------------------------
 
-    def _piece(self, record: Any, records: Iterator[Any], due: tuple[Fraction, Fraction, Codes]) -> tuple[Codes, Any]:
+    def _piece(
+        self, record: object, records: Iterator[Any], due: tuple[Fraction, Fraction, Codes]
+    ) -> tuple[Codes, Any]:
         """Check the piece that begins with this record; gives what it leaves to its halves, and the record after it."""
         number = self.pieces + 1
         try:
@@ -216,14 +218,13 @@ class GraphChecker:
         if (piece.a, piece.b) != due[:2] or not np.array_equal(_sorted(piece.roots), _sorted(due[2])):
             raise reading.RefusedError(f"piece {number} is not the next one: the interval is not covered")
         self.pieces = number
-        record = next(records, _END)
+        record = next(records, END)
         while isinstance(record, list):
             batch: list[list[Any]] = []
-            while (
-                isinstance(record, list) and len(batch) < _BATCH and not (batch and record[:1] in ([_FORM], [_CLOSED]))
-            ):
+            # leaves read and checked together
+            while isinstance(record, list) and len(batch) < 256 and not (batch and record[:1] in ([_FORM], [_CLOSED])):
                 batch.append(record)
-                record = next(records, _END)
+                record = next(records, END)
             try:
                 self._read_leaves(piece, batch)
             except ValueError as error:
@@ -247,11 +248,11 @@ class GraphChecker:
             self.progress(self.leaves)
         return piece.leaves("c"), record
 
-    def _begin(self, record: Any) -> Piece:
+    def _begin(self, record: object) -> Piece:
         if not isinstance(record, dict):
             raise ValueError("no piece begins here")  # noqa: TRY004 (as in reading)
         reading.names_only(record, ("piece", "force", "length", "roots"))
-        a, b = _interval_from(record["piece"])
+        a, b = interval_from(record["piece"])
         units = reading.units_from(record, self.problem.p)
         return Piece(a, b, *units, reading.codes_from(record["roots"], self.problem.p))
 
@@ -318,7 +319,8 @@ class GraphChecker:
         return EnclosedPiece.from_enclosure(self.enclosure, piece.a, piece.b, piece.force, piece.length, origin)
 
 
-def _interval_from(ends: Any) -> tuple[Fraction, Fraction]:
+def interval_from(ends: object) -> tuple[Fraction, Fraction]:
+    """Both ends of an interval."""
     if not isinstance(ends, list) or len(ends) != 2:
         raise ValueError(f"{reading.quoted(ends)} is not an interval")
     a, b = (reading.rational_from(end) for end in ends)
@@ -339,7 +341,7 @@ def _sorted(codes: Codes) -> Codes:
 
 
 def covers(roots: Codes, leaves: Codes, friction: Sequence[bool]) -> bool:
-    """Whether the leaves that refine one of the roots together cover every selection in the roots.
+    """True if the leaves that refine one of the roots together cover every selection in the roots.
 
     Both are sets of partial assignments, (k, p) arrays of codes. They come from trees, so that in every cell that holds
     some of them there is a node at which all of them refine it; splitting there gives smaller cells. A list that is not

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.enclosure import CondensedEnclosure
+    from enumsol.proof.records import Record
     from enumsol.trusted.space.curve_runs import KnownCurve
     from enumsol.trusted.space.solution_curve import AlphaProblem
 
@@ -103,7 +104,7 @@ class PieceTreeChecker:
                 raise RefusedError(f"leaf {self.leaves + 1} of the tree over alpha: {error}") from None
 
     def _below(self, piece: AlphaPiece, codes: Codes, record: list[Any]) -> list[tuple[Fraction, Fraction, Codes]]:
-        """What a record leaves to those after it, or nothing, and the leaf is checked."""
+        """Cells that a record leaves to those after it; none if it is a leaf, which is checked."""
         kind = record[0] if record else None
         if kind == CutPiece.kind:
             alpha = CutPiece.read(record, Limits(codes)).between(piece.low, piece.high)
@@ -127,8 +128,8 @@ class PieceTreeChecker:
     def _covers(self, node: int, code: int, children: list[int]) -> bool:
         return is_sector_covering(code, children, self._tangents[node])
 
-    def _wrong(self, piece: AlphaPiece, codes: Codes, leaf: Any) -> str | None:
-        """What a leaf does not prove; None if all is proven."""
+    def _wrong(self, piece: AlphaPiece, codes: Codes, leaf: Record) -> str | None:
+        """Sentence on what a leaf does not prove; None if all is proven."""
         if isinstance(leaf, Excluded):
             excluded = piece.margin(codes, leaf.lines, (leaf.values[0], leaf.values[1])) > 0
             return None if excluded else "its multipliers do not exclude it"
@@ -153,7 +154,7 @@ class PieceTreeChecker:
         raise AssertionError(leaf)
 
     def _is_arc(self, narrowed: AlphaPiece, codes: Codes, leaf: ThroughCurveBox) -> bool:
-        """Whether the roots of a leaf are on an arc, which is over a longer piece than they, through a box."""
+        """True if the roots of a leaf are on an arc, which is over a longer piece than they, through a box."""
         (a, b), (low, high) = self._interval, leaf.piece
         if not a <= low <= narrowed.low <= narrowed.high <= high <= b:
             return False

@@ -106,13 +106,13 @@ class GraphVerificationReport:
         In 3D, where the proof holds no selections: curves of solutions, of which the arcs are.
     """
 
-    ok: bool
-    failures: tuple[str, ...]
-    interval: tuple[Fraction, Fraction] | None
-    pieces: int
-    leaves: int
-    selections: frozenset[tuple[int, ...]]
-    data: str
+    ok: bool = False
+    failures: tuple[str, ...] = ()
+    interval: tuple[Fraction, Fraction] | None = None
+    pieces: int = 0
+    leaves: int = 0
+    selections: frozenset[tuple[int, ...]] = frozenset()
+    data: str = "problem"
     arcs: int | None = None
     open: int = 0
     closed: int = 0

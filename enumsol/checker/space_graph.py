@@ -21,13 +21,13 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from enumsol.checker.curve_cuts import parts_of
+from enumsol.checker.graph_checker import END, GraphChecker, interval_from
 from enumsol.checker.piece_tree import PieceTreeChecker
-from enumsol.checker.reports import MAX_FAILURES, GraphVerificationReport
+from enumsol.checker.reports import GraphVerificationReport
 from enumsol.condensation.data import exactly_at
-from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
-from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.condensation.enclosure import CondensedEnclosure
 from enumsol.proof.curve_records import box_from
-from enumsol.proof.reading import RefusedError, data_of, exponents_from, numbers_from, quoted, rational_from, same
+from enumsol.proof.reading import RefusedError, data_of, exponents_from, numbers_from, quoted, same
 from enumsol.proof.records import Limits
 from enumsol.trusted.space.curve_chains import apart, chain_of
 from enumsol.trusted.space.curve_parts import arcs_over
@@ -36,7 +36,7 @@ from enumsol.trusted.space.sector_rows import UNDECIDED
 from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Iterator
     from fractions import Fraction
 
     from numpy.typing import NDArray
@@ -50,57 +50,22 @@ if TYPE_CHECKING:
 _MOST_BOXES = 1 << 20
 
 
-class SpaceGraphChecker:
-    """Checks the records of a graph's proof in 3D.
+class SpaceGraphChecker(GraphChecker):
+    """Checks the records of a graph's proof in 3D: see GraphChecker."""
 
-    Parameters
-    ----------
-    problem : ContactProblem3D
-    header : the proof's first record
-    progress : callable, optional
-        Called with the number of leaves checked.
-    """
+    problem: ContactProblem3D  # type: ignore[assignment]
 
-    def __init__(
-        self, problem: ContactProblem3D, header: dict[str, Any], progress: Callable[[int], object] | None
-    ) -> None:
-        self.problem, self.header, self.progress = problem, header, progress
-        self.failures: list[str] = []
-        self.interval: tuple[Fraction, Fraction] | None = None
+    def __init__(self, problem: ContactProblem3D, *given: Any) -> None:
+        super().__init__(cast("Any", problem), *given)
         self.curves: list[CurveChain] = []
         self.arcs: int | None = 0
-        self.leaves = 0
         self.gaps: list[tuple[Fraction, Fraction]] = []
 
-    def run(self, records: Iterator[Any]) -> GraphVerificationReport:
-        """Check all records after the header."""
-        try:
-            self._check(records)
-        except RefusedError as refusal:
-            self.failures.append(str(refusal))
-        except (NotEnclosedError, InvalidProblemError, InvalidArgumentError) as error:
-            self.failures.append(f"the problem's data cannot be enclosed: {error}")
-        return GraphVerificationReport(
-            not self.failures,
-            tuple(self.failures),
-            self.interval,
-            1,
-            self.leaves,
-            frozenset(),
-            "problem",
-            arcs=self.arcs,
-            open=len(self.gaps),
-            curves=len(self.curves),
-            within=None if self.problem.held else self.problem.rigid_reach,
-        )
-
-    def _fail(self, message: str) -> None:
-        self.failures.append(message)
-        if len(self.failures) == MAX_FAILURES:
-            raise RefusedError(f"the check ends after {MAX_FAILURES} failures")
+    def _report(self) -> GraphVerificationReport:
+        return GraphVerificationReport(pieces=1, arcs=self.arcs, open=len(self.gaps), curves=len(self.curves))
 
     def _check(self, records: Iterator[Any]) -> None:
-        units, steps = self._read_header()
+        units, steps = self._read_units()
         # of a body that nothing holds that of the body on springs
         enclosure = replace(CondensedEnclosure.from_problem(self.problem.on_springs), problem=self.problem)
         given = AlphaProblem.of(enclosure, steps)
@@ -120,27 +85,24 @@ class SpaceGraphChecker:
         if self.progress is not None:
             self.progress(self.leaves)
         claim = {"curves": len(self.curves), "arcs": self.arcs, "leaves": self.leaves, "gaps": len(self.gaps)}
-        footer = next(records, None)
-        if not same(footer, claim):
-            self._fail(f"the counts at the end are {quoted(footer)}; the records give {claim!r}")
-        if next(records, None) is not None:
-            self._fail("records follow after the end of the proof")
+        self._check_end(next(records, END), claim, "records", records)
 
-    def _read_header(self) -> tuple[Any, Array]:
+    def _read_units(self) -> tuple[tuple[Array, Array], Array]:
+        """Read the header."""
         if data_of(self.header, cast("Any", self.problem), "graph") != "problem":
             raise RefusedError("a proof about a problem in 3D certifies the problem's own data only")
         try:
-            self.interval, units, steps = _read(self.header, self.problem)
+            self.interval = interval_from(self.header.get("interval"))
+            return _units_and_steps(self.header, self.problem, self.interval)
         except ValueError as error:
             raise RefusedError(f"the header cannot be read: {error}") from None
-        return units, steps
 
     @property
     def _limits(self) -> Limits:
         """Limits of records about boxes around curves."""
         return Limits((UNDECIDED,) * self.problem.p, modes=self.problem.modes.r)
 
-    def _curve(self, given: AlphaProblem, count: Any, records: Iterator[Any]) -> None:
+    def _curve(self, given: AlphaProblem, count: object, records: Iterator[Any]) -> None:
         number = len(self.curves) + 1
         if type(count) is not int or not 0 < count <= _MOST_BOXES:
             raise RefusedError(f"curve {number} has {quoted(count)} boxes")
@@ -157,8 +119,8 @@ class SpaceGraphChecker:
             raise RefusedError(f"curve {number} is not proven to be one from end to end")
         self.curves.append(chain)
 
-    def _cuts(self, given: AlphaProblem, record: Any, records: Iterator[Any]) -> Any:
-        """How the last curve is cut into arcs, if its record says so; the record that follows."""
+    def _cuts(self, given: AlphaProblem, record: object, records: Iterator[Any]) -> Any:
+        """Read the arcs into which the last curve is cut, if its record says so; gives the record that follows."""
         if not same(record, {"parts": True}):
             self.arcs = None
             return record
@@ -178,23 +140,17 @@ class SpaceGraphChecker:
                     self._fail("two curves may be the same")
 
 
-def _read(
-    header: dict[str, Any], problem: ContactProblem3D
-) -> tuple[tuple[Fraction, Fraction], tuple[Any, Any], Array]:
-    """The interval, units of forces and displacements, and steps of the coordinates."""
-    ends = header.get("interval")
-    if not isinstance(ends, list) or len(ends) != 2:
-        raise ValueError("there is no interval")
-    low, high = map(rational_from, ends)
-    if not low < high:
-        raise ValueError("an interval is empty")
+def _units_and_steps(
+    header: dict[str, Any], problem: ContactProblem3D, interval: tuple[Fraction, Fraction]
+) -> tuple[tuple[Array, Array], Array]:
+    """Units of forces and displacements, and steps of the coordinates."""
     force, length = (exponents_from(header.get(key), problem.p) for key in ("force", "length"))
     if len({a + b for a, b in zip(force, length, strict=True)}) != 1:
         raise ValueError("the units are no common scaling of energy")
     for pair in zip(problem.friction, problem.friction_slope, strict=True):
-        if min(min(exactly_at(end, *pair)) for end in (low, high)) < 0:
+        if min(min(exactly_at(end, *pair)) for end in interval) < 0:
             raise ValueError("friction is negative in the interval")
     steps = numbers_from(header.get("steps"), 3 * problem.p + problem.modes.r)
     if not np.all(steps > 0):
         raise ValueError("a step is not positive")
-    return (low, high), (np.ldexp(1.0, np.array(force)), np.ldexp(1.0, np.array(length))), steps
+    return (np.ldexp(1.0, np.array(force)), np.ldexp(1.0, np.array(length))), steps

@@ -11,23 +11,19 @@ from typing import Annotated, Any
 
 import typer
 
-from enumsol.cli import (
-    audit,
-    collection,
-    fixed_point,
-    follow,
-    gallery,
-    graph,
-    history,
-    report,
-    roots,
-    solve,
-    table,
-    verify,
-)
+from enumsol.cli.audit import audit
 from enumsol.cli.common import ExitStatus
 from enumsol.cli.files import FileCommand
+from enumsol.cli.fixed_point import fixed_point
+from enumsol.cli.follow import follow
+from enumsol.cli.graph import graph, report
+from enumsol.cli.history import history
+from enumsol.cli.problems import collection_app, gallery_app
+from enumsol.cli.roots import roots
+from enumsol.cli.solve import solve
 from enumsol.cli.streams import guarded_streams, loud_again, say
+from enumsol.cli.table import table
+from enumsol.cli.verify import verify
 from enumsol.errors import EnumsolError, OutputError
 from enumsol.support.messages import listed
 
@@ -45,18 +41,10 @@ app = typer.Typer(
     rich_markup_mode="markdown",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-app.command("solve", cls=FileCommand)(solve.solve)
-app.command("roots", cls=FileCommand)(roots.roots)
-app.command("table", cls=FileCommand)(table.table)
-app.command("graph", cls=FileCommand)(graph.graph)
-app.command("history", cls=FileCommand)(history.history)
-app.command("report", cls=FileCommand)(report.report)
-app.command("follow", cls=FileCommand)(follow.follow)
-app.command("audit", cls=FileCommand)(audit.audit)
-app.command("fixed-point", cls=FileCommand)(fixed_point.fixed_point)
-app.command("verify", cls=FileCommand)(verify.verify)
-app.add_typer(gallery.app, name="gallery")
-app.add_typer(collection.app, name="collection")
+for _command in (solve, roots, table, graph, history, report, follow, audit, fixed_point, verify):
+    app.command(_command.__name__.replace("_", "-"), cls=FileCommand)(_command)
+app.add_typer(gallery_app, name="gallery")
+app.add_typer(collection_app, name="collection")
 
 
 def _version(value: bool) -> None:

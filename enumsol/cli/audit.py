@@ -10,7 +10,7 @@ import typer
 from enumsol.cli.common import ExitStatus, finish, load_problem, parse_alpha, parse_interval, so_far
 from enumsol.cli.graph import build, read_graph
 from enumsol.cli.options import Arithmetic, JsonFile, ProblemArgument, Quiet, csv, file, number
-from enumsol.cli.output import check_outputs, deliver
+from enumsol.cli.output import deliver
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.messages import counted
 
@@ -88,7 +88,6 @@ def audit(
     from enumsol.auditing.graph_map import checked_tolerance
 
     checked_tolerance(tolerance)
-    check_outputs(json=json_file, csv=csv_file)
     if graph_file is not None and (first is not None or last is not None):
         raise InvalidArgumentError("--graph and --from or --to are both given; a graph has its own interval")
     body = load_problem(problem)

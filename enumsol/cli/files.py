@@ -1,10 +1,14 @@
-"""The files that a command names: no output takes the place of an input, or of another output of the same call."""
+"""The files that a command names, checked before it does anything.
+
+Outputs can be written where they are to go; none takes the place of an input, or of another output of the same call.
+"""
 
 from __future__ import annotations
 
 import os
 import re
 from glob import escape
+from importlib.util import find_spec
 from itertools import combinations
 from os.path import exists, isdir, isfile
 from pathlib import Path
@@ -13,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 from typer.core import TyperCommand
 
 from enumsol.cli.common import TOML
-from enumsol.errors import InvalidArgumentError
+from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.support.files import check_replaceable
 
 if TYPE_CHECKING:
@@ -21,12 +25,23 @@ if TYPE_CHECKING:
 
 #: Metavariables of what a command writes, and of what it reads.
 _WRITTEN, _READ = ("FILE",), ("PROBLEM", "MESH", "POINTS", "PROOF", "SOLUTIONS", "GRAPH", "STEPS")
-#: First bytes of the files that some options write, and the kinds of these files in words.
+#: First bytes of the files that some options write, and the kinds of these files in words. In this table and below an
+#: option of one command only has the command's name before its own.
+_PAGE = (b"<!DOCTYPE html>", "an HTML page")
 _BEGINNINGS = {
     "--proof": (b"enumsol-proof ", "a proof"),
     "--save": (b'{"format": "enumsol-', "a saved graph or history"),
-    "--report": (b"<!DOCTYPE html>", "an HTML page"),
+    "--report": _PAGE,
+    "report --output": _PAGE,
     "--graphml": (b"<?xml", "a GraphML file"),
+}
+#: Outputs that may be ``-``, at most one of a call; and those that may not, with a reason.
+_TEXTS = ("--json", "--csv")
+_NO_TEXTS = {
+    **dict.fromkeys(("--proof", "--save", "--graphml", "--report", "report --output"), ""),
+    **dict.fromkeys(("roots --proof", "solve --proof"), ", but a proof is a binary file"),
+    **dict.fromkeys(("--npz", "--vtu"), ", but it is a binary file"),
+    "--plot": ", but a figure is a binary file",
 }
 #: Patterns by which meshes name files that belong to them: heavy data of XDMF, included files of Abaqus.
 _REFERENCES = {".xdmf": rb"([^\s<>]+):/", ".inp": rb"(?i)input\s*=\s*([^,\r\n]+)"}
@@ -35,27 +50,92 @@ _MATRICES = ("*.mtx", "node_ids.json")
 
 
 class FileCommand(TyperCommand):
-    """A command that refuses, before it does anything, outputs that would take the place of other files.
+    """A command that refuses, before it does anything, outputs that cannot be written or would replace other files.
 
     Raises
     ------
     InvalidArgumentError
-        An output is an input, by whatever name, or another output, or an existing file of another kind than the option
-        writes.
+        An output cannot be written, or not to stdout; it is an input, by whatever name, or another output, or an
+        existing file of another kind than the option writes.
+    MissingDependencyError
+        What writes it is not installed.
     """
 
     def invoke(self, ctx: Any) -> Any:
         """Check the files, then run the command."""
         named = [(option.metavar, option.opts[0], option, ctx.params.get(option.name)) for option in self.params]
         given = [(metavar, name, value) for metavar, name, _, value in named if isinstance(value, str)]
-        outputs = [(_called(name), value) for metavar, name, value in given if metavar in _WRITTEN and value != "-"]
+        outputs = [(_called(name), value) for metavar, name, value in given if metavar in _WRITTEN]
         inputs = [(metavar, "/dev/stdin" if value == "-" else value) for metavar, _, value in given if metavar in _READ]
-        check_files(inputs, outputs)
+        check_files(inputs, [(name, value) for name, value in outputs if value != "-"])
+        terminal = [name for name, value in outputs if value == "-" and name in _TEXTS]
+        if len(terminal) > 1:
+            raise InvalidArgumentError(f"{' and '.join(terminal)} are both -; expected one of them to be a file")
         for name, value in outputs:
-            kind = "--report" if (ctx.info_name, name) == ("report", "--output") else name
-            if kind in _BEGINNINGS:
-                check_replaceable(Path(value), name, *_BEGINNINGS[kind])
+            check_output(name, value, f"{ctx.info_name} {name}")
         return super().invoke(ctx)
+
+
+def check_output(name: str, value: str, own: str) -> None:
+    """Refuse an output that cannot be written, before a long search rather than after it.
+
+    Parameters
+    ----------
+    name, value : str
+        Of the option.
+    own : str
+        Name of the option after that of its command, under which tables may have it.
+
+    Raises
+    ------
+    InvalidArgumentError, MissingDependencyError
+        As `FileCommand`.
+    """
+    kind = own if own in _NO_TEXTS else name
+    if kind not in _NO_TEXTS and kind not in _TEXTS:
+        return  # a problem, which may be a directory
+    if name == "--vtu" and value != "-" and not value.endswith(".vtu"):
+        raise InvalidArgumentError(f"--vtu is {value!r}; expected a name that ends in .vtu")
+    if name == "--plot":
+        _need("matplotlib", name, "plots")
+    if value != "-":
+        _check_writable(value, name)
+    elif kind in _NO_TEXTS:
+        raise InvalidArgumentError(f"{name} is -{_NO_TEXTS[kind]}; expected the name of a file")
+    if name == "--vtu":
+        _need("meshio", name, "meshes")
+    if name == "--plot":
+        _check_format(value)
+    beginning = _BEGINNINGS.get(own, _BEGINNINGS.get(name))
+    if beginning is not None and value != "-":
+        check_replaceable(Path(value), name, *beginning)
+
+
+def _need(module: str, option: str, extra: str) -> None:
+    if find_spec(module) is None:
+        raise MissingDependencyError(
+            f'{option} needs {module}, which is not installed; install it with: pip install "enumsol[{extra}]"'
+        )
+
+
+def _check_writable(path: str, option: str) -> None:
+    place = Path(path)
+    if isdir(place):
+        raise InvalidArgumentError(
+            f"{option} is {path}, a directory; expected the name of a file, or - for the terminal"
+        )
+    if not isdir(place.parent) or not os.access(place if exists(place) else place.parent, os.W_OK):
+        raise InvalidArgumentError(
+            f"{option} is {path}, which cannot be written; expected a file in a writable directory"
+        )
+
+
+def _check_format(path: str) -> None:
+    """Refuse a figure whose name has an ending for which there is no format."""
+    from matplotlib.backend_bases import FigureCanvasBase  # takes a while
+
+    if Path(path).suffix.removeprefix(".").lower() not in FigureCanvasBase.get_supported_filetypes():
+        raise InvalidArgumentError(f"--plot is {path}; expected a file name that ends in .png, .pdf or .svg")
 
 
 def _called(name: str) -> str:

@@ -57,9 +57,6 @@ def fixed_point(
     Ctrl-C, after printing the last iterate; 74 if a result could not be written; 141 if the program that read it has
     ended.
     """
-    output.check_outputs(json=json_file, csv=csv_file, npz=npz_file)
-    output.check_vtu(vtu_file)
-    output.check_named_files(", but it is a binary file", npz=npz_file)
     body, names = load_problem(problem), units_of(problem, units)
     value = _alpha(alpha, problem, body)
     options: dict[str, Any] = {"tolerance": tolerance, "max_iterations": max_iterations, "anderson": anderson}
@@ -110,15 +107,9 @@ def _content(found: FixedPoint, name: str) -> dict[str, Any]:
         "problem": name,
         "alpha": float(found.alpha),
         "alpha_text": str(found.alpha),
-        "converged": found.converged,
-        "outcome": found.outcome.value,
-        "why": found.why,
-        "iterations": found.iterations,
-        "contraction_factor": found.contraction_factor,
-        "residuals": dict(found.residuals),
-        "node_ids": list(found.problem.node_ids),
-        "statuses": [status.value for status in found.statuses],
-        **{name: getattr(found, name) for name in ("coefficients", "lambda_n", "lambda_t", "u_n", "u_t")},
-        **({} if found.rigid_coordinates is None else {name: getattr(found, name) for name in _RIGID}),
+        **output.taken(found, "converged", "outcome", "why", "iterations", "contraction_factor", "residuals"),
+        "node_ids": found.problem.node_ids,
+        **output.taken(found, "statuses", "coefficients", "lambda_n", "lambda_t", "u_n", "u_t"),
+        **({} if found.rigid_coordinates is None else output.taken(found, *_RIGID)),
         "increments": found.increments,
     }

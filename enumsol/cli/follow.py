@@ -10,7 +10,7 @@ import typer
 from enumsol.cli import options
 from enumsol.cli.common import ExitStatus, finish, load_problem, node_row, parse_alpha, parse_interval, units_of
 from enumsol.cli.graph import read_graph
-from enumsol.cli.output import check_outputs, check_plot, deliver, write_figure
+from enumsol.cli.output import deliver, taken, write_figure
 from enumsol.cli.progress import Display, SearchDisplay
 from enumsol.errors import Interrupted, InvalidArgumentError, OutOfMemoryError
 from enumsol.support.messages import counted
@@ -88,13 +88,21 @@ def follow(
     input; 130 on Ctrl-C, after printing the paths so far; 74 if a result could not be written; 141 if the program that
     read it has ended.
     """
-    check_outputs(json=json_file, csv=csv_file)
-    check_plot(plot_file)
+    from enumsol.continuation import ContinuationOptions  # numpy: not for --help
+
     if graph_file is not None and plot_file is None:
         raise InvalidArgumentError("--graph is given without --plot; expected both")
     if tangent is not None and (root is None or direction == "both"):
         raise InvalidArgumentError("--tangent is given without --root or --direction; expected one root and direction")
-    steps = _steps(h_max, h_min, h_init, eps, max_steps, check_steps)
+    steps = ContinuationOptions(
+        eps=eps,
+        eps_prime=eps,
+        h_min=h_min,
+        h_max=h_max,
+        h_init=min(0.05, h_max) if h_init is None else h_init,
+        max_steps=max_steps,
+        check_steps=check_steps,
+    )
     interval, alpha, signs = parse_interval(first, last), parse_alpha(start, "--start"), _directions(direction)
     names, body = units_of(problem, units), load_problem(problem)
     row = node_row(body, label)
@@ -121,23 +129,6 @@ def follow(
         frame=followed.frame,
     )
     finish(ended, ExitStatus.DONE if followed.arrived else ExitStatus.INCOMPLETE)
-
-
-def _steps(
-    h_max: float, h_min: float, h_init: float | None, eps: float, max_steps: int, check_steps: bool
-) -> ContinuationOptions:
-    from enumsol.continuation import ContinuationOptions
-
-    first = min(0.05, h_max) if h_init is None else h_init
-    return ContinuationOptions(
-        h_max=h_max,
-        h_min=h_min,
-        h_init=first,
-        eps=eps,
-        eps_prime=eps,
-        max_steps=max_steps,
-        check_steps=check_steps,
-    )
 
 
 def _directions(text: str) -> tuple[int, ...]:
@@ -300,17 +291,12 @@ def _leads_to(path: Path, k: int, root: Root, problem: AnyProblem) -> bool:
 
 def _content(path: Path) -> dict[str, Any]:
     return {
-        "status": path.status,
-        "message": path.message,
-        "closed": path.closed,
+        **taken(path, "status", "message", "closed"),
         "stats": vars(path.stats),
         "folds": [item.alpha for item in path.folds],
         "transitions": [
             {
-                "alpha": item.alpha,
-                "point": item.point,
-                "before": [status.value for status in item.before],
-                "after": [status.value for status in item.after],
+                **taken(item, "alpha", "point", "before", "after"),
                 "fold": item in path.folds,
                 "local_branch": None if item.local_test is None else item.local_test.exists,
             }

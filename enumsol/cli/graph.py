@@ -1,27 +1,18 @@
-"""``enumsol graph``: all solutions over an interval of alpha."""
+"""``enumsol graph`` and ``enumsol report``: all solutions over an interval of alpha, and one HTML page of them."""
 
 from __future__ import annotations
 
+import shlex
+from importlib.util import find_spec
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from enumsol.cli import options
-from enumsol.cli.common import (
-    ExitStatus,
-    finish,
-    load_problem,
-    node_row,
-    note,
-    parse_interval,
-    so_far,
-    title_of,
-    units_of,
-    workers,
-)
-from enumsol.cli.output import check_named_files, check_outputs, check_plot, deliver, write_figure
+from enumsol.cli import common, options, output
+from enumsol.cli.common import load_problem, node_row, parse_interval, so_far, title_of, units_of
+from enumsol.cli.options import csv, file
 from enumsol.cli.progress import Display
-from enumsol.errors import InvalidArgumentError
+from enumsol.errors import InvalidArgumentError, MissingDependencyError
 
 if TYPE_CHECKING:
     from enumsol.branches import BranchGraph
@@ -47,13 +38,11 @@ def graph(
     max_nodes: options.MaxNodes = None,
     time_limit: options.TimeLimit = None,
     jobs: options.Jobs = 1,
-    save_file: Annotated[str | None, options.file("--save", "Write the graph, for enumsol audit and follow.")] = None,
+    save_file: Annotated[str | None, file("--save", "Write the graph, for enumsol audit and follow.")] = None,
     json_file: options.JsonFile = None,
-    csv_file: Annotated[str | None, options.csv("arc")] = None,
-    proof_file: Annotated[
-        str | None, options.file("--proof", "Write the proof (verified), for enumsol verify.")
-    ] = None,
-    graphml_file: Annotated[str | None, options.file("--graphml", "Write GraphML for other programs.")] = None,
+    csv_file: Annotated[str | None, csv("arc")] = None,
+    proof_file: Annotated[str | None, file("--proof", "Write the proof (verified), for enumsol verify.")] = None,
+    graphml_file: Annotated[str | None, file("--graphml", "Write GraphML for other programs.")] = None,
     plot_file: options.PlotFile = None,
     quantity: Annotated[
         options.Overview | None,
@@ -77,9 +66,6 @@ def graph(
     vertex); 3 if the graph is known to be incomplete; 2 on bad input; 130 on Ctrl-C, after printing the graph so far;
     74 if a result could not be written; 141 if the program that read it has ended.
     """
-    check_outputs(json=json_file, csv=csv_file)
-    check_named_files(save=save_file, graphml=graphml_file, proof=proof_file)
-    check_plot(plot_file)
     interval, body = parse_interval(first, last), load_problem(problem)
     chosen = None if nodes is None else [body.node_ids[node_row(body, label.strip())] for label in nodes.split(",")]
     drawn: dict[str, Any] = {
@@ -92,25 +78,76 @@ def graph(
         raise InvalidArgumentError(f"--nodes is given with --quantity {quantity}; expected a quantity of nodes")
     limits = {"max_nodes": max_nodes, "time_limit": time_limit}
     found, ended = so_far(lambda: build(body, interval, arithmetic, jobs, **limits))
-    deliver(
+    output.deliver(
         (proof_file, lambda path: write_proof(found, path)),
         (save_file, found.save),
         (graphml_file, found.write_graphml),
-        (plot_file, lambda path: write_figure(path, found.plot(**drawn))),
+        (plot_file, lambda path: output.write_figure(path, found.plot(**drawn))),
         json_file=json_file,
         csv_file=csv_file,
         text=lambda: graph_as_text(found),
         content=lambda: {"problem": problem, **as_content(found)},
         frame=found.to_frame,
     )
-    finish(ended, ExitStatus.INCOMPLETE if found.reasons else ExitStatus.DONE)
+    common.finish(ended, common.ExitStatus.INCOMPLETE if found.reasons else common.ExitStatus.DONE)
+
+
+def report(
+    problem: options.ProblemArgument,
+    first: options.FirstAlpha,
+    last: options.LastAlpha,
+    page_file: Annotated[
+        str,
+        typer.Option("--output", "-o", metavar="FILE", help="File of the page, .html.", rich_help_panel=options.OUTPUT),
+    ] = "report.html",
+    arithmetic: HowExact = "verified",
+    max_nodes: options.MaxNodes = None,
+    time_limit: options.TimeLimit = None,
+    jobs: options.Jobs = 1,
+    title: options.Title = None,
+    units: options.Units = None,
+    proof_file: Annotated[str | None, file("--proof", "Write the proof (verified), to pass on with the page.")] = None,
+    json_file: options.JsonFile = None,
+    quiet: options.Quiet = False,
+) -> None:
+    """Find all solutions of PROBLEM for every alpha of an interval, and write one HTML page about them.
+
+    The page needs no network. It shows an interactive diagram of the branches, the deformed body of every solution at
+    any alpha, tables of folds and transitions, what is certified, and how to check it. Prints what enumsol graph
+    prints.
+
+    Exit status: as enumsol graph. If the graph is not complete, the page is written all the same and says so.
+    """
+    if find_spec("plotly") is None:
+        raise MissingDependencyError.of("reports", "plotly", "report")
+    interval, body, names = parse_interval(first, last), load_problem(problem), units_of(problem, units)
+    limits = {"max_nodes": max_nodes, "time_limit": time_limit}
+    found, ended = so_far(lambda: build(body, interval, arithmetic, jobs, **limits))
+
+    def write(path: str) -> None:
+        from enumsol.report import write_report  # numpy: not for --help
+
+        # -1 would be read as an option
+        place = f"--from={shlex.quote(first)} --to={shlex.quote(last)}"
+        commands = output.checking_commands(found.proof is not None, problem, "graph", place, proof_file)
+        heading = title_of(problem, title)
+        write_report(found, path, title=heading, units=names, commands=commands, scene=common.scene_of(problem))
+
+    output.deliver(
+        (proof_file, lambda path: write_proof(found, path)),
+        (page_file, write),
+        json_file=json_file,
+        text=lambda: graph_as_text(found),
+        content=lambda: {"problem": problem, "report": page_file, **as_content(found)},
+    )
+    common.finish(ended, common.ExitStatus.INCOMPLETE if found.reasons else common.ExitStatus.DONE)
 
 
 def write_proof(found: BranchGraph, path: str) -> None:
     """Write the proof of a graph, or say why there is none."""
     if found.proof is None:
         why = "only verified arithmetic gives one" if found.arithmetic != "verified" else "this search gave none"
-        note(f"no proof was written, {why}")
+        common.note(f"no proof was written, {why}")
         return
     found.proof.save(path)
 
@@ -139,7 +176,7 @@ def build(
     """
     from enumsol.branches import branch_graph
 
-    with workers(jobs) as executor, Display("branch graph") as display:
+    with common.workers(jobs) as executor, Display("branch graph") as display:
 
         def progress(stage: str, share: float) -> None:
             display.show(share, *_STEPS[stage])

@@ -7,33 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from enumsol.cli.common import (
-    ExitStatus,
-    described,
-    finish,
-    load_problem,
-    scene_of,
-    so_far,
-    title_of,
-    units_of,
-    workers,
-)
-from enumsol.cli.options import (
-    OUTPUT,
-    PLOT,
-    Arithmetic,
-    JsonFile,
-    MaxNodes,
-    PlotFile,
-    ProblemArgument,
-    Quiet,
-    Units,
-    count,
-    csv,
-    file,
-    seconds,
-)
-from enumsol.cli.output import as_json, check_outputs, check_plot, check_writable, deliver, write_figure
+from enumsol.cli import common, options, output
+from enumsol.cli.options import axis, count, csv, file
 from enumsol.cli.progress import Display
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.messages import counted
@@ -46,7 +21,7 @@ Drawn = Literal["step", "alpha", "displacement", "lambda_n", "lambda_t", "dissip
 
 
 def history(
-    problem: ProblemArgument,
+    problem: options.ProblemArgument,
     steps: Annotated[
         str | None,
         typer.Option(
@@ -57,7 +32,7 @@ def history(
         ),
     ] = None,
     arithmetic: Annotated[
-        Arithmetic,
+        options.Arithmetic,
         typer.Option(
             help="verified: rigorous error bounds, with proof. fast: floats and a tolerance, never proven. "
             "exact: rationals throughout, for small problems in 2D."
@@ -76,26 +51,22 @@ def history(
         bool, typer.Option("--refine", help="Halve the increments until the statuses no longer change.")
     ] = False,
     max_branches: Annotated[int | None, count("Follow at most N different ends of a step.")] = None,
-    max_nodes: MaxNodes = None,
-    time_limit: Annotated[float | None, seconds("Stop after this time.")] = None,
-    jobs: Annotated[int, count("Number of processes that search.")] = 1,
+    max_nodes: options.MaxNodes = None,
+    time_limit: options.TimeLimit = None,
+    jobs: options.Jobs = 1,
     proof_file: Annotated[str | None, file("--proof", "Write one proof of the whole history (verified).")] = None,
     save: Annotated[str | None, file("--save", "Write the history for History.load.")] = None,
     report: Annotated[
         str | None, file("--report", "Write an HTML page with the tree, the figures and the bodies.")
     ] = None,
-    json_file: JsonFile = None,
+    json_file: options.JsonFile = None,
     csv_file: Annotated[str | None, csv("root")] = None,
-    plot: PlotFile = None,
-    x: Annotated[
-        Drawn, typer.Option("--x", help="Quantity on the horizontal axis.", rich_help_panel=PLOT)
-    ] = "displacement",
-    y: Annotated[Drawn, typer.Option("--y", help="Quantity on the vertical axis.", rich_help_panel=PLOT)] = "alpha",
-    units: Units = None,
-    title: Annotated[
-        str | None, typer.Option(metavar="TEXT", help="Heading of the page; default: PROBLEM.", rich_help_panel=OUTPUT)
-    ] = None,
-    quiet: Quiet = False,
+    plot: options.PlotFile = None,
+    x: Annotated[Drawn, axis("--x", "Quantity on the horizontal axis.")] = "displacement",
+    y: Annotated[Drawn, axis("--y", "Quantity on the vertical axis.")] = "alpha",
+    units: options.Units = None,
+    title: options.Title = None,
+    quiet: options.Quiet = False,
 ) -> None:
     """Find all histories of solutions of PROBLEM over a sequence of loads.
 
@@ -107,42 +78,36 @@ def history(
     Ctrl-C, after printing what was found so far; 74 if a result could not be written; 141 if the program that read it
     has ended.
     """
-    check_outputs(json=json_file, csv=csv_file)
-    check_plot(plot)
-    for option, path in (("--proof", proof_file), ("--save", save), ("--report", report)):
-        if path == "-":
-            raise InvalidArgumentError(f"{option} is -; expected the name of a file")
-        check_writable(path, option)
     if proof_file is not None and arithmetic != "verified":
         raise InvalidArgumentError(f"--proof is given with {arithmetic} arithmetic; expected verified")
-    given, names, body = _steps(problem, steps), units_of(problem, units), load_problem(problem)
+    given, names, body = _steps(problem, steps), common.units_of(problem, units), common.load_problem(problem)
     limits = {"max_branches": max_branches, "max_nodes": max_nodes, "time_limit": time_limit}
     options = {"arithmetic": arithmetic, "follow": follow, "merge": merge, "refine": refine, **limits}
-    found, ended = so_far(lambda: _search(body, given, jobs, options))
+    found, ended = common.so_far(lambda: _search(body, given, jobs, options))
 
     def write_page(path: str) -> None:
         from enumsol.report import write_report  # numpy: not for --help
 
-        write_report(found, path, title=title_of(problem, title), units=names, scene=scene_of(problem))
+        write_report(found, path, title=common.title_of(problem, title), units=names, scene=common.scene_of(problem))
 
-    deliver(
+    output.deliver(
         (proof_file, lambda path: _write_proof(found, path)),
         (save, found.save),
         (report, write_page),
-        (plot, lambda path: write_figure(path, found.plot(x, y, units=names))),
+        (plot, lambda path: output.write_figure(path, found.plot(x, y, units=names))),
         json_file=json_file,
         csv_file=csv_file,
         text=lambda: found.text(names),
-        content=lambda: as_json({"problem": problem, **_content(found)}),
+        content=lambda: {"problem": problem, **_content(found)},
         frame=found.to_frame,
     )
-    finish(ended, ExitStatus.INCOMPLETE if found.reasons else ExitStatus.DONE)
+    common.finish(ended, common.ExitStatus.INCOMPLETE if found.reasons else common.ExitStatus.DONE)
 
 
 def _search(problem: Any, steps: Any, jobs: int, options: dict[str, Any]) -> History:
     from enumsol.loading.growing import histories  # numpy and scipy: not for --help
 
-    with workers(jobs) as executor, _HistoryDisplay() as display:
+    with common.workers(jobs) as executor, _HistoryDisplay() as display:
         return histories(problem, steps, executor=executor, progress=display, **options)
 
 
@@ -174,7 +139,7 @@ def _steps(problem: str, steps: str | None) -> Any:
         if Path(steps).suffix.lower() == ".csv" or Path(steps).is_file():
             return read_steps(steps)
         return [part.strip() for part in steps.split(",")]
-    said = described(problem).get("steps")
+    said = common.described(problem).get("steps")
     if said is None:
         raise InvalidArgumentError(
             "--steps is missing; expected a CSV file, a list of alphas, or steps in a .toml file"
@@ -206,12 +171,9 @@ def _content(found: History) -> dict[str, Any]:
     return {
         "arithmetic": found.arithmetic,
         "steps": [repr(step) for step in found.steps],
-        "complete": found.complete,
-        "unique_until": found.unique_until,
+        **output.taken(found, "complete", "unique_until"),
         "histories": found.counts,
-        "branchings": found.branchings,
-        "ends": found.ends,
-        "reasons": found.reasons,
+        **output.taken(found, "branchings", "ends", "reasons"),
         "increments": None if found.refinement is None else str(found.refinement),
         "roots": found.to_frame().to_dict(orient="records"),
     }

@@ -45,6 +45,11 @@ def node(name: str, metavar: str, text: str) -> Any:
     return typer.Option(name, metavar=metavar, help=text, rich_help_panel=PLOT)
 
 
+def axis(name: str, text: str) -> Any:
+    """An option that takes what an axis of a figure shows."""
+    return typer.Option(name, help=text, rich_help_panel=PLOT)
+
+
 def csv(text: str) -> Any:
     """The option --csv; ``text`` says what there is one row per, and what the file is for."""
     return file("--csv", f"Write a table with one row per {text}; - is stdout.")
@@ -118,6 +123,9 @@ Units = Annotated[
     typer.Option(
         metavar="FORCE,LENGTH", help="Units of what is printed and drawn, such as N,mm.", rich_help_panel=OUTPUT
     ),
+]
+Title = Annotated[
+    str | None, typer.Option(metavar="TEXT", help="Heading of the page; default: PROBLEM.", rich_help_panel=OUTPUT)
 ]
 PlotFile = Annotated[str | None, file("--plot", "Draw a figure: .png, .pdf, .svg.", PLOT)]
 Overview = Literal["norm", "sum_n", "sum_t", "lambda_n", "lambda_t", "u_n", "u_t"]

@@ -1,17 +1,18 @@
 """Results on stdout and in files: texts, JSON, figures.
 
-What is wrong with an option is said before a long search; what cannot be written after it is an OutputError, and keeps
-no other result from being written.
+What cannot be written after a search is an OutputError, and keeps no other result from being written; what is wrong
+with the name of a file is said before (`enumsol.cli.files`).
 """
 
 from __future__ import annotations
 
 import json
 import math
-import os
 import shlex
 import sys
+from collections.abc import Mapping
 from dataclasses import fields
+from enum import Enum
 from fractions import Fraction
 from importlib.util import find_spec
 from pathlib import Path
@@ -32,27 +33,6 @@ if TYPE_CHECKING:
 
     #: Where a result goes, None where it is not asked for, and what writes it there.
     Output = tuple[str | None, Callable[[str], object]]
-
-
-def check_writable(path: str | None, option: str) -> None:
-    """Refuse a place that cannot be written before a long search rather than after it.
-
-    Raises
-    ------
-    InvalidArgumentError
-        It is a directory, or its directory does not exist or may not be written to.
-    """
-    if path is None or path == "-":
-        return
-    place = Path(path)
-    if os.path.isdir(place):
-        raise InvalidArgumentError(
-            f"{option} is {path}, a directory; expected the name of a file, or - for the terminal"
-        )
-    if not os.path.isdir(place.parent) or not os.access(place if os.path.exists(place) else place.parent, os.W_OK):
-        raise InvalidArgumentError(
-            f"{option} is {path}, which cannot be written; expected a file in a writable directory"
-        )
 
 
 def write_text(path: str, text: str) -> None:
@@ -113,56 +93,6 @@ def _csv(frame: Callable[[], pd.DataFrame] | None) -> str:
     return "" if frame is None else frame().to_csv(index=False)
 
 
-def check_outputs(**paths: str | None) -> None:
-    """Refuse results that cannot be written, or two results on stdout; named as their options are.
-
-    Raises
-    ------
-    InvalidArgumentError
-        As `check_writable`, or two of them are ``-``.
-    """
-    on_stdout = [f"--{name}" for name, path in paths.items() if path == "-"]
-    if len(on_stdout) > 1:
-        raise InvalidArgumentError(f"{' and '.join(on_stdout)} are both -; expected one of them to be a file")
-    for name, path in paths.items():
-        check_writable(path, f"--{name}")
-
-
-def check_named_files(kind: str = "", **paths: str | None) -> None:
-    """Refuse results that cannot be written or cannot go to stdout (``kind`` says why); named as their options are.
-
-    Raises
-    ------
-    InvalidArgumentError
-        As `check_writable`, or one is ``-``.
-    """
-    for name, path in paths.items():
-        if path == "-":
-            raise InvalidArgumentError(f"--{name} is -{kind}; expected the name of a file")
-        check_writable(path, f"--{name}")
-
-
-def check_vtu(path: str | None) -> None:
-    """Refuse files for ParaView that cannot be written before the search rather than after it.
-
-    Raises
-    ------
-    MissingDependencyError
-        meshio is not installed.
-    InvalidArgumentError
-        The file cannot be written, or its name does not end in .vtu.
-    """
-    if path is None:
-        return
-    if path != "-" and not path.endswith(".vtu"):
-        raise InvalidArgumentError(f"--vtu is {path!r}; expected a name that ends in .vtu")
-    check_named_files(", but it is a binary file", vtu=path)
-    if find_spec("meshio") is None:
-        raise MissingDependencyError(
-            '--vtu needs meshio, which is not installed; install it with: pip install "enumsol[meshes]"'
-        )
-
-
 def check_places(path: str | None, problem: AnyProblem, name: str) -> None:
     """Refuse files for ParaView of a problem that has no places, before the search.
 
@@ -185,31 +115,6 @@ def check_scripts(path: str | None, problem: AnyProblem) -> None:
     """
     if path is not None and not hasattr(problem, "Bt") and find_spec("plotly") is None:
         raise MissingDependencyError.of("reports", "plotly", "report")
-
-
-def check_plot(path: str | None) -> None:
-    """Refuse a figure that cannot be drawn before the search rather than after it.
-
-    Raises
-    ------
-    MissingDependencyError
-        matplotlib is not installed.
-    InvalidArgumentError
-        The file cannot be written, or its name has an ending for which there is no format.
-    """
-    if path is None:
-        return
-    if find_spec("matplotlib") is None:
-        raise MissingDependencyError(
-            '--plot needs matplotlib, which is not installed; install it with: pip install "enumsol[plots]"'
-        )
-    check_named_files(", but a figure is a binary file", plot=path)
-    from matplotlib.backend_bases import FigureCanvasBase
-
-    known = FigureCanvasBase.get_supported_filetypes()
-    ending = Path(path).suffix.removeprefix(".").lower()
-    if ending not in known:
-        raise InvalidArgumentError(f"--plot is {path}; expected a file name that ends in .png, .pdf or .svg")
 
 
 def checking_commands(proven: bool, source: str | None, command: str, place: str, proof: str | None) -> list[str]:
@@ -238,16 +143,25 @@ def write_figure(path: str, figure: Any) -> None:
 
 
 def as_json(content: Any) -> str:
-    """JSON text of dictionaries, sequences, arrays and numbers; what is not finite is null. A text is JSON already."""
+    """JSON text of what `plain` takes; what is not finite is null. A text is JSON already."""
     return content if isinstance(content, str) else json.dumps(plain(content), indent=1)
 
 
+def taken(of: Any, *names: str) -> dict[str, Any]:
+    """Attributes of a result by their names, for JSON."""
+    return {name: getattr(of, name) for name in names}
+
+
 def plain(value: Any) -> Any:
-    """Dictionaries, lists and numbers that JSON can hold, as in `as_json`."""
-    if isinstance(value, dict):
+    """What JSON can hold, of mappings, sequences, sets, arrays, numbers and members of enumerations."""
+    if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
         return [plain(item) for item in value]
+    if isinstance(value, frozenset):
+        return sorted(plain(item) for item in value)
+    if isinstance(value, Enum):
+        return value.value
     if isinstance(value, Fraction):
         return plain(float(value))
     if hasattr(value, "tolist"):  # arrays and numbers of numpy, which is not imported for --help

@@ -6,19 +6,21 @@ import json
 import math
 from typing import TYPE_CHECKING, Any
 
-from enumsol.cli.output import plain
+from enumsol.cli.output import plain, taken
 from enumsol.support.messages import visible
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from enumsol.roots.root import Enclosure, Root, RootFamily
+    from enumsol.roots.mirrored import MirrorImages
+    from enumsol.roots.root import Root, RootFamily
     from enumsol.roots.root_set import RootSet, Undecided
     from enumsol.support.array_types import Floats
 
 #: The table over contact nodes is printed when it has at most so many rows.
 _ROWS = 24
 _STATS = ("nodes", "pruned", "selections", "qps", "fallback_qps", "closed", "seconds", "resumed", "held", "held_open")
+_VALUES = ("lambda_n", "lambda_t", "u_n", "u_t")
 
 
 def roots_as_text(found: RootSet) -> str:
@@ -72,28 +74,24 @@ def uniqueness(found: RootSet) -> str:
 
 def roots_as_json(found: RootSet, problem: str) -> str:
     """The whole result; numbers read back as the same float64, what is not finite is null."""
-    stats = found.stats
+    bound, images = found.rigid_bound, found.mirror_images
     content = {
         "problem": problem,
         "alpha": float(found.alpha),
         "alpha_text": str(found.alpha),
-        "arithmetic": found.arithmetic,
-        "method": found.method,
-        "complete": found.complete,
+        **taken(found, "arithmetic", "method", "complete"),
         "certified_data": found.certified_data if found.complete else None,
         "completeness": found.closing_line,
-        "unique": found.unique,
-        "by_one_certificate": found.by_one_certificate,
-        "stopped": found.stopped,
-        "notes": list(found.notes),
-        "index_sum": found.index_sum,
-        **_rigid_bound(found),
-        "node_ids": list(found.node_ids),
-        **_mirror(found),
-        "roots": [_root(root) | _image(found, k) for k, root in enumerate(found)],
+        **taken(found, "unique", "by_one_certificate", "stopped", "notes", "index_sum"),
+        **({} if bound is None else {"max_rigid_displacement": bound.largest, "bound_needed": bound.needed}),
+        "node_ids": found.node_ids,
+        **({} if images is None else {"mirror": _mirror(images)}),
+        "roots": [
+            _root(root) | ({} if images is None else {"mirror_image": images.images[k]}) for k, root in enumerate(found)
+        ],
         "families": [_family(family) for family in found.families],
         "undecided": [_undecided(item) for item in found.undecided],
-        "stats": {name: getattr(stats, name) for name in _STATS},
+        "stats": taken(found.stats, *_STATS),
     }
     return "{\n" + ",\n".join(f"{json.dumps(key)}: {_lines(value)}" for key, value in plain(content).items()) + "\n}"
 
@@ -105,60 +103,38 @@ def _lines(value: Any) -> str:
     return json.dumps(value, default=str)
 
 
-def _root(root: Root) -> dict[str, Any]:
+def _mirror(images: MirrorImages) -> dict[str, Any]:
+    """What is known of the symmetry of the problem, after --mirror."""
+    asymmetry = images.asymmetry
     return {
-        "statuses": [status.value for status in root.statuses],
-        "active": [sorted(status.value for status in holds) for holds in root.active],
-        **_fields(root),
-        "enclosure": None if root.enclosure is None else _fields(root.enclosure),
-        "index": root.index,
-        "regular": root.regular,
-        "margin": root.margin,
-        **(_in_space(root) if root.lambda_t.ndim == 2 else _in_plane(root)),
+        "asymmetry": asymmetry.bound,
+        **taken(asymmetry, "proven", "differs"),
+        **taken(images, "missing", "ambiguous"),
     }
 
 
-def _rigid_bound(found: RootSet) -> dict[str, Any]:
-    """Bound of the rigid displacements within which solutions were sought, for a body that nothing holds."""
-    bound = found.rigid_bound
-    return {} if bound is None else {"max_rigid_displacement": bound.largest, "bound_needed": bound.needed}
-
-
-def _mirror(found: RootSet) -> dict[str, Any]:
-    """What is known of the symmetry of the problem, after --mirror."""
-    images = found.mirror_images
-    if images is None:
-        return {}
-    asymmetry = images.asymmetry
-    content = {"asymmetry": asymmetry.bound, "proven": asymmetry.proven, "differs": asymmetry.differs}
-    return {"mirror": content | {"missing": list(images.missing), "ambiguous": list(images.ambiguous)}}
-
-
-def _image(found: RootSet, k: int) -> dict[str, Any]:
-    return {} if found.mirror_images is None else {"mirror_image": found.mirror_images.images[k]}
-
-
-def _in_plane(root: Root) -> dict[str, Any]:
-    if root.rigid_coordinates is not None:
-        return {"rigid_coordinates": root.rigid_coordinates, "rigid_displacement": root.rigid_displacement}
-    return {"condition": root.condition, "dlambda_dalpha": root.dlambda_dalpha}
-
-
-def _in_space(root: Any) -> dict[str, Any]:
-    angles = {"slip_angle": _angles(root.slip_angle)}
-    return angles if root.rigid_coordinates is not None else {**angles, "dlambda_dalpha": root.dlambda_dalpha}
+def _root(root: Root) -> dict[str, Any]:
+    if root.lambda_t.ndim == 2:
+        more = {"slip_angle": _angles(root.slip_angle)}
+        more |= {} if root.rigid_coordinates is not None else taken(root, "dlambda_dalpha")
+    elif root.rigid_coordinates is not None:
+        more = taken(root, "rigid_coordinates", "rigid_displacement")
+    else:
+        more = taken(root, "condition", "dlambda_dalpha")
+    return {
+        **taken(root, "statuses", "active", *_VALUES),
+        "enclosure": None if root.enclosure is None else taken(root.enclosure, *_VALUES),
+        **taken(root, "index", "regular", "margin"),
+        **more,
+    }
 
 
 def _undecided(item: Undecided) -> dict[str, Any]:
-    content = {"statuses": [_status(s) for s in item.statuses], "reason": item.reason, "hint": item.hint}
+    content = taken(item, "statuses", "reason", "hint")
     if item.slip_angle is None:
         return content
-    bounds = None if item.bounds is None else _fields(item.bounds)
+    bounds = None if item.bounds is None else taken(item.bounds, *_VALUES)
     return {**content, "leaves": item.leaves, "slip_angle": _angles(item.slip_angle), "bounds": bounds}
-
-
-def _fields(of: Root | Enclosure) -> dict[str, Any]:
-    return {name: getattr(of, name) for name in ("lambda_n", "lambda_t", "u_n", "u_t")}
 
 
 def _angles(angles: Any) -> list[list[float] | None]:
@@ -166,21 +142,9 @@ def _angles(angles: Any) -> list[list[float] | None]:
 
 
 def _family(family: RootFamily) -> dict[str, Any]:
-    return {
-        "index": family.index,
-        "dimension": family.dimension,
-        "vertices_proven": family.vertices_proven,
-        "polytopes": [
-            {
-                "statuses": [status.value for status in part.statuses],
-                "dimension": part.dimension,
-                "vertices": part.vertices,
-                **({} if part.rigid_coordinates is None else {"rigid_coordinates": part.rigid_coordinates}),
-            }
-            for part in family.polytopes
-        ],
-    }
-
-
-def _status(status: Any) -> str | None:
-    return status if status is None or isinstance(status, str) else str(status.value)
+    parts = [
+        taken(part, "statuses", "dimension", "vertices")
+        | ({} if part.rigid_coordinates is None else taken(part, "rigid_coordinates"))
+        for part in family.polytopes
+    ]
+    return {**taken(family, "index", "dimension", "vertices_proven"), "polytopes": parts}

@@ -97,22 +97,17 @@ class Search:
         return [field.replace(kind=Parameter.KEYWORD_ONLY) for field in fields if field.name not in without]
 
     def check(self) -> None:
-        """Refuse options that contradict each other, and results that cannot be written.
+        """Refuse options that contradict each other, and a proof to resume from that is not named.
 
         Raises
         ------
-        InvalidArgumentError, MissingDependencyError
-            As `check_outputs` and `check_vtu`, the proof is to go to stdout, or there is none to resume; or options
-            contradict each other.
+        InvalidArgumentError
+            They do.
         """
         if self.jobs > 1 and self.method != "tree":
             raise InvalidArgumentError(
                 f"--jobs is {self.jobs} with the exhaustive method; expected 1 job, or the method tree"
             )
-        output.check_outputs(json=self.json_file, csv=self.csv_file)
-        output.check_named_files(", but a proof is a binary file", proof=self.proof_file)
-        output.check_vtu(self.vtu_file)
-        output.check_named_files(report=self.report_file)
         if self.resume and self.proof_file is None:
             raise InvalidArgumentError(
                 "--resume is given without --proof; expected the file of the proof to resume from"

@@ -9,7 +9,7 @@ import typer
 
 from enumsol.cli.common import GALLERY, TOML, note, parse_alpha, refuse_misspelt, units_of
 from enumsol.cli.options import LIMITS, OUTPUT, Quiet, file, with_options
-from enumsol.cli.output import check_plot, deliver, write_figure
+from enumsol.cli.output import deliver, write_figure
 from enumsol.cli.progress import Display
 from enumsol.cli.roots import Search
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
@@ -24,20 +24,50 @@ _BODY, _SUPPORT, _LOAD = "Body and contact", "Supports", "Loads"
 
 
 class Given(NamedTuple):
-    """How an option of `fem.mesh_problem` is given on the command line.
+    """An option of `fem.mesh_problem` on the command line.
 
     Attributes
     ----------
-    panel, metavar, help : in the help
-    read : function of the text, or of the texts, and the option's name
-    repeated : whether it may be given several times; then ``read`` takes a list
+    panel, metavar, help : in the help; a metavar that begins with NAME= or [NAME=] is of values by parts of the body
+    read : function of the text of a value and the option's name
+    repeated : whether it may be given several times
     """
 
     panel: str
     metavar: str
     help: str
-    read: Callable[[Any, str], Any]
-    repeated: bool = False
+    read: Callable[[str, str], Any]
+    repeated: bool = True
+
+    def value(self, given: Any, option: str) -> Any:
+        """The option's value, of its text or, if it may be repeated, of its texts."""
+        if not self.repeated:
+            return self.read(given, option)
+        if self.metavar.startswith("NAME=") or (self.metavar.startswith("[NAME=]") and "=" in "".join(given)):
+            return _by_part(given, option, self.read)
+        if not self.metavar.startswith("[NAME=]"):
+            return [self.read(text, option) for text in given]
+        if len(given) > 1:
+            raise InvalidArgumentError(f"{option} is given {len(given)} times; expected one value, or NAME=VALUE each")
+        return self.read(given[0], option)
+
+
+def _by_part(texts: list[str], option: str, read: Callable[[str, str], Any]) -> dict[str, Any]:
+    """Values by the names of parts, of texts NAME=VALUE."""
+    found: dict[str, Any] = {}
+    for text in texts:
+        name, sign, value = text.rpartition("=")
+        if not sign or not name:
+            raise InvalidArgumentError(f"{option} is {text}; expected NAME=NUMBERS")
+        if name in found:
+            raise InvalidArgumentError(f"{option} is given twice for {name}; expected it once")
+        found[name] = read(value, option)
+    return found
+
+
+def _as_given(text: str, option: str) -> str:
+    del option
+    return text
 
 
 def _entry(part: str, option: str, text: str) -> Any:
@@ -47,11 +77,6 @@ def _entry(part: str, option: str, text: str) -> Any:
         return float(part)
     except ValueError:
         raise InvalidArgumentError(f"{option} is {text}; expected numbers such as 0.5, with commas between") from None
-
-
-def _as_given(value: Any, option: str) -> Any:
-    del option
-    return value
 
 
 def _number(text: str, option: str) -> Any:
@@ -77,128 +102,60 @@ def _plane(text: str, option: str) -> str:
     return text
 
 
-def _by_part(texts: list[str], option: str, read: Callable[[str, str], Any] = _numbers) -> dict[str, Any]:
-    """Values by the names of parts, of texts NAME=VALUES."""
-    found: dict[str, Any] = {}
-    for text in texts:
-        name, sign, numbers = text.rpartition("=")
-        if not sign or not name:
-            raise InvalidArgumentError(f"{option} is {text}; expected NAME=NUMBERS")
-        if name in found:
-            raise InvalidArgumentError(f"{option} is given twice for {name}; expected it once")
-        found[name] = read(numbers, option)
-    return found
-
-
-def _number_by_part(texts: list[str], option: str) -> dict[str, Any]:
-    return _by_part(texts, option, _number)
-
-
-def _pairs(texts: list[str], option: str) -> list[list[Any]]:
-    """Pairs of texts UPPER:LOWER or UPPER:LOWER:GAP."""
-    pairs: list[list[Any]] = []
-    for text in texts:
-        names = text.split(":")
-        if len(names) not in (2, 3):
-            raise InvalidArgumentError(f"{option} is {text}; expected NAME:NAME, or NAME:NAME:GAP")
-        pairs.append([*names[:2], *(_entry(gap, option, text) for gap in names[2:])])
-    return pairs
-
-
-def _each(read: Callable[[str, str], Any]) -> Callable[[list[str], str], Any]:
-    """Reads one value, or values by the names of parts, of texts NAME=VALUE."""
-
-    def of_texts(texts: list[str], option: str) -> Any:
-        if any("=" in text for text in texts):
-            return _by_part(texts, option, read)
-        if len(texts) > 1:
-            raise InvalidArgumentError(f"{option} is given {len(texts)} times; expected one value, or NAME=VALUE each")
-        return read(texts[0], option)
-
-    return of_texts
+def _pair(text: str, option: str) -> list[Any]:
+    names = text.split(":")
+    if len(names) not in (2, 3):
+        raise InvalidArgumentError(f"{option} is {text}; expected NAME:NAME, or NAME:NAME:GAP")
+    return [*names[:2], *(_entry(gap, option, text) for gap in names[2:])]
 
 
 def _obstacle(text: str, option: str) -> dict[str, Any]:
-    return _by_part([text], option)
+    return _by_part([text], option, _numbers)
 
 
 _FORCE = "Force per area (in 2D per length and unit thickness)."
+_TIMES_ALPHA = "The same, times alpha."
 _PULL = "NAME=fx,fy[,fz]"
+_PAIR = "Parts of two bodies that may touch, first the one whose nodes are the contact nodes; may be repeated."
+_PLANES = "In 2D, plane strain or plane stress; default: strain, but for files of elements of plane stress."
+_THICKNESS = "In 2D, thickness; by default all forces are per unit thickness."
+_FRICTION = "Coefficient of friction, by contact parts (in 3D also F1,F2); without it and --friction-slope it is alpha."
+_GAP = "Initial gap, by contact parts; negative is a press fit."
+_OBSTACLE = (
+    "plane=x,y,nx,ny (normal towards the body), circle=x,y,r, hole=x,y,r; in 3D plane=x,y,z,nx,ny,nz, "
+    "sphere=x,y,z,r, hole=x,y,z,r. Default: the contact part itself, moved by the gap."
+)
+_GROUPS = "Name of the cell data that groups the facets, for a file without names of parts."
+_PRESCRIBED = "Prescribed displacements; `free` for a component that is not prescribed."
+_SPRING = "Springs per area, along the normal and along the tangents."
+_RIGID = "Let bodies that only contact holds move as a whole, by at most this length; auto: 10 times the mesh's size."
+_WEIGHT = "Force per volume, such as the weight, by parts of the body."
 #: By their names in `fem.mesh_problem`.
 MESH_OPTIONS = {
-    "contact": Given(_BODY, "NAME", "Part of the boundary in contact; may be repeated.", _as_given, True),
-    "pairs": Given(
-        _BODY,
-        "NAME:NAME[:GAP]",
-        "Parts of two bodies that may touch, first the one whose nodes are the contact nodes; may be repeated.",
-        _pairs,
-        True,
-    ),
-    "young": Given(
-        _BODY, "[NAME=]E", "Young's modulus [force / length^2], by parts of the body.", _each(_number), True
-    ),
-    "poisson": Given(_BODY, "[NAME=]NU", "Poisson's ratio, by parts of the body.", _each(_number), True),
-    "plane": Given(
-        _BODY,
-        "[NAME=]strain|stress",
-        "In 2D, plane strain or plane stress; default: strain, but for files of elements of plane stress.",
-        _each(_plane),
-        True,
-    ),
-    "thickness": Given(
-        _BODY, "[NAME=]LENGTH", "In 2D, thickness; by default all forces are per unit thickness.", _each(_number), True
-    ),
-    "friction": Given(
-        _BODY,
-        "[NAME=]F",
-        "Coefficient of friction, by contact parts (in 3D also F1,F2); without it and --friction-slope it is alpha.",
-        _each(_one_or_two),
-        True,
-    ),
-    "friction_slope": Given(_BODY, "[NAME=]F", "The same, times alpha.", _each(_one_or_two), True),
-    "friction2": Given(
-        _BODY, "[NAME=]F", "In 3D, coefficient of friction along the second axis.", _each(_one_or_two), True
-    ),
-    "friction2_slope": Given(_BODY, "[NAME=]F", "The same, times alpha.", _each(_number), True),
-    "axis": Given(_BODY, "x,y,z", "In 3D, direction of the first axis of friction.", _numbers),
-    "gap": Given(
-        _BODY, "[NAME=]LENGTH", "Initial gap, by contact parts; negative is a press fit.", _each(_number), True
-    ),
-    "obstacle": Given(
-        _BODY,
-        "KIND=NUMBERS",
-        "plane=x,y,nx,ny (normal towards the body), circle=x,y,r, hole=x,y,r; in 3D plane=x,y,z,nx,ny,nz, "
-        "sphere=x,y,z,r, hole=x,y,z,r. Default: the contact part itself, moved by the gap.",
-        _obstacle,
-    ),
-    "groups": Given(
-        _BODY, "NAME", "Name of the cell data that groups the facets, for a file without names of parts.", _as_given
-    ),
-    "clamp": Given(_SUPPORT, "NAME", "Part that is held; may be repeated.", _as_given, True),
-    "symmetry": Given(_SUPPORT, "NAME", "Part on a plane of symmetry, or on rollers.", _as_given, True),
-    "displacement": Given(
-        _SUPPORT,
-        "NAME=ux,uy[,uz]",
-        "Prescribed displacements; `free` for a component that is not prescribed.",
-        _by_part,
-        True,
-    ),
-    "spring": Given(
-        _SUPPORT, "NAME=kn,kt", "Springs per area, along the normal and along the tangents.", _by_part, True
-    ),
-    "max_rigid_displacement": Given(
-        _SUPPORT,
-        "LENGTH|auto",
-        "Let bodies that only contact holds move as a whole, by at most this length; auto: 10 times the mesh's size.",
-        _auto_or_number,
-    ),
-    "load": Given(_LOAD, _PULL, _FORCE, _by_part, True),
-    "load_slope": Given(_LOAD, _PULL, "The same, times alpha.", _by_part, True),
-    "pressure": Given(_LOAD, "NAME=P", "Force per area into the body.", _number_by_part, True),
-    "pressure_slope": Given(_LOAD, "NAME=P", "The same, times alpha.", _number_by_part, True),
-    "body_force": Given(
-        _LOAD, "[NAME=]fx,fy[,fz]", "Force per volume, such as the weight, by parts of the body.", _each(_numbers), True
-    ),
+    "contact": Given(_BODY, "NAME", "Part of the boundary in contact; may be repeated.", _as_given),
+    "pairs": Given(_BODY, "NAME:NAME[:GAP]", _PAIR, _pair),
+    "young": Given(_BODY, "[NAME=]E", "Young's modulus [force / length^2], by parts of the body.", _number),
+    "poisson": Given(_BODY, "[NAME=]NU", "Poisson's ratio, by parts of the body.", _number),
+    "plane": Given(_BODY, "[NAME=]strain|stress", _PLANES, _plane),
+    "thickness": Given(_BODY, "[NAME=]LENGTH", _THICKNESS, _number),
+    "friction": Given(_BODY, "[NAME=]F", _FRICTION, _one_or_two),
+    "friction_slope": Given(_BODY, "[NAME=]F", _TIMES_ALPHA, _one_or_two),
+    "friction2": Given(_BODY, "[NAME=]F", "In 3D, coefficient of friction along the second axis.", _one_or_two),
+    "friction2_slope": Given(_BODY, "[NAME=]F", _TIMES_ALPHA, _number),
+    "axis": Given(_BODY, "x,y,z", "In 3D, direction of the first axis of friction.", _numbers, False),
+    "gap": Given(_BODY, "[NAME=]LENGTH", _GAP, _number),
+    "obstacle": Given(_BODY, "KIND=NUMBERS", _OBSTACLE, _obstacle, False),
+    "groups": Given(_BODY, "NAME", _GROUPS, _as_given, False),
+    "clamp": Given(_SUPPORT, "NAME", "Part that is held; may be repeated.", _as_given),
+    "symmetry": Given(_SUPPORT, "NAME", "Part on a plane of symmetry, or on rollers.", _as_given),
+    "displacement": Given(_SUPPORT, "NAME=ux,uy[,uz]", _PRESCRIBED, _numbers),
+    "spring": Given(_SUPPORT, "NAME=kn,kt", _SPRING, _numbers),
+    "max_rigid_displacement": Given(_SUPPORT, "LENGTH|auto", _RIGID, _auto_or_number, False),
+    "load": Given(_LOAD, _PULL, _FORCE, _numbers),
+    "load_slope": Given(_LOAD, _PULL, _TIMES_ALPHA, _numbers),
+    "pressure": Given(_LOAD, "NAME=P", "Force per area into the body.", _number),
+    "pressure_slope": Given(_LOAD, "NAME=P", _TIMES_ALPHA, _number),
+    "body_force": Given(_LOAD, "[NAME=]fx,fy[,fz]", _WEIGHT, _numbers),
 }
 
 
@@ -281,12 +238,11 @@ def solve(
     Exit status: as enumsol roots.
     """
     texts = {name: options.pop(name) for name in MESH_OPTIONS}
-    given = {name: MESH_OPTIONS[name].read(text, _flags(name)[0]) for name, text in texts.items() if text is not None}
+    given = {name: MESH_OPTIONS[name].value(text, _flags(name)[0]) for name, text in texts.items() if text is not None}
     alpha = options.pop("alpha")
     search = Search(**options)
     search.check()
     value = None if alpha is None else parse_alpha(alpha)
-    check_plot(plot)
     units = units_of(mesh, search.units)
     with Display("reading the mesh"):
         scene = _scene(mesh, given)

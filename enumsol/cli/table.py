@@ -8,7 +8,7 @@ import typer
 
 from enumsol.cli.common import ExitStatus, finish, load_problem, parse_alpha, parse_interval, so_far, workers
 from enumsol.cli.options import Arithmetic, JsonFile, ProblemArgument, Quiet, count, csv, number, seconds
-from enumsol.cli.output import check_outputs, deliver
+from enumsol.cli.output import deliver
 from enumsol.cli.progress import Display
 from enumsol.errors import EnumsolError, InvalidArgumentError
 
@@ -65,7 +65,6 @@ def table(
     somewhere; 2 on bad input; 130 on Ctrl-C, after printing what was done so far; 74 if a result could not be written;
     141 if the program that read it has ended.
     """
-    check_outputs(json=json_file, csv=csv_file)
     values, body = _alphas(first, last, samples, alphas), load_problem(problem)
     limits = {"max_nodes": max_nodes, "time_limit": time_limit}
     options = {name: limit for name, limit in limits.items() if limit is not None}

@@ -9,7 +9,7 @@ import typer
 
 from enumsol.cli.common import ExitStatus, load_problem
 from enumsol.cli.options import JsonFile, ProblemArgument, Quiet
-from enumsol.cli.output import check_outputs, deliver
+from enumsol.cli.output import deliver
 from enumsol.cli.progress import Display
 
 if TYPE_CHECKING:
@@ -49,7 +49,6 @@ def verify(
     from enumsol.checker.verify import verify as check
     from enumsol.proof.proof_file import Proof
 
-    check_outputs(json=json_file)
     body = load_problem(problem)
     with Display("checking", _STEPS):
         report = check(body, Proof.load(proof))

@@ -74,7 +74,7 @@ class CondensableData(Protocol):
 
     @property
     def rigid_reach(self) -> float:
-        """How far the body may move as a whole [length]."""
+        """Bound of the rigid displacement [length]."""
 
     def load_at(self, alpha: AlphaLike) -> Floats:
         """f(alpha), shape (n,)."""

@@ -161,7 +161,7 @@ class CondensedEnclosure(Sealed):
         return EnclosedSystem(S, S_rad, g, g_rad, F, F_rad, rows=RigidRows.of(self.problem, a, force, length))
 
     def constant_load(self, side: float) -> CondensedEnclosure:
-        """The same with g = side g1 at every alpha, ``side`` 1 or -1: what solutions are beside a zero of g."""
+        """Enclosure with g = side g1 at every alpha, ``side`` 1 or -1: what solutions are beside a zero of g."""
         none = np.zeros_like(self.g1)
         return replace(self, g0=side * self.g1, g0_rad=self.g1_rad, g1=none, g1_rad=none)
 
@@ -335,7 +335,7 @@ class RigidRows:
         return cls(Ball.exact(np.zeros((0, size))), Ball.exact(nothing), Ball.exact(nothing), nothing, nothing)
 
     @classmethod
-    def of(cls, problem: Any, alpha: Fraction, force: Floats, length: Floats) -> RigidRows:
+    def of(cls, problem: object, alpha: Fraction, force: Floats, length: Floats) -> RigidRows:
         """Rows of a problem at one alpha, enclosed; errors as ``along``."""
         rows = cls.along(problem, force, length)
         if not np.any(rows.slope.size):
@@ -458,7 +458,7 @@ class EnclosedSystem:
         return self.rows.unit
 
     def reaching(self, reach: Floats) -> Self:
-        """The same with other bounds of the rigid displacement."""
+        """System with other bounds of the rigid displacement."""
         return replace(self, rows=replace(self.rows, reach=reach))
 
     @property

@@ -24,7 +24,7 @@ from enumsol.support.deadlines import look, tell
 FAST_EXACT_DOF = 24
 
 
-def check_definite(S: Any) -> None:
+def check_definite(S: object) -> None:
     """Nothing; refuses an S, an fmpq_mat, that is not positive definite: no bound on the energy holds.
 
     Raises
@@ -76,7 +76,7 @@ class ExactSystem:
         return fmpq_mat([row[:size] for row in self.S.tolist()[:size]])
 
     def along(self, direction: tuple[Any, ...]) -> ExactSystem:
-        """What changes with g along a direction: neither h nor the bounds of a rigid displacement."""
+        """System of what changes with g along a direction: neither h nor the bounds of a rigid displacement."""
         zeros = (fmpq(0),) * len(self.reach)
         return ExactSystem(self.S, (*direction[: 2 * self.p], *zeros), self.F, zeros)
 
@@ -250,7 +250,7 @@ class ExactCondensed:
 
     @classmethod
     def beside_zero(cls, problem: ProblemData, zero: Fraction | None) -> ExactCondensed:
-        """The same where ``zero`` is known already, or not asked for."""
+        """Condensation where ``zero`` is known already, or not asked for; as ``from_problem``."""
         given, r = _Given.of(problem.on_springs), problem.modes.r
         rows, g0, g1, F0, F1 = given.condensed
         if r:
@@ -318,13 +318,13 @@ class ExactCondensed:
             fmpq(dS, dg),
         )
 
-    def at(self, alpha: Any) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+    def at(self, alpha: object) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
         """g and F at an alpha of any exact field."""
         g = tuple(a + b * alpha for a, b in zip(self.g0, self.g1, strict=True))
         F = tuple(a + b * alpha for a, b in zip(self.F0, self.F1, strict=True))
         return g, F
 
-    def system(self, alpha: Any) -> ExactSystem:
+    def system(self, alpha: object) -> ExactSystem:
         """The condensed problem at an alpha of any exact field."""
         return ExactSystem(self.S, *self.at(alpha), self.reach)
 

@@ -65,11 +65,11 @@ class Products(Sealed):
 
     @classmethod
     def of(cls, problem: CondensableData) -> Products:
-        """Those of a problem."""
+        """Products of a problem."""
         return cls._of(problem, problem.contact_rows.shape[0])
 
     def with_loads_of(self, problem: CondensableData) -> Products:
-        """Those of a problem with the same matrices and another load: only the columns of the load are solved for."""
+        """Products for another load on the same matrices: only the columns of the load are solved for."""
         loads, rows = self._of(problem, 0), len(self.mid)
         columns = {
             name: np.concatenate([getattr(self, name)[..., :rows], getattr(loads, name)], axis=-1)

@@ -120,7 +120,7 @@ class SpaceSystem(FrictionUnits):
 
     @classmethod
     def in_middle(cls, enclosed: EnclosedSpace, units: tuple[Floats, Floats]) -> SpaceSystem:
-        """That in the middle of balls, in units of force and length, (p,) each."""
+        """System in the middle of balls, in units of force and length, (p,) each."""
         return cls(enclosed.S, enclosed.g, enclosed.F, enclosed.tau, enclosed.unit, *units)
 
     @classmethod
@@ -164,7 +164,7 @@ def _out_of_range(F: Floats) -> str | None:
 
 
 def places(occurs: Mask) -> tuple[Indices, Indices, Indices, Indices]:
-    """Where the components of tau are in y, (p, 2); the rows of S in 3p that y takes; nodes and axes of its tau."""
+    """Places of the components of tau in y, (p, 2); the rows of S in 3p that y takes; nodes and axes of its tau."""
     p = len(occurs)
     node, axis = np.nonzero(occurs)
     tau = np.full((p, 2), -1, dtype=np.intp)
@@ -227,7 +227,7 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
 
     @property
     def turn(self) -> PieceTurn | None:
-        """How g and discs change along a piece of alpha; None at one alpha."""
+        """Change of g and discs along a piece of alpha; None at one alpha."""
         return None
 
     @cached_property
@@ -309,7 +309,7 @@ class PieceSpace(EnclosedSpace):
 
     @property
     def turn(self) -> PieceTurn | None:
-        """The same to first order; None over a point."""
+        """Change of g and discs along the piece; None over a point."""
         return self.along
 
     @property

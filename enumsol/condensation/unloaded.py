@@ -70,7 +70,7 @@ def vanishing_alpha(problem: CondensedData, data: Data) -> Fraction | None:
 
 
 def never_loaded(problem: CondensedData) -> bool:
-    """Whether g is known to vanish at every alpha, for A, Bn, Bt, f, load_slope, gap and slip_offset as given.
+    """True if g is known to vanish at every alpha, for A, Bn, Bt, f, load_slope, gap and slip_offset as given.
 
     With more than EXACT_DOF_LIMIT degrees of freedom only where all loads, gap and slip offset are zero.
     """

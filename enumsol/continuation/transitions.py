@@ -264,9 +264,9 @@ def selection_distance(equation: ScaledEquation, codes: Codes, x: Floats) -> flo
     kernel = to_metric @ right[rank:].T
     base = x + np.append(to_metric @ step, 0.0)
     slacks = equation.slacks(codes, base)
-    which = [(int(i), int(k)) for i, k in np.argwhere(np.isfinite(slacks))]
-    rates = np.array([equation.slack_gradient(codes, base, pair)[:-1] @ kernel for pair in which])
-    needed = -np.array([slacks[pair] for pair in which]) - STATUS_TOLERANCE
+    there = np.isfinite(slacks)
+    rates = equation.slack_gradients(codes, base)[there][:, :-1] @ kernel
+    needed = -slacks[there] - STATUS_TOLERANCE
     return math.hypot(float(np.linalg.norm(step)), _least_norm(rates, needed))
 
 

@@ -184,7 +184,7 @@ def _touching(basis: Any, facets: Integers, dofs: Integers) -> Integers:
     return np.flatnonzero(np.all(on_facets[dofs], axis=1))
 
 
-def _check_pressed(basis: Any, facets: Integers, dofs: Integers, touching: Integers) -> None:
+def _check_pressed(basis: object, facets: Integers, dofs: Integers, touching: Integers) -> None:
     """Refuse nodes that a uniform pressure pulls at, or does not act on."""
     shares = integrals_over(basis, facets, lambda v, _: v[0])[dofs[touching, 0]]
     if np.min(shares) <= _NO_PRESSURE * np.max(shares):
@@ -202,7 +202,7 @@ def _normals(basis: Any, facets: Integers, touching: Integers, dofs: Integers, p
     return unit_vectors(pressed(integrals, touching), "normals of the boundary")
 
 
-def integrals_over(basis: Any, facets: Integers, form: Callable[[Any, Any], Any]) -> Floats:
+def integrals_over(basis: object, facets: Integers, form: Callable[[Any, Any], Any]) -> Floats:
     """Integrals over facets of a linear form, by degrees of freedom; lumped as in `NodalBasis.on_part`."""
     from skfem import LinearForm  # here, too
 
@@ -227,7 +227,7 @@ def pressed(vectors: Floats, nodes: Integers) -> Floats:
     return vectors
 
 
-def _vector(value: Any, name: str, size: int) -> Floats:
+def _vector(value: object, name: str, size: int) -> Floats:
     if value is None:
         return np.zeros(size)
     array = real_array(value, name, error=InvalidArgumentError)

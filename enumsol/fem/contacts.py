@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
@@ -82,7 +82,7 @@ class Contacts:
 
 
 def contacts_of(
-    body: NodalBasis, mesh: PartedMesh, parts: Sequence[str], pairs: Sequence[Pair], held: Held, obstacle: Any
+    body: NodalBasis, mesh: PartedMesh, parts: Sequence[str], pairs: Sequence[Pair], held: Held, obstacle: object
 ) -> Contacts:
     """Contact nodes on the facets of parts, and of the first part of every pair.
 
@@ -147,7 +147,7 @@ def _group(
     parts: list[str],
     facets: Integers,
     held: Held,
-    obstacle: Any,
+    obstacle: object,
     pair: Pair | None,
     taken: Integers,
 ) -> tuple[ContactNodes, Floats, Group]:

@@ -254,7 +254,7 @@ def read_mesh_scene(path: str | os.PathLike[str]) -> Scene:
     return _of_file(path, lambda scene: scene)
 
 
-def _of_file(path: Any, made: Callable[[Scene], T]) -> T:
+def _of_file(path: object, made: Callable[[Scene], T]) -> T:
     place = file_path(path, "path")
     try:
         options = _toml(place)

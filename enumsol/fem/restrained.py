@@ -258,8 +258,8 @@ def problem_of(
     return ContactProblem3D(*arrays, **more)
 
 
-def axes_of(tangents: Any, normals: Floats) -> tuple[Floats, ...]:
-    """One tangent (p, 2) or two (p, 3) for normals (p, 2) or (p, 3).
+def axes_of(tangents: object, normals: Floats) -> tuple[Floats, ...]:
+    """Tangents for normals (p, 2) or (p, 3): one (p, 2), or two (p, 3).
 
     Parameters
     ----------
@@ -293,7 +293,7 @@ def _plane_axes(tangents: Any, normal: Floats) -> tuple[Floats]:
     return (tangent,)
 
 
-def _space_axes(tangents: Any, normal: Floats) -> tuple[Floats, Floats]:
+def _space_axes(tangents: object, normal: Floats) -> tuple[Floats, Floats]:
     if tangents is None:
         return default_axes(normal)
     if not (isinstance(tangents, (tuple, list)) and len(tangents) == 2):

@@ -149,7 +149,7 @@ def _refuse_cracks(scene: Any, nodes: Any, parts: list[str]) -> None:
             )
 
 
-def scene_notes(scene: Any) -> list[str]:
+def scene_notes(scene: object) -> list[str]:
     """Notes on what may not have been intended."""
     checks = (
         *(_formulations, _unjoined, _unfaced, _shared, _alone, _rest, _loaded_contact),

@@ -34,7 +34,7 @@ def sections_of(scene: Any) -> dict[str, list[str]]:
     }
 
 
-def described(scene: Any) -> str:
+def described(scene: object) -> str:
     """The lines of a `Scene`."""
     return "\n".join(_titled(sections_of(scene)))
 

@@ -32,6 +32,8 @@ from enumsol.support.array_arguments import short_vector
 from enumsol.support.plotting import checked_units, kept
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import Floats
 
@@ -71,8 +73,8 @@ class Scene:
     pieces: list[conditions.BodyPiece]
 
     @classmethod
-    def of(cls, source: Any, options: Mapping[str, Any]) -> Scene:
-        """That of a mesh, or of what `read_mesh` takes, with all options of `mesh_problem`.
+    def of(cls, source: object, options: Mapping[str, Any]) -> Scene:
+        """Scene of a mesh, or of what `read_mesh` takes, with all options of `mesh_problem`.
 
         Raises
         ------
@@ -130,12 +132,12 @@ class Scene:
 
     @cached_property
     def notes(self) -> list[str]:
-        """What may not have been intended, each in a sentence."""
+        """Sentences on what may not have been intended."""
         return scene_notes(self)
 
     @property
     def sections(self) -> dict[str, list[str]]:
-        """What is printed of the scene, lines by their titles."""
+        """Lines that are printed of the scene, by their titles."""
         return sections_of(self)
 
     def problem(self) -> AnyProblem:
@@ -185,7 +187,7 @@ class Scene:
             more.pop("max_rigid_displacement", None)
         return modes
 
-    def plot(self, *, units: tuple[str, str] | None = None, file: Any = None) -> Any:
+    def plot(self, *, units: tuple[str, str] | None = None, file: str | Path | None = None) -> Any:
         """A figure of the bodies, the parts of their boundaries, forces and contact nodes with their normals.
 
         Parameters
@@ -205,7 +207,7 @@ class Scene:
         return kept(draw_scene(self, checked_units(units)), file)
 
     def uses(self, part: str) -> list[str]:
-        """What the options say of a part of the boundary."""
+        """Words of the options on a part of the boundary."""
         found = [name for name in _USES if part in _names(self.options[name])]
         pairs = [group.pair for group in self.contacts.groups if group.pair is not None]
         found += [f"contact nodes of the pair {pair}" for pair in pairs if part == pair.slave]
@@ -216,7 +218,7 @@ class Scene:
 
 
 def _plane(mesh: PartedMesh) -> str:
-    """What is plane where no option says it: strain, unless the file has elements of plane stress."""
+    """Assumption where no option gives one: plane strain, unless the file has elements of plane stress."""
     stressed = [name for name in mesh.types if name.startswith("CPS")]
     if stressed:
         raise InvalidArgumentError(
@@ -231,7 +233,7 @@ def _names(value: Any) -> Sequence[str]:
     return [value] if isinstance(value, str) else () if value is None else list(value)
 
 
-def _held(mesh: PartedMesh, clamp: Any, symmetry: Any, displacement: Any) -> conditions.Held:
+def _held(mesh: PartedMesh, clamp: object, symmetry: object, displacement: object) -> conditions.Held:
     held = conditions.Held(mesh)
     for part in conditions.names_of(clamp, "clamp"):
         held.clamp(part)
@@ -274,7 +276,7 @@ def _coefficients(dimension: int, parts: Sequence[str], options: Mapping[str, An
     return {"friction": (F, F2), "friction_slope": (slope, slope2)}
 
 
-def refuse_old_friction(source: Any, options: Mapping[str, Any], written: Callable[[str, str, str], str]) -> Any:
+def refuse_old_friction(source: object, options: Mapping[str, Any], written: Callable[[str, str, str], str]) -> Any:
     """Refuse pairs in 2D in the words of a file or a command; the mesh, which is read if there are any.
 
     ``written`` is how a number is given for an option and a part, "" for all parts.
@@ -322,11 +324,11 @@ def along_axes(dimension: int, options: Mapping[str, Any], written: Callable[[st
 _FRICTION = "friction", "friction_slope", "friction2", "friction2_slope"
 
 
-def _is_pair(value: Any) -> bool:
+def _is_pair(value: object) -> bool:
     return isinstance(value, (tuple, list)) and len(value) == 2
 
 
-def _by_part(value: Any) -> list[tuple[Any, Any]]:
+def _by_part(value: object) -> list[tuple[Any, Any]]:
     """Values by part, "" for all parts."""
     return list(value.items()) if isinstance(value, Mapping) else [("", value)]
 
@@ -335,7 +337,7 @@ def _in_python(option: str, part: str, number: str) -> str:
     return f'{option}={{"{part}": {number}}}' if part else f"{option}={number}"
 
 
-def _axes(nodes: ContactNodes, axis: Any, dimension: int) -> tuple[Floats, ...]:
+def _axes(nodes: ContactNodes, axis: object, dimension: int) -> tuple[Floats, ...]:
     if axis is None:
         return axes_of(None, nodes.normals)
     if dimension == 2:
@@ -351,7 +353,7 @@ def _axes(nodes: ContactNodes, axis: Any, dimension: int) -> tuple[Floats, ...]:
 T = TypeVar("T")
 
 
-def lame_of(mesh: PartedMesh, young: Any, poisson: Any, plane: Any) -> Floats:
+def lame_of(mesh: PartedMesh, young: object, poisson: object, plane: object) -> Floats:
     """Lame coefficients of all cells, (2,), or of each where they differ, (M, 2).
 
     Raises
@@ -374,7 +376,7 @@ def lame_of(mesh: PartedMesh, young: Any, poisson: Any, plane: Any) -> Floats:
     return np.array([known[constants] for constants in each])
 
 
-def thickness_of(mesh: PartedMesh, value: Any) -> Floats | None:
+def thickness_of(mesh: PartedMesh, value: object) -> Floats | None:
     """Thickness of every cell of a plane body, (M,); None for one [length].
 
     Raises
@@ -390,7 +392,7 @@ def thickness_of(mesh: PartedMesh, value: Any) -> Floats | None:
     return np.broadcast_to(np.array(given, dtype=np.float64), len(mesh.cells))
 
 
-def body_force_of(mesh: PartedMesh, value: Any) -> Floats:
+def body_force_of(mesh: PartedMesh, value: object) -> Floats:
     """Force per volume of every cell, (M, d); parts of the body without one have none [force / length^3].
 
     Raises
@@ -407,7 +409,7 @@ def body_force_of(mesh: PartedMesh, value: Any) -> Floats:
     return density
 
 
-def _of_cells(mesh: PartedMesh, value: Any, name: str, read: Callable[[Any, str], T]) -> T | list[T]:
+def _of_cells(mesh: PartedMesh, value: object, name: str, read: Callable[[Any, str], T]) -> T | list[T]:
     """A value of all cells, or a list of one for each if it is given by names of parts of the body."""
     if not isinstance(value, Mapping):
         return read(value, name)
@@ -432,7 +434,9 @@ def _of_cells(mesh: PartedMesh, value: Any, name: str, read: Callable[[Any, str]
     return each
 
 
-def of_rows(value: Any, name: str, parts: Sequence[str], read: Callable[[Any, str], Any], other: Any = None) -> Floats:
+def of_rows(
+    value: object, name: str, parts: Sequence[str], read: Callable[[Any, str], Any], other: object = None
+) -> Floats:
     """A value of all contact nodes, or (p, ...) by the names of the parts of the boundary that they belong to.
 
     ``other`` is that of parts that are not named; None: all have to be.

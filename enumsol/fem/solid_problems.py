@@ -203,7 +203,7 @@ def _check_independent(means: sp.csr_array) -> None:
         )
 
 
-def local_axes(multipliers: Multipliers, normals: ArrayLike | None, axes: Any) -> tuple[Floats, Floats, Floats]:
+def local_axes(multipliers: Multipliers, normals: ArrayLike | None, axes: object) -> tuple[Floats, Floats, Floats]:
     """Normals and axes t1, t2 of the rows, each (p, 3); (t1, t2, n) is right-handed where t2 is not given.
 
     Parameters
@@ -243,7 +243,7 @@ def local_axes(multipliers: Multipliers, normals: ArrayLike | None, axes: Any) -
     return normal, given[0], given[1] if len(given) == 2 else np.cross(normal, given[0])
 
 
-def _field(value: Any, places: Floats) -> Floats:
+def _field(value: object, places: Floats) -> Floats:
     if callable(value):
         value = [value(place) for place in places]
     return mesh_checks.vectors_of_all(real_array(value, "axes", error=InvalidArgumentError), "axes", places.shape)
@@ -362,14 +362,14 @@ def solid_contact_problem(
     *,
     contact: ArrayLike,
     normals: ArrayLike | None = None,
-    axes: Any = None,
+    axes: object = None,
     held: ArrayLike = (),
     springs: ArrayLike | None = None,
     forces: ArrayLike | None = None,
     forces_slope: ArrayLike | None = None,
     gap: ArrayLike = 0.0,
-    friction: Any = 0.5,
-    friction_slope: Any = 0.0,
+    friction: object = 0.5,
+    friction_slope: object = 0.0,
     slip_offset: ArrayLike = 0.0,
     node_ids: Sequence[Any] | None = None,
     multipliers: Literal["nodes", "elements"] = "nodes",

@@ -150,7 +150,7 @@ class HistoryProgress:
 
 def histories(
     problem: AnyProblem,
-    steps: Any,
+    steps: object,
     *,
     arithmetic: str = "verified",
     follow: str | Choice = "all",
@@ -403,7 +403,7 @@ class _Growing:
             self.bases[key] = restarted(self.problem, start, step.load, step.friction)
         return self.bases[key]
 
-    def _open(self, problem: Any, alpha: Any, roots: RootSet, item: _Waiting) -> tuple[str, ...]:
+    def _open(self, problem: object, alpha: object, roots: RootSet, item: _Waiting) -> tuple[str, ...]:
         """Why a stage is not complete, in words."""
         reasons = []
         if roots.families:
@@ -500,7 +500,7 @@ def named(node: Node) -> str:
     return f"{node[0]}.{node[1]}"
 
 
-def _numbers(answer: Any, roots: RootSet) -> set[int]:
+def _numbers(answer: object, roots: RootSet) -> set[int]:
     """The numbers of the roots that a callable chose.
 
     Raises

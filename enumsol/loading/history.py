@@ -130,7 +130,7 @@ def _kind(problem: AnyProblem, steps: Any) -> dict[str, Any]:
     }
 
 
-def _is_list(value: Any) -> bool:
+def _is_list(value: object) -> bool:
     return isinstance(value, list)
 
 
@@ -260,7 +260,7 @@ def _listed(values: Floats | None) -> list[Any] | None:
     return None if values is None else values.tolist()
 
 
-def _array(values: Any) -> Floats | None:
+def _array(values: object) -> Floats | None:
     return None if values is None else np.array(values, dtype=np.float64)
 
 
@@ -326,7 +326,7 @@ class History(Immutable):
 
     @property
     def complete(self) -> bool:
-        """Whether it is proven that these are all histories: every step complete, every root followed to the end."""
+        """True if it is proven that these are all histories: every step complete, every root followed to the end."""
         return self.arithmetic != "fast" and not self.reasons
 
     @property
@@ -336,7 +336,7 @@ class History(Immutable):
 
     @property
     def proof(self) -> Proof | None:
-        """One proof of the whole for ``enumsol.verify``: all searches, their starts, and which follows which.
+        """Proof of the whole for ``enumsol.verify``: all searches, their starts, and which follows which.
 
         None in fast and exact arithmetic, and where there was no search at all.
         """
@@ -404,7 +404,7 @@ class History(Immutable):
     # -- results ---------------------------------------------------------------------------------------------------
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per node: step, alpha, root, parents, stage, statuses, index, regular and sums.
+        """Table with a row per node: step, alpha, root, parents, stage, statuses, index, regular and sums.
 
         ``lambda_n`` and ``lambda_t`` (in 3D lambda_t1, lambda_t2) are sums over the contact nodes, ``dissipated`` is
         the work of friction in the step, ``dissipated_least`` and ``dissipated_most`` that since the start,
@@ -443,11 +443,11 @@ class History(Immutable):
 
     def plot(
         self,
-        x: Any = "displacement",
-        y: Any = "alpha",
+        x: object = "displacement",
+        y: object = "alpha",
         *,
         units: tuple[str, str] | None = None,
-        ax: Any = None,
+        ax: object = None,
         file: str | Path | None = None,
     ) -> Any:
         """A figure of one quantity of the roots against another, a line for every history.
@@ -512,7 +512,7 @@ class History(Immutable):
         return self.data.closing_line
 
     def text(self, units: tuple[str, str] | None = None) -> str:
-        """What is printed, with units of forces and lengths if they are given."""
+        """Text that is printed, with units of forces and lengths if they are given."""
         return history_data.history_text(self.data, checked_units(units))
 
     def __repr__(self) -> str:

@@ -341,7 +341,7 @@ class HistoryData:
         return f"complete: {'no' if self.reasons else 'yes (proven)'}, {until}{self._within()}"
 
     def _within(self) -> str:
-        """Of a body that nothing holds, within which rigid displacements."""
+        """Words on the bound of rigid displacements, of a body that nothing holds."""
         bounds = [stage.roots.rigid_bound for stage in self.stages if stage.roots.rigid_bound is not None]
         if not bounds:
             return ""

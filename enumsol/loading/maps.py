@@ -41,7 +41,7 @@ _EXPECTED = (
 def multiplicity_map(
     problem: ContactProblem | None,
     alphas: tuple[AlphaLike, AlphaLike],
-    over: Any,
+    over: object,
     *,
     executor: Executor | None = None,
     jobs: int | None = None,
@@ -239,7 +239,7 @@ class MultiplicityMap(Immutable):
         return tuple(tuple(curve) for curve in found)
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per value and range of alpha with one number of solutions.
+        """Table with a row per value and range of alpha with one number of solutions.
 
         Columns: value; first and last of the range; solutions, exact (or a lower bound); complete (the value's graph).
         """
@@ -261,7 +261,7 @@ class MultiplicityMap(Immutable):
             columns=["value", "first", "last", "solutions", "exact", "complete"],
         )
 
-    def plot(self, *, units: tuple[str, str] | None = None, ax: Any = None, file: str | Path | None = None) -> Any:
+    def plot(self, *, units: tuple[str, str] | None = None, ax: object = None, file: str | Path | None = None) -> Any:
         """A figure: alpha across, the second parameter upwards, numbers of solutions by colour, folds as curves.
 
         What is proven are the lines in full colour, at the values. The pale colour between them only fills the space,
@@ -301,7 +301,7 @@ class MultiplicityMap(Immutable):
         return f"complete: no (not proven at {number} of {counted(len(self.rows), 'value')}{self._within()})"
 
     def _within(self) -> str:
-        """Of bodies that nothing holds, within which rigid displacements the map is about solutions."""
+        """Words on the bound of rigid displacements within which the map of such bodies counts solutions."""
         bounds = [row.within for row in self.rows if row.within is not None]
         if not bounds:
             return ""
@@ -351,7 +351,7 @@ class _Replaced:
         return self.problem.replace(gap=value)
 
 
-def _parameter(problem: Any, over: Any) -> tuple[str, Callable[[float], ContactProblem], list[float]]:
+def _parameter(problem: object, over: object) -> tuple[str, Callable[[float], ContactProblem], list[float]]:
     """The name of the second parameter, what makes a problem of a value, and the values.
 
     Raises
@@ -374,7 +374,7 @@ def _parameter(problem: Any, over: Any) -> tuple[str, Callable[[float], ContactP
     return name, _Replaced(body, name, vector_of(given[0], "direction", body.n)), _numbers(given[1])
 
 
-def _numbers(values: Any) -> list[float]:
+def _numbers(values: object) -> list[float]:
     if isinstance(values, (str, bytes)) or arguments.exact_number(values) is not None or not np.iterable(values):
         raise InvalidArgumentError(f"the values of over are {arguments.shown(values)}; expected a sequence of numbers")
     found = [arguments.finite_number(value, "a value of over") for value in values]

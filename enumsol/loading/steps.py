@@ -136,7 +136,7 @@ def way_to(problem: Problem, step: LoadStep) -> tuple[LoadStep, LoadStep]:
     return start, end
 
 
-def steps_of(problem: Problem, steps: Any) -> tuple[LoadStep, ...]:
+def steps_of(problem: Problem, steps: object) -> tuple[LoadStep, ...]:
     """The steps that a user gives, fitted to a problem.
 
     Raises
@@ -212,7 +212,7 @@ def _from_table(problem: Problem, table: Any, expected: str) -> list[LoadStep]:
     return found
 
 
-def _cell(value: Any, name: str) -> Any:
+def _cell(value: object, name: str) -> Any:
     """A number of a table."""
     return alpha_value(value, name) if name == "alpha" else float(alpha_value(value, name))
 
@@ -231,7 +231,7 @@ def _array(value: Any, name: str) -> Any:
     return sealed(real_array(value, name, error=InvalidArgumentError))
 
 
-def _coefficients(friction: Any, problem: Problem, number: int) -> Floats:
+def _coefficients(friction: object, problem: Problem, number: int) -> Floats:
     wanted = problem.slip_offset.shape
     values = np.asarray(friction, dtype=np.float64)
     if values.shape == (problem.p,) and len(wanted) == 2:

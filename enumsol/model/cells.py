@@ -132,7 +132,7 @@ _QUADRILATERALS = {4: [0, 1, 2, 2], 8: [0, 1, 2, 2, 3, 4, 2, 5], 9: [0, 1, 2, 2,
 
 
 def numbers_of_nodes(dimension: int) -> tuple[int, ...]:
-    """How many nodes cells may have, in ascending order."""
+    """Numbers of nodes that cells may have, in ascending order."""
     return tuple(sorted(nodes for d, nodes in KINDS if d == dimension))
 
 

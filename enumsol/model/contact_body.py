@@ -78,7 +78,7 @@ class ContactBody(Immutable):
         f: ArrayLike,
         gap: ArrayLike,
         load_slope: ArrayLike | None,
-        node_ids: Any,
+        node_ids: object,
         coordinates: ArrayLike | None,
     ) -> None:
         stiffness = real_matrix(A, "A")
@@ -166,7 +166,7 @@ class ContactBody(Immutable):
 
     @cached_property
     def rigid_reach(self) -> float:
-        """How far the body may move as a whole: ``max_rigid_displacement`` or its default; 0 if it is held [length]."""
+        """Bound of the rigid displacement, ``max_rigid_displacement`` or its default; 0 of a held body [length]."""
         if self.held:
             return 0.0
         if self.max_rigid_displacement is not None:
@@ -202,7 +202,7 @@ class ContactBody(Immutable):
 
     @cached_property
     def factorization(self) -> Factorization:
-        """One sparse factorization of A, shared by everything that solves with it."""
+        """Sparse factorization of A, shared by everything that solves with it."""
         self.check_held("a factorization of A")
         if self._origin is not None:
             return self._origin.factorization

@@ -155,7 +155,7 @@ class FrictionFunction:
         return f"{getattr(self.function, '__name__', type(self.function).__name__)}(node, |u_t|)"
 
 
-def friction_law(value: Any, p: int, labels: tuple[Any, ...]) -> FrictionLaw:
+def friction_law(value: object, p: int, labels: tuple[Any, ...]) -> FrictionLaw:
     """The coefficients of p contact nodes from a number, pair, FrictionTable or callable.
 
     Raises
@@ -171,7 +171,7 @@ def friction_law(value: Any, p: int, labels: tuple[Any, ...]) -> FrictionLaw:
     return ConstantFriction(friction_pair(value, "friction", p))
 
 
-def friction_pair(value: Any, name: str, p: int) -> Floats:
+def friction_pair(value: object, name: str, p: int) -> Floats:
     """A number, or a pair of numbers or arrays, as an array of shape (p, 2).
 
     Raises

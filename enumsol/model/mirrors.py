@@ -134,7 +134,7 @@ class Mirror(Sealed):
         return image
 
     def statuses(self, held: tuple[frozenset[ContactStatus], ...]) -> tuple[frozenset[ContactStatus], ...]:
-        """What holds at the contact nodes of the mirror image of a solution."""
+        """Statuses that hold at the contact nodes of the mirror image of a solution."""
         image: list[frozenset[ContactStatus]] = [frozenset()] * self.p
         for k, statuses in enumerate(held):
             turned = self.dimension == 2 and self.signs[k] < 0
@@ -146,7 +146,7 @@ class Mirror(Sealed):
         return f"Mirror of {self.p} contact nodes, {own} of them in its plane"
 
 
-def _direction(normal: Any, d: int) -> Floats:
+def _direction(normal: object, d: int) -> Floats:
     if isinstance(normal, str):
         return np.asarray(np.eye(d)["xyz".index(one_of(normal, "normal", tuple("xyz"[:d])))])
     vector = short_vector(normal, "normal", d)

@@ -101,7 +101,7 @@ class ContactProblem(ContactBody):
         friction_slope: ArrayLike | None = None,
         load_slope: ArrayLike | None = None,
         slip_offset: ArrayLike = 0.0,
-        node_ids: Any = None,
+        node_ids: object = None,
         coordinates: ArrayLike | None = None,
         mesh: BodyMesh | None = None,
         rigid_modes: ArrayLike | None = None,
@@ -122,7 +122,7 @@ class ContactProblem(ContactBody):
 
     @property
     def depends_on_alpha(self) -> bool:
-        """Whether friction or load change with alpha."""
+        """True if friction or load change with alpha."""
         return self.load_slope is not None or bool(np.any(self.friction_slope))
 
     @cached_property
@@ -134,7 +134,7 @@ class ContactProblem(ContactBody):
         return CondensedProblem.from_problem(self)
 
     def at_contact_nodes(self) -> ContactProblem:
-        """The same body with the displacements of its contact nodes as the only unknowns, n = 2p.
+        """Body with the displacements of its contact nodes as the only unknowns, n = 2p.
 
         A is the inverse of the condensed compliance S, so that the solutions are those of this problem up to rounding
         (theory, section 4.1). Exact arithmetic takes at most 250 degrees of freedom: it can decide here what it cannot
@@ -218,15 +218,15 @@ class ContactProblem(ContactBody):
         return self._text(f"{span(self.friction)}{slope}")
 
 
-def given_friction(friction: Any, slope: Any) -> tuple[Any, Any]:
+def given_friction(friction: object, slope: object) -> tuple[Any, Any]:
     """Coefficients and their derivatives: what is not given is 0, and without both F(alpha) = alpha."""
     if friction is None and slope is None:
         return 0.0, 1.0
     return 0.0 if friction is None else friction, 0.0 if slope is None else slope
 
 
-def old_friction(value: Any, written: Callable[[str], str], slope_written: Callable[[str], str]) -> str:
-    """What to write for a pair (F0, F1), which once stood for F(alpha) = F0 + alpha F1; "" for anything else.
+def old_friction(value: object, written: Callable[[str], str], slope_written: Callable[[str], str]) -> str:
+    """Advice for a pair (F0, F1), which once stood for F(alpha) = F0 + alpha F1; "" for anything else.
 
     ``written`` and ``slope_written`` are how a number is given for the coefficient and for its slope.
     """
@@ -237,7 +237,7 @@ def old_friction(value: Any, written: Callable[[str], str], slope_written: Calla
     return f"for F(alpha) = {F0} + {F1} alpha write {written(F0)} and {slope_written(F1)}"
 
 
-def _friction(friction: Any, slope: Any, p: int) -> tuple[Floats, Floats]:
+def _friction(friction: object, slope: object, p: int) -> tuple[Floats, Floats]:
     if instead := old_friction(friction, "friction={}".format, "friction_slope={}".format):
         array = ", for coefficients of two contact nodes friction=np.array([...])" if p == 2 else ""
         raise InvalidProblemError(

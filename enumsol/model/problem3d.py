@@ -200,7 +200,7 @@ class ContactProblem3D(ContactBody):
         friction_slope: float | tuple[ArrayLike, ArrayLike] = 0.0,
         load_slope: ArrayLike | None = None,
         slip_offset: ArrayLike = 0.0,
-        node_ids: Any = None,
+        node_ids: object = None,
         coordinates: ArrayLike | None = None,
         areas: ArrayLike | None = None,
         mesh: BodyMesh | None = None,

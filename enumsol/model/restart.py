@@ -36,7 +36,7 @@ class SlipStart(Sealed):
 
     @classmethod
     def of(cls, problem: ContactBody) -> SlipStart:
-        """That of a problem."""
+        """Start of a problem."""
         return cls(problem.slip_offset, problem.offset_radius, problem.exact_offset)
 
     @classmethod
@@ -76,7 +76,7 @@ class SlipStart(Sealed):
         return SlipStart(offset, radius if np.any(radius) else None)
 
     def holds(self, other: Ball) -> bool:
-        """Whether every position in a ball, in one column as ``ball``, is one of these."""
+        """True if every position in a ball, in one column as ``ball``, is one of these."""
         own = self.ball
         far = (np.abs(own.mid - other.mid) * (1 + 4 * UNIT) + other.rad) * SAFE
         return bool(np.all((far <= own.rad) | ((own.mid == other.mid) & (other.rad <= own.rad))))
@@ -108,7 +108,7 @@ def restarted(problem: _Body, start: SlipStart, load: Floats | None = None, fric
 
 
 def afresh(problem: _Body, **known: Any) -> _Body:
-    """The same problem without what it has computed, but for the factors of A, on whose accuracy no bound rests.
+    """Copy of a problem without what it has computed, but for the factors of A, on whose accuracy no bound rests.
 
     ``known`` are attributes that are other ones in the copy.
     """

@@ -43,7 +43,7 @@ class RigidModes(Sealed):
     stiffness: Floats
 
     @classmethod
-    def of(cls, N: Any, A: sp.csc_array) -> RigidModes:
+    def of(cls, N: object, A: sp.csc_array) -> RigidModes:
         """Modes as they are given, with springs to hold the body; none of a body that is held (N is None).
 
         Raises
@@ -78,12 +78,12 @@ class RigidModes(Sealed):
         return int(self.N.shape[1])
 
     def springs(self) -> sp.csc_array:
-        """What is added to A, (n, n): the springs that hold the body; the sum with A is exact."""
+        """Springs that hold the body, to be added to A, (n, n); the sum with A is exact."""
         n = len(self.N)
         return sp.csc_array((self.stiffness, (self.held, self.held)), shape=(n, n))
 
     def reach(self, largest: float) -> Floats:
-        """How large the coordinates of a rigid displacement can be, (r,), if none of its components is above this.
+        """Bounds of the coordinates of a rigid displacement, (r,), none of whose components is above ``largest``.
 
         Rounded upward from the exact inverse of the modes at the springs.
         """

@@ -40,7 +40,7 @@ def level_of(number: int) -> int:
 
 
 def count_of(number: int) -> int:
-    """How many sectors of its level a sector consists of."""
+    """Number of sectors of its level of which a sector consists."""
     return 1 + number // RUN
 
 
@@ -58,7 +58,7 @@ def width_level(number: int) -> int:
 
 @lru_cache(maxsize=1 << 16)
 def span(number: int) -> tuple[int, int]:
-    """Where a sector begins and ends, in sectors of level DEEPEST + 2 from the beginning of the circle."""
+    """Begin and end of a sector, in sectors of level DEEPEST + 2 from the beginning of the circle."""
     level = level_of(number)
     begin = start_number(number) - (1 << level)
     return begin << (DEEPEST + 2 - level), (begin + count_of(number)) << (DEEPEST + 2 - level)
@@ -66,7 +66,7 @@ def span(number: int) -> tuple[int, int]:
 
 @lru_cache(maxsize=1 << 16)
 def start_of(number: int) -> tuple[Fraction, Fraction]:
-    """Where a sector begins, a rational point of the circle: its cosine and sine, exactly."""
+    """Begin of a sector, a rational point of the circle: its cosine and sine, exactly."""
     number = start_number(number)
     place = Fraction(4 * (number - (1 << level_of(number))), 1 << level_of(number))
     quarter, s = int(place), place - int(place)
@@ -78,13 +78,13 @@ def start_of(number: int) -> tuple[Fraction, Fraction]:
 
 @lru_cache(maxsize=1 << 16)
 def direction(number: int) -> tuple[float, float]:
-    """Where a sector begins in floats, each off by at most half a unit in the last place."""
+    """Begin of a sector in floats, each off by at most half a unit in the last place."""
     x, y = start_of(number)
     return float(x), float(y)
 
 
 def is_sector(number: int) -> bool:
-    """Whether there is a sector of this number, which lies within one quarter."""
+    """True if there is a sector of this number, which lies within one quarter."""
     if number < 0 or start_number(number) < 4:
         return False
     up, first = level_of(number) - 2, start_number(number)
@@ -141,7 +141,7 @@ def around(numbers: Sequence[int]) -> int:
 
 
 def contains(number: int, other: int) -> bool:
-    """Whether a sector is another one or holds it."""
+    """True if a sector is another one or holds it."""
     (a, b), (c, d) = span(number), span(other)
     return a <= c and d <= b
 
@@ -161,7 +161,7 @@ def nearest(x: float, y: float, level: int) -> int:
 
 
 def places(vectors: Floats) -> Floats:
-    """How far the directions of vectors, (..., 2), are along the circle, in sectors of level DEEPEST + 2."""
+    """Places of the directions of vectors, (..., 2), along the circle, in sectors of level DEEPEST + 2."""
     x, y = 63.0 * vectors[..., 0] + 16.0 * vectors[..., 1], 63.0 * vectors[..., 1] - 16.0 * vectors[..., 0]
     quarter = np.floor(np.arctan2(y, x) / (0.5 * np.pi)) % 4
     for k in (1, 2, 3):

@@ -11,14 +11,10 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.loading.history_data import steps_table, tree_lines
-from enumsol.report.given import given_section
-from enumsol.report.parts import fact_list, filled_page, proof_facts, scrolling, warning_list
+from enumsol.report.parts import Heading, Statement, filled_page, proof_commands, scrolling
 from enumsol.support.messages import counted, html_table
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from enumsol.fem import Scene
     from enumsol.loading.history import History
 
 #: Lines of the tree, and steps whose bodies are drawn, at most; of more steps the last ones.
@@ -26,42 +22,34 @@ _TREE, _BODIES = 1000, 24
 _DPI = 96
 
 
-def history_page(
-    history: History, title: str, units: tuple[str, str] | None, commands: Sequence[str], scene: Scene | None
-) -> str:
+def history_page(history: History, heading: Heading) -> str:
     """The text of the page."""
+    units = heading.units
+    incomplete = (
+        "This history is not complete. Every root shown is a solution of its step, but roots and histories may be "
+        "missing. Why:"
+    )
+    said = Statement(
+        incomplete if history.reasons else "",
+        history.reasons,
+        _facts(history),
+        (),
+        _certified(history),
+        history.problem.fingerprint,
+        proof_commands("history", "--steps STEPS", "."),
+    )
     words = {
-        "title": escape(title),
-        "plotly": "",
-        "badge": "yes" if history.complete else "no",
-        "completeness": escape(history.closing_line),
-        "reasons": _reasons(history),
-        "answers": "",
-        "facts": _facts(history),
-        "given": given_section(scene, units),
         "steps": scrolling("Steps", html_table(*steps_table(history.data, units))),
         "tree": escape("\n".join(tree_lines(history.data, _TREE))),
         "figures": _figures(history, units),
         "bodies": _bodies(history, units),
-        "certified": _certified(history, commands),
     }
-    return filled_page("history", ("page.theme.js", "page.history.js"), {}, words)
+    return filled_page("history", history, heading, said, ("page.theme.js", "page.history.js"), {}, words)
 
 
-def _reasons(history: History) -> str:
-    if not history.reasons:
-        return ""
-    return warning_list(
-        "This history is not complete. Every root shown is a solution of its step, but roots and histories may be "
-        "missing. Why:",
-        history.reasons,
-    )
-
-
-def _facts(history: History) -> str:
-    problem = history.problem
-    total = history.counts[-1]
-    facts = (
+def _facts(history: History) -> list[tuple[str, str]]:
+    problem, total = history.problem, history.counts[-1]
+    return [
         ("contact nodes", str(problem.p)),
         ("degrees of freedom", f"{problem.n:,}"),
         ("steps", str(len(history.steps))),
@@ -69,8 +57,7 @@ def _facts(history: History) -> str:
         ("branchings", str(len(history.branchings))),
         ("arithmetic", history.arithmetic),
         ("increments", "not halved" if history.refinement is None else str(history.refinement)),
-    )
-    return fact_list(facts)
+    ]
 
 
 def _figures(history: History, units: tuple[str, str] | None) -> str:
@@ -114,26 +101,21 @@ def _image(figure: Any, words: str) -> str:
     return f'<figure><img src="data:image/png;base64,{text}" alt="{escape(words)}"></figure>'
 
 
-def _certified(history: History, commands: Sequence[str]) -> str:
-    lines = [f"<p>{escape(history.closing_line)}.</p>"]
+def _certified(history: History) -> list[str]:
     if history.complete:
-        lines.append(
-            "<p>It is proven that these are all histories of the steps as they are given: every step has no other "
-            "roots, from wherever it starts. What happens between the ends of the steps is not part of it.</p>"
+        known = (
+            "It is proven that these are all histories of the steps as they are given: every step has no other roots, "
+            "from wherever it starts. What happens between the ends of the steps is not part of it."
         )
     elif history.arithmetic == "fast":
-        lines.append("<p>Nothing is proven: the result rests on floating-point arithmetic.</p>")
+        known = "Nothing is proven: the result rests on floating-point arithmetic."
     else:
-        lines.append(f"<p>The history is proven to be unique until step {history.unique_until}.</p>")
-    widest = max((stage.largest_radius for stage in history.data.stages), default=0.0)
-    size = max((float(np.max(np.abs(stage.start.offset), initial=0.0)) for stage in history.data.stages), default=0.0)
-    searches = counted(len(history.data.stages), "search", "searches")
-    lines.append(
-        f"<p>{searches}; where slip is counted from is known within {widest:.1e}, for offsets up to {size:.3g}.</p>"
-    )
-    how = (
-        "<code>enumsol history PROBLEM --steps STEPS --proof FILE</code>, then "
-        "<code>enumsol verify PROBLEM FILE</code>."
-    )
-    lines.append(proof_facts(history.problem.fingerprint, commands, how))
-    return "".join(lines)
+        known = f"The history is proven to be unique until step {history.unique_until}."
+    stages = history.data.stages
+    widest = max((stage.largest_radius for stage in stages), default=0.0)
+    size = max((float(np.max(np.abs(stage.start.offset), initial=0.0)) for stage in stages), default=0.0)
+    searches = counted(len(stages), "search", "searches")
+    return [
+        known,
+        f"{searches}; where slip is counted from is known within {widest:.1e}, for offsets up to {size:.3g}.",
+    ]

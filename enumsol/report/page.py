@@ -13,17 +13,18 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.loading.history import History
 from enumsol.model.problem import ContactProblem
 from enumsol.report.content import listed, report_content
-from enumsol.report.given import given_section, with_unit
 from enumsol.report.history_page import history_page
 from enumsol.report.parts import (
+    CERTIFIED_DATA,
     DRAWING,
-    fact_list,
+    Heading,
+    Statement,
     filled_page,
     packed_plotly,
-    proof_facts,
+    proof_commands,
     span_words,
     table_text,
-    warning_list,
+    with_unit,
 )
 from enumsol.report.roots_page import roots_page
 from enumsol.roots.root_set import RootSet
@@ -114,13 +115,13 @@ def write_report(
             f"solutions is a {type(given).__name__}; expected a BranchGraph, a RootSet or a History"
         )
     place = file_path(file, "file")
-    words = (instance_of(title, str, "title"), checked_units(units), tuple(commands), _checked_scene(scene))
+    heading = Heading(instance_of(title, str, "title"), checked_units(units), tuple(commands), _checked_scene(scene))
     if isinstance(solutions, BranchGraph):
-        page = report_page(solutions, *words)
+        page = graph_page(solutions, heading)
     elif isinstance(solutions, RootSet):
-        page = roots_page(solutions, *words)
+        page = roots_page(solutions, heading)
     else:
-        page = history_page(solutions, *words)
+        page = history_page(solutions, heading)
     write_file(place, page, "file")
 
 
@@ -132,42 +133,32 @@ def _checked_scene(scene: Any) -> Scene | None:
     return instance_of(scene, Scene, "scene")
 
 
-def report_page(
-    graph: BranchGraph, title: str, units: tuple[str, str] | None, commands: Sequence[str], scene: Scene | None
-) -> str:
+def graph_page(graph: BranchGraph, heading: Heading) -> str:
     """The text of the page."""
-    content = report_content(graph, scene) | {"units": units}
-    words = {
-        "title": escape(title),
-        "plotly": packed_plotly(),
-        "badge": "yes" if graph.complete else "no",
-        "completeness": escape(graph.closing_line),
-        "reasons": _reasons(graph),
-        "facts": _facts(graph, units),
-        "given": given_section(scene, units),
-        "answers": "".join(f"<li>{escape(line)}</li>" for line in graph.claims.sentences(graph.uniqueness_bound)),
-        "branches": _branches(graph),
-        "vertices": _vertices(graph),
-        "certified": _certified(graph, commands),
-    }
-    return filled_page("graph", (*DRAWING, "page.js", "page.solutions.js"), content, words)
-
-
-def _reasons(graph: BranchGraph) -> str:
-    if not graph.reasons:
-        return ""
     where = f" for {ranges_text(graph.open_ranges)}, and only there" if graph.claims.partly else ""
-    return warning_list(
+    incomplete = (
         f"This graph is not complete. Everything shown is a solution, but solutions may be missing{where}: numbers of "
-        "solutions are lower bounds. Why:",
-        graph.reasons,
+        "solutions are lower bounds. Why:"
     )
+    said = Statement(
+        incomplete if graph.reasons else "",
+        graph.reasons,
+        _facts(graph, heading.units),
+        graph.claims.sentences(graph.uniqueness_bound),
+        _certified(graph),
+        graph.problem.fingerprint,
+        proof_commands("graph", "--from A --to B", "; the proof's first record holds the same fingerprint."),
+    )
+    words = {"plotly": packed_plotly(), "branches": _branches(graph), "vertices": _vertices(graph)}
+    content = report_content(graph, heading.scene) | {"units": heading.units}
+    return filled_page("graph", graph, heading, said, (*DRAWING, "page.js", "page.solutions.js"), content, words)
 
 
-def _facts(graph: BranchGraph, units: tuple[str, str] | None) -> str:
+def _facts(graph: BranchGraph, units: tuple[str, str] | None) -> list[tuple[str, str]]:
     problem, (a, b) = graph.problem, graph.interval
     load = "constant" if problem.load_slope is None else "f + alpha load_slope"
-    facts = (
+    branches, arcs = counted(len(graph.branches), "branch", "branches"), counted(len(graph.arcs), "arc")
+    return [
         ("contact nodes", str(problem.p)),
         ("degrees of freedom", f"{problem.n:,}"),
         ("combinations of statuses", _combinations(problem)),
@@ -176,10 +167,8 @@ def _facts(graph: BranchGraph, units: tuple[str, str] | None) -> str:
         ("gap", with_unit(span_words(problem.gap), units, 0, 1)),
         ("alpha", f"from {a:.10g} to {b:.10g}"),
         ("arithmetic", graph.arithmetic),
-        ("found", f"{counted(len(graph.branches), 'branch', 'branches')}, {counted(len(graph.arcs), 'arc')}, "
-                  f"{counted(len(graph.folds), 'fold')}"),
-    )  # fmt: skip
-    return fact_list(facts)
+        ("found", f"{branches}, {arcs}, {counted(len(graph.folds), 'fold')}"),
+    ]
 
 
 def _combinations(problem: ContactProblem | ContactProblem3D) -> str:
@@ -252,36 +241,25 @@ def _change(graph: BranchGraph, v: Vertex, arcs: Sequence[Any]) -> str:
     return "; ".join(parts[:6]) + more
 
 
-def _certified(graph: BranchGraph, commands: Sequence[str]) -> str:
-    about = {
-        "problem": "the matrices A, the contact rows and f as they were given",
-        "condensed": "the condensed problem, S and g as computed",
-    }[graph.certified_data]
-    lines = [f"<p>{escape(graph.closing_line)}.</p>"]
+def _certified(graph: BranchGraph) -> list[str]:
+    about = f"This is about {CERTIFIED_DATA[graph.certified_data]}."
     if graph.complete:
-        lines.append(
-            f"<p>It is proven that every solution for every alpha of the interval lies on the arcs shown here. This is "
-            f"about {about}.</p>"
-        )
+        known = f"every solution for every alpha of the interval lies on the arcs shown here. {about}"
     elif graph.claims.partly:
-        lines.append(
-            f"<p>It is proven that every solution lies on the arcs shown here, for every alpha of the interval but for "
-            f"{escape(ranges_text(graph.open_ranges))}. This is about {about}.</p>"
+        known = (
+            "every solution lies on the arcs shown here, for every alpha of the interval but for "
+            f"{escape(ranges_text(graph.open_ranges))}. {about}"
         )
-    elif graph.reasons:
-        lines.append("<p>Nothing is claimed about solutions that are not shown here.</p>")
     else:
-        lines.append("<p>Nothing is proven: the result rests on floating-point arithmetic.</p>")
-    lines.append(
-        "<p>This page is a picture of the result and no proof. Curves are drawn between points on the arcs; how "
-        "exactly critical alphas are known stands in their table.</p>"
+        known = ""
+    if known:
+        known = f"It is proven that {known}"
+    elif graph.reasons:
+        known = "Nothing is claimed about solutions that are not shown here."
+    else:
+        known = "Nothing is proven: the result rests on floating-point arithmetic."
+    picture = (
+        "This page is a picture of the result and no proof. Curves are drawn between points on the arcs; how exactly "
+        "critical alphas are known stands in their table."
     )
-    lines.append(
-        proof_facts(
-            graph.problem.fingerprint,
-            commands,
-            "<code>enumsol graph PROBLEM --from A --to B --proof FILE</code>, then "
-            "<code>enumsol verify PROBLEM FILE</code>; the proof's first record holds the same fingerprint.",
-        )
-    )
-    return "".join(lines)
+    return [known, picture]

@@ -1,4 +1,4 @@
-"""What the pages of reports share: filled templates, tables, Plotly's script, short texts of numbers."""
+"""The frame of all pages of reports, with the problem as given and what is certified; tables and short texts."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from importlib.resources import files
 from string import Template
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -17,25 +17,95 @@ from enumsol._version import find_version
 from enumsol.errors import MissingDependencyError
 from enumsol.model.statuses import ContactStatus
 
+if TYPE_CHECKING:
+    from enumsol.branches import BranchGraph
+    from enumsol.fem import Scene
+    from enumsol.loading.history import History
+    from enumsol.roots.root_set import RootSet
+
 #: Scripts of pages with bodies, before those of one kind.
 DRAWING = ("page.theme.js", "page.common.js", "page.body.js", "page.solid.js", "page.cards.js")
 #: Of statuses, which pages keep as their places in this list.
 STATUS_NAMES = [status.value for status in ContactStatus]
 
 
-def filled_page(kind: str, scripts: Sequence[str], content: Mapping[str, Any], words: Mapping[str, str]) -> str:
+#: What is certified about a problem, by the data that the bounds belong to.
+CERTIFIED_DATA = {
+    "problem": "the matrices A, the contact rows and f as they were given",
+    "condensed": "the condensed problem, S and g as computed",
+}
+
+
+class Heading(NamedTuple):
+    """What the user of `write_report` says of a page: title, units, commands that check the proof, and the scene."""
+
+    title: str
+    units: tuple[str, str] | None
+    commands: Sequence[str]
+    scene: Scene | None
+
+
+class Statement(NamedTuple):
+    """What a page says of its solutions: why they are incomplete, facts, answers, and what is certified.
+
+    Attributes
+    ----------
+    incomplete, reasons : a sentence that the solutions are incomplete, empty where they are not, and why
+    facts : names and values
+    answers : sentences
+    certified : paragraphs in HTML, without the solutions' closing line
+    fingerprint : of the problem
+    check : how to check the proof without commands of the user's, in HTML
+    """
+
+    incomplete: str
+    reasons: Sequence[str]
+    facts: Iterable[tuple[str, str]]
+    answers: Iterable[str]
+    certified: Iterable[str]
+    fingerprint: str | None
+    check: str
+
+
+def proof_commands(command: str, place: str, more: str) -> str:
+    """How to get a proof and to check it, in HTML."""
+    steps = (f"enumsol {command} PROBLEM {place} --proof FILE", "enumsol verify PROBLEM FILE")
+    return ", then ".join(f"<code>{step}</code>" for step in steps) + more
+
+
+def filled_page(
+    kind: str,
+    solutions: BranchGraph | RootSet | History,
+    heading: Heading,
+    said: Statement,
+    scripts: Sequence[str],
+    content: Mapping[str, Any],
+    words: Mapping[str, str],
+) -> str:
     """The text of a page: the frame of all pages around what one kind has, with words, scripts and what these draw."""
-    parts = files("enumsol.report")
-    main = Template((parts / f"page.{kind}.html").read_text(encoding="utf-8")).substitute(words)
-    own = {
-        "main": main,
-        "style": (parts / "page.css").read_text(encoding="utf-8"),
-        "script": "\n".join((parts / name).read_text(encoding="utf-8") for name in scripts),
+    certified = "".join(f"<p>{line}</p>" for line in (f"{escape(solutions.closing_line)}.", *said.certified))
+    frame = {
+        "title": escape(heading.title),
+        "badge": "yes" if solutions.complete else "no",
+        "completeness": escape(solutions.closing_line),
+        "reasons": _warning_list(said.incomplete, said.reasons),
+        "facts": fact_list(said.facts),
+        "answers": "".join(f"<li>{escape(line)}</li>" for line in said.answers),
+        "given": given_section(heading.scene, heading.units),
+        "certified": certified + _proof_facts(said.fingerprint, heading.commands, said.check),
+        "main": Template(_kept(f"page.{kind}.html")).substitute(words),
+        "style": _kept("page.css"),
+        "script": "\n".join(map(_kept, scripts)),
         # no "<" of a name may end the element
         "data": json.dumps(content, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c"),
         "version": escape(find_version()),
     }
-    return Template((parts / "page.frame.html").read_text(encoding="utf-8")).substitute({**own, **words})
+    return Template(_kept("page.frame.html")).substitute({"plotly": "", **words, **frame})
+
+
+def _kept(name: str) -> str:
+    """A file of this package."""
+    return (files("enumsol.report") / name).read_text(encoding="utf-8")
 
 
 def status_codes(statuses: Iterable[ContactStatus]) -> str:
@@ -66,7 +136,7 @@ def fact_list(facts: Iterable[tuple[str, str]]) -> str:
     return "".join(f"<dt>{escape(name)}</dt><dd>{escape(value)}</dd>" for name, value in facts)
 
 
-def proof_facts(fingerprint: str | None, commands: Sequence[str], otherwise: str) -> str:
+def _proof_facts(fingerprint: str | None, commands: Sequence[str], otherwise: str) -> str:
     """The problem's fingerprint, and how to check the proof: by the commands given, or by words in HTML, if any."""
     lines = ""
     if fingerprint is not None:
@@ -79,8 +149,10 @@ def proof_facts(fingerprint: str | None, commands: Sequence[str], otherwise: str
     return lines
 
 
-def warning_list(sentence: str, items: Sequence[str]) -> str:
-    """A warning with its reasons, of many the first."""
+def _warning_list(sentence: str, items: Sequence[str]) -> str:
+    """A warning with its reasons, of many the first; empty without a sentence."""
+    if not sentence:
+        return ""
     lines = "".join(f"<li>{escape(item)}</li>" for item in items[:20])
     more = f"<li>and {len(items) - 20} more</li>" if len(items) > 20 else ""
     return f'<div class="warning" id="incomplete"><p>{escape(sentence)}</p><ul>{lines}{more}</ul></div>'
@@ -104,3 +176,58 @@ def table_text(caption: str, heads: Iterable[str], rows: Iterable[tuple[str, Seq
 def scrolling(caption: str, table: str) -> str:
     """A box with a table in it that can be scrolled, by the keyboard too."""
     return f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(caption)}">{table}</div>'
+
+
+# -- the problem as its user gave it --------------------------------------------------------------------------------
+
+#: Powers of force and of length in the unit of every option of `enumsol.fem.mesh_problem` that has one.
+_POWERS = {
+    **dict.fromkeys(("young", "load", "load_slope", "pressure", "pressure_slope"), (1, -2)),
+    **dict.fromkeys(("spring", "body_force"), (1, -3)),
+    **dict.fromkeys(("thickness", "displacement", "gap", "obstacle", "max_rigid_displacement"), (0, 1)),
+}
+#: Options that mean nothing in 3D.
+_PLANE = ("plane", "thickness")
+_RAISED = {1: "", 2: "\N{SUPERSCRIPT TWO}", 3: "\N{SUPERSCRIPT THREE}"}
+
+
+def unit_text(units: tuple[str, str] | None, force: int, length: int) -> str:
+    """The unit of a quantity, as in "N/mm²": powers of force, 0 or 1, and of length."""
+    if units is None:
+        return ""
+    if length > 0:
+        return units[1] + _RAISED[length]
+    return units[0] if length == 0 else f"{units[0]}/{units[1]}{_RAISED[-length]}"
+
+
+def with_unit(text: str, units: tuple[str, str] | None, force: int, length: int) -> str:
+    """A number as text, with its unit if units are known."""
+    return f"{text} {unit_text(units, force, length)}".rstrip()
+
+
+def given_section(scene: Scene | None, units: tuple[str, str] | None) -> str:
+    """A section of the page with the options of a scene and what they make; empty without one."""
+    if scene is None:
+        return ""
+    rows = [
+        ("", (name, _said(value), unit_text(units, *_POWERS[name]) if name in _POWERS else ""))
+        for name, value in scene.options.items()
+        if value is not None and not (np.ndim(value) == 1 and len(value) == 0)
+        if scene.dimension == 2 or name not in _PLANE
+    ]
+    about = fact_list((title, "; ".join(lines)) for title, lines in scene.sections.items() if lines)
+    words = "" if units is not None else "<p>Numbers are in the user's own consistent units.</p>"
+    table = table_text("The options of the problem", ("option", "as given", "unit"), rows)
+    return (
+        f'<section id="given"><h2>The problem as it was given</h2>{words}{table}'
+        f'<h3>What this makes of the mesh</h3><dl class="facts">{about}</dl></section>'
+    )
+
+
+def _said(value: Any) -> str:
+    """What an option was given, in words."""
+    if isinstance(value, Mapping):
+        return "; ".join(f"{part}: {_said(own)}" for part, own in value.items())
+    if isinstance(value, (list, tuple, np.ndarray)):
+        return ", ".join(_said(own) for own in value)
+    return str(value) if isinstance(value, str) or value is None else f"{float(value):.10g}"

@@ -4,22 +4,26 @@ from __future__ import annotations
 
 from collections import Counter
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.report.given import given_section, with_unit
+from enumsol.model.shapes import body_shape
+from enumsol.report.body import bare_nodes, drawn_body, most_fields, short_list, surface_stresses, vectors
 from enumsol.report.parts import (
+    CERTIFIED_DATA,
     DRAWING,
-    fact_list,
+    STATUS_NAMES,
+    Heading,
+    Statement,
     filled_page,
     packed_plotly,
-    proof_facts,
+    proof_commands,
     span_words,
+    status_codes,
     table_text,
-    warning_list,
+    with_unit,
 )
-from enumsol.report.roots_content import roots_content
 from enumsol.roots.root import summary
 from enumsol.support.messages import counted, found_of
 
@@ -27,45 +31,45 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.fem import Scene
+    from enumsol.roots.root import Root
     from enumsol.roots.root_set import RootSet, Undecided
 
 #: Rows of the tables of roots, continua and undecided parts.
 _MOST_ROWS = 500
+#: Most numbers of forces and displacements of contact nodes in tables, about ten characters each.
+_MOST_VALUES = 150_000
 
 
-def roots_page(
-    found: RootSet, title: str, units: tuple[str, str] | None, commands: Sequence[str], scene: Scene | None
-) -> str:
+def roots_page(found: RootSet, heading: Heading) -> str:
     """The text of the page."""
-    content = roots_content(found, scene) | {"units": units, "alpha": float(found.alpha)}
+    content = roots_content(found, heading.scene) | {"units": heading.units, "alpha": float(found.alpha)}
     turned = content["body"] is not None and "triangles" in content["body"]
+    more = "; the proof's first record holds the same fingerprint."
+    incomplete = "This result is not complete. Every root shown is a solution, but there may be more. Why:"
+    said = Statement(
+        "" if found.whole else incomplete,
+        _reasons(found),
+        _root_facts(found, heading.units),
+        _answers(found),
+        _what_is_certified(found),
+        found[0].problem.fingerprint if len(found) else None,
+        "" if found.arithmetic == "fast" else proof_commands("roots", "--alpha A", more),
+    )
     words = {
-        "title": escape(title),
         "plotly": packed_plotly() if turned else "",
-        "badge": "yes" if found.complete else "no",
-        "completeness": escape(found.closing_line),
-        "reasons": _open_parts(found),
-        "facts": _root_facts(found, units),
-        "given": given_section(scene, units),
-        "answers": "".join(f"<li>{escape(line)}</li>" for line in _answers(found)),
         "alpha": escape(f"{float(found.alpha):.10g}"),
         "roots": _root_table(found),
         "families": _family_table(found),
         "undecided": _undecided_table(found),
-        "certified": _what_is_certified(found, commands),
     }
-    return filled_page("roots", (*DRAWING, "page.roots.js"), content, words)
+    return filled_page("roots", found, heading, said, (*DRAWING, "page.roots.js"), content, words)
 
 
-def _open_parts(found: RootSet) -> str:
-    if found.whole:
-        return ""
+def _reasons(found: RootSet) -> list[str]:
     alike = Counter((item.reason, item.hint) for item in found.undecided)
     reasons = [] if found.stopped is None else [f"the search ended early: {found.stopped}"]
     reasons += [f"{counted(count, 'undecided part')}: {why} ({hint})" for (why, hint), count in alike.most_common()]
-    return warning_list(
-        "This result is not complete. Every root shown is a solution, but there may be more. Why:", reasons
-    )
+    return reasons
 
 
 def _answers(found: RootSet) -> list[str]:
@@ -86,7 +90,7 @@ def _answers(found: RootSet) -> list[str]:
     return lines + [f"Note: {line}." for line in found.notes]
 
 
-def _root_facts(found: RootSet, units: tuple[str, str] | None) -> str:
+def _root_facts(found: RootSet, units: tuple[str, str] | None) -> list[tuple[str, str]]:
     alpha = f"{float(found.alpha):.10g}"
     if not isinstance(found.alpha, float):
         alpha += f", which is {found.alpha} exactly"
@@ -101,8 +105,7 @@ def _root_facts(found: RootSet, units: tuple[str, str] | None) -> str:
             ("load", with_unit(f"max |f| = {np.max(np.abs(problem.load_at(found.alpha))):.4g}", units, 1, 0)),
             ("gap", with_unit(span_words(problem.gap), units, 0, 1)),
         ]
-    facts += [("arithmetic", found.arithmetic), ("searched", counted(found.stats.nodes, "node") + " of the tree")]
-    return fact_list(facts)
+    return [*facts, ("arithmetic", found.arithmetic), ("searched", counted(found.stats.nodes, "node") + " of the tree")]
 
 
 def _root_table(found: RootSet) -> str:
@@ -171,31 +174,84 @@ def _signed(index: int | None) -> str:
     return "unknown" if index is None else f"{index:+d}"
 
 
-def _what_is_certified(found: RootSet, commands: Sequence[str]) -> str:
-    about = {
-        "problem": "the matrices A, the contact rows and f as they were given",
-        "condensed": "the condensed problem, S and g as computed",
-    }[found.certified_data]
-    lines = [f"<p>{escape(found.closing_line)}.</p>"]
+def _what_is_certified(found: RootSet) -> list[str]:
     if found.complete:
-        lines.append(
-            f"<p>It is proven that the problem has the listed solutions at this alpha, and no others. This is about "
-            f"{about}.</p>"
+        known = (
+            "It is proven that the problem has the listed solutions at this alpha, and no others. This is about "
+            f"{CERTIFIED_DATA[found.certified_data]}."
         )
     elif found.arithmetic == "fast":
-        lines.append("<p>Nothing is proven: the result rests on floating-point arithmetic.</p>")
+        known = "Nothing is proven: the result rests on floating-point arithmetic."
     else:
-        known = "The listed roots are proven. " if len(found) else ""
-        lines.append(f"<p>{known}Nothing is claimed about solutions that are not listed.</p>")
-    lines.append("<p>This page is a picture of the result and no proof; numbers are rounded.</p>")
-    lines.append(
-        proof_facts(
-            found[0].problem.fingerprint if len(found) else None,
-            commands,
-            ""
-            if found.arithmetic == "fast"
-            else "<code>enumsol roots PROBLEM --alpha A --proof FILE</code>, then "
-            "<code>enumsol verify PROBLEM FILE</code>; the proof's first record holds the same fingerprint.",
+        known = ("The listed roots are proven. " if len(found) else "") + (
+            "Nothing is claimed about solutions that are not listed."
         )
-    )
-    return "".join(lines)
+    return [known, "This page is a picture of the result and no proof; numbers are rounded."]
+
+
+# -- what the script draws ---------------------------------------------------------------------------------------------
+
+
+def roots_content(found: RootSet, scene: Scene | None = None) -> dict[str, Any]:
+    """Everything that the script needs: nodes, roots with their values, and the bodies that are drawn.
+
+    Statuses are texts of one digit per node, places in ``statuses``. ``f`` and ``w`` are forces and displacements of
+    the contact nodes: all normal ones, then those along each tangent.
+    """
+    p = len(found.node_ids)
+    listed = found[: max(1, _MOST_VALUES // (8 * p))]
+    pictures, bodies = _pictures(listed, scene) if listed else (_picture(None, ""), [])
+    bodies += [{}] * (len(listed) - len(bodies))
+    return {
+        "nodes": [str(label) for label in found.node_ids],
+        "statuses": STATUS_NAMES,
+        "tangents": listed[0].lambda_t[:1].size if listed else 1,
+        "all": len(found),
+        "roots": [_record(found, k, root) | bodies[k] for k, root in enumerate(listed)],
+        **pictures,
+    }
+
+
+def _record(found: RootSet, k: int, root: Root) -> dict[str, Any]:
+    return {
+        "index": root.index,
+        "regular": root.regular,
+        "margin": float(f"{root.margin:.3g}"),
+        "mirror": "" if found.mirror_images is None else found.mirror_images.words(k),
+        "statuses": status_codes(root.statuses),
+        "several": [i for i, holds in enumerate(root.active) if len(holds) > 1],
+        "f": short_list(np.concatenate([root.lambda_n, root.lambda_t.ravel(order="F")])),
+        "w": short_list(np.concatenate([root.u_n, root.u_t.ravel(order="F")])),
+        "angles": None
+        if root.slip_angle is None
+        else [None if np.isnan(pair[0]) else short_list(pair) for pair in root.slip_angle],
+    }
+
+
+def _pictures(roots: Sequence[Root], scene: Scene | None) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """The body, or why there is none, and what moves it and acts on it by root; of many roots the first."""
+    problem = roots[0].problem
+    if problem.mesh is None:
+        body, why = bare_nodes(problem)
+        still = [] if body is None else [{"u": [0] * (3 * problem.p), "forces": []}] * len(roots)
+        return _picture(body, why), still
+    shape = body_shape(problem)
+    body, nodes = drawn_body(problem, shape, len(roots) + 1, scene)
+    count = most_fields(*shape.points[nodes].shape) - 1
+    if count < 1:
+        return _picture(None, f"The mesh is too large to draw: its boundary alone has {len(nodes):,} nodes"), []
+    stresses = surface_stresses(problem, shape, min(count, len(roots)))
+    bodies = [
+        {
+            "u": short_list(shape.moves(root)[nodes].ravel()),
+            "forces": vectors(shape.contact_forces(problem, root.lambda_n, root.lambda_t), nodes),
+            **({} if stresses is None else {"s": short_list(stresses(root.u))}),
+        }
+        for root in roots[:count]
+    ]
+    some = f"The bodies of the first {count} roots are drawn: the page holds no more"
+    return _picture(body, some if count < len(roots) else ""), bodies
+
+
+def _picture(body: dict[str, Any] | None, why: str) -> dict[str, Any]:
+    return {"body": body, "no_body": why}

@@ -21,7 +21,7 @@ from enumsol.model.shapes import (
 )
 from enumsol.model.statuses import ContactStatus
 from enumsol.support.arguments import positive_number
-from enumsol.support.plotting import axes_or_none, figure_of, in_units, new_figure
+from enumsol.support.plotting import axes_of, axes_or_none, figure_of, in_units, line_entry, new_figure
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -57,7 +57,7 @@ def draw_body(
     (factor,), arrows = _factors([root], problem, shape, scale)
     if ax is None:
         figure = new_figure(figsize=(6.4, 5.0))
-        ax = _axes(figure, 111, shape)
+        ax = _axes(figure, (1, 1, 1), shape)
     elif shape.points.shape[1] == 3 and not hasattr(ax, "set_zlim"):
         raise InvalidArgumentError("ax is plane and the body is not; expected Axes with projection '3d', or None")
     _draw(ax, root, problem, shape, factor, arrows)
@@ -106,13 +106,13 @@ def _scale_words(scale: float) -> str:
     return f"displacements times {scale:g}"
 
 
-def _strongest(roots: Sequence[Any], problem: Any, shape: BodyShape) -> float:
+def _strongest(roots: Sequence[Any], problem: object, shape: BodyShape) -> float:
     """The largest nodal contact force of several roots [force]."""
     return max(largest_length(shape.contact_forces(problem, root.lambda_n, root.lambda_t)) for root in roots)
 
 
 def _factors(
-    roots: Sequence[Any], problem: Any, shape: BodyShape, scale: float | None
+    roots: Sequence[Any], problem: object, shape: BodyShape, scale: float | None
 ) -> tuple[tuple[float, ...], float]:
     """By what the displacements of each root are multiplied, and the forces of all."""
     arrows = arrow_scale(_strongest(roots, problem, shape), shape.size)
@@ -121,9 +121,8 @@ def _factors(
     return own_scales([largest_length(shape.moves(root)) for root in roots], shape.size), arrows
 
 
-def _axes(figure: Any, place: Any, shape: BodyShape) -> Any:
-    options = {"projection": "3d"} if shape.points.shape[1] == 3 else {}
-    return figure.add_subplot(*place, **options) if isinstance(place, tuple) else figure.add_subplot(place, **options)
+def _axes(figure: Any, place: tuple[int, int, int], shape: BodyShape) -> Any:
+    return figure.add_subplot(*place, projection="3d" if shape.points.shape[1] == 3 else None)
 
 
 def _draw(ax: Any, root: Any, problem: Any, shape: BodyShape, scale: float, arrows: float) -> None:
@@ -164,7 +163,7 @@ def _draw(ax: Any, root: Any, problem: Any, shape: BodyShape, scale: float, arro
 
 
 def _same_view(axes: Sequence[Any]) -> None:
-    """The same limits for bodies that are compared."""
+    """Set the same limits for bodies that are compared."""
     for direction in "xyz":
         limits = [getattr(ax, f"get_{direction}lim")() for ax in axes]
         for ax in axes:
@@ -194,28 +193,26 @@ def _solid(ax: Any, shape: BodyShape, points: Floats) -> None:
     ax.add_collection3d(Line3DCollection(list(edges), colors=_BEFORE_IN_SPACE, **_BEFORE_LINE, zorder=3))
 
 
-def _name_axes(ax: Any, dimension: int, units: tuple[str, str] | None) -> None:
+def _name_axes(ax: object, dimension: int, units: tuple[str, str] | None) -> None:
     """Directions with the unit of lengths; without units a picture needs no names of axes."""
     for direction in "xyz"[: dimension if units is not None else 0]:
         getattr(ax, f"set_{direction}label")(in_units(direction, "length", units), fontsize=8)
 
 
 def _legend(place: Any, roots: Sequence[Any], strongest: float, units: tuple[str, str] | None) -> None:
-    from matplotlib.lines import Line2D
-
     found = {status for root in roots for status in root.statuses}
     handles = [
-        Line2D([], [], linestyle="", marker=marker, markerfacecolor=face, markeredgecolor="black", label=status.value)
+        line_entry(status.value, linestyle="", marker=marker, markerfacecolor=face, markeredgecolor="black")
         for status, (marker, face) in MARKS.items()
         if status in found
     ]
     if strongest > 0:
         most = "" if units is None else f", up to {strongest:.4g} {units[0]}"
-        handles.append(Line2D([], [], color=_FORCE, label=f"contact force on the body{most}"))
+        handles.append(line_entry(f"contact force on the body{most}", color=_FORCE))
     if ContactStatus.SLIP in found:
-        handles.append(Line2D([], [], color=_SLIP, linewidth=1.8, label="direction of slip"))
+        handles.append(line_entry("direction of slip", color=_SLIP, linewidth=1.8))
     if roots[0].lambda_t.ndim == 2:
-        handles.append(Line2D([], [], color=_BEFORE_IN_SPACE, linewidth=0.8, linestyle="dashed", label="undeformed"))
+        handles.append(line_entry("undeformed", color=_BEFORE_IN_SPACE, linewidth=0.8, linestyle="dashed"))
     where: dict[str, Any] = {"loc": "best"}
     if hasattr(place, "add_subplot"):
         where = {"loc": "outside lower center", "ncols": 6}
@@ -224,7 +221,7 @@ def _legend(place: Any, roots: Sequence[Any], strongest: float, units: tuple[str
     place.legend(handles=handles, fontsize=8, frameon=False, **where)
 
 
-def draw_root(root: Any, problem: ContactProblem3D, ax: Any, units: tuple[str, str] | None = None) -> Any:
+def draw_root(root: object, problem: ContactProblem3D, ax: object, units: tuple[str, str] | None = None) -> Any:
     """See Root.plot."""
     if axes_or_none(ax) is not None or problem.mesh is None:
         return draw_slips(root, problem, ax, units)
@@ -242,8 +239,7 @@ def draw_slips(root: Any, problem: ContactProblem3D, ax: Any, units: tuple[str, 
     # the two coordinate axes along which the contact surface extends most
     shown = np.sort(np.argsort(np.ptp(places, axis=0), kind="stable")[1:])
     moves = np.einsum("pk,pkc->pc", root.u_t, _tangents(problem, shown))[:, shown]
-    if axes_or_none(ax) is None:
-        ax = new_figure(figsize=(6.4, 5.0)).subplots()
+    ax = axes_of(ax, (6.4, 5.0))
     for status, (marker, face) in MARKS.items():
         at = places[[found is status for found in root.statuses]][:, shown]
         if len(at):

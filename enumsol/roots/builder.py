@@ -153,8 +153,8 @@ def root_family(alpha: Alpha, component: RootComponent, solver: SelectionSolver,
     """The family of a component of positive dimension."""
     known: list[Any] = []
 
-    def shared(vertex: Any) -> Any:
-        """The same for equal vertices, so that polytopes that meet share their corners to the last bit."""
+    def shared(vertex: object) -> Any:
+        """Vertex that stands for all equal ones, so that polytopes that meet share their corners to the last bit."""
         found = next((other for other in known if solver.equal(vertex, other)), None)
         if found is None:
             known.append(vertex)

@@ -58,7 +58,7 @@ class RootComponent:
 
     @property
     def regular(self) -> bool:
-        """One selection holds, strictly, and is not singular."""
+        """True if one selection holds, strictly, and is not singular."""
         first = self.solutions[0]
         return len(self.solutions) == 1 and self.dimension == 0 and first.strict and first.det_sign != 0
 
@@ -164,7 +164,7 @@ def _with_own(active: ActiveSets, codes: Codes | None) -> ActiveSets:
 
 
 def _touch(a: SelectionSolution, b: SelectionSolution, solver: SelectionSolver) -> bool:
-    """Whether two solutions share a point; points must agree, and each lie in the other's selection."""
+    """True if two solutions share a point; points must agree, and each lie in the other's selection."""
     look()
     if a.dimension == 0 and b.dimension == 0:
         return solver.equal(a.vertices[0], b.vertices[0])
@@ -174,7 +174,7 @@ def _touch(a: SelectionSolution, b: SelectionSolution, solver: SelectionSolver) 
     )
 
 
-def _holds(codes: Codes, point: Any, solver: SelectionSolver) -> bool:
+def _holds(codes: Codes, point: object, solver: SelectionSolver) -> bool:
     look()
     return all(code in active for code, active in zip(codes, solver.active(point), strict=True))
 

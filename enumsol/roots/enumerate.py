@@ -66,24 +66,24 @@ class AtRest:
         active = tuple(frozenset(FINAL[positive]) for positive in self._F_positive)
         return RootComponent((solution,), active, 0, 1, whole=True)
 
-    def forces(self, point: Any) -> Floats:
+    def forces(self, point: object) -> Floats:
         """Zeros."""
         del point
         return np.zeros(2 * self._p)
 
     displacements = forces
 
-    def slip_signs(self, point: Any) -> tuple[int, ...]:
+    def slip_signs(self, point: object) -> tuple[int, ...]:
         """Zeros."""
         del point
         return (0,) * self._p
 
-    def exact_slips(self, point: Any) -> tuple[Fraction, ...]:
+    def exact_slips(self, point: object) -> tuple[Fraction, ...]:
         """Zeros."""
         del point
         return (Fraction(0),) * self._p
 
-    def bounds(self, point: Any) -> tuple[Floats, Floats] | None:
+    def bounds(self, point: object) -> tuple[Floats, Floats] | None:
         """Zeros where they are proven."""
         del point
         return (np.zeros(4 * self._p), np.zeros(4 * self._p)) if self._proven else None
@@ -227,7 +227,7 @@ def enumerate_roots(
 
 
 def is_unique(problem: AnyProblem, alpha: AlphaLike, **options: Any) -> bool | None:
-    """Whether the problem has one solution at one alpha, proven either way; None when that stayed open.
+    """True if the problem has one solution at one alpha, False if it has not, both proven; None when that stayed open.
 
     True if all selections are accounted for and one solution is left: by one certificate where that serves (theory,
     section 6.11), otherwise by the search. False as soon as two solutions are proven, or a continuum. The search then
@@ -262,7 +262,7 @@ def is_unique(problem: AnyProblem, alpha: AlphaLike, **options: Any) -> bool | N
 
 
 def _is_in_space(problem: object) -> TypeIs[ContactProblem3D]:
-    """Whether it is a problem in 3D, whose class is not loaded for others."""
+    """True if it is a problem in 3D, whose class is not loaded for others."""
     return isinstance(problem, ContactBody) and not isinstance(problem, ContactProblem)
 
 

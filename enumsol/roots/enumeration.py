@@ -101,7 +101,7 @@ class Enumeration(ABC, Generic[_Solvers]):
         """The result of what was found before something ended ``run``, wherever that was."""
         self.outcome.stopped = Stop(StopReason.of(ending), self._examined())
         if self.tree is not None and not self.unloaded and not issubclass(ending, MemoryError):
-            self.tree.add_known()
+            self.tree.rest.add_known()
         return self._result()
 
     def _at_least(self, known: int) -> int:
@@ -116,7 +116,7 @@ class Enumeration(ABC, Generic[_Solvers]):
         self.outcome = search.outcome
         search.at_limit = solvers.at_limit
         search.rest.otherwise = AWAY if search.at_limit is not None else "" if self.problem.held else HOLD
-        search.continua = self._continua
+        search.rest.continua = self._continua
         if solvers.unloaded():
             self.certifier.unloaded()
             self.unloaded = True
@@ -139,12 +139,12 @@ class Enumeration(ABC, Generic[_Solvers]):
                     spread.cancel()
 
     def _examined(self) -> int:
-        """What an interruption says was done."""
+        """Number of selections that an interruption says were done."""
         return self.outcome.nodes
 
     @abstractmethod
     def _enough(self, stop_after: int) -> Callable[[list[Any]], bool]:
-        """Whether solutions of leaves are so many roots and families."""
+        """True if solutions of leaves are so many roots and families."""
 
     def _continua(self) -> list[Codes]:
         """Complete selections that hold on the families of which solutions were found; in 3D there are none."""

@@ -1,4 +1,4 @@
-"""Whether a local Lipschitz branch passes through a root: coherent orientation of the normal map (theory, (3.3))."""
+"""True if a local Lipschitz branch passes through a root: coherent orientation of the normal map (theory, (3.3))."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class LocalBranchTest:
 
 
 def local_branch_test(problem: AnyProblem, root: SolutionPoint) -> LocalBranchTest:
-    """Whether a local Lipschitz branch of solutions passes through a root (theory, section 3.2).
+    """Test of the existence of a local Lipschitz branch of solutions through a root (theory, section 3.2).
 
     The test looks at the normal map G(z) = w + S lambda, which does not depend on the parameter r of H, over the
     statuses that hold at the root (``root.active``).

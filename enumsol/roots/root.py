@@ -18,6 +18,7 @@ from enumsol.support.plotting import checked_units, kept
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from fractions import Fraction
+    from pathlib import Path
 
     from enumsol.condensation.condensed import Condensation, CondensedProblem
     from enumsol.roots.linearisation import SelectionTangent, SlipSigns
@@ -172,12 +173,12 @@ class Root(ContactState):
 
     @property
     def rigid_coordinates(self) -> Floats | None:
-        """Of a body that nothing holds: q of the rigid displacement N q, shape (r,); None of others."""
+        """Coordinates q of the rigid displacement N q, shape (r,); None if the body is held."""
         return self._rigid
 
     @property
     def rigid_displacement(self) -> Floats | None:
-        """Of a body that nothing holds: how it moves as a whole, N q, shape (n,) [length]; None of others.
+        """Rigid displacement N q of the body as a whole, shape (n,) [length]; None if it is held.
 
         It is the rigid displacement that equals u at r degrees of freedom, where theory, section 14.1, has the body on
         springs.
@@ -185,7 +186,7 @@ class Root(ContactState):
         return None if self._rigid is None else np.asarray(self.problem.rigid_modes @ self._rigid)
 
     def local_branch_test(self) -> LocalBranchTest:
-        """Whether a local Lipschitz branch of solutions passes through the root (theory, section 3.2).
+        """Test of the existence of a local Lipschitz branch of solutions through the root (theory, section 3.2).
 
         Its ``exists`` is True when the determinants of all selections that hold at the root have one and the same
         sign; ``differing`` names those that break this. A regular root always has such a branch. ``premise`` tells
@@ -213,7 +214,7 @@ class Root(ContactState):
         """The problem that it solves."""
         return self._condensed.problem
 
-    def plot(self, ax: Any = None, *, units: tuple[str, str] | None = None, file: Any = None) -> Any:
+    def plot(self, ax: object = None, *, units: tuple[str, str] | None = None, file: str | Path | None = None) -> Any:
         """The deformed body; in 3D also statuses and directions of slip on the contact surface.
 
         Parameters
@@ -245,11 +246,11 @@ class Root(ContactState):
 
     def plot_body(
         self,
-        ax: Any = None,
+        ax: object = None,
         *,
         scale: float | None = None,
         units: tuple[str, str] | None = None,
-        file: Any = None,
+        file: str | Path | None = None,
     ) -> Any:
         """The deformed body with contact forces as arrows and contact nodes by status; in 3D also directions of slip.
 
@@ -464,7 +465,7 @@ def _places_head(places: Floats | None) -> tuple[str, ...]:
 
 
 def _place(places: Floats | None, i: int) -> tuple[str, ...]:
-    """Where in the body a contact node is, if that is known."""
+    """Place of a contact node in the body, if it is known."""
     return () if places is None else (f"({', '.join(f'{x + 0.0:.4g}' for x in places[i])})",)
 
 

@@ -18,6 +18,8 @@ from enumsol.support.messages import counted, found_of, html_lines, html_table
 from enumsol.support.plotting import checked_units, kept
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import pandas as pd
 
     from enumsol.model.statuses import ContactStatus
@@ -253,17 +255,17 @@ class RootSet(Sequence[Root], Immutable):
 
     @property
     def complete(self) -> bool:
-        """Whether completeness is proven: exact arithmetic, nothing undecided, search not cut short."""
+        """True if completeness is proven: exact arithmetic, nothing undecided, search not cut short."""
         return self.arithmetic != "fast" and self.whole
 
     @property
     def whole(self) -> bool:
-        """Whether nothing is known to be missing: the search ran to its end and left nothing undecided."""
+        """True if nothing is known to be missing: the search ran to its end and left nothing undecided."""
         return self.stopped is None and not self.undecided
 
     @property
     def unique(self) -> bool | None:
-        """Whether there is one solution, proven either way; None when that stayed open, and in fast arithmetic."""
+        """True if there is one solution, False if not, both proven; None if it stayed open, and in fast arithmetic."""
         if self.arithmetic == "fast":
             return None
         if self.families or self.at_least > 1:
@@ -272,7 +274,7 @@ class RootSet(Sequence[Root], Immutable):
 
     @property
     def by_one_certificate(self) -> bool:
-        """Whether a form that is definite proved, without a tree, that there is one solution (theory, section 6.11)."""
+        """True if a form that is definite proved, without a tree, that there is one solution (theory, section 6.11)."""
         stats = self.stats
         return self.whole and len(self) == 1 and (stats.closed, stats.pruned, stats.selections) == (1, 0, 0)
 
@@ -290,7 +292,7 @@ class RootSet(Sequence[Root], Immutable):
 
     @property
     def adds_up(self) -> bool:
-        """Whether the sum of the indices, where it is known and the body is held, is +1 (theory, (6.7))."""
+        """True if the sum of the indices, where it is known and the body is held, is +1 (theory, (6.7))."""
         return self.rigid_bound is not None or self.index_sum in (None, 1)
 
     @property
@@ -311,7 +313,7 @@ class RootSet(Sequence[Root], Immutable):
     def __getitem__(self, item: int | slice) -> Root | tuple[Root, ...]:
         return self._roots[item]
 
-    def index(self, root: Any = None, start: int = 0, stop: int | None = None) -> int:
+    def index(self, root: object = None, start: int = 0, stop: int | None = None) -> int:
         """Position of a root, as that of an item of a list; the topological index is ``index`` of a root.
 
         Raises
@@ -327,8 +329,8 @@ class RootSet(Sequence[Root], Immutable):
             f"{counted(len(self), 'root')} (for topological indices, roots[0].index or roots.index_sum)"
         )
 
-    def mirrored(self, mirror: Any, *, tolerance: float = 1e-6) -> RootSet:
-        """The same roots with ``mirror_images``, which tells which are mirror images of one another.
+    def mirrored(self, mirror: object, *, tolerance: float = 1e-6) -> RootSet:
+        """Roots with ``mirror_images``, which tells which are mirror images of one another.
 
         Nothing is taken from the symmetry: the search has found all roots without it, and a root without a mirror image
         is reported as such (theory, section 6.14). Families are not compared.
@@ -385,7 +387,7 @@ class RootSet(Sequence[Root], Immutable):
         )
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per root and node: alpha, root, node, status, lambda_n, lambda_t, u_n, u_t, index, regular.
+        """Table with a row per root and node: alpha, root, node, status, lambda_n, lambda_t, u_n, u_t, index, regular.
 
         After `mirrored` also mirror_image, the number of the root that is the mirror image, None where there is none.
         """
@@ -414,7 +416,9 @@ class RootSet(Sequence[Root], Immutable):
             return {}
         return {"mirror_image": np.repeat(np.array(self.mirror_images.images, dtype=object), p)}
 
-    def plot_bodies(self, *, scale: float | None = None, units: tuple[str, str] | None = None, file: Any = None) -> Any:
+    def plot_bodies(
+        self, *, scale: float | None = None, units: tuple[str, str] | None = None, file: str | Path | None = None
+    ) -> Any:
         """A matplotlib figure of the deformed bodies of the isolated roots, up to 12 of them, side by side.
 
         Forces are drawn in one scale, and displacements too unless their sizes differ by more than a factor of 8, as
@@ -464,7 +468,7 @@ class RootSet(Sequence[Root], Immutable):
         return f"{heading} ({self.arithmetic}, {self.method})"
 
     def _rows(self) -> list[tuple[str, str, str, str, str, str]]:
-        """What is printed of the first roots: number, index, whether regular, margin, largest force, statuses."""
+        """Rows printed of the first roots: number, index, whether regular, margin, largest force, statuses."""
         return [
             (
                 str(k),
@@ -560,7 +564,7 @@ def by_axis(name: str, values: Floats) -> list[tuple[str, Floats]]:
 
 
 def _resumed(stats: SearchStats) -> str:
-    """What a search has taken of the nodes in its file, and why not all of them."""
+    """Words on how many nodes of its file a search has taken, and why not all of them."""
     left = stats.held - stats.held_open - stats.resumed
     why = [f"{stats.held_open:,} undecided there"] if stats.held_open else []
     why += [f"{left:,} not proven again"] if left > 0 else []

@@ -15,13 +15,11 @@ import numpy as np
 from enumsol.condensation.condensed import ScaledSystem
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, RigidRows, enclosure_of
 from enumsol.proof import records
-from enumsol.search.balance import in_balance
 from enumsol.search.certifiers.protocol import Bound, Certifier, UndecidedPart
 from enumsol.search.certifiers.rational_certifier import ExactCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier, proven
 from enumsol.search.closing import TreeCloser
 from enumsol.search.reference_closer import LeadingCloser, reference_numbers
-from enumsol.search.setup import HeldByNothing
 from enumsol.search.solvers import Solvers
 from enumsol.search.splitting import PlaneSplitting
 from enumsol.selections.solution import SelectionSolution
@@ -31,7 +29,8 @@ from enumsol.trusted.exclusion import Terms, exclusion_margin
 from enumsol.trusted.floating_bounds import is_unbalanced
 from enumsol.trusted.joint_roots import JointRoot, joint_root
 from enumsol.trusted.reference import Reference
-from enumsol.trusted.status_rows import CONDITIONS, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.trusted.selection import PENETRATION, SLIP_BACKWARD, SLIP_FORWARD
+from enumsol.trusted.status_rows import CONDITIONS, FORBIDDEN, FREE, SLIP_MINUS, SLIP_PLUS, STICK, row_signs
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,16 +39,20 @@ if TYPE_CHECKING:
     from enumsol.search.certifiers.protocol import Margin
     from enumsol.search.reference_closer import OnlyRoot
     from enumsol.selections.rational_selections import ExactSelections
-    from enumsol.support.array_types import Codes, Floats
+    from enumsol.support.array_types import Codes, Floats, Indices
     from enumsol.trusted.at_alpha import VerifiedSelection
 
 #: How a node slips, or is about to, where one of these kinds of rows is zero.
 _SLIPS = {2: SLIP_PLUS, 5: SLIP_PLUS, 3: SLIP_MINUS, 6: SLIP_MINUS}
 #: Stiffness of the springs of the relaxations, relative to that of the body (theory, section 14.5).
 WEAK = 2.0**-20
+#: Weight of multipliers that are zero, relative to the largest: they change only where the others cannot do it.
+_SPARE = 2.0**-20
+#: How often multipliers that would change their sign are set to zero, and what is left is balanced again.
+_BALANCES = 8
 
 
-class FloatingSolvers(HeldByNothing, Solvers):
+class FloatingSolvers(Solvers):
     """Solvers and certifier for a body that nothing holds, at one alpha; parameters as of Solvers."""
 
     @cached_property
@@ -146,6 +149,37 @@ def weakly_held(S: Floats, g: Floats, rows: RigidRows, stiffness: float = WEAK) 
     soft = G.T / stiffness
     S = S + soft @ G
     return 0.5 * (S + S.T), g + soft @ h
+
+
+def in_balance(system: EnclosedSystem, codes: Codes, rows: Indices, values: Floats) -> tuple[Indices, Floats]:
+    """Multipliers next to given ones with G y = h, up to rounding, or these where there are none.
+
+    Those of the body on weak springs satisfy this up to the springs only, times the rigid displacement.
+    """
+    p, G, h = system.p, system.rows.G.mid, system.rows.h.mid
+    signs = row_signs(np.array(codes), system.F)
+    normal, forward, backward = (signs[:, kind] for kind in (PENETRATION, SLIP_FORWARD, SLIP_BACKWARD))
+    low = np.concatenate([normal == FREE, forward != FORBIDDEN])
+    high = np.concatenate([normal != FORBIDDEN, backward != FORBIDDEN])
+    table = np.bincount(rows, values, minlength=signs.size).reshape(-1, p)
+    y = np.concatenate([table[PENETRATION], table[SLIP_BACKWARD] - table[SLIP_FORWARD]])
+    size = np.abs(y)
+    weight = np.where(low | high, size + _SPARE * np.max(size), 0.0)
+    for _ in range(_BALANCES):
+        step = np.linalg.lstsq((G * weight) @ G.T, h - G @ y, rcond=1e-13)[0]
+        y = y + weight * (step @ G)
+        wrong = np.where(y < 0, ~low, ~high) & (y != 0)
+        if not np.any(wrong):
+            break
+        y, weight = np.where(wrong, 0.0, y), np.where(wrong, 0.0, weight)
+    else:
+        return rows, values
+    forces = rows < PENETRATION * p
+    kind = np.repeat([PENETRATION, SLIP_BACKWARD], p)
+    kind[p:][y[p:] < 0] = SLIP_FORWARD
+    given, of = np.flatnonzero(y), np.tile(np.arange(p), 2)
+    sizes = np.where(kind == PENETRATION, y, np.abs(y))
+    return np.concatenate([rows[forces], kind[given] * p + of[given]]), np.concatenate([values[forces], sizes[given]])
 
 
 class Exclusions:

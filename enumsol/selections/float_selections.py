@@ -135,11 +135,11 @@ class FloatSelections:
         return active_within(rows, self.F_positive, self.tolerance)
 
     def equal(self, a: Floats, b: Floats) -> bool:
-        """Whether two points agree within ten tolerances in scaled forces."""
+        """True if two points agree within ten tolerances in scaled forces."""
         return bool(np.max(np.abs(a - b) / self._force_scale) <= 10 * self.tolerance)
 
     def meet(self, a: SelectionSolution, b: SelectionSolution) -> bool:
-        """Whether two polytopes share a point, within the tolerance: the distance of their hulls, a linear program."""
+        """True if two polytopes share a point, within the tolerance: the distance of their hulls, a linear program."""
         from scipy.optimize import linprog  # only families need it
 
         Va = np.array(a.vertices) / self._force_scale

@@ -54,7 +54,7 @@ class SelectionFunctions:
 
     @property
     def singular(self) -> bool:
-        """Whether the determinant vanishes for every alpha."""
+        """True if the determinant vanishes for every alpha."""
         return bool(self.det.is_zero())
 
     @property
@@ -132,7 +132,7 @@ class SelectionFunctions:
         return list(self._selection.forces(unknowns, F, fmpz_poly([]), data.friction_unit))
 
     def margins(self) -> list[Any]:
-        """What is left of the rigid displacement's bounds on both sides, (2r,), of a body that nothing holds."""
+        """Distances of the rigid displacement from its bounds on both sides, (2r,), of a body that nothing holds."""
         data, found = self.exact.integers, []
         for moved, most in zip(self._forces[2 * self.exact.p :], self.exact.reach, strict=True):
             # both times the denominators of the bound and of the unit of forces

@@ -57,7 +57,7 @@ def polytope_vertices(equations: list[Form], inequalities: list[Form], reduce: R
 
 
 def _affine_solutions(equations: list[Form], reduce: Reduction) -> tuple[Point, list[Point]] | None:
-    """One solution of the equations and a kernel basis, or None when they contradict each other."""
+    """Solution of the equations and a kernel basis, or None when they contradict each other."""
     size = len(equations[0][0])
     table, pivots = reduce([[*form, -constant] for form, constant in equations])
     if size in pivots:

@@ -131,7 +131,7 @@ class ExactSelections:
         return tuple(selection.forces(as_objects(y), self._F, fmpq(0))), -sign if self.modes % 2 else sign
 
     def _solved_apart(self, system: UncondensedSystem, selection: Selection) -> tuple[Point, int] | None:
-        """The same from the matrices of the problem, for its own load."""
+        """Solution of a selection from the matrices of the problem, for its own load."""
         index = system.index(selection.codes)
         solved = system.solved(lambda K: selection.columns(K, self._F), selection.unknown, index)
         if solved is None:
@@ -179,7 +179,7 @@ class ExactSelections:
         return rows
 
     def rests_on_reach(self, codes: Codes, found: SelectionSolution | None) -> bool:
-        """Whether a selection, in which this was found, holds other points without the bounds (theory, section 14.4).
+        """True if a selection, in which this was found, holds other points without the bounds (theory, section 14.4).
 
         True as well if more than MAX_BASES bases would have to be tried to find out.
         """
@@ -235,7 +235,7 @@ class ExactSelections:
         return a == b
 
     def meet(self, a: SelectionSolution, b: SelectionSolution) -> bool:
-        """Whether both selections' conditions hold at a common point, exactly."""
+        """True if both selections' conditions hold at a common point, exactly."""
         first, second = self.forms(a.codes), self.forms(b.codes)
         return bool(polytope_vertices(first[0] + second[0], first[1] + second[1], self.row_reduced))
 
@@ -303,7 +303,7 @@ class FiberSelections(ExactSelections):
     push : direction that replaces g, in the perturbations that give the local degree
     """
 
-    def __init__(self, exact: ExactCondensed, alpha: Any, push: tuple[Any, ...] | None = None) -> None:
+    def __init__(self, exact: ExactCondensed, alpha: object, push: tuple[Any, ...] | None = None) -> None:
         system = exact.system(alpha)
         super().__init__(system if push is None else system.along(push))
         self.exact, self.alpha = exact, alpha
@@ -341,7 +341,7 @@ class FiberSelections(ExactSelections):
         return table[: len(pivots)], pivots
 
     @staticmethod
-    def as_float(number: Any) -> float:
+    def as_float(number: object) -> float:
         """The nearest float."""
         return as_float(number)
 

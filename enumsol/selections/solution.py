@@ -83,10 +83,10 @@ class SelectionSolver(PointValues, Protocol):
         """Per node the codes whose conditions hold at a root."""
 
     def equal(self, a: Any, b: Any) -> bool:
-        """Whether two points are the same."""
+        """True if two points are the same."""
 
     def meet(self, a: SelectionSolution, b: SelectionSolution) -> bool:
-        """Whether two polytopes have a point in common."""
+        """True if two polytopes have a point in common."""
 
     def departure(self, solution: SelectionSolution, direction: np.ndarray[Any, Any]) -> int | None:
         """det_sign if the regular selection's root stays a root when g moves a little along ``direction``.

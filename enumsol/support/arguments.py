@@ -58,7 +58,7 @@ class _Short(Repr):
         return repr(x) if x.bit_length() <= 200 else f"<integer of {x.bit_length()} bits>"
 
     def repr_Fraction(self, x: Fraction, level: int) -> str:  # noqa: N802 (reprlib looks for the type's name)
-        """As a/b."""
+        """Text of a fraction, a/b."""
         return f"{self.repr_int(x.numerator, level)}/{self.repr_int(x.denominator, level)}"
 
     def repr_ndarray(self, x: NDArray[Any], level: int) -> str:
@@ -90,7 +90,7 @@ def _refusal(value: object, name: str, expected: str) -> InvalidArgumentError:
 # -- alpha -----------------------------------------------------------------------------------------------------------
 
 
-def alpha_value(value: Any, name: str = "alpha") -> Alpha:
+def alpha_value(value: object, name: str = "alpha") -> Alpha:
     """The exact value of alpha: a float where it is one, otherwise (and for fractions that were given) a Fraction.
 
     Parameters
@@ -124,14 +124,14 @@ def alpha_value(value: Any, name: str = "alpha") -> Alpha:
 
 
 def _in_range(number: Fraction) -> bool:
-    """Whether float64 neither rounds a fraction to zero nor to infinity."""
+    """True if float64 neither rounds a fraction to zero nor to infinity."""
     try:
         return number == 0 or float(number) != 0
     except OverflowError:
         return False
 
 
-def exact_number(value: Any) -> float | Fraction | None:
+def exact_number(value: object) -> float | Fraction | None:
     """The exact value of a real number of any type; None for anything else.
 
     A float is given for floats, which may be nan or infinite, and a Fraction for everything else. A Decimal whose
@@ -151,7 +151,7 @@ def exact_number(value: Any) -> float | Fraction | None:
     return None
 
 
-def _without_array(value: Any) -> Any:
+def _without_array(value: object) -> Any:
     """The content of an array without dimensions; anything else unchanged (a masked value too)."""
     if isinstance(value, np.ndarray) and value.ndim == 0 and not np.ma.is_masked(value):
         return np.asarray(value)[()]
@@ -183,7 +183,7 @@ def _from_text(text: str, name: str) -> float | Fraction | None:
     return number
 
 
-def text_of(value: Any, name: str) -> str:
+def text_of(value: object, name: str) -> str:
     """A text.
 
     Raises
@@ -213,7 +213,7 @@ def alpha_list(values: Any, name: str = "alphas") -> list[Alpha]:
     return [alpha_value(value, f"{name}[{k}]") for k, value in enumerate(several)]
 
 
-def even_alphas(ends: Any, samples: Any, name: str = "alphas") -> list[Alpha]:
+def even_alphas(ends: object, samples: object, name: str = "alphas") -> list[Alpha]:
     """Evenly spaced alphas, both ends included: exact ones between fractions, else the floats nearest to the decimals.
 
     Between -1 and 0.2 the sixth of seven is 0, and not what is left of -1 + 5 * 0.2 in floats.
@@ -231,7 +231,7 @@ def even_alphas(ends: Any, samples: Any, name: str = "alphas") -> list[Alpha]:
     return [low, *(map(float, inside) if rounded else inside), high]
 
 
-def alpha_interval(value: Any, name: str = "interval") -> tuple[Alpha, Alpha]:
+def alpha_interval(value: object, name: str = "interval") -> tuple[Alpha, Alpha]:
     """Both ends of an interval of alpha, exactly.
 
     Raises
@@ -243,7 +243,7 @@ def alpha_interval(value: Any, name: str = "interval") -> tuple[Alpha, Alpha]:
     return _in_order(low, high, value, name)
 
 
-def unbounded_interval(value: Any, name: str = "interval") -> tuple[float, float]:
+def unbounded_interval(value: object, name: str = "interval") -> tuple[float, float]:
     """Both ends of an interval that may reach to infinity, as floats.
 
     Raises
@@ -259,7 +259,7 @@ def unbounded_interval(value: Any, name: str = "interval") -> tuple[float, float
     return _in_order(ends[0], ends[1], value, name)
 
 
-def _in_order(low: N, high: N, value: Any, name: str) -> tuple[N, N]:
+def _in_order(low: N, high: N, value: object, name: str) -> tuple[N, N]:
     if not low < high:
         raise _refusal(value, name, "its first alpha below its last")
     return low, high
@@ -280,7 +280,7 @@ def _pair(value: Any, name: str) -> list[Any]:
 # Each gives the value in a plain type and raises InvalidArgumentError for anything else.
 
 
-def positive_integer(value: Any, name: str, least: int = 1, most: int | None = None) -> int:
+def positive_integer(value: object, name: str, least: int = 1, most: int | None = None) -> int:
     """Value as an int of at least ``least`` and, where that is given, at most ``most``."""
     number = _whole(value, name, lambda k: k >= least, f"an integer of at least {least}")
     if most is not None and number > most:
@@ -288,27 +288,27 @@ def positive_integer(value: Any, name: str, least: int = 1, most: int | None = N
     return number
 
 
-def optional_count(value: Any, name: str) -> int | None:
+def optional_count(value: object, name: str) -> int | None:
     """Value as a positive int, or None for no limit."""
     return None if value is None else _whole(value, name, lambda k: k >= 1, "a positive integer or None")
 
 
-def row_number(value: Any, name: str, count: int, expected: str = "") -> int:
+def row_number(value: object, name: str, count: int, expected: str = "") -> int:
     """Value as an int in 0 .. count - 1; ``expected`` says in messages what it counts."""
     return _whole(value, name, lambda k: 0 <= k < count, expected or f"a row number below {count}")
 
 
-def optional_seconds(value: Any, name: str = "time_limit") -> float | None:
+def optional_seconds(value: object, name: str = "time_limit") -> float | None:
     """Value as a positive number of seconds, or None for no limit."""
     return None if value is None else _real(value, name, lambda x: x > 0, "a positive number of seconds or None")
 
 
-def share(value: Any, name: str = "tolerance") -> float:
+def share(value: object, name: str = "tolerance") -> float:
     """Value as a float of at least zero and below one."""
     return _real(value, name, lambda x: 0 <= x < 1, "a number in [0, 1)")
 
 
-def finite_number(value: Any, name: str) -> float:
+def finite_number(value: object, name: str) -> float:
     """Value as a finite float, which it is exactly."""
     number = _real(value, name, math.isfinite, "a finite number")
     if number != exact_number(value):
@@ -316,7 +316,7 @@ def finite_number(value: Any, name: str) -> float:
     return number
 
 
-def direction_value(value: Any) -> int:
+def direction_value(value: object) -> int:
     """Value as +1 or -1."""
     number = exact_number(value)
     if number not in (1, -1):
@@ -324,17 +324,17 @@ def direction_value(value: Any) -> int:
     return 1 if number == 1 else -1
 
 
-def positive_number(value: Any, name: str) -> float:
+def positive_number(value: object, name: str) -> float:
     """Value as a finite float above zero, rounded if need be."""
     return _real(value, name, lambda x: 0 < x < math.inf, "a finite number > 0")
 
 
-def nonnegative_number(value: Any, name: str) -> float:
+def nonnegative_number(value: object, name: str) -> float:
     """Value as a finite float of at least zero, rounded if need be."""
     return _real(value, name, lambda x: 0 <= x < math.inf, "a finite number >= 0")
 
 
-def _real(value: Any, name: str, admissible: Callable[[float], bool], expected: str) -> float:
+def _real(value: object, name: str, admissible: Callable[[float], bool], expected: str) -> float:
     number = real_or_nan(value)
     if not admissible(number):
         raise _refusal(value, name, expected)
@@ -351,7 +351,7 @@ def _whole(value: Any, name: str, admissible: Callable[[int], bool], expected: s
     return number
 
 
-def real_or_nan(value: Any) -> float:
+def real_or_nan(value: object) -> float:
     """A real number of any type as a float, rounded if necessary; nan for anything else."""
     number = exact_number(value)
     try:
@@ -363,14 +363,14 @@ def real_or_nan(value: Any) -> float:
 # -- options, objects and files --------------------------------------------------------------------------------------
 
 
-def one_of(value: Any, name: str, known: Collection[str | None]) -> Any:
+def one_of(value: object, name: str, known: Collection[str | None]) -> Any:
     """Value, if it is one of the known texts (or None, if that is among them)."""
     if not (value is None or isinstance(value, str)) or value not in known:
         raise _refusal(value, name, f"one of {', '.join(map(repr, known))}")
     return value
 
 
-def entry_named(name: Any, entries: Mapping[str, T], where: str, example: str) -> T:
+def entry_named(name: object, entries: Mapping[str, T], where: str, example: str) -> T:
     """The entry of that name; a refusal names similar ones, or all."""
     if not isinstance(name, str):
         raise InvalidArgumentError(f"name is {shown(name)}; expected a name of {where}, such as {example}")
@@ -390,7 +390,7 @@ def close_names(name: str, entries: Collection[str]) -> list[str]:
     return difflib.get_close_matches(name.lower(), entries, n=5, cutoff=0.5)
 
 
-def instance_of(value: Any, kind: type[T], name: str) -> T:
+def instance_of(value: object, kind: type[T], name: str) -> T:
     """Value, which is of a type; another one may say in ``taken_by`` what takes it."""
     if not isinstance(value, kind):
         article = "an" if kind.__name__[0] in "AEIOU" else "a"
@@ -399,14 +399,14 @@ def instance_of(value: Any, kind: type[T], name: str) -> T:
     return value
 
 
-def optional_callable(value: Any, name: str) -> Any:
+def optional_callable(value: object, name: str) -> Any:
     """Value, which can be called, or None."""
     if value is not None and not callable(value):
         raise _refusal(value, name, "a function or None")
     return value
 
 
-def optional_executor(value: Any, jobs: Any = None) -> None:
+def optional_executor(value: object, jobs: object = None) -> None:
     """Refuse what is not like a concurrent.futures.Executor nor None, a number of jobs that is none, and both."""
     if value is not None and not callable(getattr(value, "submit", None)):
         raise _refusal(value, "executor", "a concurrent.futures.Executor or None")

@@ -30,7 +30,7 @@ _RAGGED = "rows of different lengths or depths"
 
 
 def real_array(
-    value: Any, name: str, *, error: type[EnumsolError] = InvalidProblemError, finite: bool = True
+    value: object, name: str, *, error: type[EnumsolError] = InvalidProblemError, finite: bool = True
 ) -> Floats:
     """A new float64 array with exactly the numbers that were given.
 
@@ -71,7 +71,7 @@ def real_array(
     return array
 
 
-def plain_array(value: Any, name: str, *, error: type[EnumsolError]) -> NDArray[Any]:
+def plain_array(value: object, name: str, *, error: type[EnumsolError]) -> NDArray[Any]:
     """The value as an array of its own type.
 
     Raises
@@ -97,8 +97,8 @@ def plain_array(value: Any, name: str, *, error: type[EnumsolError]) -> NDArray[
     return raw
 
 
-def _has_masked(value: Any) -> bool:
-    """Whether something is masked in an array or in the arrays of a list, whose masks numpy would drop."""
+def _has_masked(value: object) -> bool:
+    """True if something is masked in an array or in the arrays of a list, whose masks numpy would drop."""
     if isinstance(value, (list, tuple)):
         return any(_has_masked(row) for row in value if isinstance(row, (list, tuple, np.ma.MaskedArray)))
     return isinstance(value, np.ma.MaskedArray) and bool(np.ma.is_masked(value))
@@ -119,7 +119,7 @@ def _as_floats(raw: NDArray[Any]) -> Floats:
 
 
 def _rounded(raw: NDArray[Any], array: Floats) -> Mask:
-    """Where floats, integers or bools are not what they were."""
+    """Mask of entries that conversion to float64 has changed."""
     lost = np.zeros(raw.shape, dtype=bool)
     if raw.dtype.kind in "iu":
         # compared as Python's: the largest of NumPy's integers round to a float beyond them
@@ -130,7 +130,7 @@ def _rounded(raw: NDArray[Any], array: Floats) -> Mask:
     return lost
 
 
-def _inexact(name: str, value: Any, where: tuple[int, ...], error: type[EnumsolError]) -> EnumsolError:
+def _inexact(name: str, value: object, where: tuple[int, ...], error: type[EnumsolError]) -> EnumsolError:
     at = f" at index {where}" if where else ""
     return error(f"{name} has the value {shown(value)}{at}, which float64 would round; expected float64 values")
 
@@ -156,7 +156,7 @@ def _from_objects(raw: NDArray[Any], name: str, error: type[EnumsolError]) -> Fl
 # -- sparse matrices -----------------------------------------------------------------------------------------------
 
 
-def real_matrix(value: Any, name: str, *, error: type[EnumsolError] = InvalidProblemError) -> sp.csc_array:
+def real_matrix(value: object, name: str, *, error: type[EnumsolError] = InvalidProblemError) -> sp.csc_array:
     """A new sparse matrix with exactly the numbers that were given: sorted, without duplicates or stored zeros.
 
     Parameters
@@ -234,7 +234,7 @@ def _check_sums(entries: Floats, row: NDArray[Any], column: NDArray[Any], name: 
         raise error(f"{name} has integers at index {where} that add up to 2^53 or more; expected float64 values")
 
 
-def short_vector(value: Any, name: str, size: int) -> Floats:
+def short_vector(value: object, name: str, size: int) -> Floats:
     """Value as a finite array of shape (2,) or (3,).
 
     Raises
@@ -252,7 +252,7 @@ def short_vector(value: Any, name: str, size: int) -> Floats:
     return array
 
 
-def vector_of(value: Any, name: str, size: int) -> Floats:
+def vector_of(value: object, name: str, size: int) -> Floats:
     """Value as a finite array of shape (size,).
 
     Raises

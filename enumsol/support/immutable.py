@@ -40,7 +40,7 @@ def _is_sealed(array: NDArray[Any]) -> bool:
     return isinstance(base, bytes)
 
 
-def _sealed_within(value: Any) -> Any:
+def _sealed_within(value: object) -> Any:
     """An array, or the arrays in a tuple, made immutable; anything else as it is."""
     if isinstance(value, np.ndarray):
         return value if value.dtype.hasobject else sealed(value)

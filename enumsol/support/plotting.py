@@ -59,7 +59,7 @@ def _figure_class() -> Any:
     return NotebookFigure
 
 
-def checked_units(units: Any, name: str = "units") -> tuple[str, str] | None:
+def checked_units(units: object, name: str = "units") -> tuple[str, str] | None:
     """Units of forces and lengths, of a pair or a text such as "N,mm"; None for None.
 
     Raises
@@ -81,6 +81,38 @@ def in_units(name: str, dimension: str | None, units: tuple[str, str] | None) ->
         return name
     force, length = units
     return f"{name} [{ {'force': force, 'length': length, 'work': f'{force} {length}'}[dimension] }]"
+
+
+def axes_of(ax: Any, figsize: tuple[float, float]) -> Any:
+    """The axes that a picture is drawn into: those given, or those of a new figure [inches].
+
+    Raises
+    ------
+    InvalidArgumentError, MissingDependencyError
+        As `axes_or_none` and `new_figure`.
+    """
+    return new_figure(figsize=figsize).add_subplot() if axes_or_none(ax) is None else ax
+
+
+def plain_axes(axis: Any) -> None:
+    """A light grid behind what is drawn, and lines on the left and below only."""
+    axis.grid(visible=True, color="#e4e4e4", linewidth=0.6)
+    axis.set_axisbelow(True)
+    axis.spines[["top", "right"]].set_visible(False)
+
+
+def line_entry(label: str, **look: Any) -> Any:
+    """An entry of a legend: a line that looks like that, or with ``marker`` and linestyle "" a mark."""
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], label=label, **look)
+
+
+def area_entry(label: str, **look: Any) -> Any:
+    """An entry of a legend: an area that looks like that."""
+    from matplotlib.patches import Patch
+
+    return Patch(label=label, **look)
 
 
 def figure_of(ax: Any) -> Any:
@@ -111,7 +143,7 @@ def kept(figure: Any, file: Any) -> Any:
     return figure
 
 
-def axes_or_none(ax: Any) -> Any:
+def axes_or_none(ax: object) -> Any:
     """The axes that a picture is drawn into; None for those of a new figure.
 
     Raises

@@ -41,7 +41,7 @@ _LONG_KEY = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+
 
 
 def json_from(content: bytes | str) -> Any:
-    """What a JSON text holds; names that are given twice, deep nesting and very long numbers are refused."""
+    """Content of a JSON text; names that are given twice, deep nesting and very long numbers are refused."""
     if len(content) > LARGEST_JSON:
         raise ValueError(f"it has more than {LARGEST_JSON} bytes")
     try:
@@ -53,7 +53,7 @@ def json_from(content: bytes | str) -> Any:
 
 
 def toml_from(content: bytes) -> dict[str, Any]:
-    """What a TOML text holds; keys of very many parts and deep nesting are refused."""
+    """Content of a TOML text; keys of very many parts and deep nesting are refused."""
     if len(content) > LARGEST_TOML:
         raise ValueError(f"it has more than {LARGEST_TOML} bytes")
     text = content.decode("utf-8")
@@ -97,7 +97,7 @@ _DECODER = json.JSONDecoder(parse_int=_whole, object_pairs_hook=once_each)
 
 
 def archive_arrays(file: IO[bytes]) -> dict[str, Any]:
-    """What a .npz file holds, but for names that begin with an underscore; None is a pickled object, never loaded."""
+    """Arrays of a .npz file, but for names that begin with an underscore; None is a pickled object, never loaded."""
     pickled = _check_archive(file)
     file.seek(0)
     with np.load(file, allow_pickle=False) as archive:
@@ -123,7 +123,7 @@ def _check_archive(file: IO[bytes]) -> set[str]:
 
 
 def _is_pickled(member: zipfile.ZipInfo, content: IO[bytes]) -> bool:
-    """Whether an array is one of objects; refused where it is larger than the member that holds it."""
+    """True if an array is one of objects; refused where it is larger than the member that holds it."""
     if not content.peek(6).startswith(np.lib.format.MAGIC_PREFIX):  # type: ignore[attr-defined]
         return False  # no array, which is said where it is read
     readers = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
@@ -165,8 +165,8 @@ class Array:
     def __init__(self, *shape: int | None) -> None:
         self.shape = shape
 
-    def fits(self, value: Any) -> bool:
-        """Whether a value is such an array."""
+    def fits(self, value: object) -> bool:
+        """True if a value is such an array."""
         if isinstance(value, (list, np.ndarray)):
             array = np.asarray(value)  # ValueError where lists have different lengths
             if not array.size:
@@ -181,18 +181,18 @@ class Array:
 _FRACTION = re.compile(r"-?[0-9]{1,4300}(/0*[1-9][0-9]{0,4299})?", re.ASCII)
 
 
-def is_number(value: Any) -> bool:
-    """Whether a value is a number, which may be infinite or nan."""
+def is_number(value: object) -> bool:
+    """True if a value is a number, which may be infinite or nan."""
     return type(value) in (int, float)
 
 
-def is_fraction(value: Any) -> bool:
-    """Whether a value is the text of a fraction within bounds, such as "-8/3"."""
+def is_fraction(value: object) -> bool:
+    """True if a value is the text of a fraction within bounds, such as "-8/3"."""
     return type(value) is str and _FRACTION.fullmatch(value) is not None
 
 
-def is_label(value: Any) -> bool:
-    """Whether a value may be the label of a node."""
+def is_label(value: object) -> bool:
+    """True if a value may be the label of a node."""
     return type(value) in (int, float, str)
 
 
@@ -245,6 +245,6 @@ def check_kind(value: Any, kind: Any, where: str) -> None:
     _check_is(fits, value, where)
 
 
-def _check_is(fits: bool, value: Any, where: str) -> None:
+def _check_is(fits: bool, value: object, where: str) -> None:
     if not fits:
         raise ValueError(f"{where} is {shown(value)}")

@@ -56,10 +56,9 @@ SHARED = {
     "trusted.arcs.over_parts": None,
     "trusted.over_interval": {"EnclosedPiece", "PieceNumbers", "as_computed"},
     "trusted.arcs.precise": None,
-    "trusted.arcs.bordered": None,
+    "trusted.arcs.taylor": {"ShortExpansion"},
     "trusted.positions": {"certain_statuses", "tangential_positions"},
     "trusted.reference": {"Reference"},
-    "trusted.root_forms": {"Product"},
     "trusted.selection": None,
     "trusted.uniqueness": {
         *("ClosedSolution", "closed_solution", "lone_root", "numbers_of", "only_solution", "same_solution")

@@ -23,16 +23,16 @@ from complete import all_roots
 from effort import some
 from generators import integer_problem, random_problem, singular_problem
 from graph_proofs import GRAPHS, accepted, cut_in_two, graph, refused, three_with_everything, triangle, without_arcs
-from proof_tools import (in_rationals, 
+from proof_tools import (
     MAGIC,
     Judge,
     bytes_of,
+    in_rationals,
     leaves_of,
     multipliers,
     of_kind,
     proof_of,
     put,
-    put_in_all,
     records_of,
     replaced,
     sealed,

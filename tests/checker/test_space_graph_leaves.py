@@ -145,7 +145,7 @@ def test_the_check_ends_after_many_failures():
     ("path", "value", "why"),
     [
         ((0, "data"), "condensed", "certifies the problem's own data only"),
-        ((0, "interval"), ["0"], "there is no interval"),
+        ((0, "interval"), ["0"], "is not an interval"),
         ((0, "interval"), ["1", "0"], "an interval is empty"),
         ((0, "interval"), ["-1000", "1"], "friction is negative in the interval"),
         ((0, "length"), lambda length: [length[0] + 1, *length[1:]], "no common scaling of energy"),
@@ -161,7 +161,7 @@ def test_the_check_ends_after_many_failures():
         ((3, 6), lambda half: 0.5 * half, "curve 1 is not proven to be one"),
         ((-1, "curves"), 2, "the counts at the end"),
         ((-1, "leaves"), True, "the counts at the end"),
-        ((-1,), None, "the counts at the end are None"),
+        ((-1,), None, "the counts at the end are missing"),
     ],
 )
 def test_forged_headers_curves_and_counts_are_refused(path, value, why):

@@ -21,7 +21,7 @@ import space_proofs
 from complete import proven_roots
 from generators import fe_compliance, from_condensed, integer_problem, random_problem, through_the_unloaded_state
 from graph_proofs import cut_in_two, forms_at_once, triangle
-from proof_tools import closed, MAGIC, bytes_of, of_kind, proof_of, put, records_of, sealed
+from proof_tools import MAGIC, bytes_of, closed, of_kind, proof_of, put, records_of, sealed
 from rational_checker import check
 from rational_forms import Refused
 from refusals import bad_argument
@@ -89,7 +89,9 @@ def case(name):
         roots = enumerate_roots(problem, alpha, max_nodes=4 if name == "cut short" else None)
     header, *records, footer = records_of(roots.proof)
     if name == "in rationals":
-        records = [[*record, "rational"] if record[0] in "xn" and record[-1] != "rational" else record for record in records]
+        records = [
+            [*record, "rational"] if record[0] in "xn" and record[-1] != "rational" else record for record in records
+        ]
     return problem, [header, *records, footer]
 
 

@@ -16,7 +16,7 @@ import enumsol
 from enumsol import MissingDependencyError, enumerate_roots, fem, gallery, write_report
 from enumsol.fem.bases import von_mises
 from enumsol.model.shapes import body_shape, slip_directions
-from enumsol.report import body, roots_content
+from enumsol.report import body, roots_page
 
 pytest.importorskip("plotly")
 HOSTILE = '</script><script>document.title = "broken"</script>'
@@ -170,23 +170,23 @@ def test_pages_are_small_and_ask_the_network_for_nothing(pages, monkeypatch):
         for tag, attributes in Reader(text).tags:
             assert not {"src", "srcset", "data", "action"} & set(attributes), tag
     roots = enumerate_roots(gallery.chain(2), 5)
-    monkeypatch.setattr(roots_content, "_MOST_VALUES", 40)
-    shortened = roots_content.roots_content(roots)
+    monkeypatch.setattr(roots_page, "_MOST_VALUES", 40)
+    shortened = roots_page.roots_content(roots)
     assert (len(shortened["roots"]), shortened["all"]) == (2, 9)
 
 
 def test_large_meshes_are_drawn_in_part_or_not_at_all(found, monkeypatch):
-    count = 3 * len(roots_content.roots_content(found["wedge"])["body"]["points"])
+    count = 3 * len(roots_page.roots_content(found["wedge"])["body"]["points"])
     monkeypatch.setattr(body, "_MOST_NUMBERS", 4 * count)
-    part = roots_content.roots_content(found["wedge"])
+    part = roots_page.roots_content(found["wedge"])
     assert ["u" in record for record in part["roots"]] == [True] * 3 + [False] * 6
     assert part["no_body"] == "The bodies of the first 3 roots are drawn: the page holds no more"
     monkeypatch.setattr(body, "_MOST_NUMBERS", count)
-    assert roots_content.roots_content(found["wedge"])["no_body"].startswith("The mesh is too large to draw: ")
+    assert roots_page.roots_content(found["wedge"])["no_body"].startswith("The mesh is too large to draw: ")
     plane = found["plane"]
     nodes = len(plane[0].problem.mesh.points)
     monkeypatch.setattr(body, "_MOST_NUMBERS", 2 * nodes * (len(plane) + 1) - 1)
-    boundary = roots_content.roots_content(plane)["body"]
+    boundary = roots_page.roots_content(plane)["body"]
     assert boundary["cells"] is None
     assert len(boundary["points"]) == len(boundary["lines"]) < nodes
 
@@ -194,7 +194,7 @@ def test_large_meshes_are_drawn_in_part_or_not_at_all(found, monkeypatch):
 def test_second_order_solids_are_drawn_by_their_surface(tmp_path):
     options = {"contact": "bottom", "clamp": "left", "load": {"top": (0.1, 0.0, -0.3)}, "friction": 0.4}
     problem = fem.mesh_problem(solid((2, 1, 1), 27), young=2, poisson=0.3, **options)
-    drawn = roots_content.roots_content(enumerate_roots(problem, 0))["body"]
+    drawn = roots_page.roots_content(enumerate_roots(problem, 0))["body"]
     assert volume_of(drawn) == pytest.approx(1, rel=0.01)
 
 

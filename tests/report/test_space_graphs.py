@@ -16,7 +16,7 @@ from enumsol import branch_graph, fem, gallery, write_report
 from enumsol.branches import ways
 from enumsol.branches.figures.curves import QUANTITIES, curves
 from enumsol.model.shapes import body_shape
-from enumsol.report.given import given_section
+from enumsol.report.parts import given_section
 
 pytest.importorskip("plotly")
 in_a_browser = pytest.mark.skipif(find_browser() is None, reason="no headless browser (Debian's package chromium)")

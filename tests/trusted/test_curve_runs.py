@@ -14,8 +14,7 @@ from enumsol import enumerate_roots
 from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space.cover import SpaceCover
 from enumsol.condensation.space_condensed import AlphaSpace
-from enumsol.search.space.piece_certificates import runs_over
-from enumsol.search.space.piece_tree import _Examined
+from enumsol.search.space.piece_certificates import ExaminedPiece, runs_over
 from enumsol.trusted.space import curve_runs
 from enumsol.trusted.space.curve_runs import KnownCurve, Run
 from enumsol.trusted.space.piece_forms import PieceWeights, how_far_off
@@ -120,7 +119,7 @@ def test_a_form_leaves_only_the_solutions_of_its_curve(p, seed):
         low = Fraction(int(rng.integers(0, 48)), 64)
         high = min(low + Fraction(1, 4 ** (1 + k % 3)), Fraction(1))
         piece = piece_over(cover, low, high)
-        at = _Examined(piece)
+        at = ExaminedPiece(piece)
         for known in curves:
             for run in runs_over(known, low, high):
                 parts = known.over(run, low, high)
@@ -145,7 +144,7 @@ def test_numbers_that_make_no_sense_are_refused():
     piece = piece_over(cover, low, high)
     run = next(run for run in runs_over(known, low, high))
     codes = (UNDECIDED,)
-    numbers = _Examined(piece).proposals.numbers(codes, known.over(run, low, high))
+    numbers = ExaminedPiece(piece).proposals.numbers(codes, known.over(run, low, high))
     assert piece.lies_on(known, run, codes, numbers)
     for place, value in ((0, -1.0), (1, 0.0), (2, 9.0), (4, np.inf), (5, 40.0)):
         changed = numbers.copy()

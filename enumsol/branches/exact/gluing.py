@@ -25,6 +25,8 @@ from enumsol.support.deadlines import TimeOverError, look, tell
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from flint import fmpq
+
     from enumsol.branches.exact.selection_arcs import SelectionArcs, SelectionEvent
     from enumsol.condensation.exact import ExactCondensed
     from enumsol.selections.solution import ActiveSets, SelectionSolution
@@ -225,7 +227,7 @@ def _join_polytopes(known: KnownSelections, events: Iterable[SelectionEvent], un
 
 
 def _vertices(groups: Sequence[list[SelectionEvent]]) -> list[GluedVertex]:
-    """One vertex a group of events, in the order of alpha."""
+    """Vertices, one for each group of events, in the order of alpha."""
     by_alpha: dict[CriticalAlpha, list[list[SelectionEvent]]] = {}
     for events in groups:
         by_alpha.setdefault(events[0].alpha, []).append(events)
@@ -247,7 +249,7 @@ def _vertices(groups: Sequence[list[SelectionEvent]]) -> list[GluedVertex]:
 
 
 def _edges(known: KnownSelections, vertices: list[GluedVertex]) -> list[GluedArc]:
-    """One arc per cell in which a selection holds; of selections that coincide there, one for all."""
+    """Arcs, one for each cell in which a selection holds; of selections that coincide there, one for all."""
     found: dict[tuple[int, int, tuple[Codes, ...]], GluedArc] = {}
     for number, (codes, arcs) in enumerate(known.arcs.items()):
         tell("selections whose arcs are made", number, len(known.arcs))
@@ -283,7 +285,7 @@ def _all_known(known: KnownSelections, component: RootComponent) -> bool:
     return component.whole and all(solution.codes in known.arcs for solution in component.solutions)
 
 
-def _component(known: KnownSelections, codes: Codes, sample: Any) -> RootComponent | None:
+def _component(known: KnownSelections, codes: Codes, sample: fmpq) -> RootComponent | None:
     """The connected set of solutions that a degenerate selection belongs to at a point of its cell."""
     look()
     solver = FiberSelections(known.exact, sample)

@@ -45,13 +45,9 @@ if TYPE_CHECKING:
 
 #: Nodes of a search at one alpha that is to find curves.
 _SAMPLED = 500
-#: Seconds that it has at least.
-_LEAST_TIME = 1e-3
 #: After so many curves that are not new, or neither whole nor as long as this share of the interval, no further one is
 #: followed.
 _FAILURES, _LONG = 3, 2.0**-6
-#: What the record of an open leaf says.
-_OPEN = "solutions there lie on no curve that is known"
 
 
 @dataclass(eq=False)
@@ -156,7 +152,8 @@ class SpaceCover:
         """Forces of solutions at an alpha, as many as a short search finds, with rigid displacements if any."""
         look()
         seconds = remaining()
-        left = None if seconds is None else max(seconds, _LEAST_TIME)
+        # seconds that it has at least
+        left = None if seconds is None else max(seconds, 1e-3)
         roots = enumerate_roots(self.problem, alpha, max_nodes=_SAMPLED, time_limit=left)
         rigid = [np.zeros(0) if root.rigid_coordinates is None else root.rigid_coordinates for root in roots]
         return [np.concatenate([root.lambda_n, *root.lambda_t.T, q]) for root, q in zip(roots, rigid, strict=True)]
@@ -201,6 +198,9 @@ class SpaceCover:
             is_open = isinstance(record, OpenLeaf)
             gaps += is_open
             leaves += is_open or record.kind not in ("p", "b")
-            writer.write((UndecidedRecord(_OPEN) if is_open else record).write())
+            # what the record of an open leaf says
+            writer.write(
+                (UndecidedRecord("solutions there lie on no curve that is known") if is_open else record).write()
+            )
         writer.write({"curves": len(self.chains), "arcs": arcs, "leaves": leaves, "gaps": gaps})
         return writer.close()

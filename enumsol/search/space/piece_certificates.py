@@ -5,6 +5,7 @@ Nothing here is trusted: what is proposed is proven, or the tree goes on.
 
 from __future__ import annotations
 
+from functools import cached_property
 from itertools import combinations_with_replacement, pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -34,8 +35,6 @@ if TYPE_CHECKING:
 _DEFINITE, _MANY = 1e-9, 8
 #: Weight of the equations of an assignment, by the largest entry of S; what of a gap may serve for its slip.
 _WEIGHT, _SHARED = 1024.0, 0.5
-#: How often large distances get more weight in the fit of psi, and by how little the least ones count.
-_ROUNDS, _LEAST = 4, 1e-3
 #: By how much more a writer of proofs has theta vary.
 ERRORS = 1.0 + 2.0**-6
 
@@ -72,7 +71,7 @@ class PieceProposals:
         self._system = SpaceSystem.in_middle(self._middle, piece.space.units)
 
     def numbers(self, codes: Codes, parts: CurveParts) -> Array | None:
-        """Those of a form that seems to serve all over the piece, or None."""
+        """Numbers of a form that seems to serve all over the piece, or None."""
         p, places, whole = self._system.p, self._system.tau >= 0, self._piece.whole
         with np.errstate(all="ignore"):
             thetas, apart = self._thetas(parts)
@@ -89,7 +88,7 @@ class PieceProposals:
         return np.concatenate([mu, kappa, nu[places], *(theta[places] for theta in thetas)])
 
     def is_hopeful(self, codes: Codes, parts: CurveParts) -> bool:
-        """Whether a shorter piece may have such a form: the middle has one, by the parts of the curve there."""
+        """True if a shorter piece may have such a form: the middle has one, by the parts of the curve there."""
         with np.errstate(all="ignore"):
             apart, discs = self._apart(parts), self._middle.discs.mid
             turn, off = self._turn(parts, apart)
@@ -125,7 +124,7 @@ class PieceProposals:
         return np.asarray(np.all(parts.open & (parts.slips[0].mid < 0), axis=0))
 
     def _thetas(self, parts: CurveParts) -> tuple[Sequence[Array], Flags]:
-        """Those at both ends whose psi is near to that of the curve all over the piece, (p, 2) each, and open nodes."""
+        """Thetas at both ends, (p, 2) each, whose psi is near the curve's all over the piece, and open nodes."""
         low, high, reference = float(self._piece.low), float(self._piece.high), self._piece.whole.references
         share = np.clip((parts.alpha.mid - low) / (high - low), 0.0, 1.0)
         r = np.maximum(parts.F.mid, 0.0) / reference
@@ -135,15 +134,68 @@ class PieceProposals:
         basis = (1.0 - share)[:, None] * ends[0], share[:, None] * ends[1]
         weight = np.ones_like(r)
         fitted = [np.zeros_like(theta[0]), np.zeros_like(theta[0])]
-        for _ in range(_ROUNDS):
+        # large distances get more weight each time, the least ones a little
+        for _ in range(4):
             a, b, c = (np.sum(weight * x * y, axis=0) for x, y in combinations_with_replacement(basis, 2))
             a, c = a + 1e-12 * (a + c) + 1e-300, c + 1e-12 * (a + c) + 1e-300
             one, other = (np.sum((weight * x)[:, :, None] * psi, axis=0) for x in basis)
             det = (a * c - b * b)[:, None]
             fitted = [(c[:, None] * one - b[:, None] * other) / det, (a[:, None] * other - b[:, None] * one) / det]
             missed = np.linalg.norm(psi - sum(x[:, :, None] * y for x, y in zip(basis, fitted, strict=True)), axis=2)
-            weight *= missed / np.maximum(np.max(missed, axis=0), 1e-300) + _LEAST
+            weight *= missed / np.maximum(np.max(missed, axis=0), 1e-300) + 1e-3
         size = [np.linalg.norm(theta, axis=1) for theta in fitted]
         shrunk = [np.where(apart & (x > 1.0), (1.0 - 4e-16) / np.maximum(x, 1.0), 1.0) for x in size]
         places = self._system.tau >= 0
         return [np.where(places, theta * by[:, None], 0.0) for theta, by in zip(fitted, shrunk, strict=True)], apart
+
+
+def _only_turns(alpha: Array, piece: AlphaPiece) -> bool:
+    """True if a run along a curve, given by alphas, passes some alphas of a piece twice, but none just once."""
+    low, high = float(piece.low), float(piece.high)
+    # at four alphas of the piece
+    beyond = alpha > (low + (high - low) * (2.0 * np.arange(4) + 1.0) / 8)[:, None]
+    passed = np.sum(beyond[:, 1:] != beyond[:, :-1], axis=1)
+    return bool(np.any(passed > 1) and not np.any(passed == 1))
+
+
+class ExaminedPiece:
+    """A piece with what the search needs of it."""
+
+    def __init__(self, piece: AlphaPiece) -> None:
+        self.piece = piece
+        #: Runs of known curves that pass the piece, of so many curves.
+        self.passages: list[Passage] = []
+        self.curves = 0
+        #: Parts of known curves over the piece, and over longer ones.
+        self.parts: dict[tuple[Fraction, Fraction], list[CurveParts]] = {}
+        #: Assignments of statuses for which no form is definite.
+        self.hopeless: set[tuple[int, ...]] = set()
+
+    @cached_property
+    def proposals(self) -> PieceProposals:
+        """Forms that may be definite over the piece."""
+        return PieceProposals(self.piece)
+
+    def along(
+        self, curves: Sequence[KnownCurve], piece: AlphaPiece | None = None
+    ) -> list[tuple[KnownCurve, CurveParts]]:
+        """Known curves and their parts over the piece, or over a longer one."""
+        piece = self.piece if piece is None else piece
+        parts = self.parts.setdefault((piece.low, piece.high), [])
+        for known in curves[len(parts) :]:
+            whole = Run(0, len(known.chain.links) - 1)
+            parts.append(known.over(whole, piece.low, piece.high))
+        return list(zip(curves, parts, strict=True))
+
+    def ends_within(self, curves: Sequence[KnownCurve], statuses: tuple[int, ...]) -> bool:
+        """True if in one run along the known curves, and in no other, these statuses hold over a part of a piece.
+
+        Not where that run turns back and passes no alpha just once: with two solutions at one no form is definite.
+        """
+        runs = 0
+        for _, parts in self.along(curves):
+            held = parts.held(statuses)
+            if len(held):
+                runs += int(held[0]) + int(np.sum(held[1:] & ~held[:-1]))
+                runs += int(_only_turns(parts.alpha.mid[held], self.piece))
+        return runs == 1

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
-from collections import OrderedDict
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property
+from functools import lru_cache, partial
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -14,20 +12,19 @@ import numpy as np
 
 from enumsol.arithmetic.rationals import simplest
 from enumsol.condensation.space_condensed import AlphaSpace
-from enumsol.model.sectors import DEEPEST, SECTORS, level_of, parts_around, places, span, width_level, width_of
+from enumsol.model.sectors import DEEPEST, SECTORS, level_of, width_level
 from enumsol.model.statuses import CONTACT, UNDECIDED
-from enumsol.proof.curve_records import CutPiece, OnCurve, ThroughCurveBox
-from enumsol.proof.records import Branching, Excluded, NoRoot
+from enumsol.proof.curve_records import CutPiece, OnCurve
+from enumsol.proof.records import Branching, Excluded
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.outcome import StopReason
 from enumsol.search.space.known_curves import Curves, middle_of
-from enumsol.search.space.piece_arcs import beside, points_on, slides
-from enumsol.search.space.piece_certificates import ERRORS, Passage, PieceProposals, runs_over
+from enumsol.search.space.piece_certificates import ERRORS, ExaminedPiece, Passage, runs_over
+from enumsol.search.space.piece_leaves import PieceLeaves, around_curves
 from enumsol.search.space.piece_multipliers import COUNTED, AlphaPoint, exclusion, unbalanced
 from enumsol.search.space.space_fathoming import without_sectors
 from enumsol.search.tree import depth_first
 from enumsol.support.deadlines import TimeOverError, look
-from enumsol.trusted.space.curve_runs import CurveParts, KnownCurve, Run
 from enumsol.trusted.space.leaves import Open, SpaceRoot
 from enumsol.trusted.space.pieces import AlphaPiece
 from enumsol.trusted.space.sector_rows import sector_children
@@ -52,24 +49,10 @@ _KEPT = 256
 _ALONE = 2.0**-5
 #: Pieces are cut so often at most between two branchings where multipliers fail at their ends only.
 _CUTS = 2
-#: Around the directions of known curves sectors get more room by this share of what these turn by, and are no narrower
-#: than those of a level; a sector is cut so if no more than this share of it is left.
-_ROOM, _NARROWEST, _LEFT = 0.5, 9, 0.5
 #: Longer pieces are cut where statuses occur along one curve over a part of them.
 _SHORT = 2.0**-6
-#: At these shares of a piece it is asked how often a curve passes it.
-_PASSED = (2.0 * np.arange(4) + 1.0) / 8
-#: By so many times their lengths pieces are made longer on both sides for arcs.
-_FACTORS = 0, 1
-#: Arcs are sought where a known curve has directions in a leaf, or beside it by this factor.
-_BESIDE = 1.5
-#: Leaves are tested from this level of their sectors on; where more than two nodes slip, from the second one on.
-_TRIED = 3, 5
 #: Nodes that are examined before others than this process help.
 FIRST = 16
-#: Sectors above this level are halved, rather than alpha, where a leaf is settled in the middle only; by how many
-#: levels fewer sectors are halved than pieces.
-_WIDE, _NARROW = 6, 8
 
 
 @dataclass(frozen=True)
@@ -123,55 +106,8 @@ class PieceNode:
         return replace(self, parent=None, changed=-1, last=False)
 
 
-def _kept(known: OrderedDict[Any, Any], key: Any, make: Callable[[], Any]) -> Any:
-    """What is known under a key, or is made now; what was not asked for lately goes."""
-    if key not in known:
-        known[key] = make()
-        if len(known) > _KEPT:
-            known.popitem(last=False)
-    known.move_to_end(key)
-    return known[key]
-
-
 def _is_excluded(relaxation: SpaceRelaxation) -> bool:
     return relaxation.pruned and relaxation.bound > PRUNE_MARGIN
-
-
-def _only_turns(alpha: Array, piece: AlphaPiece) -> bool:
-    """True if a run along a curve, given by alphas, passes some alphas of a piece twice, but none just once."""
-    low, high = float(piece.low), float(piece.high)
-    beyond = alpha > (low + (high - low) * _PASSED)[:, None]
-    passed = np.sum(beyond[:, 1:] != beyond[:, :-1], axis=1)
-    return bool(np.any(passed > 1) and not np.any(passed == 1))
-
-
-class _Examined:
-    """A piece with what the search needs of it."""
-
-    def __init__(self, piece: AlphaPiece) -> None:
-        self.piece = piece
-        #: Runs of known curves that pass the piece, of so many curves.
-        self.passages: list[Passage] = []
-        self.curves = 0
-        #: Parts of known curves over the piece, and over longer ones.
-        self.parts: dict[tuple[Fraction, Fraction], list[CurveParts]] = {}
-        #: Assignments of statuses for which no form is definite.
-        self.hopeless: set[tuple[int, ...]] = set()
-
-    @cached_property
-    def proposals(self) -> PieceProposals:
-        return PieceProposals(self.piece)
-
-    def along(
-        self, curves: Sequence[KnownCurve], piece: AlphaPiece | None = None
-    ) -> list[tuple[KnownCurve, CurveParts]]:
-        """Known curves and their parts over the piece, or over a longer one."""
-        piece = self.piece if piece is None else piece
-        parts = self.parts.setdefault((piece.low, piece.high), [])
-        for known in curves[len(parts) :]:
-            whole = Run(0, len(known.chain.links) - 1)
-            parts.append(known.over(whole, piece.low, piece.high))
-        return list(zip(curves, parts, strict=True))
 
 
 class PieceTree:
@@ -211,12 +147,13 @@ class PieceTree:
         smallest: float = 2.0**-30,
     ) -> None:
         self.interval, self.curves = interval, curves
+        self._leaves = PieceLeaves(curves, interval)
         self._space = AlphaSpace(enclosure, sum(interval, Fraction(0)) / 2, units)
         self.problem = enclosure, interval, units, smallest
         self._most, self._tick = max_nodes, tick
         self._least = Fraction(smallest) * (interval[1] - interval[0])
-        self._pieces: OrderedDict[tuple[Fraction, Fraction], _Examined] = OrderedDict()
-        self._points: OrderedDict[Fraction, AlphaPoint] = OrderedDict()
+        self._examined = lru_cache(_KEPT)(lambda low, high: ExaminedPiece(AlphaPiece(self._space, low, high)))
+        self._point = lru_cache(_KEPT)(partial(AlphaPoint, self._space))
         self.records: list[Any] = []
         self.nodes, self.covered = 0, 0.0
         #: True if parts of the tree are neither examined nor left open nor waiting here.
@@ -225,14 +162,6 @@ class PieceTree:
         self.settled = False
         #: Why the search ended early, if it did.
         self.stopped: StopReason | None = None
-
-    def _examined(self, low: Fraction, high: Fraction) -> _Examined:
-        found: _Examined = _kept(self._pieces, (low, high), lambda: _Examined(AlphaPiece(self._space, low, high)))
-        return found
-
-    def _point(self, alpha: Fraction) -> AlphaPoint:
-        found: AlphaPoint = _kept(self._points, alpha, lambda: AlphaPoint(self._space, alpha))
-        return found
 
     def run(self, spread: Callable[[PieceTree, list[PieceNode]], object] | None = None) -> None:
         """Search the tree; ``spread`` examines what waits after some nodes.
@@ -332,7 +261,7 @@ class PieceTree:
             done = self._leaf(at, codes)
             if done is not None:
                 return done
-            if (parts := self._around_curve(at, codes)) is not None:
+            if (parts := around_curves(at, codes, self.curves.known)) is not None:
                 return self._branched(at, codes, parts[0], (point, relaxation), children=parts[1])
             split = self._widest(codes)
         else:
@@ -346,9 +275,10 @@ class PieceTree:
         """True if a leaf is to be tested: where sectors are wide that is of no use."""
         levels = [width_level(code - SECTORS) for code in codes if code > SECTORS]
         final = not {CONTACT, UNDECIDED} & set(codes)
-        return final and (not levels or min(levels) >= _TRIED[len(levels) > 2])
+        # of wide sectors a test is of no use, the more so where more than two nodes slip
+        return final and (not levels or min(levels) >= (5 if len(levels) > 2 else 3))
 
-    def _excluded(self, at: _Examined, codes: Codes, parent: tuple[AlphaPoint, SpaceRelaxation], cuts: int) -> Done:
+    def _excluded(self, at: ExaminedPiece, codes: Codes, parent: tuple[AlphaPoint, SpaceRelaxation], cuts: int) -> Done:
         """An assignment that one alpha excludes: over all of the piece, if possible, or it is cut or branched."""
         point, relaxation = parent
         rows, values = point.multipliers(relaxation)
@@ -365,9 +295,9 @@ class PieceTree:
             if found is not None:
                 return found, []
         if self._is_due(codes):
-            done = self._settled(at, codes, at.piece.narrowed(codes))
-            if done is not None:
-                return done
+            record = self._leaves.settled(at, codes, *at.piece.narrowed(codes))
+            if record is not None:
+                return record, []
         if cuts < _CUTS:
             return self._halved(at, codes, cuts=cuts + 1)
         for other_parent in possible:
@@ -377,7 +307,7 @@ class PieceTree:
         node = next((i for i, code in enumerate(codes) if code in (CONTACT, UNDECIDED)), self._widest(codes))
         return self._halved(at, codes, cuts=cuts + 1) if node < 0 else self._branched(at, codes, node, None)
 
-    def _ends(self, at: _Examined, codes: Codes) -> list[tuple[AlphaPoint, SpaceRelaxation]]:
+    def _ends(self, at: ExaminedPiece, codes: Codes) -> list[tuple[AlphaPoint, SpaceRelaxation]]:
         """The relaxations of an assignment at the ends of a piece; not at one where friction vanishes."""
         ends = [self._point(alpha) for alpha in (at.piece.low, at.piece.high)]
         return [(end, end.root(codes)) for end in ends if np.array_equal(end.system.tau, self._space.fixed.tau)]
@@ -393,34 +323,16 @@ class PieceTree:
         sectors = [i for i, code in enumerate(codes) if code > SECTORS and level_of(code - SECTORS) < DEEPEST]
         return min(sectors, key=lambda i: width_level(codes[i] - SECTORS)) if sectors else -1
 
-    def _around_curve(self, at: _Examined, codes: Codes) -> tuple[int, Sequence[int]] | None:
-        """A node in a sector, and the part of that around the directions of known curves, then what is left of it."""
-        nodes = [i for i, code in enumerate(codes) if code > SECTORS]
-        towards = [parts.thetas[0][slides(parts, codes)][:, nodes] for _, parts in at.along(self.curves.known)]
-        where = np.concatenate([places(theta) for theta in towards]) if nodes and towards else np.zeros((0, 0))
-        spans = np.array([span(codes[i] - SECTORS) for i in nodes], dtype=float).reshape(-1, 2)
-        where = where[np.all((where >= spans[:, 0]) & (where < spans[:, 1]), axis=1)] if len(where) else where
-        if not len(where):
-            return None
-        low, high = np.min(where, axis=0), np.max(where, axis=0)
-        room = np.maximum(_ROOM * (high - low), np.ldexp(1.0, DEEPEST + 2 - _NARROWEST))
-        k = int(np.argmax((spans[:, 1] - spans[:, 0]) / (high - low + room)))
-        number, half = codes[nodes[k]] - SECTORS, 0.5 * float(room[k])
-        level = DEEPEST + 2 - math.floor(math.log2(half))
-        children = parts_around(number, low[k] - half, high[k] + half, level)
-        if width_of(children[0]) > _LEFT * width_of(number):
-            return None
-        return nodes[k], [SECTORS + child for child in children]
-
     def _is_wide(self, piece: AlphaPiece, codes: Codes) -> bool:
         """True if a sector is to be halved rather than the piece: those of short pieces may be narrow."""
         share = float((piece.high - piece.low) / (self.interval[1] - self.interval[0]))
-        level = max(_WIDE, -np.log2(share) - _NARROW)
+        # wider sectors are halved rather than alpha; those of short pieces may be narrower, by so many levels less
+        level = max(6, -np.log2(share) - 8)
         return any(code > SECTORS and width_level(code - SECTORS) < min(level, DEEPEST) for code in codes)
 
     def _branched(
         self,
-        at: _Examined,
+        at: ExaminedPiece,
         codes: Codes,
         node: int,
         parent: tuple[AlphaPoint, SpaceRelaxation] | None,
@@ -439,33 +351,33 @@ class PieceTree:
             below.append(PieceNode(at.piece.low, at.piece.high, there, parent=parent, changed=changed, last=last))
         return Branching(node, list(children)), below
 
-    def _halved(self, at: _Examined, codes: Codes, forces: Array | None = None, cuts: int = 0) -> Done:
-        low, high = at.piece.low, at.piece.high
-        if high - low <= self._least:
-            return self._open(at, codes, forces), []
+    def _halved(self, at: ExaminedPiece, codes: Codes, cuts: int = 0) -> Done:
+        if at.piece.high - at.piece.low <= self._least:
+            return self._open(at, codes), []
         return self._cut(at, codes, at.piece.middle, cuts)
 
     @staticmethod
-    def _cut(at: _Examined, codes: Codes, alpha: Fraction, cuts: int = 0) -> Done:
+    def _cut(at: ExaminedPiece, codes: Codes, alpha: Fraction, cuts: int = 0) -> Done:
         ends = at.piece.low, alpha, at.piece.high
         return CutPiece(str(alpha)), [PieceNode(*both, codes, cuts=cuts) for both in pairwise(ends)]
 
-    def _beside_ends(self, at: _Examined, codes: Codes) -> Done | None:
-        """Where curves end, what stays open is cut off from what has to be searched."""
+    def _beside_ends(self, at: ExaminedPiece, codes: Codes) -> Done | None:
+        """A cut between places where curves end, which stay open, and what has to be searched; or None."""
         low, high = at.piece.low, at.piece.high
         for begin, end in self.curves.ends:
             if begin <= low and high <= end:
-                return self._open(at, codes, None), []
+                return self._open(at, codes), []
             alpha = next((alpha for alpha in (begin, end) if low < alpha < high), None)
             if alpha is not None:
                 return self._cut(at, codes, alpha)
         return None
 
-    def _open(self, at: _Examined, codes: Codes, forces: Array | None) -> OpenLeaf:
+    @staticmethod
+    def _open(at: ExaminedPiece, codes: Codes, forces: Array | None = None) -> OpenLeaf:
         return OpenLeaf(at.piece.low, at.piece.high, codes, forces)
 
-    def _certified(self, at: _Examined, codes: Codes) -> Done | None:
-        """One certificate for all that is below an assignment, or the piece is cut since it is too long for that.
+    def _certified(self, at: ExaminedPiece, codes: Codes) -> Done | None:
+        """A certificate for all that is below an assignment, or a cut of a piece that is too long for one; or None.
 
         None of a body that nothing holds: the form says nothing about its rigid displacement.
         """
@@ -473,7 +385,8 @@ class PieceTree:
             return None
         piece, statuses = at.piece, without_sectors(codes)
         passages = [passage for passage in self._passages(at, statuses) if passage.parts.allowed(statuses)]
-        if not passages and statuses == codes and self._is_longer(piece, _SHORT) and self._ends_within(at, statuses):
+        whole = not passages and statuses == codes and self._is_longer(piece, _SHORT)
+        if whole and at.ends_within(self.curves.known, statuses):
             return self._halved(at, codes)
         # where two curves have these statuses no form is definite
         if len(passages) != 1 or statuses in at.hopeless:
@@ -496,20 +409,7 @@ class PieceTree:
         """Than a share of the interval."""
         return piece.high - piece.low > Fraction(share) * (self.interval[1] - self.interval[0])
 
-    def _ends_within(self, at: _Examined, statuses: tuple[int, ...]) -> bool:
-        """True if in one run along the known curves, and in no other, these statuses hold over a part of a piece.
-
-        Not where that run turns back and passes no alpha just once: with two solutions at one no form is definite.
-        """
-        runs = 0
-        for _, parts in at.along(self.curves.known):
-            held = parts.held(statuses)
-            if len(held):
-                runs += int(held[0]) + int(np.sum(held[1:] & ~held[:-1]))
-                runs += int(_only_turns(parts.alpha.mid[held], at.piece))
-        return runs == 1
-
-    def _passages(self, at: _Examined, statuses: tuple[int, ...]) -> list[Passage]:
+    def _passages(self, at: ExaminedPiece, statuses: tuple[int, ...]) -> list[Passage]:
         """Runs of known curves that pass a piece; the first ones are sought where no status is assigned."""
         low, high = at.piece.low, at.piece.high
         curves = self.curves.known
@@ -522,12 +422,12 @@ class PieceTree:
         found = self.curves.seek(lambda: self._point(at.piece.middle))
         return self._passages(at, statuses) if found else []
 
-    def _leaf(self, at: _Examined, codes: Codes) -> Done | None:
+    def _leaf(self, at: ExaminedPiece, codes: Codes) -> Done | None:
         """A leaf that is decided, or halved; None where statuses are to be split further."""
         piece = at.piece
         narrowed, found = piece.narrowed(codes)
-        if (done := self._settled(at, codes, (narrowed, found))) is not None:
-            return done
+        if (record := self._leaves.settled(at, codes, narrowed, found)) is not None:
+            return record, []
         if isinstance(found, Open) and not found.swept and self._widest(codes) >= 0:
             return None
         there = piece.point.held(codes)
@@ -535,55 +435,11 @@ class PieceTree:
             number = self.curves.met(piece.point, there)
             if number is None and not self.curves.is_known(middle_of(piece, there)):
                 return self._open(at, codes, piece.forces(there.y).mid), []
-            passed = narrowed.low <= piece.middle <= narrowed.high and found is not None
-            passed = passed and number is not None and self.curves.runs_through(number, narrowed)
-            arc = narrowed.arc(codes, 2.0, found) if passed else None
-            if number is not None and arc is not None and self._has(narrowed, codes, found, there, codes):
-                return ThroughCurveBox(number, str(narrowed.low), str(narrowed.high), str(piece.middle), codes), []
+            passed = found if narrowed.low <= piece.middle <= narrowed.high else None
+            if number is not None and passed is not None and narrowed.arc(codes, 2.0, passed) is not None:
+                through = self._leaves.through(narrowed, codes, passed, number, (piece.middle, codes, there))
+                if through is not None:
+                    return through, []
         elif self._is_wide(piece, codes) and (there is None or self.curves.box(piece.point, there) is None):
             return None
         return self._halved(at, codes)
-
-    def _settled(self, at: _Examined, codes: Codes, settled: tuple[AlphaPiece, SpaceRoot | Open | None]) -> Done | None:
-        """The record of a leaf that has no root, or none that is not known."""
-        piece, found = settled
-        if found is None:
-            return NoRoot(), []
-        if (without := unbalanced(at.piece, codes)) is not None:
-            return without, []
-        run = self.curves.run(piece, found)
-        return self._on_arc(at, codes, (piece, found)) if run is None else (OnCurve(*run), [])
-
-    def _on_arc(self, at: _Examined, codes: Codes, settled: tuple[AlphaPiece, SpaceRoot | Open]) -> Done | None:
-        """The record of a leaf whose roots lie on an arc that has a point of a known curve."""
-        centre, half = settled[1].centre, np.abs(settled[1].angle) + settled[1].angle_rad
-        for factor in _FACTORS:
-            whole = settled[0].wider(factor, self.interval)
-            runs = at.along(self.curves.known, whole)
-            if not any(len(beside(parts, codes, centre, 0.0, _BESIDE * half)) for _, parts in runs):
-                continue
-            found = whole.held(codes) if factor else settled[1]
-            arc = None if found is None else whole.arc(codes, 2.0, found)
-            if arc is None:
-                continue
-            for known, parts in runs:
-                for point in points_on(arc, known, parts, codes):
-                    there, root = whole.root_at(*point)
-                    number = None if root is None else self.curves.box(there, root)
-                    if root is None or number is None or not self.curves.runs_through(number, whole):
-                        continue
-                    if not arc.has(root, point[1]):
-                        continue
-                    if self._has(whole, codes, found, root, point[1]):
-                        ends = str(whole.low), str(whole.high)
-                        return ThroughCurveBox(number, *ends, str(point[0]), point[1]), []
-        return None
-
-    @staticmethod
-    def _has(piece: AlphaPiece, codes: Codes, found: SpaceRoot | Open | None, root: SpaceRoot, there: Codes) -> bool:
-        """True if the arc of a leaf has the root of another one, as a checker has it: no wider than is needed.
-
-        ``found`` is what the leaf holds.
-        """
-        arc = piece.arc(codes, found=found)
-        return arc is not None and arc.has(root, there)

@@ -140,7 +140,7 @@ class ProductSearch:
         return None
 
     def _narrowed(self, ellipsoid: Ellipsoid, tree: list[Branched | Missed | Enclosed]) -> Codes | None:
-        """What an ellipsoid leaves of an assignment, if that is much less; what it cuts off is put into the tree."""
+        """The rest that an ellipsoid leaves of an assignment, if that is much less; the tree gets the parts cut off."""
         codes, gain, cuts = list(ellipsoid.codes), 0.0, []
         for i, code in enumerate(codes):
             parts: list[int] = []

@@ -18,7 +18,6 @@ from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.certifiers.protocol import Bound, Certifier, Refine, UndecidedPart, Unrecorded
 from enumsol.search.closing import TreeCloser
 from enumsol.search.floating_solvers import WEAK, weakly_held
-from enumsol.search.setup import HeldByNothing
 from enumsol.search.space.space_references import reference_numbers, space_closer
 from enumsol.search.space.space_search import SpaceCertifier
 from enumsol.search.space.space_setup import SpaceSolvers
@@ -38,10 +37,8 @@ if TYPE_CHECKING:
     from enumsol.trusted.space.sector_rows import Row
 
 
-class FloatingSpaceSolvers(HeldByNothing, SpaceSolvers):
+class FloatingSpaceSolvers(SpaceSolvers):
     """Solvers and certifier for a body in 3D that nothing holds, at one alpha; parameters as of SpaceSolvers."""
-
-    offered = '"verified"'
 
     @cached_property
     def relaxed(self) -> SpaceSystem:

@@ -623,7 +623,7 @@ class Leaf:
         return self._root(state, angle, radius, reach)
 
     def _left_open(self, angle: Floats, radius: Floats, state: State | None) -> Open | None:
-        """What is known of a leaf that is not settled; None if there is nothing."""
+        """Bounds of a leaf that is not settled; None if nothing is known of it."""
         node = None
         # what is proven does not depend on which sector is halved, and whether any is
         q = len(self.turning)
@@ -671,7 +671,7 @@ class Leaf:
         return Cause.DIRECTIONS if len(angle) and nearly_singular(point.J.mid) else Cause.EQUALITY
 
     def _worth_halving(self, angle: Floats, radius: Floats, state: State | None) -> Floats:
-        """What is expected of halving each sector; 0 where smaller ones would be left open, too."""
+        """Gain that is expected of halving each sector; 0 where smaller ones would be left open, too."""
         point = self._state(angle, np.zeros(len(angle)))
         if state is not None and point is not None and np.all(point.y.rad <= _POINT):
             # the width, where it changes more than what is not known anyway
@@ -774,7 +774,7 @@ class Leaf:
         return self._curved(Y, over, angle, radius)[1]
 
     def _second(self, Y: Floats, over: tuple[State, State], angle: Floats, radius: Floats) -> Ball:
-        """The same over a box and a piece of alpha with respect to all n unknowns and s, (n, n + 1, n + 1)."""
+        """Second derivatives over a box and a piece of alpha by all n unknowns and s, (n, n + 1, n + 1)."""
         (w, bends), n, q = self._curved(Y, over, angle, radius), len(angle), len(self.turning)
         (s1, s2), (_, turned) = self._slips(over[0].box.ds), self._directions(angle, radius)
         turn = Ball.exact(Y[:, :q])[:, :, None] * (s1 * turned[:, 1][:, None] - s2 * turned[:, 0][:, None])
@@ -789,7 +789,7 @@ class Leaf:
         return second
 
     def _curved(self, Y: Floats, over: tuple[State, State], angle: Floats, radius: Floats) -> tuple[Combined, Ball]:
-        """What Y G takes of w for directions that are held, and Y times second derivatives of G by the angles."""
+        """Part of w that Y G takes for directions that are held, and Y times second derivatives of G by the angles."""
         (state, point), (d, turned), own = over, self._directions(angle, radius), np.arange(len(self.turning))
         # v_i1 d_i2 - v_i2 d_i1
         rows = Ball(np.zeros((len(Y), len(state.box.w.mid))), np.zeros((len(Y), len(state.box.w.mid))))
@@ -868,7 +868,7 @@ class Leaf:
 
 
 def same_root(one: SpaceRoot, other: SpaceRoot) -> bool | None:
-    """Whether two roots of leaves with the same statuses up to sectors are one; None where that is open.
+    """True if two roots of leaves with the same statuses up to sectors are one; None where that is open.
 
     The leaves have the same nodes open, sticking and slipping. They are one if one root's directions lie in the box in
     which the other is the only root; they are two if their forces differ.

@@ -281,11 +281,11 @@ class Turning:
 
     @property
     def sign(self) -> int:
-        """That of det P S E over every box in which the equations are regular; 0 where it is not proven."""
+        """Sign of det P S E over every box in which the equations are regular; 0 where it is not proven."""
         return determinant_sign(self.matrix)
 
     def over(self, radius: Floats, free: Ball) -> Box | None:
-        """What holds over all angles up to ``radius``, (q,), from the middle; None if they are not proven regular.
+        """Bounds over all angles up to ``radius``, (q,), from the middle; None if they are not proven regular.
 
         ``free`` are the values of the free unknowns, (k,). In the middle directions are known but for rounding.
         """
@@ -299,7 +299,7 @@ class Turning:
 
     @cached_property
     def _points(self) -> dict[bytes, Box | None]:
-        """What holds in the middle, by values of the free unknowns."""
+        """Bounds in the middle, by values of the free unknowns."""
         return {}
 
     def coupling(self, radius: Floats) -> Floats:

@@ -1,36 +1,86 @@
-"""``enumsol collection``: problems with certified solutions, and a check of what other solvers find."""
+"""``enumsol gallery`` and ``enumsol collection``: named problems, those with certified solutions, and files of them."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from enumsol.cli.common import ExitStatus
+from enumsol.cli.common import COLLECTION, GALLERY, ExitStatus
 from enumsol.cli.files import FileCommand
 from enumsol.cli.options import JsonFile, Quiet, csv
-from enumsol.cli.output import check_outputs, deliver, list_entries, named_group
+from enumsol.cli.output import deliver, list_entries, named_group
 from enumsol.support.messages import counted
 
-app = named_group("Problems with certified solutions, and a check of what other solvers find.")
+if TYPE_CHECKING:
+    from enumsol.gallery import GalleryEntry
+
+gallery_app = named_group("Named problems to experiment with.")
+collection_app = named_group("Problems with certified solutions, and a check of what other solvers find.")
 
 
-@app.command("list", cls=FileCommand)
-def list_(json_file: JsonFile = None) -> None:
+@gallery_app.command("list", cls=FileCommand)
+def list_gallery(json_file: JsonFile = None) -> None:
+    """List the problems, each with an alpha of interest and the number of its roots there."""
+    from enumsol import gallery  # numpy and scipy: not for --help
+
+    entries = list(gallery.GALLERY.values())
+    rows = [(entry.name, f"{entry.alpha:g}", _count(entry), entry.summary) for entry in entries]
+    hint = "Try one: enumsol roots gallery:NAME --alpha ALPHA"
+    list_entries(("NAME", "alpha", "roots", "what it shows"), rows, json_file=json_file, content=entries, hint=hint)
+
+
+def _count(entry: GalleryEntry) -> str:
+    if entry.roots is None:
+        return "family" if entry.dimension == 2 else "-"  # of a large body in 3D the number is not known
+    return str(entry.roots)
+
+
+@gallery_app.command(cls=FileCommand)
+def write(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name as in enumsol gallery list.", show_default=False)],
+    file: Annotated[
+        str,
+        typer.Argument(
+            metavar="FILE",
+            help="File to write: .npz, .h5 (fclib), or a directory for MatrixMarket files.",
+            show_default=False,
+        ),
+    ],
+    json_file: JsonFile = None,
+    quiet: Quiet = False,
+) -> None:
+    """Write the problem NAME to FILE, in a format that read_problem and the other commands accept."""
+    from enumsol import gallery  # as above
+    from enumsol.io import write_problem
+
+    entry = gallery.get(name.removeprefix(GALLERY))
+    problem = entry.build()
+    write_problem(problem, file)
+    command = "fixed-point" if entry.roots is None and entry.dimension == 3 else "roots"
+    about = {"name": entry.name, "file": file, "alpha": entry.alpha, "fingerprint": problem.fingerprint}
+    deliver(
+        json_file=json_file,
+        text=lambda: f"wrote {entry.name} to {file}; try: enumsol {command} {file} --alpha {entry.alpha:g}",
+        content=lambda: about,
+    )
+
+
+@collection_app.command("list", cls=FileCommand)
+def list_collection(json_file: JsonFile = None) -> None:
     """List the problems, each with its dimension, its contact nodes and the number of its solutions."""
-    from enumsol.collection import COLLECTION  # numpy: not for --help
+    from enumsol import collection  # numpy: not for --help
 
-    check_outputs(json=json_file)
     columns = ("NAME", "dimension", "nodes", "solutions", "what it shows")
     rows = [
         (entry.name, str(entry.dimension), str(entry.p), entry.solutions_in_words(), entry.summary)
-        for entry in COLLECTION.values()
+        for entry in collection.COLLECTION.values()
     ]
     hint = "Write them all to a folder: enumsol collection export FOLDER"
-    list_entries(columns, rows, json_file=json_file, content=list(COLLECTION.values()), hint=hint)
+    list_entries(columns, rows, json_file=json_file, content=list(collection.COLLECTION.values()), hint=hint)
 
 
-@app.command(cls=FileCommand)
+@collection_app.command(cls=FileCommand)
 def export(
     folder: Annotated[
         str, typer.Argument(metavar="FOLDER", help="Folder to write to; it is made if need be.", show_default=False)
@@ -45,8 +95,7 @@ def export(
     """Write the problems as .npz and .h5 (fclib), with their certified solutions (JSON) and proofs, to FOLDER."""
     from enumsol import collection  # as above
 
-    check_outputs(json=json_file)
-    written = collection.export(folder, [name.removeprefix("collection:") for name in names] if names else None)
+    written = collection.export(folder, [name.removeprefix(COLLECTION) for name in names] if names else None)
     deliver(
         json_file=json_file,
         text=lambda: (
@@ -57,7 +106,7 @@ def export(
     )
 
 
-@app.command(cls=FileCommand)
+@collection_app.command(cls=FileCommand)
 def check(
     solutions: Annotated[
         str,
@@ -93,7 +142,6 @@ def check(
     """
     from enumsol import collection  # as above
 
-    check_outputs(json=json_file, csv=csv_file)
     report = collection.check(solutions, tolerance)
     deliver(
         json_file=json_file,
