@@ -15,6 +15,7 @@ import numpy as np
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.proof.curve_records import CutPiece, OnCurve, ThroughCurveBox
+from enumsol.proof.leaves import kind_of
 from enumsol.proof.reading import RefusedError, quoted
 from enumsol.proof.records import (
     Branching,
@@ -25,7 +26,6 @@ from enumsol.proof.records import (
     Tree,
     Unbalanced,
     UndecidedRecord,
-    kind_of,
 )
 from enumsol.trusted.space.curve_runs import Run
 from enumsol.trusted.space.pieces import AlphaPiece

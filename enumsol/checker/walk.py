@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from enumsol.checker.reports import MAX_FAILURES, VerificationReport
 from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.proof.leaves import kind_of
 from enumsol.proof.reading import RefusedError, quoted, same
-from enumsol.proof.records import Branching, DeclaredForm, Limits, RecordError, Tree, UndecidedRecord, Unloaded, kind_of
+from enumsol.proof.records import Branching, DeclaredForm, Limits, RecordError, Tree, UndecidedRecord, Unloaded
 from enumsol.support.deadlines import tell
 from enumsol.trusted.status_rows import UNDECIDED
 

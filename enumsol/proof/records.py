@@ -1,8 +1,8 @@
 """Certificates of a proof as classes: one for each kind of record, which writes it and reads it strictly.
 
 A search writes a record by making one of these. The checker, and a search that resumes from an earlier proof, read it
-by the class that its letter gives in the tree at hand (``kind_of``). Reading says whether a record makes sense, never
-that it is true. docs/proof_format.md says what each of them claims and how that is tested.
+by the class that its letter gives in the tree at hand (``proof.leaves``). Reading says whether a record makes sense,
+never that it is true. docs/proof_format.md says what each of them claims and how that is tested.
 
 A new kind of leaf begins here, with the trees in which its theorem holds; docs/architecture.md lists the other places
 that it touches. What stands in trees over pieces of alpha only is in ``proof.curve_records``. Records of graphs in 2D
@@ -14,12 +14,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from enum import Flag, auto
-from functools import cache
 from typing import Any, ClassVar, cast
 
 import numpy as np
 
-from enumsol.model.sectors import DEEPEST, RUN, SECTORS, is_sector
 from enumsol.proof.proof_file import packed
 from enumsol.proof.reading import multipliers_from, numbers_from, quoted
 from enumsol.support.array_types import Codes, Floats, Indices
@@ -646,23 +644,6 @@ class OnlyReference(ClosingRecord):
         return self.back, self.rows, [list(product) for product in self.products], *(self.enclosure or ())
 
 
-@cache
-def leaves_of(tree: Tree) -> dict[str, type[Any]]:
-    """The kinds of leaves that may stand in a tree, by their letters."""
-    from enumsol.proof.curve_records import OnCurve, ThroughCurveBox
-
-    every: tuple[type[Record], ...] = (
-        *(Excluded, Unbalanced, NoRoot, RegularRoot, SharedRoot, RootSetRecord, Closed, Alone, BoxedRoot),
-        *(OnlyReference, OnCurve, ThroughCurveBox, Unloaded, UndecidedRecord),
-    )
-    return {record.kind: record for record in every if record.trees & tree}
-
-
-def kind_of(record: list[Any], tree: Tree) -> type[Any] | None:
-    """The class of a leaf; None for one that may not stand in a tree."""
-    return leaves_of(tree).get(record[0]) if record and isinstance(record[0], str) else None
-
-
 def check_complete(codes: Codes) -> None:
     """Raise RecordError where an assignment is not complete."""
     if any(code in _PARTIAL for code in codes):
@@ -671,12 +652,15 @@ def check_complete(codes: Codes) -> None:
 
 def is_code_of_leaf(code: Any) -> bool:
     """True for a status in 3D that is not undecided, or that of a sector."""
+    from enumsol.model.sectors import SECTORS, is_sector  # in 3D only
+
     return type(code) is int and (0 <= code < UNDECIDED or (code > SECTORS and is_sector(code - SECTORS)))
 
 
 def checked_row(row: Any, p: int) -> Row:
     """A row in 3D; ValueError where there is none such."""
-    from enumsol.trusted.space.sector_rows import FORCE, GAP, RIGHT  # in 3D only
+    from enumsol.model.sectors import DEEPEST, RUN  # in 3D only
+    from enumsol.trusted.space.sector_rows import FORCE, GAP, RIGHT
 
     if not isinstance(row, list | tuple) or len(row) != 3 or not all(type(x) is int for x in row):
         raise ValueError(f"{quoted(row)} is not a row")

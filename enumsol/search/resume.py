@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from enumsol.proof import records
+from enumsol.proof.leaves import kind_of
 from enumsol.search.certifiers.protocol import NO_BOUND, RecordedBound
 from enumsol.search.fathoming_in_contact import LoneProposal
 from enumsol.search.nodes import TreeNode
@@ -51,7 +52,7 @@ class Reader:
 
     def read(self, codes: Codes, record: list[Any]) -> Any:
         """A leaf; None or ValueError where the record makes no sense."""
-        kind = records.kind_of(record, self._limits.tree)
+        kind = kind_of(record, self._limits.tree)
         return kind and kind.read(record, replace(self._limits, codes=codes, declared=self._declared))
 
     def form_over(self, codes: Codes) -> Any:

@@ -95,6 +95,7 @@ SHARED = {
     "proof.records": None,
     "proof.curve_records": None,
     "proof.declared_forms": None,
+    "proof.leaves": None,
     "proof.writer": None,
     "model.sectors": None,
 }

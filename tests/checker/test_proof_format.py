@@ -44,7 +44,8 @@ from touching import beside_a_loaded_node
 
 from enumsol import enumerate_roots, gallery, verify
 from enumsol.proof.curve_records import PARTS
-from enumsol.proof.records import Tree, leaves_of as kinds_in
+from enumsol.proof.leaves import leaves_of as kinds_in
+from enumsol.proof.records import Tree
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "proof_format.md"
 

@@ -113,7 +113,7 @@ def test_a_curve_alone_says_nothing():
         (NONE, "n", lambda _: [], "unknown kind of record None"),
         (ARCS, "x", lambda _: ["x", [], "", ""], "its multipliers do not exclude it"),
         (ARCS, "x", lambda record: ["x", record[1][1:], *record[2:]], "rows and"),
-        (ARCS, "x", lambda record: ["x", *record[2:], record[2]], "its multipliers are not two texts"),
+        (ARCS, "x", lambda record: ["x", *record[2:], record[2]], "its form was not declared"),
         (ROWS, "k", lambda _: ["n"], "not proven to hold no root"),
         (ROWS, "k", lambda record: ["k", record[2], record[2]], "not proven to lie in its boxes"),
         (ROWS, "k", lambda record: ["k", record[2], record[1]], "not proven to lie in its boxes"),

@@ -31,7 +31,8 @@ from trees import above_known_roots, by_the_tree
 from enumsol import Proof, ProofFormatError, branch_graph, enumerate_roots, gallery, verify
 from enumsol.checker.plane_checker import Checker
 from enumsol.checker.space_checker import SpaceChecker
-from enumsol.proof.records import Tree, leaves_of
+from enumsol.proof.leaves import leaves_of
+from enumsol.proof.records import Tree
 from enumsol.search import form_policy as forms
 
 POINTS = {

@@ -11,6 +11,7 @@ from refusals import bad_argument
 
 from enumsol.model.statuses import CONTACT, FORWARD, OPEN, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.proof import curve_records, reading, records
+from enumsol.proof.leaves import leaves_of
 from enumsol.proof.records import Limits
 
 
@@ -97,7 +98,7 @@ def test_forms_that_say_the_same():
 
 def test_no_two_kinds_begin_alike():
     """Whatever has a letter has it alone, in all trees."""
-    kinds = [kind for tree in records.Tree for kind in {*records.leaves_of(tree).values()}]
+    kinds = [kind for tree in records.Tree for kind in {*leaves_of(tree).values()}]
     others = [records.Branching, records.DeclaredForm, curve_records.CutPiece, curve_records.CurveBoxRecord]
     every = {*kinds, *others}
     assert len({kind.kind for kind in every}) == len(every) == 18
@@ -105,8 +106,8 @@ def test_no_two_kinds_begin_alike():
 
 @pytest.mark.parametrize("kind", [records.Closed, records.Alone, records.BoxedRoot, records.Unloaded])
 def test_what_rests_on_a_definite_stiffness_is_no_leaf_of_other_bodies(kind):
-    assert all(kind not in records.leaves_of(tree).values() for tree in records.Tree.FLOATING)
-    assert any(kind in records.leaves_of(tree).values() for tree in records.Tree.HELD)
+    assert all(kind not in leaves_of(tree).values() for tree in records.Tree.FLOATING)
+    assert any(kind in leaves_of(tree).values() for tree in records.Tree.HELD)
 
 
 @pytest.mark.parametrize("by", [1, records.RATIONAL])

@@ -42,7 +42,8 @@ import enumsol
 from enumsol import ContactProblem, Interrupted, InvalidArgumentError, Proof, enumerate_roots, gallery, verify
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.proof.begun import BegunProof
-from enumsol.proof.records import Tree, leaves_of
+from enumsol.proof.leaves import leaves_of
+from enumsol.proof.records import Tree
 from enumsol.proof.writer import BESIDE, FLUSH_EVERY
 from enumsol.search import form_policy as policy
 from enumsol.search.resume import Replay
@@ -367,12 +368,12 @@ def test_files_of_other_searches(tmp_path):
     records = records_of(whole.proof)
     for change, message in (
         ({"data": "condensed"}, "another data"),
-        ({"version": 2}, "another version"),
+        ({"version": 3}, "another version"),
         ({"force": [x + 1 for x in records[0]["force"]]}, "other units"),
     ):
         path.write_bytes(bytes_of(proof_of([records[0] | change, *records[1:]])))
         refused(path, message, problem, alpha)
-    path.write_bytes(b"enumsol-proof 2\n" + bytes_of(whole.proof)[16:])
+    path.write_bytes(b"enumsol-proof 3\n" + bytes_of(whole.proof)[16:])
     refused(path, "is of another version", problem, alpha)
     for content in (b"My notes on contact.\n", bytes_of(proof_of([[1, 2], ["x"]]))):
         path.write_bytes(content)
