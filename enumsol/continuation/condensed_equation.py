@@ -164,7 +164,7 @@ class PiecewiseSmoothEquation:
 
 
 def pieces(rows: Mask) -> tuple[Mask, Floats, Floats]:
-    """What a selection takes, by the signs of its test functions, shape (p, 3), True where one is positive.
+    """Pieces of P that a selection takes, by the signs of its test functions, shape (p, 3), True where one is positive.
 
     Contact, the slip sign, and how often lambda_t + r u_t enters P: with P = [bound or trial] + [trial or -bound] -
     trial (1 for stick, 0 for slip, -1 for the fourth piece).
@@ -267,7 +267,7 @@ class CondensedEquation(ScaledEquation):
         return found
 
     def slacks(self, codes: Codes, x: Floats) -> Floats:
-        """What must be >= 0 for the statuses to hold at a root, shape (p, 2); infinite where there is one condition."""
+        """Values that are >= 0 where the statuses hold, shape (p, 2); infinite where there is one condition."""
         return self._of_inequalities(codes, self._row_values(x), np.inf)
 
     def slack_gradients(self, codes: Codes, x: Floats) -> Floats:

@@ -148,7 +148,7 @@ class DiscEquation(ScaledEquation):
         return (cone.c * x[: self.p] - size) / (1.0 + cone.c), force / np.where(size > 0, size, 1.0)[:, None]
 
     def slacks(self, codes: Codes, x: Floats) -> Floats:
-        """What must be >= 0 for the statuses to hold at a root, shape (p, 2); infinite where there is one condition."""
+        """Values that are >= 0 where the statuses hold, shape (p, 2); infinite where there is one condition."""
         named, cone, (w_n, w_t) = np.array(codes), self._cone(x), self.split(self.w(x))
         along = np.sum(self._trial(x, self.r, cone).direction * cone.q * w_t, axis=1)
         first = np.select([named == OPEN, named == STICK], [-w_n, self._room(x, cone)[0]], x[: self.p])

@@ -171,7 +171,7 @@ class Follower(Generic[_Path]):
         return self._take(step)
 
     def _slide(self) -> _Stop | None:
-        """Where the body moves as a whole at fixed forces: straight to the next transition point, or to the bound.
+        """Go straight to the next transition point, or to the bound, where the body moves as a whole at fixed forces.
 
         All conditions are affine along this line (theory, section 14.7).
         """
@@ -368,7 +368,7 @@ class Follower(Generic[_Path]):
         return None if status is None else self._stop(status, self.equation.alpha(kink.before.x))
 
     def _beyond(self, start: TangentPoint, end: TangentPoint) -> _Stop | None:
-        """Where a body that nothing holds comes to the bound of its rigid displacement."""
+        """The stop where a body that nothing holds comes to the bound of its rigid displacement."""
         equation = self.equation
         here, there = equation.rigid(start.x), equation.rigid(end.x)
         sides = np.where(there < 0, -equation.reach, equation.reach)
@@ -397,8 +397,7 @@ class Follower(Generic[_Path]):
             x[-1] = value
             self._end(TangentPoint(x, end.codes, end.tangent))
         low, high = self.interval
-        left = self.equation.alpha_scale * value
-        return self._stop(PathStatus.INTERVAL_LEFT, left, low=low, high=high)
+        return self._stop(PathStatus.INTERVAL_LEFT, self.equation.alpha_scale * value, low=low, high=high)
 
     def _end(self, point: TangentPoint) -> None:
         if self.equation.norm(point.x - self.record.last.x) > FORWARD_TOLERANCE:

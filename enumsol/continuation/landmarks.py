@@ -65,7 +65,7 @@ class Landmarks:
         return None
 
     def status_of(self, kink: Kink, *, moved: bool) -> PathStatus | None:
-        """How a path that has ``moved`` ends at a transition point: None, unless that is a landmark."""
+        """Status with which a path that has ``moved`` ends at a transition point; None if that is no landmark."""
         equation, x, origin = self.equation, kink.before.x, self.origin
         at_origin = equation.norm(x - origin.x) <= SAME_POINT and kink.after.codes == origin.codes
         if moved and at_origin and equation.dot(kink.after.tangent, origin.tangent) > 0:

@@ -96,7 +96,7 @@ def newton(
     smooth_path: SmoothPath | None = None,
     max_iterations: int = 100,
 ) -> Root:
-    """One root at alpha, by the piecewise smooth Newton method from any start.
+    """Root at alpha, by the piecewise smooth Newton method from any start.
 
     Every iteration solves the selection of H that is active at the iterate. Full steps are taken until a selection
     recurs; from then on a line search lowers the norm of H. Which root is found depends on the start; a start near a

@@ -179,11 +179,11 @@ class ScaledEquation(ABC):
 
     @cached_property
     def reach(self) -> Floats:
-        """How large the components of q may be, (r,)."""
+        """Bounds of the components of q, (r,)."""
         return self.problem.modes.reach(self.problem.rigid_reach) if self.modes else np.zeros(0)
 
     def moves_rigidly(self, tangent: Floats) -> bool:
-        """Whether a curve with this unit tangent changes the rigid displacement alone."""
+        """True if a curve with this unit tangent changes the rigid displacement alone."""
         others = np.delete(tangent, slice(self.m, self.m + self.modes))
         return self.modes > 0 and bool(np.max(np.abs(others)) <= _RIGID_TOLERANCE)
 
@@ -260,7 +260,7 @@ class ScaledEquation(ABC):
 
     @abstractmethod
     def slacks(self, codes: Codes, x: Floats) -> Floats:
-        """What must be >= 0 for the statuses to hold at a root, shape (p, 2); infinite where there is one condition."""
+        """Values that are >= 0 where the statuses hold, shape (p, 2); infinite where there is one condition."""
 
     @abstractmethod
     def slack_gradients(self, codes: Codes, x: Floats) -> Floats:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import AlphaLike, Floats
 
 
-def check_problem(problem: Any, smooth_path: SmoothPath | None) -> None:
+def check_problem(problem: object, smooth_path: SmoothPath | None) -> None:
     """Refuse what continuation does not take.
 
     Raises

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Hashable, Iterator, Mapping
 
     from enumsol.loading.steps import LoadStep
+    from enumsol.model.problem3d import AnyProblem
     from enumsol.proof.proof_file import Proof
     from enumsol.roots.root_set import RootSet
     from enumsol.support.array_types import Floats
@@ -184,7 +185,7 @@ def dissipated(root: Root) -> float:
     return float(np.sum(root.lambda_t * root.u_t))
 
 
-def contact_displacements(problem: Any, root: Root) -> Floats:
+def contact_displacements(problem: AnyProblem, root: Root) -> Floats:
     """Bn u and Bt u in one column, by which roots of one step are near each other [length]."""
     return np.concatenate([root.u_n + problem.gap, (root.u_t + problem.slip_offset).ravel()])
 

@@ -142,7 +142,7 @@ class ActiveSetEngine(CompiledEngine):
         return other
 
     def _is_slow(self, F: NDArray[np.float64]) -> bool:
-        """Whether one dual step closes little of the gap at the root of the tree."""
+        """True if one dual step closes little of the gap at the root of the tree."""
         p, rows, modes = len(F), list[int](), list[int]()
         for node, friction in enumerate((F > 0).tolist()):
             for kind, mode in status_rows(UNDECIDED, friction=friction):

@@ -16,7 +16,7 @@ BRANCHING_CANDIDATES = 24
 
 
 def not_compiled(error: ImportError) -> str:
-    """What is the case where the compiled solver cannot be imported, and what to do, in one sentence.
+    """Sentence that the compiled solver cannot be imported, and what to do.
 
     Python imports the first enumsol that it finds: in a source tree the one there, where nothing may be compiled.
     """

@@ -26,7 +26,7 @@ from enumsol.support.plotting import axes_of, axes_or_none, figure_of, in_units,
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import AnyProblem, ContactProblem3D
     from enumsol.support.array_types import Floats, Indices
 
 
@@ -49,7 +49,7 @@ _ACROSS, MOST_BODIES = 3, 12
 
 
 def draw_body(
-    root: Any, problem: Any, ax: Any = None, scale: float | None = None, units: tuple[str, str] | None = None
+    root: Any, problem: AnyProblem, ax: Any = None, scale: float | None = None, units: tuple[str, str] | None = None
 ) -> Any:
     """A figure of one deformed body; see Root.plot_body."""
     axes_or_none(ax)
@@ -125,7 +125,7 @@ def _axes(figure: Any, place: tuple[int, int, int], shape: BodyShape) -> Any:
     return figure.add_subplot(*place, projection="3d" if shape.points.shape[1] == 3 else None)
 
 
-def _draw(ax: Any, root: Any, problem: Any, shape: BodyShape, scale: float, arrows: float) -> None:
+def _draw(ax: Any, root: Any, problem: AnyProblem, shape: BodyShape, scale: float, arrows: float) -> None:
     moves = scale * shape.moves(root)
     points = shape.points + moves
     places = shape.at_rows(points)

@@ -2,7 +2,7 @@
 
 A piece is a subinterval. It is searched by trees whose leaves cover all selections: a leaf is proven empty on the whole
 piece, or it is a complete selection that survives, or it is left to both halves of the piece. What was proven for the
-whole piece is proven for its halves, too. Bodies that nothing holds have their own certifier (theory, section 14.8).
+whole piece is proven for its halves, too.
 """
 
 from __future__ import annotations
@@ -19,15 +19,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.condensation.enclosure import NotEnclosedError, enclosure_of
 from enumsol.model.statuses import UNDECIDED
 from enumsol.relaxation.interval_relaxation import IntervalSystem
 from enumsol.search.floating_solvers import WEAK
 from enumsol.search.interval.interval_tree import LARGEST_TREE, EmptyLeaf, SubintervalTree, Subtree, TreeResult
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.support.workers import Crew, Job
-from enumsol.trusted.exclusion import exclusion_margin
-from enumsol.trusted.over_interval import EnclosedPiece, PieceNumbers
+from enumsol.trusted.over_interval import PieceNumbers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -35,7 +33,6 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.condensed import CondensedProblem
     from enumsol.model.problem import ContactProblem
-    from enumsol.search.certifiers.protocol import Margin
     from enumsol.support.array_types import Codes, Floats
 
 
@@ -455,10 +452,6 @@ def _search_tree(packed: bytes, task: Task, seconds: float | None) -> TreeResult
     return worker.run(task, deadline=None if seconds is None else time.perf_counter() + seconds)
 
 
-#: As of other intervals.
-_MARGIN = 1e-12
-
-
 def on_weak_springs(problem: ContactProblem) -> CondensedProblem:
     """The body on weak springs at the degrees of freedom where springs hold it, which relaxations are about."""
     modes = problem.modes
@@ -466,38 +459,3 @@ def on_weak_springs(problem: ContactProblem) -> CondensedProblem:
         raise AssertionError("the body is held")
     condensed: CondensedProblem = problem.on_springs.replace(A=problem.A + WEAK * modes.springs()).condensed
     return condensed
-
-
-class FloatingIntervalCertifier(IntervalCertifier):
-    """Accepts a leaf when the bounds of its multipliers prove it empty on the whole piece, within the bound or without.
-
-    What balls cannot exclude is branched on: complete selections are followed by algebra.
-
-    Parameters
-    ----------
-    problem : ContactProblem
-    checkable : bool
-        A proof is wanted.
-    """
-
-    def __init__(self, problem: ContactProblem, *, checkable: bool) -> None:
-        self._problem, self.checkable = problem, checkable
-        self._piece: tuple[Piece, Margin | None] | None = None
-
-    def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
-        """True if the bounds at both ends of the piece are positive."""
-        if self._piece is None or self._piece[0] != piece:
-            self._piece = piece, self._on(piece, system)
-        margin = self._piece[1]
-        return margin is not None and margin(leaf.codes, leaf.rows, leaf.values) > _MARGIN
-
-    def _on(self, piece: Piece, system: IntervalSystem) -> Margin | None:
-        units = system.scaled
-        try:
-            enclosure = enclosure_of(self._problem)
-            within = EnclosedPiece.from_enclosure(enclosure, piece.a, piece.b, units.force, units.length, None)
-        except NotEnclosedError:
-            return None
-        if not all(end.smallest_eigenvalue > 0 for end in within.ends):
-            return None
-        return partial(exclusion_margin, within, errors=2.0)

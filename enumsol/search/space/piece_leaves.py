@@ -74,7 +74,7 @@ def _narrow(problem: AlphaProblem, x: Floats, codes: Codes, nodes: Sequence[int]
     leaf, p = list(codes), len(codes)
     y = (problem.unplaced(x)[:-1] / problem.ratio.mid)[p : 3 * p].reshape(2, p)
     for i in nodes:
-        # wider sectors hold directions of other curves
+        # sectors of this level around the point, or narrower ones
         up = DEEPEST + 2 - max(12, level_of(codes[i] - SECTORS))
         leaf[i] = SECTORS + (1 << (DEEPEST + 2 - up)) + (int(places(y[:, i])) >> up)
     return tuple(leaf)

@@ -50,7 +50,7 @@ class AlphaPoint:
     def __init__(self, space: AlphaSpace, alpha: Fraction) -> None:
         self.alpha = alpha
         self.system, self._floats = _relaxed(space, alpha), not space.fixed.held
-        # room for rows of many sectors
+        # the rows of a program at one alpha
         self.engine = SpaceEngine(self.system, 4096)
         self.splitting = SpaceSplitting(self.engine)
         self.rows = ImposedRows(self.splitting, self.system.p)

@@ -73,7 +73,7 @@ def _pattern(codes: Sequence[int]) -> Codes:
     return tuple(min(code, SECTORS) for code in codes)
 
 
-class _Along(NamedTuple):
+class _ArcRates(NamedTuple):
     """Along an arc: bounds of y and w, and of their derivatives and those of s, by the parameter of the arc."""
 
     y: Ball
@@ -145,7 +145,7 @@ class _ArcLeaf(Leaf):
         for part in (values, rates):
             part.mid[fixed], part.rad[fixed] = 0.0, 0.0
         s_rate = rate[-1] if k < q else Ball.exact(np.array(1.0))
-        found = _Along(values[:m], values[m:], rates[:m], rates[m:], s_rate)
+        found = _ArcRates(values[:m], values[m:], rates[:m], rates[m:], s_rate)
         holding = self._slacks(found.y, found.w, angle, radius) > 0
         mid, rad = self._rates(found, angle, radius)
         if not np.all(holding | (np.abs(mid) > rad * errors * SAFE)):
@@ -161,7 +161,7 @@ class _ArcLeaf(Leaf):
         cut = self._cut_free(np.r_[angle, np.zeros(len(wide))], np.r_[radius, wide])
         return cut if cut is not None and np.all(np.isfinite(cut[1])) else None
 
-    def _rates(self, along: _Along, angle: Floats, radius: Floats) -> tuple[Floats, Floats]:
+    def _rates(self, along: _ArcRates, angle: Floats, radius: Floats) -> tuple[Floats, Floats]:
         """Bounds of how the conditions of ``_slacks`` change along the arc."""
         turn, tau, unit, scale = self.system.turn, self.system.tau, self.system.unit, self.system.disc_scale
         assert turn is not None

@@ -29,7 +29,7 @@ from enumsol.arithmetic.balls import (
 from enumsol.model.sectors import SECTORS, direction, end_number
 from enumsol.trusted.same_roots import Apart, told_apart
 from enumsol.trusted.space.sector_rows import OPEN, SLIP_PLUS, STICK
-from enumsol.trusted.space.turning import LIBRARY, Box, Combined, Turning, turned_by
+from enumsol.trusted.space.turning import LIBRARY, AngleBox, Combined, Turning, turned_by
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -229,7 +229,7 @@ class State(NamedTuple):
     w: Ball
     G: Ball
     J: Ball
-    box: Box
+    box: AngleBox
     #: Derivatives of G along a piece of alpha.
     G_turn: Ball | None = None
 
