@@ -72,8 +72,8 @@ What checker and search share
     - ``proof.records`` and, for graphs in 3D, ``proof.curve_records``: what a record of each kind may say, and in which
       trees its theorem holds (``proof.leaves``); ``proof.declared_forms``, what leaves refer to. The search writes
       records by these classes, the checkers read them by the same ones, strictly, and so does a search that resumes
-      from an earlier proof. It takes what ``proof.begun`` finds, and proves it again before ``proof.writer`` writes it. What a record
-      makes of a leaf is not in these classes: a checker tests it;
+      from an earlier proof. It takes what ``proof.begun`` finds, and proves it again before ``proof.writer`` writes it.
+      What a record makes of a leaf is not in these classes: a checker tests it;
     - ``model.problem``, ``model.mesh``, ``model.cells``, ``model.contact_body``, ``condensation.data``,
       ``condensation.condensed``, ``condensation.factorization``, ``support.deadlines``, ``support.immutable``,
       ``support.arguments``, ``support.array_arguments``, ``support.array_types``, ``support.files``,
