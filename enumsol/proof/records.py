@@ -291,12 +291,8 @@ class Unloaded(Record):
 # -- no solution -------------------------------------------------------------------------------------------------------
 
 
-class Exclusion(Record):
-    """Base of leaves without a solution that may stand at any assignment."""
-
-
 @dataclass(frozen=True, eq=False)
-class Excluded(Exclusion):
+class Excluded(Record):
     """Multipliers of rows exclude the assignment.
 
     Attributes
@@ -343,7 +339,7 @@ class Excluded(Exclusion):
 
 
 @dataclass(frozen=True, eq=False)
-class Unbalanced(Exclusion):
+class Unbalanced(Record):
     """Of a body that nothing holds: no forces below the assignment are in balance with its load."""
 
     kind, sizes, trees = "i", (2,), Tree.FLOATING

@@ -210,7 +210,9 @@ class Exclusions:
             partial(exclusion_margin, enclosed, errors=2.0),
         )
 
-    def record(self, codes: Codes, bound: Bound, *, within: bool) -> tuple[records.Exclusion, bool] | None:
+    def record(
+        self, codes: Codes, bound: Bound, *, within: bool
+    ) -> tuple[records.Excluded | records.Unbalanced, bool] | None:
         """A record that excludes a partial assignment, and whether it needs the bound; or None.
 
         Whether the bound is needed must not depend on the numbers that a relaxation arrives at. So an assignment that
@@ -315,7 +317,9 @@ class FloatingCertifier(VerifiedCertifier):
         self._leaf(leaf())
         return []
 
-    def _excluded_by_record(self, record: records.Exclusion | records.NoRoot, *, bounded: bool) -> None:
+    def _excluded_by_record(
+        self, record: records.Excluded | records.Unbalanced | records.NoRoot, *, bounded: bool
+    ) -> None:
         self.bounded |= bounded
         self._escalations.balls += 1
         self._leaf(record)
@@ -329,7 +333,7 @@ class FloatingCertifier(VerifiedCertifier):
             if ball is not None and ball.is_root:
                 self._escalations.balls += 1
                 return self._regular(codes, ball)
-            found: records.Exclusion | records.NoRoot | None = self._exclusions.unbalanced(codes)
+            found: records.Excluded | records.Unbalanced | records.NoRoot | None = self._exclusions.unbalanced(codes)
             if found is None and _holds_none(self._exclusions.free, codes):
                 found = records.NoRoot()
             if found is not None:

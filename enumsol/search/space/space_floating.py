@@ -13,7 +13,7 @@ import numpy as np
 
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.statuses import CONTACT, UNDECIDED
-from enumsol.proof.records import DeclaredForm, Excluded, Exclusion, NoRoot, OnlyReference, Unbalanced
+from enumsol.proof.records import DeclaredForm, Excluded, NoRoot, OnlyReference, Unbalanced
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.certifiers.protocol import Bound, Certifier, Refine, UndecidedPart, Unrecorded
 from enumsol.search.closing import TreeCloser
@@ -98,7 +98,7 @@ class SpaceExclusions:
 
     def record(
         self, codes: Codes, rows: Sequence[Row], values: Floats, *, within: bool
-    ) -> tuple[Exclusion | NoRoot, bool] | None:
+    ) -> tuple[Excluded | Unbalanced | NoRoot, bool] | None:
         """A record that excludes a partial assignment, and whether it needs the bound; or None.
 
         ``within``: the bound is known to be needed. Otherwise it is used only where all statuses are determined
