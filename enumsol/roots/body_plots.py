@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.model.problem3d import AnyProblem, ContactProblem3D
-    from enumsol.roots.root import Root
     from enumsol.support.array_types import Floats, Indices
 
 
@@ -50,7 +49,7 @@ _ACROSS, MOST_BODIES = 3, 12
 
 
 def draw_body(
-    root: Root, problem: AnyProblem, ax: Any = None, scale: float | None = None, units: tuple[str, str] | None = None
+    root: Any, problem: AnyProblem, ax: Any = None, scale: float | None = None, units: tuple[str, str] | None = None
 ) -> Any:
     """A figure of one deformed body; see Root.plot_body."""
     axes_or_none(ax)
@@ -99,7 +98,7 @@ def draw_bodies(roots: Sequence[Root], scale: float | None = None, units: tuple[
     return figure
 
 
-def _index(root: Root) -> str:
+def _index(root: Any) -> str:
     return "index unknown" if root.index is None else f"index {root.index:+d}"
 
 
@@ -126,7 +125,7 @@ def _axes(figure: Any, place: tuple[int, int, int], shape: BodyShape) -> Any:
     return figure.add_subplot(*place, projection="3d" if shape.points.shape[1] == 3 else None)
 
 
-def _draw(ax: Any, root: Root, problem: AnyProblem, shape: BodyShape, scale: float, arrows: float) -> None:
+def _draw(ax: Any, root: Any, problem: AnyProblem, shape: BodyShape, scale: float, arrows: float) -> None:
     moves = scale * shape.moves(root)
     points = shape.points + moves
     places = shape.at_rows(points)
@@ -222,7 +221,7 @@ def _legend(place: Any, roots: Sequence[Root], strongest: float, units: tuple[st
     place.legend(handles=handles, fontsize=8, frameon=False, **where)
 
 
-def draw_root(root: Root, problem: ContactProblem3D, ax: object, units: tuple[str, str] | None = None) -> Any:
+def draw_root(root: Any, problem: ContactProblem3D, ax: object, units: tuple[str, str] | None = None) -> Any:
     """See Root.plot."""
     if axes_or_none(ax) is not None or problem.mesh is None:
         return draw_slips(root, problem, ax, units)
@@ -232,7 +231,7 @@ def draw_root(root: Root, problem: ContactProblem3D, ax: object, units: tuple[st
     return figure
 
 
-def draw_slips(root: Root, problem: ContactProblem3D, ax: Any, units: tuple[str, str] | None = None) -> Any:
+def draw_slips(root: Any, problem: ContactProblem3D, ax: Any, units: tuple[str, str] | None = None) -> Any:
     """Statuses and directions of slip on the contact surface."""
     if problem.coordinates is None:
         raise InvalidArgumentError("the problem has no coordinates; expected a problem made with coordinates=")
