@@ -69,10 +69,11 @@ What checker and search share
       ``condensation.data``: F(alpha) and f(alpha) without rounding; of ``arithmetic.rationals`` the pivots of a
       definite matrix, and floats as rationals (that the search cuts intervals at simple numbers proves nothing);
     - ``proof.proof_file`` and of ``proof.reading`` what a fraction in a proof may be: the file;
-    - ``proof.records`` and, for problems in 3D, ``proof.space_records``: what a record of each kind may say. The search
-      writes records by these classes, the checkers read them by the same ones, strictly, and so does a search that
-      resumes from an earlier proof. It takes what ``proof.begun`` finds, and proves it again before ``proof.writer``
-      writes it. What a record makes of a leaf is not in these classes: a checker tests it;
+    - ``proof.records`` and, for graphs in 3D, ``proof.curve_records``: what a record of each kind may say, and in which
+      trees its theorem holds (``proof.leaves``); ``proof.declared_forms``, what leaves refer to. The search writes
+      records by these classes, the checkers read them by the same ones, strictly, and so does a search that resumes
+      from an earlier proof. It takes what ``proof.begun`` finds, and proves it again before ``proof.writer`` writes it.
+      What a record makes of a leaf is not in these classes: a checker tests it;
     - ``model.problem``, ``model.mesh``, ``model.cells``, ``model.contact_body``, ``condensation.data``,
       ``condensation.condensed``, ``condensation.factorization``, ``support.deadlines``, ``support.immutable``,
       ``support.arguments``, ``support.array_arguments``, ``support.array_types``, ``support.files``,

@@ -397,8 +397,7 @@ class Follower(Generic[_Path]):
             x[-1] = value
             self._end(TangentPoint(x, end.codes, end.tangent))
         low, high = self.interval
-        left = self.equation.alpha_scale * value
-        return self._stop(PathStatus.INTERVAL_LEFT, left, low=low, high=high)
+        return self._stop(PathStatus.INTERVAL_LEFT, self.equation.alpha_scale * value, low=low, high=high)
 
     def _end(self, point: TangentPoint) -> None:
         if self.equation.norm(point.x - self.record.last.x) > FORWARD_TOLERANCE:

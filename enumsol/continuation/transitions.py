@@ -16,6 +16,7 @@ import numpy as np
 from enumsol.continuation.corrector import smooth_newton
 from enumsol.continuation.scaled_equation import STATUS_TOLERANCE, ScaledEquation
 from enumsol.continuation.tangents import (
+    RANK_TOLERANCE,
     RATE_TOLERANCE,
     SAME_TANGENT,
     Tangent,
@@ -241,10 +242,6 @@ def continuations(equation: ScaledEquation, arrival: TangentPoint, sign: int) ->
     return keep, [t for t in others if t.orientation != sign]
 
 
-#: Singular values of a selection's matrix below this fraction of the largest are zero: on a sheet they are so exactly.
-_RANK = 1e-10
-
-
 def selection_distance(equation: ScaledEquation, codes: Codes, x: Floats) -> float:
     """Distance of x from the solutions of one selection at the alpha of x; infinite when it has none there.
 
@@ -256,7 +253,7 @@ def selection_distance(equation: ScaledEquation, codes: Codes, x: Floats) -> flo
     rows = equation.selection(codes)
     to_metric = np.linalg.inv(np.linalg.cholesky(equation.metric[:-1, :-1]).T)
     left, sizes, right = np.linalg.svd(equation.jacobian(rows, x)[:, :-1] @ to_metric)
-    rank = int(np.sum(sizes > _RANK * sizes[0]))
+    rank = int(np.sum(sizes > RANK_TOLERANCE * sizes[0]))
     residual = left.T @ equation.selection_residual(rows, x)
     if np.linalg.norm(residual[rank:]) > STATUS_TOLERANCE:
         return math.inf

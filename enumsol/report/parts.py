@@ -211,7 +211,7 @@ def given_section(scene: Scene | None, units: tuple[str, str] | None) -> str:
         return ""
     rows = [
         ("", (name, _said(value), unit_text(units, *_POWERS[name]) if name in _POWERS else ""))
-        for name, value in scene.options.items()
+        for name, value in vars(scene.options).items()
         if value is not None and not (np.ndim(value) == 1 and len(value) == 0)
         if scene.dimension == 2 or name not in _PLANE
     ]

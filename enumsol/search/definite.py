@@ -21,8 +21,6 @@ _WORTH = 1e-5
 _CLEARLY = 1e-3
 #: Steps of Newton's method.
 _STEPS = 40
-#: Steps after t was positive.
-_AFTER = 2
 #: What the weight of the objective is multiplied by, once so little is left of the Newton decrement, or a step raises t
 #: by less than this share of it.
 _GROWTH, _CENTRED, _STALLED = 5.0, 1.0, 0.1
@@ -42,8 +40,6 @@ _HOPELESS_SQUARES, _FAR_SQUARES = -1.0, -0.14
 _ROUNDS, _EVALUATIONS, _ABOVE = 10, 15, 1.2
 #: The objective where M is not definite.
 _BEYOND = 1e10
-#: What mu begins with where squares count.
-_BEGINNING = 3.0
 
 
 @dataclass(frozen=True)
@@ -153,9 +149,9 @@ class AnalyticCentres:
             before = z[-1]
             z, decrement = self._moved(z, weight)
             if z[-1] > DEFINITE:
-                # farther from the border where it is not far yet: enclosures are wide near it
+                # two steps farther from the border where it is not far yet: enclosures are wide near it
                 after += 1
-                if after > _AFTER or decrement < _CENTRED or z[-1] > _CLEARLY:
+                if after > 2 or decrement < _CENTRED or z[-1] > _CLEARLY:
                     return self._found(z)
             elif decrement < _CENTRED or z[-1] - before < _STALLED * abs(before):
                 # near a centre no t is larger by more than this
@@ -247,7 +243,8 @@ class Descent:
         """mu, kappa, nu, theta / F and tau as a proof has them, or None."""
         z = np.zeros(self._nu.stop)
         if self._spare is not None:
-            z[self._mu] = np.log(_BEGINNING)
+            # what mu begins with where squares count
+            z[self._mu] = np.log(3.0)
         lowest, far = (_HOPELESS, _FAR) if self._spare is None else (_HOPELESS_SQUARES, _FAR_SQUARES)
         least = self._least(z)
         for _ in range(_ROUNDS):

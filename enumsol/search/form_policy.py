@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
 #: Nodes examined with the energy before a form is tried: more than what that costs.
 NODES = 1000
-#: A form is tried where at least this share of the tree is left.
-_LEFT = 0.5
 #: Steps of the ascent on trial, and those that follow once it pays.
 TRIAL, STEPS = 4, 2
 #: A form pays when it closes so much more of the gap at the root, or so many times as much.
@@ -62,7 +60,8 @@ class Forms:
 
     def due(self, nodes: int, covered: float) -> bool:
         """True if it is time to try a form."""
-        return self.tried(nodes) and covered < 1.0 - _LEFT
+        # a form is tried where at least half of the tree is left
+        return self.tried(nodes) and covered < 0.5
 
     def tried(self, nodes: int) -> bool:
         """True if a search of so many nodes has tried a form."""

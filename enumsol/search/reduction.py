@@ -98,7 +98,7 @@ class Reduction:
                 x, share, step = found, ahead, 1.5 * step if step else 0.25
             else:
                 step *= 0.5
-                # the path has an end, or turns back
+                # the least step
                 if step < 1 / 64:
                     return None
 
@@ -126,7 +126,7 @@ class Reduction:
     def _shortened(self, x: Floats, ahead: Floats, residual: float, share: float) -> Floats | None:
         """A point on the way at which the residual is less."""
         part = 1.0
-        # a shorter step gains nothing, nor one that lowers the residual by less than a share of what it promises
+        # the least part of a step; the residual has to fall by a share of what a step promises
         while part >= 1 / 64:
             point = x + part * (ahead - x)
             if self._residual(point, self.h - self.R @ point, share) < (1.0 - 1e-4 * part) * residual:

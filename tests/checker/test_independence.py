@@ -25,7 +25,7 @@ CHECKERS = inside("checker", "verify", "plane_checker", "graph_checker", "histor
 IN_SPACE = {
     *("enumsol.checker.space_checker", "enumsol.condensation.space_condensed", "enumsol.model.sectors"),
     *inside("trusted.space", "resultants", "sector_rows", "slip_forms", "leaves", "boxed_solution"),
-    *inside("trusted.space", "product_forms", "natural_map", "space_reference", "space_uniqueness", "turning"),
+    *inside("trusted.space", "product_forms", "natural_map", "space_uniqueness", "turning"),
 }
 #: The search: its rooms, and what it alone uses of rooms that it shares with the checkers.
 SEARCH = (
@@ -90,10 +90,12 @@ SHARED = {
         *("equations", "lone_root", "only_root", "only_solution_in_space"),
     },
     "proof.begun": None,
-    "proof.proof_file": {"Proof", "fraction_text", "packed", "coarse"},
+    "proof.proof_file": {"PROOF_VERSION", "Proof", "fraction_text", "packed", "coarse"},
     "proof.reading": {"fits", "rational_text"},
     "proof.records": None,
-    "proof.space_records": None,
+    "proof.curve_records": None,
+    "proof.declared_forms": None,
+    "proof.leaves": None,
     "proof.writer": None,
     "model.sectors": None,
 }

@@ -152,7 +152,7 @@ class Curves:
         for ends in piece.places(found, self._given) if self._boxes else ():
             sides = [np.flatnonzero(self._around(end.mid, end.rad)).tolist() for end in ends]
             runs = {(min(pair), max(pair)) for pair in product(sides[0], sides[-1])}
-            # rows of boxes of one curve: few of them, and none so long that the test takes longer than the tree
+            # a few rows of boxes of one curve, the shortest first, and no longer ones
             for first, last in sorted(runs, key=lambda run: run[1] - run[0])[:4]:
                 near = last - first < 64 and self._owner[first] == self._owner[last]
                 if near and lie_along(ends, self._boxes[first : last + 1], 2.0):

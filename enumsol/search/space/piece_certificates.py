@@ -33,8 +33,6 @@ if TYPE_CHECKING:
 
 #: Smallest eigenvalue relative to S from which a form counts as definite, nodes from which better ones are sought.
 _DEFINITE, _MANY = 1e-9, 8
-#: Weight of the equations of an assignment, by the largest entry of S; what of a gap may serve for its slip.
-_WEIGHT, _SHARED = 1024.0, 0.5
 #: By how much more a writer of proofs has theta vary.
 ERRORS = 1.0 + 2.0**-6
 
@@ -98,7 +96,8 @@ class PieceProposals:
 
     def _rows(self, codes: Codes) -> Array | None:
         """Rows that are zero for the difference of two solutions with these statuses."""
-        return None if all(code == UNDECIDED for code in codes) else equations(self._middle, codes, _WEIGHT).mid
+        # weighed so by the largest entry of S, equations leave little of what does not satisfy them
+        return None if all(code == UNDECIDED for code in codes) else equations(self._middle, codes, 1024.0).mid
 
     def _turn(self, parts: CurveParts, apart: Flags) -> tuple[Array, Array]:
         """theta of the curve at the middle of the piece, (p, 2), and how far it is from one that serves there, (p,)."""
@@ -114,7 +113,8 @@ class PieceProposals:
         (theta, far), normal, slip = parts.thetas, *(part.mid for part in parts.slips)
         r = np.maximum(parts.F.mid, 0.0) / self._piece.whole.references
         pushed = self._piece.whole.references * r * np.linalg.norm(slip, axis=2)
-        shorter = np.maximum(1.0 - _SHARED * np.maximum(-normal, 0.0) / np.maximum(pushed, 1e-300), 0.0)
+        # half of a gap serves for the slip
+        shorter = np.maximum(1.0 - 0.5 * np.maximum(-normal, 0.0) / np.maximum(pushed, 1e-300), 0.0)
         apart = self._apart(parts)
         return np.where(apart[:, None], shorter[:, :, None] * theta, theta), np.isfinite(far) | apart
 

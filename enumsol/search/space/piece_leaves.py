@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of, parts_around, places, span, width_of
+from enumsol.proof.curve_records import OnCurve, ThroughCurveBox
 from enumsol.proof.records import NoRoot
-from enumsol.proof.space_records import InCurveBoxes, ThroughCurveBox
 from enumsol.search.space.piece_multipliers import unbalanced
 from enumsol.search.space.space_fathoming import without_sectors
 from enumsol.trusted.space.solution_curve import curve_point
@@ -74,7 +74,7 @@ def _narrow(problem: AlphaProblem, x: Floats, codes: Codes, nodes: Sequence[int]
     leaf, p = list(codes), len(codes)
     y = (problem.unplaced(x)[:-1] / problem.ratio.mid)[p : 3 * p].reshape(2, p)
     for i in nodes:
-        # wider sectors hold directions of other curves
+        # sectors of this level around the point, or narrower ones
         up = DEEPEST + 2 - max(12, level_of(codes[i] - SECTORS))
         leaf[i] = SECTORS + (1 << (DEEPEST + 2 - up)) + (int(places(y[:, i])) >> up)
     return tuple(leaf)
@@ -121,7 +121,7 @@ class PieceLeaves:
         if (without := unbalanced(at.piece, codes)) is not None:
             return without
         run = self._curves.run(piece, found)
-        return self._on_arc(at, codes, piece, found) if run is None else InCurveBoxes(*run)
+        return self._on_arc(at, codes, piece, found) if run is None else OnCurve(*run)
 
     def through(
         self,

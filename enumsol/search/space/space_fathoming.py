@@ -355,14 +355,9 @@ class DefiniteForm:
         """The smallest eigenvalue of Q relative to S."""
         numbers = self._numbers(logs, shares)
         try:
-            return min(
-                float(
-                    scipy.linalg.eigh(self._matrix(turn, *numbers), self._S, eigvals_only=True, subset_by_index=[0, 0])[
-                        0
-                    ]
-                )
-                for turn in self._turns
-            )
+            forms = (self._matrix(turn, *numbers) for turn in self._turns)
+            first = {"eigvals_only": True, "subset_by_index": [0, 0]}
+            return min(float(scipy.linalg.eigh(form, self._S, **first)[0]) for form in forms)
         except (np.linalg.LinAlgError, ValueError):
             return -np.inf
 

@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from enumsol.trusted.space.sector_rows import Row
     from enumsol.trusted.space.space_reference import SpaceProduct, SpaceReference
 
-#: Smallest eigenvalue relative to S from which a form counts as definite; the share of a gap that serves for a slip.
-_DEFINITE, _SHARED = 1e-9, 0.5
 #: Eigenvalues of the small matrix, relative to its largest one, that count as none; what of rows counts as none.
 _NONE, _NOTHING = 1e-9, 1e-8
 #: Factors of products that are tried, relative to the compliance.
@@ -146,8 +144,8 @@ def reference_numbers(
     y, w, code = root.y.mid, root.w.mid, np.array(leaf)
     force, slip = (np.where(tau >= 0, part, 0.0) for part in (y[tau] * unit[tau], w[tau] / unit[tau]))
     apart, size = code == OPEN, np.linalg.norm(slip, axis=1)
-    # of open nodes as much of the slip as their gap does not serve for
-    need = np.maximum(1.0 + _SHARED * w[:p] / np.where(size > 0, size, np.inf), 0.0)
+    # of open nodes as much of the slip as half of their gap does not serve for
+    need = np.maximum(1.0 + 0.5 * w[:p] / np.where(size > 0, size, np.inf), 0.0)
     length = np.where(code == STICK, y[:p], np.linalg.norm(force, axis=1))
     divisor = np.where(length > 0, length, np.inf)
     theta = np.where(
@@ -159,7 +157,7 @@ def reference_numbers(
         held = np.sqrt(balance) * enclosed.rows.G.mid
         form = DefiniteForm(replace(system, S=enclosed.S, g=enclosed.g), [theta], apart, np.zeros(p), held=held)
         for better in (False, True):
-            found = form.best(_DEFINITE, better=better)
+            found = form.best(1e-9, better=better)
             if found is not None:
                 mu, kappa, nu = found
                 numbers = np.concatenate([mu, kappa, np.zeros(p), nu[tau >= 0], theta[tau >= 0]])
