@@ -71,7 +71,7 @@ def draw_body(
     return figure_of(ax)
 
 
-def draw_bodies(roots: Sequence[Root], scale: float | None = None, units: tuple[str, str] | None = None) -> Any:
+def draw_bodies(roots: Sequence[Any], scale: float | None = None, units: tuple[str, str] | None = None) -> Any:
     """A figure of the deformed bodies of several roots side by side; see RootSet.plot_bodies."""
     if not roots:
         raise InvalidArgumentError("there are no isolated roots to draw; expected at least one")
@@ -106,13 +106,13 @@ def _scale_words(scale: float) -> str:
     return f"displacements times {scale:g}"
 
 
-def _strongest(roots: Sequence[Root], problem: object, shape: BodyShape) -> float:
+def _strongest(roots: Sequence[Any], problem: object, shape: BodyShape) -> float:
     """The largest nodal contact force of several roots [force]."""
     return max(largest_length(shape.contact_forces(problem, root.lambda_n, root.lambda_t)) for root in roots)
 
 
 def _factors(
-    roots: Sequence[Root], problem: object, shape: BodyShape, scale: float | None
+    roots: Sequence[Any], problem: object, shape: BodyShape, scale: float | None
 ) -> tuple[tuple[float, ...], float]:
     """Factors of the displacements of each root, and one of all forces."""
     arrows = arrow_scale(_strongest(roots, problem, shape), shape.size)
@@ -199,7 +199,7 @@ def _name_axes(ax: object, dimension: int, units: tuple[str, str] | None) -> Non
         getattr(ax, f"set_{direction}label")(in_units(direction, "length", units), fontsize=8)
 
 
-def _legend(place: Any, roots: Sequence[Root], strongest: float, units: tuple[str, str] | None) -> None:
+def _legend(place: Any, roots: Sequence[Any], strongest: float, units: tuple[str, str] | None) -> None:
     found = {status for root in roots for status in root.statuses}
     handles = [
         line_entry(status.value, linestyle="", marker=marker, markerfacecolor=face, markeredgecolor="black")
