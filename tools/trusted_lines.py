@@ -4,7 +4,7 @@
 
 Counted are lines that are neither blank nor comments nor docstrings, of all modules that the checkers import, however
 indirectly and wherever in a module. With ``--modules`` each of them is listed. numpy, scipy and python-flint come
-on top of that; what reader and writer of a proof share is said in ``help(enumsol.checker)``.
+on top of that; what reader and writer of a proof share is said in docs/trust.md.
 """
 
 from __future__ import annotations
@@ -55,23 +55,31 @@ def code_lines(path: Path) -> int:
     return len(lines)
 
 
+def by_room() -> dict[str, int]:
+    """Lines of all modules that a verification may load, by rooms."""
+    return {room: sum(modules.values()) for room, modules in counted().items()}
+
+
+def counted() -> dict[str, dict[str, int]]:
+    """Lines of these modules, by rooms and modules."""
+    rooms = defaultdict(dict)
+    for module in sorted(reached(CHECKER)):
+        base = SOURCE.parent.joinpath(*module.split("."))
+        places = base.with_suffix(".py"), base / "__init__.py", base.with_suffix(".pyx")
+        rooms[module.split(".")[1]][module] = sum(code_lines(file) for file in places if file.exists())
+    return rooms
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--modules", action="store_true", help="list each module")
-    listed = parser.parse_args().modules
-    rooms = defaultdict(dict)
-    for module in sorted(reached(CHECKER)):
-        base = SOURCE.parent.joinpath(*module.split("."))
-        files = [
-            file for file in (base.with_suffix(".py"), base / "__init__.py", base.with_suffix(".pyx")) if file.exists()
-        ]
-        rooms[module.split(".")[1]][module] = sum(map(code_lines, files))
+    listed, rooms = parser.parse_args().modules, counted()
     for room, modules in sorted(rooms.items(), key=lambda each: -sum(each[1].values())):
         print(f"{sum(modules.values()):6d}  {room} ({len(modules)} modules)")
         for module, count in modules.items() if listed else ():
             print(f"          {count:6d}  {module}")
-    print(f"{sum(sum(modules.values()) for modules in rooms.values()):6d}  in all")
+    print(f"{sum(by_room().values()):6d}  in all")
 
 
 if __name__ == "__main__":

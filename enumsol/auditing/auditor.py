@@ -136,16 +136,14 @@ class _Tally:
     def _locate(self, run: PointRun, k: int, x: Floats, near: GraphPlace | None) -> GraphPlace | None:
         """GraphPlace of one point; None unless it lies on the graph."""
         chart, alpha = self.chart, float(run.alpha[k])
+        place, verdict, reason = GraphPlace(GraphPlaceKind.OUTSIDE, -1, math.nan), Verdict.NOT_COMPARED, ""
         if chart.outside(alpha):
-            place = GraphPlace(GraphPlaceKind.OUTSIDE, -1, math.nan)
             low, high = (float(end) for end in chart.graph.interval)
-            verdict, reason = Verdict.NOT_COMPARED, f"outside the graph's interval [{low:.10g}, {high:.10g}]"
+            reason = f"outside the graph's interval [{low:.10g}, {high:.10g}]"
         elif chart.beyond(run.rigid[k]):
-            place = GraphPlace(GraphPlaceKind.OUTSIDE, -1, math.nan)
-            verdict, reason = Verdict.NOT_COMPARED, "beyond the bound of the rigid displacement"
+            reason = "beyond the bound of the rigid displacement"
         else:
-            place = chart.place(x, near)
-            verdict, reason = Verdict.ON, ""
+            place, verdict = chart.place(x, near), Verdict.ON
             if place.distance > chart.tolerance:
                 verdict, reason = (
                     (Verdict.NOT_COMPARED, "on no arc that the graph holds, and the graph is not complete")

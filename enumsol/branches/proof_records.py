@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.branches.enclosed.cutting import ArcPart, ArcPartKind
-from enumsol.proof.proof_file import Proof, packed
+from enumsol.proof.proof_file import PROOF_VERSION, Proof, packed
 from enumsol.proof.reading import fits
 from enumsol.proof.writer import ProofWriter, unit_exponents
 
@@ -50,7 +50,7 @@ def write_graph_proof(
     writer.write(
         {
             "format": "enumsol-proof",
-            "version": 1,
+            "version": PROOF_VERSION,
             "kind": "graph",
             "problem": problem.fingerprint,
             "interval": ends,

@@ -12,9 +12,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from enumsol.proof.curve_records import CurvePart
 from enumsol.proof.reading import RefusedError
 from enumsol.proof.records import Limits, RecordError
-from enumsol.proof.space_records import CurvePart
 from enumsol.trusted.space.curve_events import CurveMotion
 from enumsol.trusted.space.curve_parts import LinkParts, in_order, up_to_bound
 from enumsol.trusted.space.solution_curve import only_curve
@@ -22,7 +22,7 @@ from enumsol.trusted.space.solution_curve import only_curve
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from enumsol.proof.space_records import CurveBoxRecord
+    from enumsol.proof.curve_records import CurveBoxRecord
     from enumsol.trusted.space.curve_chains import CurveChain, CurveLink
     from enumsol.trusted.space.curve_parts import Place, Run, Turn
     from enumsol.trusted.space.solution_curve import AlphaProblem, SolutionCurve

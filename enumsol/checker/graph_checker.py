@@ -1,7 +1,7 @@
 """Checker of a branch graph: every solution in the interval lies in one of the surviving selections, or on its arcs.
 
 Records (see enumsol.proof.proof_file for the file and the reader): a header ``{"format": "enumsol-proof",
-"version": 1, "kind": "graph", "problem": <fingerprint>, "interval": [a, b], "p": p, "data": "problem" | "condensed"}``;
+"version": 2, "kind": "graph", "problem": <fingerprint>, "interval": [a, b], "p": p, "data": "problem" | "condensed"}``;
 for every piece ``{"piece": [a, b], "force", "length", "roots"}``, then its leaves ``["x", codes, rows, multipliers]``
 (no solution anywhere in the piece), ``["f", codes, rows, multipliers]`` (the same by the form declared last, ``["q",
 mu, nu, alpha, beta]``), ``["s", codes]`` (a surviving selection) and ``["c", codes]`` (left to both halves of the

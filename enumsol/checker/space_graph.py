@@ -1,6 +1,6 @@
 """Checker of a branch graph in 3D: every solution over an interval lies on curves, each given by boxes.
 
-Records: a header ``{"format": "enumsol-proof", "version": 1, "kind": "graph", "problem": <fingerprint>, "interval":
+Records: a header ``{"format": "enumsol-proof", "version": 2, "kind": "graph", "problem": <fingerprint>, "interval":
 [a, b], "p": p, "data": "problem", "force", "length", "steps"}`` with the steps of the coordinates (see AlphaProblem);
 for every curve ``{"curve": n}`` with n boxes, and these as ``["w", centre, direction, border, radius, rho, half]``
 between n + 1 boxes without length around the points that they share (see ``trusted.space.curve_chains``), and perhaps
@@ -26,9 +26,9 @@ from enumsol.checker.piece_tree import PieceTreeChecker
 from enumsol.checker.reports import GraphVerificationReport
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.enclosure import CondensedEnclosure
+from enumsol.proof.curve_records import box_from
 from enumsol.proof.reading import RefusedError, data_of, exponents_from, numbers_from, quoted, same
 from enumsol.proof.records import Limits
-from enumsol.proof.space_records import box_from
 from enumsol.trusted.space.curve_chains import apart, chain_of
 from enumsol.trusted.space.curve_parts import arcs_over
 from enumsol.trusted.space.curve_runs import KnownCurve

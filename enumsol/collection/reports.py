@@ -1,4 +1,4 @@
-"""What `check` found: for every problem which solutions were found and missed, and which answers are spurious."""
+"""Reports of `check`: for every problem which solutions were found and missed, and which answers are spurious."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _PRINTED = 5
 
 @dataclass(frozen=True)
 class JudgedSolution:
-    """One answer of a solver.
+    """An answer of a solver.
 
     Attributes
     ----------
@@ -165,7 +165,7 @@ class ProblemReport:
         return (self.entry.name, *map(str, counts))
 
     def lines(self) -> list[str]:
-        """What was missed, and which answers are spurious, one line each."""
+        """Lines about missed solutions and spurious answers, one each."""
         missed = [f"missed root {k} ({self._about(k)})" for k in self.missed_roots]
         missed += [f"missed family {k}, a continuum" for k in self.missed_families]
         lines = []
@@ -217,11 +217,11 @@ largest residual is 3.1e-01 (dissipation)
 
     @property
     def ok(self) -> bool:
-        """All solutions of every problem that was tried were found, and every answer is one of them."""
+        """True if all solutions of every problem that was tried were found, and every answer is one of them."""
         return all(report.ok for report in self.problems)
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per answer: problem, file, answer, found, nearest, distance, reason."""
+        """A table with one row per answer: problem, file, answer, found, nearest, distance, reason."""
         import pandas as pd  # for frames only
 
         columns = ["problem", "file", "answer", "found", "nearest", "distance", "reason"]

@@ -9,7 +9,7 @@ import numpy as np
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.bases import between_corners, facet_basis
 from enumsol.fem.mesh_checks import unit_vectors, vectors_of_all
-from enumsol.fem.restrained import Supports, axes_of, movable, problem_of
+from enumsol.fem.restrained import Body, Supports, axes_of, movable, problem_of
 from enumsol.support.arguments import shown
 from enumsol.support.array_arguments import plain_array, real_array, real_matrix
 
@@ -114,9 +114,8 @@ def basis_contact_problem(
     more = {"gap": [gap(place) for place in at] if callable(gap) else gap, "coordinates": at, **more}
     more.setdefault("node_ids", nodes.nodes.tolist())
     slope = None if forces_slope is None else _vector(forces_slope, "forces_slope", dofs.size)
-    return problem_of(
-        A, _vector(forces, "forces", dofs.size), slope, dofs, nodes, axes_of(tangents, nodes.normals), supports, **more
-    )
+    body = Body(A, _vector(forces, "forces", dofs.size), slope, dofs)
+    return problem_of(body, nodes, axes_of(tangents, nodes.normals), supports, **more)
 
 
 def _nodes_of(basis: Any) -> tuple[Integers, Floats]:

@@ -21,6 +21,7 @@ from enumsol.support.array_arguments import real_array, short_vector
 if TYPE_CHECKING:
     from enumsol.fem.bases import NodalBasis
     from enumsol.fem.meshes import PartedMesh
+    from enumsol.fem.options import Options
     from enumsol.support.array_types import Floats, Integers, Mask
 
 #: Positions in a plane of symmetry may differ from it by this share of the extent of the body.
@@ -76,6 +77,24 @@ class Held:
         self._values = np.zeros(mesh.points.shape)
         #: Components across a plane of symmetry.
         self.mirrored = np.zeros(mesh.points.shape, dtype=bool)
+
+    @classmethod
+    def of(cls, mesh: PartedMesh, options: Options) -> Held:
+        """Displacements that the options clamp, symmetry and displacement give.
+
+        Raises
+        ------
+        InvalidArgumentError
+            One names no part or is not of its form, or they contradict each other.
+        """
+        held = cls(mesh)
+        for part in names_of(options.clamp, "clamp"):
+            held.clamp(part)
+        for part in names_of(options.symmetry, "symmetry"):
+            held.mirror(part)
+        for part, value in by_part(options.displacement, "displacement").items():
+            held.displace(part, value)
+        return held
 
     @property
     def supports(self) -> Supports:

@@ -445,9 +445,7 @@ def solid_contact_problem(
     mask = mesh_checks.held_mask(held, nodes.shape)
     rows = _rows(surface, mask, one_of(multipliers, "multipliers", ("nodes", "elements")), ratio, patches)
     normal, first, second = local_axes(rows, normals, axes)
-    A = solid_stiffness(nodes, bodies, lame)
-    if springs is not None:
-        A = sp.csc_array(A + sp.diags_array(mesh_checks.spring_stiffnesses(springs, nodes.shape).ravel()))
+    A = restrained.with_springs(solid_stiffness(nodes, bodies, lame), springs, nodes.shape)
     dofs, free = restrained.plain_dofs(nodes.shape), np.flatnonzero(~mask.ravel())
     of_facets, mean = rows.rows_of_facets, None
     if of_facets is not None:
@@ -455,10 +453,7 @@ def solid_contact_problem(
         offset = real_array(slip_offset, "slip_offset")
         mean = SlipMean(*_slips(surface, of_facets, (first, second), offset, dofs, free), weights)
     problem = restrained.problem_of(
-        A,
-        mesh_checks.nodal_vectors(forces, "forces", nodes.shape),
-        None if forces_slope is None else mesh_checks.nodal_vectors(forces_slope, "forces_slope", nodes.shape),
-        dofs,
+        restrained.loaded(A, forces, forces_slope, nodes.shape),
         restrained.ContactRows(rows.means, normal, np.zeros_like(mask)),
         (first, second),
         restrained.Supports.held(mask),

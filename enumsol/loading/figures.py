@@ -229,7 +229,7 @@ def draw_map(name: str, rows: Sequence[MapRow], curves: Sequence[Any], title: st
 
 
 def _edges(values: Sequence[float]) -> list[tuple[float, float]]:
-    """For every value from where to where the space around it is filled: half way to its neighbours."""
+    """Ends of the space that is filled around every value: half way to its neighbours."""
     if len(values) == 1:
         return [(values[0] - 0.5, values[0] + 0.5)]
     middles = [0.5 * (a + b) for a, b in pairwise(values)]

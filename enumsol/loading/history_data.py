@@ -19,6 +19,7 @@ from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.model.restart import SlipStart
 from enumsol.model.statuses import FRICTIONLESS, ContactStatus
+from enumsol.proof.proof_file import PROOF_VERSION
 from enumsol.proof.reading import rational_text
 from enumsol.proof.writer import ProofWriter
 from enumsol.roots.root import Root, summary
@@ -358,7 +359,7 @@ def history_proof(data: HistoryData) -> Proof | None:
     writer.write(
         {
             "format": "enumsol-proof",
-            "version": 1,
+            "version": PROOF_VERSION,
             "kind": "history",
             "problem": data.problem.fingerprint,
             "p": data.problem.p,

@@ -114,7 +114,7 @@ def _strongest(roots: Sequence[Any], problem: object, shape: BodyShape) -> float
 def _factors(
     roots: Sequence[Any], problem: object, shape: BodyShape, scale: float | None
 ) -> tuple[tuple[float, ...], float]:
-    """By what the displacements of each root are multiplied, and the forces of all."""
+    """Factors of the displacements of each root, and one of all forces."""
     arrows = arrow_scale(_strongest(roots, problem, shape), shape.size)
     if scale is not None:
         return (positive_number(scale, "scale"),) * len(roots), arrows
@@ -221,7 +221,7 @@ def _legend(place: Any, roots: Sequence[Any], strongest: float, units: tuple[str
     place.legend(handles=handles, fontsize=8, frameon=False, **where)
 
 
-def draw_root(root: object, problem: ContactProblem3D, ax: object, units: tuple[str, str] | None = None) -> Any:
+def draw_root(root: Any, problem: ContactProblem3D, ax: object, units: tuple[str, str] | None = None) -> Any:
     """See Root.plot."""
     if axes_or_none(ax) is not None or problem.mesh is None:
         return draw_slips(root, problem, ax, units)

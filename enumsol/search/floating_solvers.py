@@ -15,12 +15,11 @@ import numpy as np
 from enumsol.condensation.condensed import ScaledSystem
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, RigidRows, enclosure_of
 from enumsol.proof import records
-from enumsol.search.certifiers.protocol import NO_BOUND, Bound, Certifier, UndecidedPart
+from enumsol.search.certifiers.protocol import Bound, Certifier, UndecidedPart
 from enumsol.search.certifiers.rational_certifier import ExactCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier, proven
 from enumsol.search.closing import TreeCloser
 from enumsol.search.reference_closer import LeadingCloser, reference_numbers
-from enumsol.search.resume import PlaneReader, Reader
 from enumsol.search.solvers import Solvers
 from enumsol.search.splitting import PlaneSplitting
 from enumsol.selections.solution import SelectionSolution
@@ -136,40 +135,6 @@ class FloatingSolvers(Solvers):
     def _closer(self, certifier: Certifier) -> TreeCloser:
         return LeadingCloser(certifier, lambda: self.known_root)
 
-    def reader(self) -> FloatingReader:
-        """Understands the records of an earlier proof."""
-        held = PlaneReader((self.scaled.F > 0).tolist(), self.enclosed)
-        return FloatingReader(held, records.FLOATING_LEAVES, len(self.rows.unit))
-
-
-class FloatingReader:
-    """Of proofs about a body that nothing holds, in 2D and 3D: those of other bodies, but for forms and balance.
-
-    Parameters
-    ----------
-    held : Reader
-        Of proofs about a body that is held.
-    kinds : dict
-        The kinds of leaves, by their letters.
-    modes : number of rigid modes
-    """
-
-    def __init__(self, held: Reader, kinds: dict[str, type[Any]], modes: int) -> None:
-        self.kinds = kinds
-        self.form_over, self.lone = held.form_over, held.lone
-        self._held, self._modes = held, modes
-
-    def declare(self, record: list[Any]) -> None:
-        """Pass over the form of a root: it is made again."""
-
-    def bound(self, codes: Codes, record: list[Any]) -> Bound:
-        """What is said to exclude a partial assignment; ValueError where the record makes no sense."""
-        if record[0] != records.Unbalanced.kind:
-            return self._held.bound(codes, record)
-        records.Unbalanced.read(record, records.Limits(codes, modes=self._modes))
-        # the certifier finds a direction of its own
-        return NO_BOUND
-
 
 def on_weak_springs(scaled: ScaledSystem, rows: RigidRows, stiffness: float = WEAK) -> ScaledSystem:
     """The body on weak springs, which the relaxations of the search are about (theory, section 14.5)."""
@@ -239,13 +204,15 @@ class Exclusions:
         self.system, self.free = enclosed, without_bound(enclosed)
         self._references: dict[Codes, Reference | None] = {}
         #: How the forms of roots are declared, by their selections.
-        self.declared: dict[Codes, records.DeclaredReference] = {}
+        self.declared: dict[Codes, records.DeclaredForm] = {}
         self._margins: tuple[Margin, Margin] = (
             partial(exclusion_margin, self.free, errors=2.0),
             partial(exclusion_margin, enclosed, errors=2.0),
         )
 
-    def record(self, codes: Codes, bound: Bound, *, within: bool) -> tuple[records.Exclusion, bool] | None:
+    def record(
+        self, codes: Codes, bound: Bound, *, within: bool
+    ) -> tuple[records.Excluded | records.Unbalanced, bool] | None:
         """A record that excludes a partial assignment, and whether it needs the bound; or None.
 
         Whether the bound is needed must not depend on the numbers that a relaxation arrives at. So an assignment that
@@ -270,16 +237,16 @@ class Exclusions:
     def _excluded(self, margin: int, codes: Codes, tried: list[Terms]) -> records.Excluded | None:
         """The first multipliers that prove something, with bounds beyond which there are no solutions, or its own."""
         kept = ((terms, proven(self._margins[margin], codes, *terms)) for terms in tried)
-        return next((records.Excluded(Terms(terms.rows, values)) for terms, values in kept if values is not None), None)
+        return next((records.Excluded(terms.rows, values) for terms, values in kept if values is not None), None)
 
     def reference(self, selection: Codes) -> Reference | None:
         """The form of a root, if one is proven definite."""
         if selection not in self._references:
             self._references[selection] = None
-            for numbers in reference_numbers(self.system, selection):
-                found = Reference.of(self.system, selection, *numbers)
+            for weights, *more in reference_numbers(self.system, selection):
+                found = Reference.of(self.system, selection, weights, *more)
                 if found is not None:
-                    self.declared[selection] = records.DeclaredReference(selection, *numbers)
+                    self.declared[selection] = records.DeclaredForm(selection, weights, np.array(more))
                     self._references[selection] = found
                     break
         return self._references[selection]
@@ -319,8 +286,6 @@ class FloatingCertifier(VerifiedCertifier):
     ) -> None:
         super().__init__(scaled, None, exact, recorder, node_ids)
         self._exclusions, self._exactly = exclusions, exact
-        #: Selections of roots whose forms were declared, in the order of their declarations.
-        self._declared: list[Codes] = []
 
     def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """True if the relaxation's multipliers are proven to exclude the partial assignment."""
@@ -345,22 +310,16 @@ class FloatingCertifier(VerifiedCertifier):
         self.bounded |= needs
         self._escalations.balls += 1
         selection = reference.selection
-        if selection not in self._declared:
-            self._declared.append(selection)
-            self.recorder.write(exclusions.declared[selection].write())
-        back = len(self._declared) - self._declared.index(selection)
+        back = self._back(selection, lambda: exclusions.declared[selection])
         leaf = partial(records.OnlyReference, back, proposal.rows, proposal.products)
         if reference.lies_below(codes):
             return [self._regular(selection, reference.root, leaf)]
         self._leaf(leaf())
         return []
 
-    def forget(self) -> None:
-        """Forget what was proven."""
-        super().forget()
-        self._declared.clear()
-
-    def _excluded_by_record(self, record: records.Exclusion | records.NoRoot, *, bounded: bool) -> None:
+    def _excluded_by_record(
+        self, record: records.Excluded | records.Unbalanced | records.NoRoot, *, bounded: bool
+    ) -> None:
         self.bounded |= bounded
         self._escalations.balls += 1
         self._leaf(record)
@@ -374,7 +333,7 @@ class FloatingCertifier(VerifiedCertifier):
             if ball is not None and ball.is_root:
                 self._escalations.balls += 1
                 return self._regular(codes, ball)
-            found: records.Exclusion | records.NoRoot | None = self._exclusions.unbalanced(codes)
+            found: records.Excluded | records.Unbalanced | records.NoRoot | None = self._exclusions.unbalanced(codes)
             if found is None and _holds_none(self._exclusions.free, codes):
                 found = records.NoRoot()
             if found is not None:

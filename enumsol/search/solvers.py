@@ -13,6 +13,8 @@ from enumsol.condensation.data import EXACT_DOF_LIMIT, exactly_at
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.model.statuses import UNDECIDED
+from enumsol.proof.declared_forms import plane_form
+from enumsol.proof.records import Limits, Tree
 from enumsol.proof.writer import Recorder
 from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.relaxation.engine import Engine, not_compiled
@@ -24,7 +26,7 @@ from enumsol.search.fathoming import Closer, Closing, propose
 from enumsol.search.form_policy import Forms, plane_forms
 from enumsol.search.nodes import Relaxations
 from enumsol.search.reduction import WeightSource
-from enumsol.search.resume import PlaneReader, Reader
+from enumsol.search.resume import Reader
 from enumsol.search.setup import SearchSetup
 from enumsol.search.splitting import PlaneSplitting
 from enumsol.search.tree import TreeSearch
@@ -269,7 +271,10 @@ class Solvers(SearchSetup):
 
     def reader(self) -> Reader:
         """Understands the records of an earlier proof."""
-        return PlaneReader((self.scaled.F > 0).tolist(), self.enclosed)
+        system, F = self.enclosed, (self.scaled.F > 0).tolist()
+        tree = Tree.PLANE if self.problem.held else Tree.FLOATING_PLANE
+        limits = Limits((UNDECIDED,) * self.problem.p, tree, F, modes=self.problem.modes.r)
+        return Reader(limits, lambda said: None if system is None else plane_form(system, said))
 
 
 def _positive(system: EnclosedSystem) -> bool:

@@ -49,7 +49,7 @@ _BESIDE, _WIDEST = 2.6, 6.0
 
 @dataclass(frozen=True)
 class _Style:
-    """What all panels of a figure share."""
+    """Quantity, units and tolerance of all panels of a figure."""
 
     quantity: Quantity
     units: tuple[str, str] | None
@@ -163,7 +163,7 @@ def _rows(graph: GraphData, quantity: Quantity, nodes: Sequence[Any] | None, *, 
     return sorted(np.argsort(-spread, kind="stable")[:most].tolist())
 
 
-def _windows(graph: GraphData, zoom: Any) -> list[tuple[float, float]]:
+def _windows(graph: GraphData, zoom: bool | tuple[float, float]) -> list[tuple[float, float]]:
     if isinstance(zoom, (bool, np.bool_)):
         return narrow_changes(graph.claims.steps(), graph.interval) if zoom else []
     low, high = (float(end) for end in alpha_interval(zoom, "zoom"))
@@ -173,7 +173,9 @@ def _windows(graph: GraphData, zoom: Any) -> list[tuple[float, float]]:
     return [(max(low, a), min(high, b))]
 
 
-def _grid(rows: int, multiplicity: bool, zooms: int, figsize: Any) -> tuple[Any, list[list[Any]]]:
+def _grid(
+    rows: int, multiplicity: bool, zooms: int, figsize: tuple[float, float] | None
+) -> tuple[Any, list[list[Any]]]:
     """A figure and its axes, column by column; those of the whole interval come first in figure.axes."""
     heights = [3.6 if rows == 1 else 2.7] * rows + [1.1] * int(multiplicity)
     size = figsize or (7.5 + 3.0 * zooms, sum(heights) + 1.0)

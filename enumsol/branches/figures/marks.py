@@ -1,4 +1,4 @@
-"""How branches, arcs and vertices look in figures: colours, line styles, markers, and where numbers beside them go."""
+"""Looks of branches, arcs and vertices in figures: colours, line styles, markers, and places for numbers."""
 
 from __future__ import annotations
 

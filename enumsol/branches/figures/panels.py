@@ -37,7 +37,7 @@ _SHEET, _NAMED = 9, 4
 
 
 def drawn_range(vertices: Iterable[Vertex], quantity: Quantity) -> Floats:
-    """How much a quantity differs between the vertices, by columns."""
+    """The range of a quantity over the vertices, by columns."""
     values = np.array([state_columns(quantity, v) for v in vertices])
     return np.asarray(np.ptp(values, axis=0))
 

@@ -14,9 +14,9 @@ import numpy as np
 
 from enumsol.branches.space.chains import chain_through
 from enumsol.condensation.enclosure import enclosure_of
-from enumsol.proof.proof_file import Proof
+from enumsol.proof.curve_records import CurveBoxRecord
+from enumsol.proof.proof_file import PROOF_VERSION, Proof
 from enumsol.proof.records import UndecidedRecord
-from enumsol.proof.space_records import CurveBoxRecord
 from enumsol.proof.writer import ProofWriter, unit_exponents
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.search.space.known_curves import Curves, joined
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.proof.space_records import CurvePart
+    from enumsol.proof.curve_records import CurvePart
     from enumsol.search.outcome import StopReason
     from enumsol.trusted.space.curve_chains import CurveChain
     from enumsol.trusted.space.curve_parts import Run, Turn
@@ -167,7 +167,7 @@ class SpaceCover:
         writer.write(
             {
                 "format": "enumsol-proof",
-                "version": 1,
+                "version": PROOF_VERSION,
                 "kind": "graph",
                 "problem": self.problem.fingerprint,
                 "interval": [str(end) for end in self.interval],
@@ -197,7 +197,7 @@ class SpaceCover:
         for record in self.records:
             is_open = isinstance(record, OpenLeaf)
             gaps += is_open
-            leaves += is_open or record.kind not in ("a", "b")
+            leaves += is_open or record.kind not in ("p", "b")
             # what the record of an open leaf says
             writer.write(
                 (UndecidedRecord("solutions there lie on no curve that is known") if is_open else record).write()

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import brentq
 
-from enumsol.proof.space_records import CurveBoxRecord, CurvePart
+from enumsol.proof.curve_records import CurveBoxRecord, CurvePart
 from enumsol.support.deadlines import look, tell
 from enumsol.trusted.space.curve_events import CurveMotion
 from enumsol.trusted.space.curve_parts import LinkParts, Place, Run, Turn, in_order, put_behind, up_to_bound

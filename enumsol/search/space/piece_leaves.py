@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of, parts_around, places, span, width_of
+from enumsol.proof.curve_records import OnCurve, ThroughCurveBox
 from enumsol.proof.records import NoRoot
-from enumsol.proof.space_records import InCurveBoxes, ThroughCurveBox
 from enumsol.search.space.piece_multipliers import unbalanced
 from enumsol.search.space.space_fathoming import without_sectors
 from enumsol.trusted.space.solution_curve import curve_point
@@ -121,7 +121,7 @@ class PieceLeaves:
         if (without := unbalanced(at.piece, codes)) is not None:
             return without
         run = self._curves.run(piece, found)
-        return self._on_arc(at, codes, piece, found) if run is None else InCurveBoxes(*run)
+        return self._on_arc(at, codes, piece, found) if run is None else OnCurve(*run)
 
     def through(
         self,

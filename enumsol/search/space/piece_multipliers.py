@@ -14,8 +14,7 @@ from scipy.linalg import solve_triangular
 from scipy.optimize import nnls
 
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
-from enumsol.proof.records import Unbalanced
-from enumsol.proof.space_records import ExcludedOverPiece
+from enumsol.proof.records import Excluded, Unbalanced
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.floating_solvers import weakly_held
 from enumsol.search.space.space_newton import Isotropic
@@ -173,7 +172,7 @@ class PieceBounds:
         return None
 
 
-def exclusion(piece: AlphaPiece, codes: Sequence[int], rows: Sequence[Row]) -> ExcludedOverPiece | None:
+def exclusion(piece: AlphaPiece, codes: Sequence[int], rows: Sequence[Row]) -> Excluded | None:
     """The proof by multipliers of rows that a piece holds no solution; None if none are found."""
     with np.errstate(over="ignore", invalid="ignore"):
         try:
@@ -186,7 +185,7 @@ def exclusion(piece: AlphaPiece, codes: Sequence[int], rows: Sequence[Row]) -> E
     if not piece.margin(codes, rows, (low, high), COUNTED) > 0:
         return None
     used = np.flatnonzero((low != 0) | (high != 0))
-    return ExcludedOverPiece([rows[k] for k in used.tolist()], low[used], high[used])
+    return Excluded([rows[k] for k in used.tolist()], np.stack([low[used], high[used]]))
 
 
 def _columns(system: EnclosedSpace, rows: Sequence[Row]) -> tuple[Floats, Floats, Floats]:

@@ -14,8 +14,8 @@ from enumsol.arithmetic.rationals import simplest
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of, width_level
 from enumsol.model.statuses import CONTACT, UNDECIDED
-from enumsol.proof.records import Branching
-from enumsol.proof.space_records import CutPiece, ExcludedOverPiece, OnlyOnCurve
+from enumsol.proof.curve_records import CutPiece, OnCurve
+from enumsol.proof.records import Branching, Excluded
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.outcome import StopReason
 from enumsol.search.space.known_curves import Curves, middle_of
@@ -283,7 +283,7 @@ class PieceTree:
         point, relaxation = parent
         rows, values = point.multipliers(relaxation)
         if at.piece.margin(codes, rows, (values, values), COUNTED) > 0:
-            return ExcludedOverPiece(rows, values, values), []
+            return Excluded(rows, np.stack([values, values])), []
         if (without := unbalanced(at.piece, codes)) is not None:
             return without, []
         ends = self._ends(at, codes)
@@ -396,7 +396,7 @@ class PieceTree:
         numbers = at.proposals.numbers(statuses, passage.parts)
         if numbers is not None and piece.lies_on(known, run, statuses, numbers, ERRORS):
             before = sum(len(other.chain.links) for other in self.curves.known[: passage.curve])
-            return OnlyOnCurve(numbers, before + run.first, before + run.last), []
+            return OnCurve(before + run.first, before + run.last, numbers), []
         longer = self._is_longer(piece, _ALONE)
         if longer and at.proposals.is_hopeful(statuses, known.over(run, piece.middle, piece.middle)):
             # a leaf may be decided over a longer piece

@@ -11,21 +11,24 @@ import numpy as np
 
 from enumsol.condensation.enclosure import NotEnclosedError, enclosure_of
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
+from enumsol.model.statuses import UNDECIDED
+from enumsol.proof.declared_forms import space_form
+from enumsol.proof.records import Limits, Tree
 from enumsol.proof.writer import Recorder
 from enumsol.relaxation.convex_forms import SlipFormAscent
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.certifiers.protocol import Certifier, Unrecorded
 from enumsol.search.closing import TreeCloser
 from enumsol.search.form_policy import Forms
+from enumsol.search.resume import Reader
 from enumsol.search.setup import SearchSetup
 from enumsol.search.space.space_fathoming import SpaceCloser, SpaceClosing, solved
-from enumsol.search.space.space_search import SpaceCertifier, SpaceReader, SpaceSplitting
+from enumsol.search.space.space_search import SpaceCertifier, SpaceSplitting
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.search.resume import Reader
     from enumsol.support.array_types import Alpha, Codes, Floats
     from enumsol.trusted.space.slip_forms import SlipForm
 
@@ -133,4 +136,7 @@ class SpaceSolvers(SearchSetup):
 
     def reader(self) -> Reader:
         """Understands the records of an earlier proof."""
-        return SpaceReader(self._engine, self.enclosed)
+        system, tree = self.system, Tree.SPACE if self.problem.held else Tree.FLOATING_SPACE
+        codes, modes = (UNDECIDED,) * system.p, self.problem.modes.r
+        limits = Limits(codes, tree, components=len(system.g), modes=modes)
+        return Reader(limits, partial(space_form, self.enclosed))
