@@ -11,13 +11,13 @@ from documents import ROOT
 
 #: A change that lowers a measure lowers its bound; one that has to raise it says why in its commit.
 BOUNDS = {
-    "code lines": 47_463,
-    "classes": 631,
-    "kinds of records": 37,
-    "parameters annotated Any": 616,
-    "files": 336,
-    "docstrings that begin with a pronoun": 408,
-    "class names used twice or more": 16,
+    "code lines": 46_562,
+    "classes": 602,
+    "kinds of records": 20,
+    "parameters annotated Any": 331,
+    "files": 332,
+    "docstrings that begin with a pronoun": 68,
+    "class names used twice or more": 10,
 }
 _NO_CODE = (tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER)
 _PRONOUN = re.compile(r"(What|Of|The same|Where|Those|That|As|In which|How|Whether|One)\b")

@@ -55,7 +55,7 @@ def compared(seed: int, given: argparse.Namespace, found: dict[tuple[int, str], 
     """What is wrong with the answer to one problem; takes note of it in its row of the table."""
     from oracles3d import newton_set
     from problems3d import from_compliance, random_coupled, unmatched
-    from proof_tools import records_of
+    from proof_tools import by_forms, records_of
     from trees import by_the_tree, closed_in_the_tree, forms_at_once, products_at_once
 
     rng = np.random.default_rng(seed)
@@ -70,8 +70,10 @@ def compared(seed: int, given: argparse.Namespace, found: dict[tuple[int, str], 
             stack.enter_context(by_the_tree() if way == 1 else closed_in_the_tree())
             stack.enter_context(forms_at_once())
         roots = enumsol.enumerate_roots(problem, 0, max_nodes=given.max_nodes)
-    kinds, wrong = {record[0] for record in records_of(roots.proof)[1:-1]}, []
-    forms, lone, products = "f" in kinds, {"b", "m"} <= kinds, "j" in kinds
+    records, wrong = records_of(roots.proof)[1:-1], []
+    kinds = {record[0] for record in records}
+    forms, lone = bool(by_forms(records)), {"b", "a"} <= kinds
+    products = any(record[0] == "l" and len(record) == 8 for record in records)
     if roots.complete:
         # the stiffness is the inverse of S, rounded: that moves roots by more than the enclosures
         loose = 1e-6 + 1e-11 * float(np.linalg.cond(data[0]))

@@ -1,4 +1,4 @@
-"""What an audit found, and what it may claim."""
+"""Reports of audits: points, jumps, missed arcs, and the claims that they allow."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _PRINTED = 8
 
 
 class Verdict(TextEnum):
-    """Where a point is; members compare with their texts: ``point.verdict == "on"``."""
+    """Verdict on a point; members compare with their texts: ``point.verdict == "on"``."""
 
     #: Within the tolerance of its place.
     ON = "on"
@@ -38,7 +38,7 @@ class Verdict(TextEnum):
 
 @dataclass(frozen=True)
 class AuditedPoint:
-    """One point and what is known about it.
+    """A point of a path with its place on the graph.
 
     Attributes
     ----------
@@ -199,7 +199,7 @@ class AuditReport:
         return tuple(k for k, point in enumerate(self.points) if point.verdict is Verdict.NOT_COMPARED)
 
     def graph_state(self) -> str:
-        """What is known about the graph, as a clause."""
+        """Clause about the completeness of the graph."""
         if self.graph_complete:
             return "the graph is complete"
         if not self.graph_reasons:
@@ -234,7 +234,7 @@ class AuditReport:
     # -- output ------------------------------------------------------------------------------------------------------
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per point.
+        """Table with a row for each point.
 
         Columns: path, row, alpha, place ("arc", "vertex", "outside" or "none"), number and branch of the place (-1 for
         none), distance, off, compared, reason (why not), jump and unjoined (to the next point).
@@ -348,7 +348,7 @@ def _stretches(points: Sequence[AuditedPoint]) -> list[str]:
 
 
 def _line(item: AuditedPoint | Jump | MissedArc | str) -> str:
-    """One line about a point off the graph, a jump or a missed arc."""
+    """Line about a point off the graph, a jump or a missed arc."""
     if isinstance(item, str):
         return item
     if isinstance(item, MissedArc):

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 POINT_TOLERANCE = 1e-5
 #: Two points follow each other on the graph when the way along it is at most this many times their distance.
 DETOUR = 10.0
-#: Why a point that lies on no arc of an incomplete graph is not reported as off.
-_UNPLACED = "on no arc that the graph holds, and the graph is not complete"
 
 
 def audit(
@@ -123,7 +121,7 @@ class _Tally:
         self._branch_of = {arc.number: branch.number for branch in chart.graph.branches for arc in branch.arcs}
 
     def add(self, run: PointRun) -> None:
-        """One run of points."""
+        """Take in a run of points."""
         equation = self.chart.equation
         points = [
             equation.point(float(a), forces, rigid)
@@ -138,18 +136,20 @@ class _Tally:
     def _locate(self, run: PointRun, k: int, x: Floats, near: GraphPlace | None) -> GraphPlace | None:
         """GraphPlace of one point; None unless it lies on the graph."""
         chart, alpha = self.chart, float(run.alpha[k])
+        place, verdict, reason = GraphPlace(GraphPlaceKind.OUTSIDE, -1, math.nan), Verdict.NOT_COMPARED, ""
         if chart.outside(alpha):
-            place = GraphPlace(GraphPlaceKind.OUTSIDE, -1, math.nan)
             low, high = (float(end) for end in chart.graph.interval)
-            verdict, reason = Verdict.NOT_COMPARED, f"outside the graph's interval [{low:.10g}, {high:.10g}]"
+            reason = f"outside the graph's interval [{low:.10g}, {high:.10g}]"
         elif chart.beyond(run.rigid[k]):
-            place = GraphPlace(GraphPlaceKind.OUTSIDE, -1, math.nan)
-            verdict, reason = Verdict.NOT_COMPARED, "beyond the bound of the rigid displacement"
+            reason = "beyond the bound of the rigid displacement"
         else:
-            place = chart.place(x, near)
-            verdict, reason = Verdict.ON, ""
+            place, verdict = chart.place(x, near), Verdict.ON
             if place.distance > chart.tolerance:
-                verdict, reason = (Verdict.NOT_COMPARED, _UNPLACED) if chart.graph.reasons else (Verdict.OFF, "")
+                verdict, reason = (
+                    (Verdict.NOT_COMPARED, "on no arc that the graph holds, and the graph is not complete")
+                    if chart.graph.reasons
+                    else (Verdict.OFF, "")
+                )
         self.points.append(AuditedPoint(run.path, int(run.rows[k]), alpha, place, self._branch(place), verdict, reason))
         if verdict is not Verdict.ON:
             return None

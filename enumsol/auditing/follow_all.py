@@ -28,9 +28,6 @@ if TYPE_CHECKING:
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import AlphaLike, Floats
 
-#: Where on a missed arc it is started anew, as fractions of its interval; its ends are transition points.
-_SEEDS = (0.5, 0.25, 0.75)
-
 
 @dataclass(frozen=True)
 class FollowAllResult:
@@ -175,7 +172,8 @@ class _Coverage:
         for arc in self.chart.graph.arcs:
             if arc.dimension or not arc.lo < arc.hi:
                 continue
-            for share in _SEEDS:
+            # where on a missed arc it is started anew, as fractions of its interval; its ends are transition points
+            for share in (0.5, 0.25, 0.75):
                 if arc.number in self.visited:
                     break
                 alpha = arc.lo + share * (arc.hi - arc.lo)

@@ -1,4 +1,4 @@
-"""Where points lie on a branch graph: distances to arcs and vertices, and ways along the graph from one to another."""
+"""Places of points on a branch graph: distances to arcs and vertices, and ways along the graph from one to another."""
 
 from __future__ import annotations
 
@@ -25,15 +25,8 @@ if TYPE_CHECKING:
     from enumsol.roots.root import Polytope
     from enumsol.support.array_types import Floats
 
-#: Points at which the length of an arc is measured.
-_SAMPLES = 9
-#: Gauss-Newton iterations towards the nearest point of an arc, and the step of their difference quotient.
-_NEAREST_ITERATIONS = 8
+#: Step of difference quotients along an arc, relative to its length.
 _DIFFERENCE = 1e-6
-#: A distance below this fraction of the tolerance need not be made smaller.
-_EXACT = 1e-4
-#: A vertex is nearer than the arcs that end there only when it is so by more than rounding.
-_NEARER = 1 - 1e-9
 #: What a graph must have.
 _ASKED = ("problem", "interval", "arcs", "vertices", "branches", "complete", "reasons")
 
@@ -58,7 +51,7 @@ def checked_graph(graph: Any) -> BranchGraph:
 
 
 class GraphPlaceKind(TextEnum):
-    """What a point lies on; members compare with their texts."""
+    """Kind of the place of a point; members compare with their texts."""
 
     #: An arc, or a sheet.
     ARC = "arc"
@@ -71,7 +64,7 @@ class GraphPlaceKind(TextEnum):
 
 @dataclass(frozen=True)
 class GraphPlace:
-    """Where a point lies.
+    """Place of a point on the graph.
 
     Attributes
     ----------
@@ -134,13 +127,13 @@ class GraphMap:
     # -- distances ---------------------------------------------------------------------------------------------------
 
     def outside(self, alpha: float) -> bool:
-        """Whether an alpha is outside the graph's interval, by more than the tolerance."""
+        """True if an alpha is outside the graph's interval, by more than the tolerance."""
         low, high = (float(end) for end in self.graph.interval)
         slack = self.tolerance * self.equation.alpha_scale
         return not low - slack <= alpha <= high + slack
 
     def beyond(self, rigid: Floats) -> bool:
-        """Whether the body has moved farther than the graph asks for, by more than the tolerance."""
+        """True if the body has moved farther than the graph asks for, by more than the tolerance."""
         return bool(np.any(np.abs(rigid) > self.equation.reach * (1 + self.tolerance)))
 
     def place(self, x: Floats, near: GraphPlace | None = None) -> GraphPlace:
@@ -160,7 +153,8 @@ class GraphMap:
                     best = GraphPlace(GraphPlaceKind.ARC, arc.number, distance)
                 if distance <= self.tolerance:
                     break
-        return vertex if vertex.distance < _NEARER * best.distance else best
+        # a vertex is nearer than the arcs that end there only when it is so by more than rounding
+        return vertex if vertex.distance < (1 - 1e-9) * best.distance else best
 
     def _at_vertex(self, x: Floats, place: GraphPlace) -> GraphPlace:
         """A place at a vertex with the distance from it or from an arc that ends there."""
@@ -190,14 +184,16 @@ class GraphMap:
         if arc.dimension:
             return self._sheet_distance(x, arc, alpha)
         best = math.inf
-        for _ in range(_NEAREST_ITERATIONS):
+        # Gauss-Newton iterations towards the nearest point of an arc
+        for _ in range(8):
             y = self.on_arc(arc, alpha)
             distance = self.equation.norm(x - y)
             if distance >= 0.999 * best:
                 break
             best = distance
             step = _DIFFERENCE * (high - low)
-            if best <= _EXACT * self.tolerance or step == 0:
+            # a distance below this fraction of the tolerance need not be made smaller
+            if best <= 1e-4 * self.tolerance or step == 0:
                 break
             other = alpha + step if alpha + step <= high else alpha - step
             if other == alpha:  # an arc of a few floats' length
@@ -270,7 +266,8 @@ class GraphMap:
         """Length of an arc; of a sheet, what every way across it has at least."""
         if arc.dimension:
             return (arc.hi - arc.lo) / self.equation.alpha_scale
-        points = [self.on_arc(arc, alpha) for alpha in np.linspace(arc.lo, arc.hi, _SAMPLES)]
+        # points at which the length of an arc is measured
+        points = [self.on_arc(arc, alpha) for alpha in np.linspace(arc.lo, arc.hi, 9)]
         return sum(self.equation.norm(b - a) for a, b in pairwise(points))
 
     def way(self, x: Floats, start: GraphPlace, y: Floats, end: GraphPlace) -> tuple[float, tuple[int, ...]]:

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import Floats, Indices
 
-    Body = AnyProblem
-
 
 #: How the names of columns tell the contact nodes apart; "auto" takes the one for which all columns are there.
 Columns = Literal["auto", "rows", "labels"]
@@ -60,7 +58,7 @@ class PointRun:
 
 
 def read_points(
-    source: Any, problem: Body, *, columns: Columns = "auto", name: str | None = None
+    source: Any, problem: AnyProblem, *, columns: Columns = "auto", name: str | None = None
 ) -> tuple[PointRun, ...]:
     """The runs of points in a source; none where it holds no point.
 
@@ -105,7 +103,7 @@ def read_points(
     raise InvalidArgumentError(f"path is a {kind}; expected a Path, several of them, a DataFrame or a CSV file")
 
 
-def _from_path(number: int, path: Path, problem: Body) -> PointRun:
+def _from_path(number: int, path: Path, problem: AnyProblem) -> PointRun:
     _check_nodes(path.lambda_n.shape[1], problem.p)
     found, wanted = ("3D" if solid else "2D" for solid in (path.lambda_t.ndim == 3, len(_forces(problem)) == 3))
     if found != wanted:
@@ -122,7 +120,7 @@ def _from_path(number: int, path: Path, problem: Body) -> PointRun:
     return PointRun(number, np.arange(len(path)), path.alpha, forces, rigid)
 
 
-def _forces(problem: Body) -> tuple[str, ...]:
+def _forces(problem: AnyProblem) -> tuple[str, ...]:
     """Names of the forces of a contact node."""
     return _FORCES if isinstance(problem, ContactProblem) else _FORCES_3D
 
@@ -132,14 +130,10 @@ def _check_nodes(found: int, p: int) -> None:
         raise InvalidArgumentError(f"path has {found} contact nodes; expected the graph's {p}")
 
 
-def _modes(problem: Body) -> int:
-    return problem.modes.r
-
-
-def _check_modes(found: int, problem: Body) -> None:
-    if found != _modes(problem):
+def _check_modes(found: int, problem: AnyProblem) -> None:
+    if found != problem.modes.r:
         raise InvalidArgumentError(
-            f"path has a rigid displacement of {counted(found, 'coordinate')}; expected the graph's {_modes(problem)}"
+            f"path has a rigid displacement of {counted(found, 'coordinate')}; expected the graph's {problem.modes.r}"
         )
 
 
@@ -162,7 +156,7 @@ def _read_csv(source: str | os.PathLike[str] | IO[str], name: str) -> pd.DataFra
     return frame
 
 
-def _from_frame(frame: pd.DataFrame, problem: Body, columns: Columns, name: str) -> tuple[PointRun, ...]:
+def _from_frame(frame: pd.DataFrame, problem: AnyProblem, columns: Columns, name: str) -> tuple[PointRun, ...]:
     titles = _titles(frame, problem, columns, name)
     values = np.column_stack([_numbers(frame, title, name) for title in titles])
     rigid = _rigid(frame, problem, name)
@@ -172,9 +166,9 @@ def _from_frame(frame: pd.DataFrame, problem: Body, columns: Columns, name: str)
     )
 
 
-def _rigid(frame: pd.DataFrame, problem: Body, name: str) -> Floats:
+def _rigid(frame: pd.DataFrame, problem: AnyProblem, name: str) -> Floats:
     """Columns with the coordinates of the rigid displacement, (rows, r)."""
-    known, titles = list(frame.columns), [f"rigid_{mode}" for mode in range(_modes(problem))]
+    known, titles = list(frame.columns), [f"rigid_{mode}" for mode in range(problem.modes.r)]
     for title in titles:
         if known.count(title) != 1:
             raise InvalidArgumentError(
@@ -188,7 +182,7 @@ def _rigid(frame: pd.DataFrame, problem: Body, name: str) -> Floats:
 # -- names of columns --------------------------------------------------------------------------------------------------
 
 
-def _titles(frame: pd.DataFrame, problem: Body, columns: Columns, name: str) -> list[str]:
+def _titles(frame: pd.DataFrame, problem: AnyProblem, columns: Columns, name: str) -> list[str]:
     """Names of the columns with alpha, lambda_n and lambda_t of the nodes in the order of their rows."""
     known = [title if isinstance(title, str) else repr(title) for title in frame.columns]
     ways = _ways(problem, columns, name)
@@ -216,7 +210,7 @@ def _titles(frame: pd.DataFrame, problem: Body, columns: Columns, name: str) -> 
 _MEANING = {"rows": "row number", "labels": "label"}
 
 
-def _ways(problem: Body, columns: Columns, name: str) -> dict[str, list[str]]:
+def _ways(problem: AnyProblem, columns: Columns, name: str) -> dict[str, list[str]]:
     """The admissible ways to name the nodes, with all names of columns; one where both are the same."""
     rows = [str(row) for row in range(problem.p)]
     labels = [str(label) for label in problem.node_ids]
@@ -249,7 +243,7 @@ def _listed(known: Sequence[str]) -> str:
 
 
 def _numbers(frame: pd.DataFrame, title: str, name: str) -> Floats:
-    """One column as finite floats."""
+    """A column as finite floats."""
     column = frame[title]
     if column.dtype.kind in "iuf":
         values = column.to_numpy(dtype=np.float64, na_value=np.nan)

@@ -1,4 +1,4 @@
-"""What a branch graph may claim: the one place that knows how far its statements reach (theory, section 7.13).
+"""Claims of a branch graph: the one place that knows how far its statements reach (theory, section 7.13).
 
 Arcs and settled vertices of any graph are solutions, whatever cut the search short: each arc is one of regular roots,
 and no two of them meet between their ends. So a graph that is not complete gives lower bounds, which are counted here,
@@ -36,13 +36,11 @@ if TYPE_CHECKING:
 _SHOWN, _SINGLE = 6, 3
 #: Numbers of solutions in words.
 _WORDS = ("none", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve")
-#: Ranges narrower than this share of the interval are no place to begin in: a slider hardly finds them again.
-_NARROW = 0.005
 
 
 @dataclass
 class _Tally:
-    """What is known at one alpha, or at all alphas between two neighbouring floats.
+    """Solutions found at one alpha, or at all alphas between two neighbouring floats.
 
     Attributes
     ----------
@@ -248,7 +246,7 @@ def _degree(v: Vertex) -> int | None:
 
 
 class Standing(enum.Enum):
-    """How far the statements of a branch graph reach."""
+    """Reach of the statements of a branch graph."""
 
     PROVEN = "proven"
     NOT_PROVEN = "not proven"
@@ -308,7 +306,8 @@ class MultiplicitySteps:
     def busiest(self) -> float:
         """The middle of the widest range with most solutions, or beside it where it is a critical alpha itself."""
         ends = [float(alpha) for alpha in self.alphas]
-        ranges = self.ranges(_NARROW * (ends[-1] - ends[0])) or self.ranges()
+        # ranges narrower than this share of the interval are no place to begin in: a slider hardly finds them again
+        ranges = self.ranges(0.005 * (ends[-1] - ends[0])) or self.ranges()
         if not ranges:
             return ends[0]
         low, high, _ = max(ranges, key=lambda span: (span[2], span[1] - span[0]))
@@ -427,7 +426,7 @@ class Uniqueness:
 
 
 class Claims:
-    """What the arcs and vertices that were found prove.
+    """Statements that the arcs and vertices found prove.
 
     Parameters
     ----------

@@ -129,7 +129,7 @@ def branch_graph(
 
 @dataclass
 class _Construction:
-    """One call of branch_graph, and how far it came."""
+    """A call of branch_graph, and how far it came."""
 
     problem: AnyProblem
     interval: tuple[Fraction, Fraction]

@@ -1,4 +1,4 @@
-"""What a branch graph is made of: vertices, arcs, components and branches (theory, section 7.11).
+"""Parts of a branch graph: vertices, arcs, components and branches (theory, section 7.11).
 
 Vertices have their kinds and degrees here, whichever arithmetic they come from.
 """
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 class VertexKind(TextEnum):
-    """What a vertex is; members compare with their texts: ``vertex.kind == "fold"``."""
+    """Kind of a vertex; members compare with their texts: ``vertex.kind == "fold"``."""
 
     #: One arc from the left goes on as another to the right.
     TRANSITION = "transition"
@@ -127,7 +127,7 @@ class ArcValues(Protocol):
         """At an alpha of the arc; beside its rounded ends, those of a point on it."""
 
     def record(self) -> dict[str, Any]:
-        """What a file needs besides the selection and an alpha inside the arc."""
+        """Entries that a file needs besides the selection and an alpha inside the arc."""
         return {}
 
 
@@ -184,7 +184,7 @@ class Arc:
         return self.hi - self.lo
 
     def passes_over(self, alpha: CriticalAlpha) -> bool:
-        """Whether it is known to begin below an alpha and to end above it."""
+        """True if it is known to begin below an alpha and to end above it."""
         return self.begin.compare(alpha) < 0 < self.end.compare(alpha)
 
     def state(self, alpha: AlphaLike) -> Pair:
@@ -285,7 +285,7 @@ class Branch:
 
     @property
     def sheet(self) -> bool:
-        """Whether it is a sheet."""
+        """True if it is a sheet."""
         return any(arc.dimension for arc in self.arcs)
 
 
@@ -375,7 +375,7 @@ def degree_of(arcs: Sequence[Arc]) -> int | None:
 def vertex_kind(
     left: Sequence[Arc], right: Sequence[Arc], *, border: bool, dimension: int, bounded: bool = False
 ) -> VertexKind:
-    """What a settled vertex is, by the arcs that end there from the left and begin there to the right."""
+    """Kind of a settled vertex, by the arcs that end there from the left and begin there to the right."""
     if any(arc.dimension for arc in (*left, *right)):
         return VertexKind.SHEET
     if dimension:
@@ -411,7 +411,7 @@ def multigraph(vertices: Sequence[Vertex], arcs: Sequence[Arc]) -> Any:
     return nx.freeze(graph)
 
 
-def make_components(graph: Any, vertices: Sequence[Vertex], arcs: Sequence[Arc]) -> tuple[Component, ...]:
+def make_components(graph: nx.MultiGraph, vertices: Sequence[Vertex], arcs: Sequence[Arc]) -> tuple[Component, ...]:
     """Connected components in the order of their first vertex."""
     groups = sorted((sorted(group) for group in nx.connected_components(graph)), key=lambda group: group[0])
     place = {v: k for k, group in enumerate(groups) for v in group}

@@ -240,7 +240,7 @@ class BranchGraph(GraphData):
         return None
 
     def starting_points(self) -> tuple[Root, ...]:
-        """One regular root on every branch that has any, as starting points of continuation, in order."""
+        """Regular roots, one on every branch that has any, as starting points of continuation, in order."""
         found = (self.starting_point(branch) for branch in self.branches)
         return tuple(root for root in found if root is not None)
 

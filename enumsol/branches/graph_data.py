@@ -1,4 +1,4 @@
-"""What a branch graph is made of, what its file holds, and how it reads as text and tables (theory, section 7)."""
+"""Data of a branch graph, and its text and tables (theory, section 7)."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class GraphStats:
-    """What the construction did.
+    """Counts and times of the construction.
 
     Attributes
     ----------
@@ -112,12 +112,12 @@ class GraphData(Immutable):
 
     @property
     def certified_data(self) -> str:
-        """What completeness is about: "problem" (A, Bn, Bt, f as given) or "condensed" (S and g as computed)."""
+        """Subject of completeness: "problem" (A, Bn, Bt, f as given) or "condensed" (S and g as computed)."""
         return "problem" if self.exact is None or self.exact.condensed_exactly else "condensed"
 
     @property
     def arcs_by(self) -> str:
-        """How arcs were followed: "exact" (functions of alpha in rationals) or "balls"."""
+        """Way in which arcs were followed: "exact" (functions of alpha in rationals) or "balls"."""
         return "balls" if self.exact is None else "exact"
 
     @property
@@ -132,7 +132,7 @@ class GraphData(Immutable):
 
     @cached_property
     def claims(self) -> Claims:
-        """What is known about the number of solutions: exact counts, or lower bounds for a graph with gaps."""
+        """Knowledge of the number of solutions: exact counts, or lower bounds for a graph with gaps."""
         whole = Standing.PROVEN if self.complete else Standing.NOT_PROVEN
         standing = Standing.INCOMPLETE if self.reasons else whole
         # what contradicts itself may be wrong anywhere
@@ -300,7 +300,7 @@ def _shape(branch: Branch) -> str:
 
 
 def arcs_frame(data: GraphData) -> pd.DataFrame:
-    """One row per arc: its branch, component, ends and their kinds, index, dimension and statuses (by node)."""
+    """Table with a row for each arc: branch, component, ends and their kinds, index, dimension and statuses by node."""
     import pandas as pd
 
     place = {arc.number: c.number for c in data.components for arc in c.arcs}
@@ -326,7 +326,7 @@ def arcs_frame(data: GraphData) -> pd.DataFrame:
 
 
 def vertices_frame(data: GraphData) -> pd.DataFrame:
-    """One row per vertex and contact node: alpha, kind, statuses that hold, and values."""
+    """Table with a row for each vertex and contact node: alpha, kind, statuses that hold, and values."""
     import pandas as pd
 
     rows = [

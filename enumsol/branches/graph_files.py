@@ -19,7 +19,7 @@ from enumsol.arithmetic.algebraic import CriticalAlpha, EnclosedAlpha
 from enumsol.branches.elements import Arc, ArcValues, Vertex, VertexKind
 from enumsol.branches.enclosed.following import TracedProblem
 from enumsol.branches.enclosed.make_traced import TracedArcValues
-from enumsol.branches.exact.make_elements import ExactArcValues
+from enumsol.branches.exact.gluing import ExactArcValues
 from enumsol.branches.graph_data import GraphData, GraphStats
 from enumsol.condensation.enclosure import enclosure_of
 from enumsol.condensation.exact import ExactCondensed
@@ -163,7 +163,7 @@ def _unknowns(problem: AnyProblem) -> int:
     return 3 * problem.p + problem.modes.r
 
 
-def _is_whole(value: Any) -> bool:
+def _is_whole(value: object) -> bool:
     return type(value) is str and _WHOLE.fullmatch(value) is not None
 
 
@@ -396,7 +396,7 @@ def _arc(number: int, item: dict[str, Any], vertices: Sequence[Vertex], values: 
 
 
 def _arc_end(known: str | None, vertex: Vertex) -> tuple[float, CriticalAlpha]:
-    """Where an arc ends: at its vertex, or beside it as far as it is known to hold."""
+    """End of an arc: at its vertex, or beside it as far as it is known to hold."""
     if known is None:
         return vertex.alpha, vertex.exact
     value = fmpq(*Fraction(known).as_integer_ratio())

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.branches.enclosed.cutting import ArcPart, ArcPartKind
-from enumsol.proof.proof_file import Proof, packed
+from enumsol.proof.proof_file import PROOF_VERSION, Proof, packed
 from enumsol.proof.reading import fits
 from enumsol.proof.writer import ProofWriter, unit_exponents
 
@@ -20,10 +20,6 @@ if TYPE_CHECKING:
     from enumsol.model.problem import ContactProblem
     from enumsol.search.interval.subintervals import SearchedPiece
     from enumsol.support.array_types import Codes
-
-
-#: Begins the record of a form, which is no leaf.
-_FORM = "q"
 
 
 class GraphLeaf(enum.StrEnum):
@@ -54,7 +50,7 @@ def write_graph_proof(
     writer.write(
         {
             "format": "enumsol-proof",
-            "version": 1,
+            "version": PROOF_VERSION,
             "kind": "graph",
             "problem": problem.fingerprint,
             "interval": ends,
@@ -82,7 +78,8 @@ def write_graph_proof(
             # the same form is another object when it comes from a worker
             if leaf.form is not None and not (declared is not None and np.array_equal(declared, leaf.form)):
                 declared = leaf.form
-                writer.write([_FORM, *declared.tolist()])
+                # begins the record of a form, which is no leaf
+                writer.write(["q", *declared.tolist()])
             writer.write([kind, _text(leaf.codes), *packed(leaf.rows, leaf.values)])
         if found.numbers is not None:
             numbers = found.numbers
@@ -111,7 +108,7 @@ def _ends(followed: Followed) -> Iterator[float | Fraction]:
 
 
 def _write_arcs(writer: ProofWriter, followed: Followed) -> dict[str, int]:
-    """Where every selection holds, box by box; the counts for the footer."""
+    """Write the traces of all selections, box by box; gives the counts for the footer."""
     writer.write({"traces": len(followed.traces), **unit_exponents(followed.force, followed.length)})
     for trace in followed.traces:
         ends = [_number(end) for end in (trace.low, trace.high)]

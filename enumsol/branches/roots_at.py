@@ -43,7 +43,7 @@ def roots_at(data: GraphData, alpha: AlphaLike) -> RootSet:
 def roots_on(
     data: GraphData, alpha: Alpha, arcs: Sequence[Arc], vertices: Sequence[Vertex] = (), near: Sequence[Vertex] = ()
 ) -> RootSet:
-    """Those of some arcs, of vertices at ``alpha``, and of ones of which only bounds are known, ``alpha`` in them."""
+    """Solutions on arcs, at vertices at ``alpha``, and at vertices of which only bounds are known that hold it."""
     if not isinstance(data.problem, ContactProblem):
         from enumsol.branches.space.roots_on_arcs import roots_on_arcs  # for problems in 3D only
 

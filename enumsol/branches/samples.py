@@ -51,7 +51,7 @@ class LinkRule(enum.StrEnum):
 
 @dataclass(frozen=True)
 class Missed:
-    """What a sampled graph lacks, compared with the exact graph.
+    """Parts that a sampled graph lacks, compared with the exact graph.
 
     Attributes
     ----------
@@ -191,7 +191,7 @@ def link_samples(
 
 
 def _link(
-    graph: Any, problem: AnyProblem, sample: int, left: RootSet, right: RootSet
+    graph: nx.Graph, problem: AnyProblem, sample: int, left: RootSet, right: RootSet
 ) -> list[tuple[tuple[int, int], tuple[int, int]]]:
     """Link neighbouring samples; returns the pairs left open."""
     equal = [(i, j) for i, a in enumerate(left) for j, b in enumerate(right) if _may_continue(a, b)]
@@ -377,7 +377,7 @@ def _frame(problem: AnyProblem, done: dict[int, dict[str, Any]]) -> pd.DataFrame
 
 
 def table_row(problem: AnyProblem, options: dict[str, Any], alpha: Alpha) -> dict[str, Any]:
-    """One row of the table (a module-level function, so that other processes can import it)."""
+    """Row of the table (a module-level function, so that other processes can import it)."""
     roots = enumerate_roots(problem, alpha, **options)
     counts = kinds(roots)
     return {

@@ -17,9 +17,8 @@ from enumsol.arithmetic.rationals import rational
 from enumsol.branches.enclosed.following import Followed, TracedProblem, follow_selections
 from enumsol.branches.enclosed.make_traced import make_traced
 from enumsol.branches.enclosed.single_branches import ClosedPieces
-from enumsol.branches.exact.gluing import glue
+from enumsol.branches.exact.gluing import glue, make_vertices
 from enumsol.branches.exact.known_selections import KnownSelections
-from enumsol.branches.exact.make_elements import make_arcs, make_vertices
 from enumsol.branches.graph_data import GraphStats
 from enumsol.branches.proof_records import write_graph_proof
 from enumsol.branches.unfinished import Effort
@@ -30,12 +29,11 @@ from enumsol.condensation.unloaded import never_loaded, vanishing_alpha
 from enumsol.errors import TooLargeError
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.search.certifiers.interval_certifiers import ExactIntervalCertifier, VerifiedIntervalCertifier
-from enumsol.search.interval.interval_parallel import run_parallel
 from enumsol.search.interval.subintervals import (
     FastIntervalCertifier,
-    FloatingIntervalCertifier,
     IntervalSearch,
     on_weak_springs,
+    run_parallel,
 )
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.support.deadlines import Deadline, Limited, TimeOverError, over, within
@@ -249,7 +247,8 @@ class ByAlgebra(PlaneWay):
         """With the certifier of an arithmetic."""
         certifier: IntervalCertifier = FastIntervalCertifier()
         if not problem.held:
-            certifier = FloatingIntervalCertifier(problem, checkable=arithmetic == "verified")
+            certifier = VerifiedIntervalCertifier(problem, None)
+            certifier.checkable = arithmetic == "verified"
         elif arithmetic == "exact":
             certifier = ExactIntervalCertifier(exact)
         elif arithmetic == "verified":
@@ -269,8 +268,7 @@ class ByAlgebra(PlaneWay):
             self.known = KnownSelections(self.exact, a, b, cut_short=search.stopped is not None)
         few = max(8, _SELECTIONS_AFTER_INTERRUPT // self.problem.p**2)
         gluing = glue(self.known, candidates, self._bounded(effort, few))
-        arcs = make_arcs(gluing)
-        return self._made((make_vertices(gluing, arcs), arcs), gluing.reasons, gluing.stopped, self.followed)
+        return self._made((make_vertices(gluing), gluing.edges), gluing.reasons, gluing.stopped, self.followed)
 
 
 class ByBalls(PlaneWay):
@@ -287,10 +285,7 @@ class ByBalls(PlaneWay):
         self.problem, self.interval, self.traced, self.closed = traced.problem, traced.interval, traced, ClosedPieces()
         self._traces: list[Trace] = []
         self._algebra: ByAlgebra | None = None
-        if self.problem.held:
-            self.certifier = VerifiedIntervalCertifier(traced.problem, None, traced.origin)
-        else:
-            self.certifier = FloatingIntervalCertifier(traced.problem, checkable=True)
+        self.certifier = VerifiedIntervalCertifier(traced.problem, None, traced.origin if self.problem.held else None)
 
     @property
     def origin(self) -> Fraction | None:

@@ -48,11 +48,11 @@ class BoxSelection:
 
     @property
     def conditions(self) -> tuple[tuple[int, int], ...]:
-        """Those of the selection, by their numbers."""
+        """Conditions of the selection, by their numbers."""
         return self.plain.rows.conditions
 
     def signs_differ(self, part: list[Any]) -> bool:
-        """Whether the bounds of an event's zero lie on both sides of it."""
+        """True if the bounds of an event's zero lie on both sides of it."""
         condition, bounds = part[3], part[5:7]
         signs = []
         for bound in bounds:
@@ -151,7 +151,7 @@ def _expected(part: list[Any]) -> list[int]:
 
 
 def _proven(known: OverInterval, part: list[Any], low: Fraction, high: Fraction) -> bool:
-    """Whether what is known shows what a part says."""
+    """True if what is known shows what a part says."""
     kind = part[0]
     if kind == "n":
         return bool(known.none)
@@ -184,18 +184,18 @@ def check_entries(part: Any, conditions: int) -> None:
 
 
 def inside(zero: tuple[Fraction, Fraction], part: tuple[Fraction, Fraction]) -> bool:
-    """Whether the bounds of a zero lie in a part, in their order."""
+    """True if the bounds of a zero lie in a part, in their order."""
     return part[0] <= zero[0] < zero[1] <= part[1]
 
 
-def alpha_number(value: Any) -> Fraction:
+def alpha_number(value: object) -> Fraction:
     """An alpha: a float, or a fraction as text."""
     if type(value) is float or isinstance(value, Fraction):
         return Fraction(value)
     return rational_from(value)
 
 
-def _plain(value: Any) -> float | Fraction:
+def _plain(value: object) -> float | Fraction:
     """An alpha for an expansion in double arithmetic, as a float if it is one."""
     return value if isinstance(value, float) else alpha_number(value)
 

@@ -63,7 +63,7 @@ class ClaimedEvent:
 
 @dataclass(eq=False)
 class ClaimedArc:
-    """Where a trace shows a root of its selection at every alpha.
+    """Interval over which a trace shows a root of its selection at every alpha.
 
     Attributes
     ----------
@@ -304,7 +304,7 @@ class ArcChecker:
     # -- all of them -----------------------------------------------------------------------------------------------
 
     def end_at(self, alpha: Fraction, side: int, *, upper: bool) -> bool:
-        """Whether an arc may end there: at an end of the interval, or where g vanishes."""
+        """True if an arc may end there: at an end of the interval, or where g vanishes."""
         if self._origin is not None and side == (-1 if upper else 1):
             return alpha >= self._origin if upper else alpha <= self._origin
         return alpha >= self._interval[1] if upper else alpha <= self._interval[0]
@@ -430,7 +430,7 @@ class _Follower:
 
 
 def _is_next(value: Fraction, end: Fraction) -> bool:
-    """Whether it is the smallest float that is not smaller than ``end``: what is beyond would not be about it."""
+    """True if it is the smallest float that is not smaller than ``end``: what is beyond would not be about it."""
     return value == end or (value > end and Fraction(np.nextafter(float(value), -np.inf)) < end)
 
 

@@ -12,9 +12,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from enumsol.proof.curve_records import CurvePart
 from enumsol.proof.reading import RefusedError
 from enumsol.proof.records import Limits, RecordError
-from enumsol.proof.space_records import CurvePart
 from enumsol.trusted.space.curve_events import CurveMotion
 from enumsol.trusted.space.curve_parts import LinkParts, in_order, up_to_bound
 from enumsol.trusted.space.solution_curve import only_curve
@@ -22,15 +22,12 @@ from enumsol.trusted.space.solution_curve import only_curve
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    from enumsol.proof.space_records import CurveBoxRecord
+    from enumsol.proof.curve_records import CurveBoxRecord
     from enumsol.trusted.space.curve_chains import CurveChain, CurveLink
     from enumsol.trusted.space.curve_parts import Place, Run, Turn
     from enumsol.trusted.space.solution_curve import AlphaProblem, SolutionCurve
 
     Codes = tuple[int, ...]
-
-#: Parts that are cut more often than this are no honest proof's.
-_DEEPEST = 64
 
 
 def parts_of(problem: AlphaProblem, chain: CurveChain, records: Iterator[Any], limits: Limits) -> list[Run | Turn]:
@@ -68,7 +65,8 @@ class LinkCuts(LinkParts):
         """From one joint to another one."""
         if None in start.statuses or None in end.statuses:
             raise RefusedError("at a point of a curve that is cut into arcs a status is not known")
-        return self._read(self.curve, self.place(start), self.place(end), None, _DEEPEST)
+        # parts that are cut more often than this are no honest proof's
+        return self._read(self.curve, self.place(start), self.place(end), None, 64)
 
     def _read(
         self, curve: SolutionCurve | None, start: Place, end: Place, codes: Codes | None, deepest: int

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from enumsol.checker.rational import RationalBody
     from enumsol.condensation.enclosure import EnclosedSystem
-    from enumsol.proof.records import Closed, ClosedInRationals
+    from enumsol.proof.records import Closed
     from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.joint_roots import JointRoot
     from enumsol.trusted.same_roots import Apart
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 def closed_by_balls(system: EnclosedSystem, said: Closed, force: Floats) -> tuple[str | None, ClosedSolution | None]:
     """Why a record proves nothing, or None; and the root that it proves, if it claims one."""
-    ball = closed_solution(system, said.selection, said.free, said.weights, said.force / force)
+    ball = closed_solution(system, said.selection, said.free, np.asarray(said.weights), np.asarray(said.at) / force)
     if ball is None:
         return "its reduced problem is not proven to have one solution", None
     if said.enclosure is None:
@@ -45,10 +45,10 @@ def closed_by_balls(system: EnclosedSystem, said: Closed, force: Floats) -> tupl
 
 
 def closed_in_rationals(
-    system: EnclosedSystem, rational: RationalBody, codes: Codes, said: ClosedInRationals
+    system: EnclosedSystem, rational: RationalBody, codes: Codes, said: Closed
 ) -> tuple[str | None, list[Any]]:
     """Why a record proves nothing, or None; and its root, if it holds one."""
-    selection, free = said.selection, said.free(codes)
+    selection, free = said.selection, said.free
     slides = {i: code for i, code in enumerate(codes) if code in (FORWARD, BACKWARD)}
     named = tuple(slides.get(i, code) for i, code in enumerate(selection))
     point = rational.point(selection)
@@ -58,11 +58,11 @@ def closed_in_rationals(
     least = {i: rational.least(selection[i], i, point) for i in range(rational.p)}
     if any(least[i] < 0 for i in free) or any(w[i] > 0 if selection[i] == OPEN else point[i] < 0 for i in slides):
         return "the point of its selection does not solve the reduced problem", []
-    if not only_solution(system, named, free, said.weights, point, w):
+    if not only_solution(system, named, free, np.asarray(said.weights), point, w):
         return "its solution is not proven to be the only one", []
     touching = all(w[i] == 0 for i, code in enumerate(codes) if code == CONTACT)
     holds = touching and all(least[i] >= 0 for i in range(rational.p) if i not in free)
-    if not same(said.count, int(holds)):
+    if not same(said.at, int(holds)):
         return "it holds another number of roots than it claims", []
     return None, [tuple(to_fraction(x) for x in point)] if holds else []
 

@@ -1,7 +1,7 @@
 """Checker of a branch graph: every solution in the interval lies in one of the surviving selections, or on its arcs.
 
 Records (see enumsol.proof.proof_file for the file and the reader): a header ``{"format": "enumsol-proof",
-"version": 1, "kind": "graph", "problem": <fingerprint>, "interval": [a, b], "p": p, "data": "problem" | "condensed"}``;
+"version": 2, "kind": "graph", "problem": <fingerprint>, "interval": [a, b], "p": p, "data": "problem" | "condensed"}``;
 for every piece ``{"piece": [a, b], "force", "length", "roots"}``, then its leaves ``["x", codes, rows, multipliers]``
 (no solution anywhere in the piece), ``["f", codes, rows, multipliers]`` (the same by the form declared last, ``["q",
 mu, nu, alpha, beta]``), ``["s", codes]`` (a surviving selection) and ``["c", codes]`` (left to both halves of the
@@ -46,10 +46,6 @@ if TYPE_CHECKING:
     Codes = NDArray[np.uint8]
 
 
-#: Leaves read and checked together.
-_BATCH = 256
-#: Leaves of a piece after which repetitions are first looked for; then whenever their number has doubled.
-_LOOK = 1024
 #: Entries of a leaf's record, by its kind, and those of a form's.
 _ENTRIES = {"x": 4, "f": 4, "s": 2, "c": 2}
 #: Kinds that do not rest on a stiffness that is positive definite.
@@ -72,7 +68,8 @@ class Piece:
     #: of every leaf its kind, and its p codes as bytes
     kinds: bytearray = field(default_factory=bytearray)
     codes: bytearray = field(default_factory=bytearray)
-    look: int = _LOOK
+    # leaves of a piece after which repetitions are first looked for; then whenever their number has doubled
+    look: int = 1024
     #: made when there is something to exclude
     enclosed: EnclosedPiece | None = None
     #: multipliers of the form declared last, and the piece with it
@@ -174,7 +171,7 @@ class GraphChecker:
             self._fail("pieces are said to be decided by their arcs, but there are none")
         self._check_end(record, claim, "pieces", records)
 
-    def _check_end(self, record: Any, claim: Mapping[str, int | None], what: str, records: Iterator[Any]) -> None:
+    def _check_end(self, record: object, claim: Mapping[str, int | None], what: str, records: Iterator[Any]) -> None:
         """Compare the counts in the last record with those of what was read."""
         if not reading.same(record, claim):
             found = reading.quoted(record) if isinstance(record, (dict, list)) else "missing"
@@ -209,7 +206,9 @@ class GraphChecker:
 
     # -- pieces ----------------------------------------------------------------------------------------------------
 
-    def _piece(self, record: Any, records: Iterator[Any], due: tuple[Fraction, Fraction, Codes]) -> tuple[Codes, Any]:
+    def _piece(
+        self, record: object, records: Iterator[Any], due: tuple[Fraction, Fraction, Codes]
+    ) -> tuple[Codes, Any]:
         """Check the piece that begins with this record; gives what it leaves to its halves, and the record after it."""
         number = self.pieces + 1
         try:
@@ -222,9 +221,8 @@ class GraphChecker:
         record = next(records, END)
         while isinstance(record, list):
             batch: list[list[Any]] = []
-            while (
-                isinstance(record, list) and len(batch) < _BATCH and not (batch and record[:1] in ([_FORM], [_CLOSED]))
-            ):
+            # leaves read and checked together
+            while isinstance(record, list) and len(batch) < 256 and not (batch and record[:1] in ([_FORM], [_CLOSED])):
                 batch.append(record)
                 record = next(records, END)
             try:
@@ -250,7 +248,7 @@ class GraphChecker:
             self.progress(self.leaves)
         return piece.leaves("c"), record
 
-    def _begin(self, record: Any) -> Piece:
+    def _begin(self, record: object) -> Piece:
         if not isinstance(record, dict):
             raise ValueError("no piece begins here")  # noqa: TRY004 (as in reading)
         reading.names_only(record, ("piece", "force", "length", "roots"))
@@ -321,7 +319,7 @@ class GraphChecker:
         return EnclosedPiece.from_enclosure(self.enclosure, piece.a, piece.b, piece.force, piece.length, origin)
 
 
-def interval_from(ends: Any) -> tuple[Fraction, Fraction]:
+def interval_from(ends: object) -> tuple[Fraction, Fraction]:
     """Both ends of an interval."""
     if not isinstance(ends, list) or len(ends) != 2:
         raise ValueError(f"{reading.quoted(ends)} is not an interval")
@@ -343,7 +341,7 @@ def _sorted(codes: Codes) -> Codes:
 
 
 def covers(roots: Codes, leaves: Codes, friction: Sequence[bool]) -> bool:
-    """Whether the leaves that refine one of the roots together cover every selection in the roots.
+    """True if the leaves that refine one of the roots together cover every selection in the roots.
 
     Both are sets of partial assignments, (k, p) arrays of codes. They come from trees, so that in every cell that holds
     some of them there is a node at which all of them refine it; splitting there gives smaller cells. A list that is not

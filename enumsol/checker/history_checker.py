@@ -11,6 +11,7 @@ from enumsol.checker.reports import MAX_FAILURES, HistoryVerificationReport
 from enumsol.condensation.enclosure import NotEnclosedError, enclosure_of
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.model.restart import SlipStart, afresh, restarted
+from enumsol.proof.proof_file import PROOF_VERSION
 from enumsol.proof.reading import RefusedError, numbers_from, quoted, rational_from, same
 from enumsol.support.deadlines import heard_by, tell, tell_part
 from enumsol.trusted.positions import tangential_positions
@@ -122,7 +123,7 @@ class HistoryChecker:
     def _read_header(self) -> int:
         """Read the steps; the number of searches."""
         header, problem = self.header, self.problem
-        if set(header) != _HEADER or header["format"] != "enumsol-proof" or not same(header["version"], 1):
+        if set(header) != _HEADER or header["format"] != "enumsol-proof" or not same(header["version"], PROOF_VERSION):
             raise RefusedError("the first record is not the header of a history in an enumsol-proof of version 1")
         if header["problem"] != problem.fingerprint or not same(header["p"], problem.p):
             raise RefusedError("the proof belongs to another problem (its fingerprint is different)")

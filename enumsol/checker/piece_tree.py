@@ -1,12 +1,8 @@
 """Checker of trees over alpha in 3D: all solutions over an interval lie on curves in boxes (theory, section 12.9).
 
-A tree is given by its records in the order of a walk: ``["a", alpha]`` (the piece is cut there), ``["b", node, codes]``
-(a status is split), ``["x", rows, low, high]`` (no solution over the piece), ``["n"]`` (the same, by the equations of
-a leaf), ``["k", first, last]`` (all solutions of a leaf lie in boxes of one curve), ``["r", box, low, high, alpha,
-codes]`` (the roots of a leaf lie on one arc over another piece, and one of its points is in the box), ``["m", numbers,
-first, last]`` (all solutions with the statuses of the assignment lie on the curve between two boxes, by one
-certificate) and ``["u", reason]`` (open: a gap). Of a body that nothing holds there is no "m", but ``["i", z]`` (no
-forces are in balance with the load).
+A tree is given by its records in the order of a walk: ``["p", alpha]`` (the piece is cut there), ``["b", node, codes]``
+(a status is split), and the leaves of ``proof.records.leaves_of`` over a piece: no solution; all of them on a curve, in
+boxes of it or by one certificate; all of them on one arc, through a box; or nothing, which is a gap.
 """
 
 from __future__ import annotations
@@ -18,16 +14,18 @@ import numpy as np
 
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.space_condensed import AlphaSpace
+from enumsol.proof.curve_records import CutPiece, OnCurve, ThroughCurveBox
+from enumsol.proof.leaves import kind_of
 from enumsol.proof.reading import RefusedError, quoted
-from enumsol.proof.records import Branching, Limits, NoRoot, RecordError, Unbalanced, UndecidedRecord, kind_of
-from enumsol.proof.space_records import (
-    FLOATING_PIECE_LEAVES,
-    PIECE_LEAVES,
-    CutPiece,
-    ExcludedOverPiece,
-    InCurveBoxes,
-    OnlyOnCurve,
-    ThroughCurveBox,
+from enumsol.proof.records import (
+    Branching,
+    Excluded,
+    Limits,
+    NoRoot,
+    RecordError,
+    Tree,
+    Unbalanced,
+    UndecidedRecord,
 )
 from enumsol.trusted.space.curve_runs import Run
 from enumsol.trusted.space.pieces import AlphaPiece
@@ -41,6 +39,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from enumsol.condensation.enclosure import CondensedEnclosure
+    from enumsol.proof.records import Record
     from enumsol.trusted.space.curve_runs import KnownCurve
     from enumsol.trusted.space.solution_curve import AlphaProblem
 
@@ -105,7 +104,7 @@ class PieceTreeChecker:
                 raise RefusedError(f"leaf {self.leaves + 1} of the tree over alpha: {error}") from None
 
     def _below(self, piece: AlphaPiece, codes: Codes, record: list[Any]) -> list[tuple[Fraction, Fraction, Codes]]:
-        """What a record leaves to those after it, or nothing, and the leaf is checked."""
+        """Cells that a record leaves to those after it; none if it is a leaf, which is checked."""
         kind = record[0] if record else None
         if kind == CutPiece.kind:
             alpha = CutPiece.read(record, Limits(codes)).between(piece.low, piece.high)
@@ -113,12 +112,12 @@ class PieceTreeChecker:
         if kind == Branching.kind:
             split = Branching.covering(record, codes, self._covers)
             return [(piece.low, piece.high, below) for below in split.below(codes)]
-        modes = self.enclosure.problem.modes
-        known = kind_of(record, PIECE_LEAVES if modes.r == 0 else FLOATING_PIECE_LEAVES)
+        tree = Tree.PIECE if self.enclosure.problem.held else Tree.FLOATING_PIECE
+        known = kind_of(record, tree)
         if known is None:
             raise RecordError(f"unknown kind of record {quoted(kind)}")
-        components, r = len(codes) + sum(self._tangents), modes.r
-        leaf = known.read(record, Limits(codes, boxes=len(self._boxes), components=components, modes=r))
+        components, modes = len(codes) + sum(self._tangents), self.enclosure.problem.modes.r
+        leaf = known.read(record, Limits(codes, tree, components=components, modes=modes, boxes=len(self._boxes)))
         self.leaves += 1
         if isinstance(leaf, UndecidedRecord):
             self.gaps.append((piece.low, piece.high))
@@ -129,23 +128,23 @@ class PieceTreeChecker:
     def _covers(self, node: int, code: int, children: list[int]) -> bool:
         return is_sector_covering(code, children, self._tangents[node])
 
-    def _wrong(self, piece: AlphaPiece, codes: Codes, leaf: Any) -> str | None:
-        """What a leaf does not prove; None if all is proven."""
-        if isinstance(leaf, ExcludedOverPiece):
-            excluded = piece.margin(codes, leaf.rows, (leaf.low, leaf.high)) > 0
+    def _wrong(self, piece: AlphaPiece, codes: Codes, leaf: Record) -> str | None:
+        """Sentence on what a leaf does not prove; None if all is proven."""
+        if isinstance(leaf, Excluded):
+            excluded = piece.margin(codes, leaf.lines, (leaf.values[0], leaf.values[1])) > 0
             return None if excluded else "its multipliers do not exclude it"
         if isinstance(leaf, Unbalanced):
             return None if piece.is_unbalanced(codes, leaf.direction) else "forces may be in balance"
-        if isinstance(leaf, OnlyOnCurve):
-            (known, first), (other, last) = self._boxes[leaf.first], self._boxes[leaf.last]
-            alone = known is other and piece.lies_on(known, Run(first, last), codes, leaf.numbers)
-            return None if alone else "it is not proven that all its solutions lie on its curve"
+        if isinstance(leaf, OnCurve):
+            (known, first), (other, last) = (self._boxes[box] for box in (leaf.first, leaf.last))
+            if leaf.numbers is not None:
+                alone = known is other and piece.lies_on(known, Run(first, last), codes, leaf.numbers)
+                return None if alone else "it is not proven that all its solutions lie on its curve"
         if not is_complete(piece.whole, codes):
             return "its statuses are not final"
         if isinstance(leaf, NoRoot):
             return None if piece.narrowed(codes)[1] is None else "it is not proven to hold no root"
-        if isinstance(leaf, InCurveBoxes):
-            (known, first), (other, last) = self._boxes[leaf.first], self._boxes[leaf.last]
+        if isinstance(leaf, OnCurve):
             curves = [link.curve for link in known.chain.links[first : last + 1]] if known is other else []
             inside = piece.holds_all(codes, self.given, curves)
             return None if inside else "its roots are not proven to lie in its boxes"
@@ -155,7 +154,7 @@ class PieceTreeChecker:
         raise AssertionError(leaf)
 
     def _is_arc(self, narrowed: AlphaPiece, codes: Codes, leaf: ThroughCurveBox) -> bool:
-        """Whether the roots of a leaf are on an arc, which is over a longer piece than they, through a box."""
+        """True if the roots of a leaf are on an arc, which is over a longer piece than they, through a box."""
         (a, b), (low, high) = self._interval, leaf.piece
         if not a <= low <= narrowed.low <= narrowed.high <= high <= b:
             return False

@@ -18,6 +18,7 @@ from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
 from enumsol.checker.walk import Located, TreeChecker
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.proof import records
+from enumsol.proof.declared_forms import plane_form
 from enumsol.proof.proof_file import fraction_text
 from enumsol.proof.reading import RefusedError, data_of, friction_at, rational_from, same, units_from
 from enumsol.trusted.at_alpha import VerifiedSelection, holds_no_root, solve_selection
@@ -26,9 +27,7 @@ from enumsol.trusted.exclusion import Leaves, Terms, exclusion_margins
 from enumsol.trusted.floating_bounds import is_unbalanced
 from enumsol.trusted.joint_roots import JointRoot, joint_root
 from enumsol.trusted.positions import certain_statuses
-from enumsol.trusted.quadratic_forms import EnclosedForm
-from enumsol.trusted.reference import Reference
-from enumsol.trusted.status_rows import ROW_KINDS, UNDECIDED, is_covering, row_signs
+from enumsol.trusted.status_rows import ROW_KINDS, is_covering, row_signs
 from enumsol.trusted.uniqueness import ClosedSolution, lone_root
 
 if TYPE_CHECKING:
@@ -37,9 +36,11 @@ if TYPE_CHECKING:
     from enumsol.checker.rational import Hull, RationalBody, RationalSystem
     from enumsol.checker.walk import Test
     from enumsol.proof.records import EnclosureRecord, Record
-    from enumsol.support.array_types import Codes, Indices
+    from enumsol.support.array_types import Codes, Mask
     from enumsol.trusted.positions import Among
     from enumsol.trusted.precise_at_alpha import PreciseAtAlpha
+    from enumsol.trusted.quadratic_forms import EnclosedForm
+    from enumsol.trusted.reference import Reference
 
     #: codes of a selection, the vertices of its root set, and its dimension
     Polytope = tuple[tuple[int, ...], list[Any], int]
@@ -50,53 +51,18 @@ _BATCH = 256
 _SUBNORMAL = 2.0**-1070
 
 
-class _FormLeaves:
-    """Forms as they are declared, and leaves that wait to be checked."""
-
-    def __init__(self) -> None:
-        self.declared: list[records.DeclaredForm] = []
-        self._waiting: dict[int, list[tuple[int, tuple[int, ...], Terms]]] = {}
-
-    def __len__(self) -> int:
-        return sum(map(len, self._waiting.values()))
-
-    def add(self, number: int, codes: tuple[int, ...], said: records.ExcludedByForm) -> None:
-        """Take a leaf, to be checked with others."""
-        place = len(self.declared) - said.back
-        self._waiting.setdefault(place, []).append((number, codes, said.terms))
-
-    def clear(self) -> None:
-        """Let go of the leaves that wait."""
-        self._waiting.clear()
-
-    def failing(self, system: EnclosedSystem) -> list[int]:
-        """Check the leaves that wait, form by form; the numbers of those that are not excluded."""
-        failed: list[int] = []
-        for place, leaves in self._waiting.items():
-            declared = self.declared[place]
-            numbers, codes, terms = zip(*leaves, strict=True)
-            with np.errstate(over="ignore", invalid="ignore"):
-                form = EnclosedForm.of(system, declared.codes, declared.multipliers, declared.weight)
-                margins = exclusion_margins(form, Leaves.of(codes, terms))
-            failed += np.array(numbers)[~(margins > 0)].tolist()
-        return sorted(failed)
-
-
 @dataclass
 class Checker(TreeChecker):
     """Checks one proof of a problem in 2D."""
 
-    held_kinds, floating_kinds = records.LEAVES, records.FLOATING_LEAVES
+    trees = records.Tree.PLANE, records.Tree.FLOATING_PLANE
 
     polytopes: list[Polytope] = field(default_factory=list)
     closed: dict[tuple[int, ...], ClosedSolution | JointRoot] = field(default_factory=dict)
     #: Codes of the strict roots of complete selections.
     strict: list[tuple[int, ...]] = field(default_factory=list)
-    _waiting: list[tuple[int, tuple[int, ...], Terms]] = field(default_factory=list)
-    _by_forms: _FormLeaves = field(default_factory=_FormLeaves)
-    #: Of a body that nothing holds, what was declared of roots, and their forms; None where these are not definite.
-    _declared: list[records.DeclaredReference] = field(default_factory=list)
-    _references: dict[int, Reference | None] = field(default_factory=dict)
+    #: Leaves to be tested together, by the places of their forms: numbers, codes and multipliers.
+    _waiting: dict[int | None, list[tuple[int, Codes, Terms]]] = field(default_factory=dict)
     #: Roots that selections share, by the one in which all their nodes stick, and by how these slip.
     shared: dict[tuple[Codes, tuple[tuple[int, int], ...]], JointRoot | None] = field(default_factory=dict)
 
@@ -167,46 +133,38 @@ class Checker(TreeChecker):
             return False
 
     def _flush(self, *, last: bool) -> None:
-        """Check the dual inequalities of the waiting leaves together."""
-        if len(self._by_forms) >= (1 if last else _BATCH):
-            for number in self._by_forms.failing(self.system):
-                self.fail(f"leaf {number}: its form and multipliers do not exclude it")
-            self._by_forms.clear()
-        if not self._waiting or (not last and len(self._waiting) < _BATCH):
+        """Check the dual inequalities of the waiting leaves together, form by form."""
+        if not last and sum(map(len, self._waiting.values())) < _BATCH:
             return
-        numbers, codes, terms = zip(*self._waiting, strict=True)
-        self._waiting.clear()
-        self._check_exclusions(np.array(numbers), Leaves.of(codes, terms))
+        waiting, self._waiting = self._waiting, {}
+        for place, leaves in waiting.items():
+            numbers, codes, terms = zip(*leaves, strict=True)
+            given = Leaves.of(codes, terms)
+            if place is None:
+                proven = self._excludes(given)
+            else:
+                with np.errstate(over="ignore", invalid="ignore"):
+                    proven = exclusion_margins(self._form(len(self.declared) - place), given) > 0
+            for number in np.array(numbers)[~proven]:
+                form = "" if place is None else "form and "
+                self.fail(f"leaf {number}: its {form}multipliers do not exclude it")
 
-    def _check_exclusions(self, numbers: Indices, leaves: Leaves) -> None:
+    def _excludes(self, leaves: Leaves) -> Mask:
+        """Which assignments hold no solution, if possible without the bound of the rigid displacement."""
         proven = exclusion_margins(self.free, leaves) > 0
         if not self.problem.held and not np.all(proven):
             self.bounded = True
             proven |= exclusion_margins(self.system, leaves) > 0
-        for number in numbers[~proven]:
-            self.fail(f"leaf {number}: its multipliers do not exclude it")
+        return np.asarray(proven)
 
     def _limits(self, codes: Codes, kind: type[Record]) -> records.Limits:
-        if not self.problem.held:
-            return records.Limits(codes, self.friction, self._declared, modes=self.problem.modes.r)
-        if not issubclass(kind, records.ClosingRecord):
-            return records.Limits(codes, self.friction, self._by_forms.declared)
-        # as the kernel has it
-        friction = (self.system.F > 0).tolist()
-        if kind is records.ClosedInRationals:
-            _ = self._body  # refused before the record is read
-        return records.Limits(codes, friction)
+        friction = self.friction
+        if kind is records.Closed or (kind is records.DeclaredForm and not self.problem.held):
+            friction = (self.system.F > 0).tolist()  # as the kernel has it
+        return records.Limits(codes, self.tree, friction, self.declared, modes=self.problem.modes.r)
 
-    def _declare(self, record: list[Any]) -> None:
-        nothing = (UNDECIDED,) * self.problem.p
-        try:
-            if self.problem.held:
-                self._by_forms.declared.append(records.DeclaredForm.read(record, records.Limits(nothing)))
-            else:
-                limits = records.Limits(nothing, (self.system.F > 0).tolist())
-                self._declared.append(records.DeclaredReference.read(record, limits))
-        except ValueError as error:
-            raise RefusedError(str(error)) from None
+    def _made(self, said: records.DeclaredForm) -> EnclosedForm | Reference | None:
+        return plane_form(self.system, said)
 
     def _covers(self, node: int, code: int, children: list[int]) -> bool:
         return is_covering(code, children, friction=self.friction[node])
@@ -220,14 +178,10 @@ class Checker(TreeChecker):
     def _tests(self) -> dict[type[Record], Test]:
         return {
             records.Excluded: self._excluded,
-            records.ExcludedByForm: self._excluded_by_form,
-            records.ExcludedInRationals: self._rational_exclusion,
             records.NoRoot: self._no_root,
             records.RegularRoot: self._regular_root,
-            records.NoRootInRationals: self._no_rational_root,
             records.RootSetRecord: self._root_set,
             records.Closed: self._closed,
-            records.ClosedInRationals: self._closed_in_rationals,
             records.Alone: self._alone,
             records.Unbalanced: self._unbalanced,
             records.OnlyReference: self._only_reference,
@@ -238,11 +192,10 @@ class Checker(TreeChecker):
         self.polytopes.append(((0,) * self.problem.p, [tuple([Fraction(0)] * (2 * self.problem.p))], 0))
 
     def _excluded(self, codes: Codes, said: records.Excluded) -> str | None:
-        self._waiting.append((self.leaves, codes, said.terms))
-        return None
-
-    def _excluded_by_form(self, codes: Codes, said: records.ExcludedByForm) -> str | None:
-        self._by_forms.add(self.leaves, codes, said)
+        if said.by == records.RATIONAL:
+            return self._excluded_in_rationals(codes, said)
+        place = len(self.declared) - said.by if isinstance(said.by, int) else None
+        self._waiting.setdefault(place, []).append((self.leaves, codes, said.terms))
         return None
 
     def _solved(self, codes: Codes) -> VerifiedSelection | None:
@@ -262,6 +215,9 @@ class Checker(TreeChecker):
         return PreciseAtAlpha.of(self.problem, self.alpha, self.force, self.length)
 
     def _no_root(self, codes: Codes, said: records.NoRoot) -> str | None:
+        if said.by == records.RATIONAL:
+            self.bounded |= self._rests_on_reach(codes, [])
+            return "it holds a root" if self._hull(codes).points else None
         if self._either(lambda system: holds_no_root(system, codes, solve_selection(system, codes))):
             return None
         ball = self._solved(codes)
@@ -298,7 +254,7 @@ class Checker(TreeChecker):
         return "forces below it may be in balance with the load"
 
     def _only_reference(self, codes: Codes, said: records.OnlyReference) -> str | None:
-        known = self._reference(len(self._declared) - said.back)
+        known = self._form(said.back)
         if known is None:
             return "the form of its root is not proven definite"
         if not self._either(lambda system: known.is_only_root(codes, said.rows, said.products, system.reach)):
@@ -308,13 +264,6 @@ class Checker(TreeChecker):
         if said.enclosure is None:
             return "it has no enclosure of the root that lies below its assignment"
         return self._regular(known.selection, known.root, said.enclosure)
-
-    def _reference(self, place: int) -> Reference | None:
-        if place not in self._references:
-            said = self._declared[place]
-            numbers = said.weights, said.balance, said.share
-            self._references[place] = Reference.of(self.system, said.selection, *numbers)
-        return self._references[place]
 
     def _shared(self, codes: Codes, said: records.SharedRoot) -> str | None:
         core = said.core(codes)
@@ -329,8 +278,12 @@ class Checker(TreeChecker):
         return self._placed(found, said.enclosure)
 
     def _closed(self, codes: Codes, said: records.Closed) -> str | None:
-        from enumsol.checker.fathomed_subtrees import closed_by_balls
+        from enumsol.checker.fathomed_subtrees import closed_by_balls, closed_in_rationals
 
+        if isinstance(said.at, int):
+            reason, points = closed_in_rationals(self.system, self._body, codes, said)
+            self.polytopes += [(said.selection, points, 0)] if points else []
+            return reason
         reason, ball = closed_by_balls(self.system, said, self.force)
         if ball is not None:
             self._locate(ball.core, ball)
@@ -384,31 +337,22 @@ class Checker(TreeChecker):
         return not self.problem.held and self.rational.rests_on_reach(codes, points)  # type: ignore[attr-defined]
 
     def _alone(self, codes: Codes, said: records.Alone) -> str | None:
-        root = lone_root(self.system, codes, *said.arguments)
+        if said.strengths is None or said.terms is None:
+            raise AssertionError("read without what it has in 2D")
+        root = lone_root(self.system, codes, said.selection, said.numbers, said.strengths, *said.terms)
         return (
             "its root is not proven to be alone"
             if root is None
             else self._regular(said.selection, root, said.enclosure)
         )
 
-    def _closed_in_rationals(self, codes: Codes, said: records.ClosedInRationals) -> str | None:
-        from enumsol.checker.fathomed_subtrees import closed_in_rationals
-
-        reason, points = closed_in_rationals(self.system, self._body, codes, said)
-        self.polytopes += [(said.selection, points, 0)] if points else []
-        return reason
-
-    def _rational_exclusion(self, codes: Codes, said: records.ExcludedInRationals) -> str | None:
+    def _excluded_in_rationals(self, codes: Codes, said: records.Excluded) -> str | None:
         p = self.problem.p
         signs = row_signs(np.array(codes), np.array(self.friction, dtype=float))
         units = [Fraction(self.length[r % p] if r // p < 4 else self.force[r % p]) for r in range(ROW_KINDS * p)]
         rows, values = (part.tolist() for part in said.terms)
         positive = self.rational.energy_bound_positive(signs, rows, values, units)
         return None if positive else "its multipliers do not exclude it in rational arithmetic"
-
-    def _no_rational_root(self, codes: Codes, said: records.NoRootInRationals) -> str | None:
-        self.bounded |= self._rests_on_reach(codes, [])
-        return "it holds a root" if self._hull(codes).points else None
 
     def _hull(self, codes: Codes) -> Hull:
         """All that a selection holds; S is computed only where its equations are singular."""

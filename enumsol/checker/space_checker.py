@@ -12,23 +12,36 @@ from enumsol.arithmetic.balls import SAFE, TINY, Ball
 from enumsol.checker.walk import Located, TreeChecker
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.space_condensed import EnclosedSpace
-from enumsol.proof import records, space_records
+from enumsol.proof.declared_forms import space_form
 from enumsol.proof.reading import RefusedError, data_of, exponents_from, rational_from, shown_alpha
-from enumsol.proof.records import EnclosureRecord, Limits, NoRoot, Record, RegularRoot
+from enumsol.proof.records import (
+    Alone,
+    BoxedRoot,
+    DeclaredForm,
+    EnclosureRecord,
+    Excluded,
+    Limits,
+    NoRoot,
+    OnlyReference,
+    RegularRoot,
+    Tree,
+    Unbalanced,
+)
 from enumsol.trusted.space.boxed_solution import Box, BoxedSolution, apart_in_boxes, is_inside, solution_in_box
 from enumsol.trusted.space.leaves import Open, SpaceRoot, distinct_roots, settle
-from enumsol.trusted.space.product_forms import Ellipsoid, refines
+from enumsol.trusted.space.product_forms import Ellipsoid
 from enumsol.trusted.space.resultants import floating_margin, is_unbalanced_in_space, unbounded
 from enumsol.trusted.space.sector_rows import OPEN, STICK, UNDECIDED, is_sector_covering, sector_margin
 from enumsol.trusted.space.slip_forms import SlipForm
-from enumsol.trusted.space.space_reference import SpaceReference
 from enumsol.trusted.space.space_uniqueness import LooseSolution, lone_root, only_root, only_solution_in_space
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from enumsol.checker.walk import Test
+    from enumsol.proof.records import Record
     from enumsol.support.array_types import Codes, Floats
+    from enumsol.trusted.space.space_reference import SpaceReference
 
 _OPEN = "what it holds is not proven"
 _NO_FORM = "no form that is convex was declared over it"
@@ -38,18 +51,12 @@ _NO_FORM = "no form that is convex was declared over it"
 class SpaceChecker(TreeChecker):
     """Checks one proof of a problem in 3D."""
 
-    held_kinds, floating_kinds = space_records.LEAVES, space_records.FLOATING_LEAVES
+    trees = Tree.SPACE, Tree.FLOATING_SPACE
 
     roots: list[tuple[tuple[int, ...], SpaceRoot]] = field(default_factory=list)
     boxed: list[tuple[tuple[int, ...], BoxedSolution]] = field(default_factory=list)
     #: What boxes hold that were tested.
     known: dict[bytes, BoxedSolution | None] = field(default_factory=dict)
-    #: The form that was declared last.
-    form: SlipForm | None = None
-    #: The ellipsoid of the form of products that was declared last; None where it is not proven to be one.
-    ellipsoid: Ellipsoid | None = None
-    #: The root that was declared last, with its form; None where it is not proven. Of a body that nothing holds.
-    reference: SpaceReference | None = None
 
     # -- header and tree -------------------------------------------------------------------------------------------
 
@@ -82,24 +89,24 @@ class SpaceChecker(TreeChecker):
     # -- leaves ----------------------------------------------------------------------------------------------------
 
     def _limits(self, codes: Codes, kind: type[Record]) -> Limits:
-        components = len(self.system.g) if kind is space_records.OnlyRoot else 0
-        return Limits(codes, components=components, modes=self.problem.modes.r)
+        components = len(self.system.g) if kind in (DeclaredForm, Alone) else 0
+        return Limits(codes, self.tree, (), self.declared, components, self.problem.modes.r)
 
     def _without_bound(self) -> EnclosedSpace:
         return unbounded(self.system)
 
+    def _made(self, said: DeclaredForm) -> SlipForm | Ellipsoid | SpaceReference | None:
+        return space_form(self.system, said)
+
     def _tests(self) -> dict[type[Record], Test]:
         return {
-            space_records.ExcludedInSpace: self._excluded,
-            space_records.ExcludedBySlipForm: self._excluded_by_form,
+            Excluded: self._excluded,
             NoRoot: self._no_root,
             RegularRoot: self._regular_root,
-            space_records.BoxedRoot: self._in_box,
-            space_records.MissedByProducts: self._missed,
-            space_records.EnclosedByProducts: self._in_ellipsoid,
-            space_records.OnlyRoot: self._only,
-            records.Unbalanced: self._unbalanced,
-            space_records.OnlySpaceReference: self._only_reference,
+            BoxedRoot: self._in_box,
+            Alone: self._only,
+            Unbalanced: self._unbalanced,
+            OnlyReference: self._only_reference,
         }
 
     def _at_rest(self) -> None:
@@ -107,20 +114,29 @@ class SpaceChecker(TreeChecker):
         still = np.ones(2 * self.problem.p, dtype=bool)
         self.locate(None, Located(Ball.exact(np.zeros(3 * self.problem.p)), still))
 
-    def _excluded(self, codes: Codes, said: space_records.ExcludedInSpace) -> str | None:
+    def _excluded(self, codes: Codes, said: Excluded) -> str | None:
+        rows, values = said.lines, said.values
+        if isinstance(said.by, int):
+            form = self._form(said.by)
+            if isinstance(form, SlipForm):
+                positive = sector_margin(self.system, codes, rows, values, form=form) > 0
+                return None if positive else "its multipliers and its form do not exclude it"
+            if form is None or len(rows):
+                return _NO_FORM if form is None else "it has multipliers beside those of a form of products"
+            return None if form.misses(codes) else "its ellipsoid does not exclude it"
         margin = sector_margin if self.problem.held else floating_margin
-        positive = self._either(lambda system: margin(system, codes, said.rows, said.values) > 0)
+        positive = self._either(lambda system: margin(system, codes, rows, values) > 0)
         return None if positive else "its multipliers do not exclude it"
 
-    def _unbalanced(self, codes: Codes, said: records.Unbalanced) -> str | None:
+    def _unbalanced(self, codes: Codes, said: Unbalanced) -> str | None:
         if is_unbalanced_in_space(self.system, codes, said.direction):
             return None
         return "forces below it may be in balance with the load"
 
-    def _only_reference(self, codes: Codes, said: space_records.OnlySpaceReference) -> str | None:
-        known = self.reference
+    def _only_reference(self, codes: Codes, said: OnlyReference) -> str | None:
+        known = self._form(said.back)
         if known is None:
-            return "no root was declared"
+            return "the root that was declared is not proven"
         proven = self._either(lambda system: known.is_only_root(codes, said.rows, said.products, system.reach))
         return None if proven else "the root that was declared is not proven to be the only one in it"
 
@@ -128,42 +144,25 @@ class SpaceChecker(TreeChecker):
         """Nothing waits: every leaf is checked as it is read."""
 
     def _declare(self, record: list[Any]) -> None:
-        system = self.system
-        try:
-            limits = Limits((UNDECIDED,) * self.problem.p, components=len(system.g))
-            if not self.problem.held:
-                self._declare_root(space_records.DeclaredSpaceReference.read(record, limits))
-                return
-            if len(record) in space_records.DeclaredProductForm.sizes:
-                said = space_records.DeclaredProductForm.read(record, limits)
-                with np.errstate(over="ignore", invalid="ignore"):
-                    centre = said.centre / system.unit
-                self.ellipsoid = Ellipsoid.of(system, said.codes, centre, said.numbers)
-                return
-            numbers = space_records.DeclaredSlipForm.read(record, limits).numbers
-            if self.form is None or not np.array_equal(self.form.numbers, numbers):
-                self.form = SlipForm.of(system, numbers)
-        except ValueError as error:
-            raise RefusedError(str(error)) from None
+        super()._declare(record)
+        if not self.problem.held:
+            try:
+                self._declare_root(self.declared[-1])
+            except ValueError as error:
+                raise RefusedError(str(error)) from None
 
-    def _declare_root(self, said: space_records.DeclaredSpaceReference) -> None:
+    def _declare_root(self, said: DeclaredForm) -> None:
         """Take note of a root, which is one whatever leaves refer to it."""
-        self.reference = SpaceReference.of(self.system, said.leaf, said.numbers, said.balance, said.share)
-        if self.reference is None:
+        known = self._form(1)
+        if known is None or said.enclosure is None:
             self.fail("the root that is declared is not proven to be one whose form is definite")
             return
-        root = self.reference.root
+        root = known.root
         if (reason := self._placed(root, said.enclosure)) is not None:
             self.fail(f"the root that is declared: {reason}")
-        self._ask_without_bound(said.leaf)
-        self.roots.append((said.leaf, root))
-        self._locate(said.leaf, root, said.leaf)
-
-    def _excluded_by_form(self, codes: Codes, said: space_records.ExcludedBySlipForm) -> str | None:
-        if self.form is None:
-            return "its form was not declared"
-        positive = sector_margin(self.system, codes, said.rows, said.values, form=self.form) > 0
-        return None if positive else "its multipliers and its form do not exclude it"
+        self._ask_without_bound(said.codes)
+        self.roots.append((said.codes, root))
+        self._locate(said.codes, root, said.codes)
 
     def _no_root(self, codes: Codes, said: NoRoot) -> str | None:
         del said
@@ -187,22 +186,11 @@ class SpaceChecker(TreeChecker):
         self._locate(codes, found, codes)
         return self._placed(found, said.enclosure)
 
-    def _missed(self, codes: Codes, said: space_records.MissedByProducts) -> str | None:
-        del said
-        ellipsoid = self.ellipsoid
-        if ellipsoid is None or not refines(codes, ellipsoid.codes):
-            return _NO_FORM
-        return None if ellipsoid.misses(codes) else "its ellipsoid does not exclude it"
-
-    def _in_ellipsoid(self, codes: Codes, said: space_records.EnclosedByProducts) -> str | None:
-        """The only solution of a box that holds an ellipsoid in which all roots of the assignment lie."""
-        ellipsoid = self.ellipsoid
-        if ellipsoid is None or not refines(codes, ellipsoid.codes):
-            return _NO_FORM
-        return self._of_box(codes, said, ellipsoid.is_in)
-
-    def _in_box(self, codes: Codes, said: space_records.BoxedRoot) -> str | None:
-        """The only solution of a box, in which all roots of the leaf lie."""
+    def _in_box(self, codes: Codes, said: BoxedRoot) -> str | None:
+        """The only solution of a box, in which all roots of a leaf lie, or the ellipsoid of an assignment."""
+        if said.by is not None:
+            form = self._form(said.by)
+            return self._of_box(codes, said, form.is_in) if isinstance(form, Ellipsoid) else _NO_FORM
         leaf = settle(self.system, codes)
         bounds = None if leaf is None else (leaf.y, leaf.w)
 
@@ -214,7 +202,7 @@ class SpaceChecker(TreeChecker):
 
         return self._of_box(codes, said, within)
 
-    def _of_box(self, codes: Codes, said: space_records.BoxedRoot, within: Callable[[Box], bool]) -> str | None:
+    def _of_box(self, codes: Codes, said: BoxedRoot, within: Callable[[Box], bool]) -> str | None:
         """The only solution of a box, of which ``within`` tells whether all roots of the leaf lie in it."""
         (mid, rad, rho), unit = said.box(len(self.system.g)), self.system.unit
         with np.errstate(over="ignore", invalid="ignore"):
@@ -231,24 +219,25 @@ class SpaceChecker(TreeChecker):
         self._locate(codes, found)
         return self._placed(found, said.enclosure)
 
-    def _only(self, codes: Codes, said: space_records.OnlyRoot) -> str | None:
+    def _only(self, codes: Codes, said: Alone) -> str | None:
         """The only solution of all, or of an assignment."""
         found: LooseSolution | SpaceRoot | None
         if any(code != UNDECIDED for code in codes):
-            found = lone_root(self.system, codes, said.numbers, said.leaf)
+            found = lone_root(self.system, codes, said.numbers, said.selection)
             if found is None:
                 return "its root is not proven to be the only one in it"
-            self.roots.append((said.leaf, found))
-            self._locate(tuple(said.leaf), found, said.leaf)
+            self.roots.append((said.selection, found))
+            self._locate(said.selection, found, said.selection)
             return self._placed(found, said.enclosure)
-        if said.leaf:
-            found = only_root(self.system, said.numbers, said.leaf)
+        if said.selection:
+            found = only_root(self.system, said.numbers, said.selection)
         else:
-            found = only_solution_in_space(self.system, said.numbers, said.force[: self.problem.p])
+            force, _ = said.enclosure.numbers(len(self.system.g))
+            found = only_solution_in_space(self.system, said.numbers, force[: self.problem.p])
         if found is None:
             return "its solution is not proven to be the only one"
         self.regular += 1
-        self._locate(tuple(said.leaf), found, said.leaf)
+        self._locate(said.selection, found, said.selection)
         return self._placed(found, said.enclosure)
 
     def _placed(self, found: SpaceRoot | LooseSolution, said: EnclosureRecord) -> str | None:

@@ -1,6 +1,6 @@
 """Checker of a branch graph in 3D: every solution over an interval lies on curves, each given by boxes.
 
-Records: a header ``{"format": "enumsol-proof", "version": 1, "kind": "graph", "problem": <fingerprint>, "interval":
+Records: a header ``{"format": "enumsol-proof", "version": 2, "kind": "graph", "problem": <fingerprint>, "interval":
 [a, b], "p": p, "data": "problem", "force", "length", "steps"}`` with the steps of the coordinates (see AlphaProblem);
 for every curve ``{"curve": n}`` with n boxes, and these as ``["w", centre, direction, border, radius, rho, half]``
 between n + 1 boxes without length around the points that they share (see ``trusted.space.curve_chains``), and perhaps
@@ -26,9 +26,9 @@ from enumsol.checker.piece_tree import PieceTreeChecker
 from enumsol.checker.reports import GraphVerificationReport
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.enclosure import CondensedEnclosure
+from enumsol.proof.curve_records import box_from
 from enumsol.proof.reading import RefusedError, data_of, exponents_from, numbers_from, quoted, same
 from enumsol.proof.records import Limits
-from enumsol.proof.space_records import box_from
 from enumsol.trusted.space.curve_chains import apart, chain_of
 from enumsol.trusted.space.curve_parts import arcs_over
 from enumsol.trusted.space.curve_runs import KnownCurve
@@ -102,7 +102,7 @@ class SpaceGraphChecker(GraphChecker):
         """Limits of records about boxes around curves."""
         return Limits((UNDECIDED,) * self.problem.p, modes=self.problem.modes.r)
 
-    def _curve(self, given: AlphaProblem, count: Any, records: Iterator[Any]) -> None:
+    def _curve(self, given: AlphaProblem, count: object, records: Iterator[Any]) -> None:
         number = len(self.curves) + 1
         if type(count) is not int or not 0 < count <= _MOST_BOXES:
             raise RefusedError(f"curve {number} has {quoted(count)} boxes")
@@ -119,8 +119,8 @@ class SpaceGraphChecker(GraphChecker):
             raise RefusedError(f"curve {number} is not proven to be one from end to end")
         self.curves.append(chain)
 
-    def _cuts(self, given: AlphaProblem, record: Any, records: Iterator[Any]) -> Any:
-        """How the last curve is cut into arcs, if its record says so; the record that follows."""
+    def _cuts(self, given: AlphaProblem, record: object, records: Iterator[Any]) -> Any:
+        """Read the arcs into which the last curve is cut, if its record says so; gives the record that follows."""
         if not same(record, {"parts": True}):
             self.arcs = None
             return record

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from enumsol.checker.reports import MAX_FAILURES, VerificationReport
 from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.proof.leaves import kind_of
 from enumsol.proof.reading import RefusedError, quoted, same
-from enumsol.proof.records import Branching, DeclaredForm, Limits, RecordError, UndecidedRecord, Unloaded, kind_of
+from enumsol.proof.records import Branching, DeclaredForm, Limits, RecordError, Tree, UndecidedRecord, Unloaded
 from enumsol.support.deadlines import tell
 from enumsol.trusted.status_rows import UNDECIDED
 
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
     Test = Callable[[Codes, Any], str | None]
 
 _REPORT_EVERY = 256
+#: Forms that are kept as they were made: a file that alternates between more has each of them made again.
+_KEPT = 16
 _END = object()
 
 
@@ -86,9 +89,12 @@ class TreeChecker(ABC):
     #: Of a body that nothing holds: some leaf rests on the bound of its rigid displacement.
     bounded: bool = False
 
-    #: Kinds of leaves, by their letters, of bodies that are held, and of others.
-    held_kinds: ClassVar[dict[str, type[Record]]]
-    floating_kinds: ClassVar[dict[str, type[Record]]]
+    #: What later leaves may refer to, and what was made of the last of these by their places.
+    declared: list[DeclaredForm] = field(default_factory=list)
+    _forms: dict[int, Any] = field(default_factory=dict)
+
+    #: Trees of bodies that are held, and of others.
+    trees: ClassVar[tuple[Tree, Tree]]
 
     def run(self, proof: Proof) -> VerificationReport:
         """Check all records.
@@ -132,9 +138,9 @@ class TreeChecker(ABC):
         return self.problem.rigid_reach if self.bounded else None
 
     @property
-    def kinds(self) -> dict[str, type[Record]]:
-        """Kinds of leaves, by their letters: some rest on a stiffness that is positive definite, others on balance."""
-        return self.held_kinds if self.problem.held else self.floating_kinds
+    def tree(self) -> Tree:
+        """What may stand in it: some theorems rest on a stiffness that is positive definite, others on balance."""
+        return self.trees[0 if self.problem.held else 1]
 
     @cached_property
     def free(self) -> Any:
@@ -185,8 +191,8 @@ class TreeChecker(ABC):
         """Count the root of the unloaded body."""
 
     @abstractmethod
-    def _declare(self, record: list[Any]) -> None:
-        """Take note of what later leaves refer to."""
+    def _made(self, said: DeclaredForm) -> Any:
+        """What leaves that refer to a declared form are tested by; None where that is not proven."""
 
     @abstractmethod
     def _flush(self, *, last: bool) -> None:
@@ -250,7 +256,7 @@ class TreeChecker(ABC):
 
     def _leaf(self, codes: Codes, record: list[Any]) -> str | None:
         """Check one leaf; the reason when it proves nothing."""
-        kind = kind_of(record, self.kinds)
+        kind = kind_of(record, self.tree)
         if kind is None:
             return f"unknown kind of record {quoted(record[0])}"
         try:
@@ -274,6 +280,23 @@ class TreeChecker(ABC):
         # g = 0: by the energy bound nothing but lambda = 0 solves
         self._at_rest()
         return None if unloaded else "the problem is not unloaded"
+
+    def _declare(self, record: list[Any]) -> None:
+        """Take note of what later leaves refer to."""
+        try:
+            limits = self._limits((UNDECIDED,) * self.problem.p, DeclaredForm)
+            self.declared.append(DeclaredForm.read(record, limits))
+        except ValueError as error:
+            raise RefusedError(str(error)) from None
+
+    def _form(self, back: int) -> Any:
+        """The form that was declared so many before, as ``_made`` gives it."""
+        place = len(self.declared) - back
+        if place not in self._forms:
+            if len(self._forms) == _KEPT:
+                del self._forms[next(iter(self._forms))]
+            self._forms[place] = self._made(self.declared[place])
+        return self._forms[place]
 
     def locate(self, name: Hashable, found: Located) -> None:
         """Add the place of a root in a leaf to ``located`` if places are collected."""

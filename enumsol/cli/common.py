@@ -1,4 +1,4 @@
-"""What the commands share: the problem and alpha they are given, exit statuses, worker processes."""
+"""Parts of all commands: the problem and alpha they are given, exit statuses, worker processes."""
 
 from __future__ import annotations
 

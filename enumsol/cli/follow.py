@@ -194,7 +194,7 @@ class _Followed:
                 display.show((done + 1) / len(starts), f"{counted(len(self.paths), 'path')}, {points:,} points")
 
     def _follow(self, number: int, root: Root, sign: int, *, alone: bool) -> bool:
-        """One path; whether it closed."""
+        """Follow one path; returns whether it closed."""
         from enumsol.continuation import AmbiguousStart, follow as follow_path
 
         try:

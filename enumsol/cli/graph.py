@@ -16,8 +16,7 @@ from enumsol.errors import InvalidArgumentError, MissingDependencyError
 
 if TYPE_CHECKING:
     from enumsol.branches import BranchGraph
-    from enumsol.model.problem import ContactProblem
-    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import Alpha
 
 
@@ -161,7 +160,7 @@ _STEPS = {
 
 
 def build(
-    problem: ContactProblem | ContactProblem3D,
+    problem: AnyProblem,
     interval: tuple[Alpha, Alpha],
     arithmetic: options.Arithmetic = "verified",
     jobs: int = 1,
@@ -184,7 +183,7 @@ def build(
         return branch_graph(problem, interval, arithmetic, progress=progress, executor=executor, **limits)
 
 
-def read_graph(file: str, problem: ContactProblem | ContactProblem3D) -> BranchGraph:
+def read_graph(file: str, problem: AnyProblem) -> BranchGraph:
     """The graph in a file, which must be one of this problem.
 
     Raises
@@ -200,7 +199,7 @@ def read_graph(file: str, problem: ContactProblem | ContactProblem3D) -> BranchG
     return found
 
 
-def _same_problem(a: Any, b: Any) -> bool:
+def _same_problem(a: AnyProblem, b: AnyProblem) -> bool:
     import numpy as np  # not for --help
 
     plane = hasattr(a, "Bt")

@@ -16,6 +16,7 @@ from enumsol.support.messages import counted
 if TYPE_CHECKING:
     from enumsol.loading.growing import HistoryProgress
     from enumsol.loading.history import History
+    from enumsol.model.problem3d import AnyProblem
 
 Drawn = Literal["step", "alpha", "displacement", "lambda_n", "lambda_t", "dissipated"]
 
@@ -104,7 +105,7 @@ def history(
     common.finish(ended, common.ExitStatus.INCOMPLETE if found.reasons else common.ExitStatus.DONE)
 
 
-def _search(problem: Any, steps: Any, jobs: int, options: dict[str, Any]) -> History:
+def _search(problem: AnyProblem, steps: Any, jobs: int, options: dict[str, Any]) -> History:
     from enumsol.loading.growing import histories  # numpy and scipy: not for --help
 
     with common.workers(jobs) as executor, _HistoryDisplay() as display:

@@ -20,9 +20,9 @@ def number(name: str, text: str) -> Any:
     return typer.Option(name, metavar="NUMBER", help=text, show_default=False)
 
 
-def count(text: str, *, least: int = 1, panel: str = LIMITS) -> Any:
+def count(text: str, *, least: int = 1, panel: str | None = LIMITS, metavar: str = "N") -> Any:
     """An option that takes a whole number."""
-    return typer.Option(min=least, metavar="N", help=text, rich_help_panel=panel)
+    return typer.Option(min=least, metavar=metavar, help=text, rich_help_panel=panel)
 
 
 def seconds(text: str) -> Any:
@@ -56,7 +56,7 @@ def csv(text: str) -> Any:
 
 
 def with_options(*options: Parameter, after: int) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Of a command: its last argument, ``**named``, are these options, after so many arguments of its own."""
+    """A decorator: these options take the place of a command's ``**named``, after so many arguments of its own."""
 
     def decorated(command: Callable[..., None]) -> Callable[..., None]:
         # typer reads both

@@ -142,18 +142,18 @@ def write_figure(path: str, figure: Any) -> None:
     kept(figure, path)
 
 
-def as_json(content: Any) -> str:
+def as_json(content: object) -> str:
     """JSON text of what `plain` takes; what is not finite is null. A text is JSON already."""
     return content if isinstance(content, str) else json.dumps(plain(content), indent=1)
 
 
-def taken(of: Any, *names: str) -> dict[str, Any]:
+def taken(of: object, *names: str) -> dict[str, Any]:
     """Attributes of a result by their names, for JSON."""
     return {name: getattr(of, name) for name in names}
 
 
-def plain(value: Any) -> Any:
-    """What JSON can hold, of mappings, sequences, sets, arrays, numbers and members of enumerations."""
+def plain(value: object) -> Any:
+    """Values that JSON can hold, of mappings, sequences, sets, arrays, numbers and members of enumerations."""
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):

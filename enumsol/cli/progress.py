@@ -49,7 +49,7 @@ class Display:
         self._timer.daemon = True
 
     def __enter__(self) -> Self:
-        """Nothing is shown yet."""
+        """Begin to listen; the bar appears later."""
         self._hearing.__enter__()
         if self._shown:
             self._timer.start()
@@ -112,7 +112,7 @@ class Display:
 
 
 def remaining(seconds: float, share: float, since: float = 0.0) -> str:
-    """How long it will take, if the rest is done as fast as the part so far, which was told some time ago.
+    """The time left, if the rest is done as fast as the part so far, which was told some time ago.
 
     Nothing before enough is done to tell, nor once that time has passed.
     """

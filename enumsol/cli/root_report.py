@@ -96,7 +96,7 @@ def roots_as_json(found: RootSet, problem: str) -> str:
     return "{\n" + ",\n".join(f"{json.dumps(key)}: {_lines(value)}" for key, value in plain(content).items()) + "\n}"
 
 
-def _lines(value: Any) -> str:
+def _lines(value: object) -> str:
     """JSON with one line per entry of a list of objects."""
     if isinstance(value, list) and value and isinstance(value[0], dict):
         return "[\n" + ",\n".join(json.dumps(item) for item in value) + "\n]"
@@ -104,7 +104,7 @@ def _lines(value: Any) -> str:
 
 
 def _mirror(images: MirrorImages) -> dict[str, Any]:
-    """What is known of the symmetry of the problem, after --mirror."""
+    """The symmetry of the problem, as far as --mirror shows it."""
     asymmetry = images.asymmetry
     return {
         "asymmetry": asymmetry.bound,

@@ -38,7 +38,7 @@ class _Guarded:
         self._empty = "" if isinstance(stream, io.TextIOBase) else b""
         self._failure = OutputError(f"{name} is closed; expected a terminal, a pipe or a file") if closed else None
 
-    def write(self, data: Any) -> int:
+    def write(self, data: str | bytes) -> int:
         if data == self._empty:
             return 0  # a library that asks whether the stream takes text or bytes; a full disk would refuse even that
         try:

@@ -40,9 +40,7 @@ def table(
     problem: ProblemArgument,
     first: Annotated[str | None, number("--from", "First alpha.")] = None,
     last: Annotated[str | None, number("--to", "Last alpha.")] = None,
-    samples: Annotated[
-        int, typer.Option(min=2, metavar="N", help="Number of evenly spaced alphas, including both ends.")
-    ] = 21,
+    samples: Annotated[int, count("Number of evenly spaced alphas, including both ends.", least=2, panel=None)] = 21,
     alphas: Annotated[
         str | None, typer.Option(metavar="LIST", help="A list of alphas instead, such as 1,2.5,8/3.")
     ] = None,
@@ -118,7 +116,7 @@ def _open(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def _gaps(frame: pd.DataFrame) -> pd.Series[bool]:
-    """Whether the counts of a row are lower bounds."""
+    """True in rows whose counts are lower bounds."""
     return frame["undecided"].gt(0) | frame["stopped"].notna()
 
 

@@ -169,7 +169,7 @@ def hull_distance(first: Floats, second: Floats) -> float:
 
 
 def _reason(problem: Problem, submission: Submission, values: Floats) -> str:
-    """What an answer violates most, in words."""
+    """The condition that an answer violates most, in words."""
     if not np.all(np.isfinite(values)):
         return "not all of its values are finite"
     if submission.displacements:

@@ -35,7 +35,7 @@ _ENDINGS = {PROBLEMS: ("npz", "h5"), CERTIFIED: ("json", "proof")}
 
 @dataclass(frozen=True)
 class CertifiedSolutions(Sealed):
-    """All solutions of a problem of the collection.
+    """Certified solutions of a problem of the collection, which has no others.
 
     Attributes
     ----------
@@ -115,7 +115,7 @@ class CollectionEntry:
         return Proof.load(DATA / CERTIFIED / f"{self.name}.proof")
 
     def certified(self) -> CertifiedSolutions:
-        """All its solutions."""
+        """The list of its solutions, which is complete."""
         found = json.loads((DATA / CERTIFIED / f"{self.name}.json").read_text(encoding="utf-8"))
         roots = [_forces(root["lambda_n"], root["lambda_t"]) for root in found["roots"]]
         return CertifiedSolutions(
@@ -138,7 +138,7 @@ class CollectionEntry:
         return f"{low:g}" if low == high else f"{low:g} to {high:g}"
 
 
-def _forces(normal: Any, tangential: Any) -> Floats:
+def _forces(normal: list[float], tangential: list[Any]) -> Floats:
     """Contact forces of all nodes, (p, d), the normal one first."""
     return np.column_stack([np.array(normal), np.array(tangential)])
 

@@ -1,4 +1,4 @@
-"""What `check` found: for every problem which solutions were found and missed, and which answers are spurious."""
+"""Reports of `check`: for every problem which solutions were found and missed, and which answers are spurious."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _PRINTED = 5
 
 @dataclass(frozen=True)
 class JudgedSolution:
-    """One answer of a solver.
+    """An answer of a solver.
 
     Attributes
     ----------
@@ -61,6 +61,11 @@ class JudgedSolution:
     def nearest_in_words(self) -> str:
         """The nearest certified solution, as in "root 2"."""
         return "" if self.nearest is None else f"{self.nearest[0]} {self.nearest[1]}"
+
+    def record(self) -> dict[str, Any]:
+        """A row of a table, and an entry in JSON."""
+        given = {"file": self.file, "answer": self.row, "found": self.found}
+        return given | {"nearest": self.nearest_in_words, "distance": self.distance, "reason": self.reason}
 
     def __str__(self) -> str:
         if self.found:
@@ -134,8 +139,33 @@ class ProblemReport:
         """Every solution was found, and every answer is one."""
         return not (self.missed_roots or self.missed_families or self.spurious)
 
+    def record(self) -> dict[str, Any]:
+        """Everything as numbers, texts and lists, for JSON."""
+        return {
+            "name": self.entry.name,
+            "found_roots": self.found_roots,
+            "missed_roots": self.missed_roots,
+            "found_families": self.found_families,
+            "missed_families": self.missed_families,
+            "spurious": len(self.spurious),
+            "repeated": self.repeated,
+            "answers": [answer.record() for answer in self.answers],
+        }
+
+    def row(self) -> tuple[str, ...]:
+        """A row of the printed table."""
+        counts = (
+            self.entry.roots + self.entry.families,
+            len(self.answers),
+            len(self.found_roots) + len(self.found_families),
+            len(self.missed_roots) + len(self.missed_families),
+            len(self.spurious),
+            self.repeated,
+        )
+        return (self.entry.name, *map(str, counts))
+
     def lines(self) -> list[str]:
-        """What was missed, and which answers are spurious, one line each."""
+        """Lines about missed solutions and spurious answers, one each."""
         missed = [f"missed root {k} ({self._about(k)})" for k in self.missed_roots]
         missed += [f"missed family {k}, a continuum" for k in self.missed_families]
         lines = []
@@ -187,54 +217,24 @@ largest residual is 3.1e-01 (dissipation)
 
     @property
     def ok(self) -> bool:
-        """All solutions of every problem that was tried were found, and every answer is one of them."""
+        """True if all solutions of every problem that was tried were found, and every answer is one of them."""
         return all(report.ok for report in self.problems)
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per answer: problem, file, answer, found, nearest, distance, reason."""
+        """A table with one row per answer: problem, file, answer, found, nearest, distance, reason."""
         import pandas as pd  # for frames only
 
-        columns = ("problem", "file", "answer", "found", "nearest", "distance", "reason")
-        rows = [
-            (report.entry.name, a.file, a.row, a.found, a.nearest_in_words, a.distance, a.reason)
-            for report in self.problems
-            for a in report.answers
-        ]
-        return pd.DataFrame(rows, columns=list(columns))
+        columns = ["problem", "file", "answer", "found", "nearest", "distance", "reason"]
+        rows = [{"problem": report.entry.name} | a.record() for report in self.problems for a in report.answers]
+        return pd.DataFrame(rows, columns=columns)
 
     def summary(self) -> dict[str, Any]:
         """Everything as numbers, texts and lists, for JSON."""
-        return {
-            "tolerance": self.tolerance,
-            "ok": self.ok,
-            "problems": [
-                {
-                    "name": report.entry.name,
-                    "found_roots": report.found_roots,
-                    "missed_roots": report.missed_roots,
-                    "found_families": report.found_families,
-                    "missed_families": report.missed_families,
-                    "spurious": len(report.spurious),
-                    "repeated": report.repeated,
-                    "answers": [
-                        {
-                            "file": a.file,
-                            "answer": a.row,
-                            "found": a.found,
-                            "nearest": a.nearest_in_words,
-                            "distance": a.distance,
-                            "reason": a.reason,
-                        }
-                        for a in report.answers
-                    ],
-                }
-                for report in self.problems
-            ],
-            "not_tried": self.not_tried,
-        }
+        about = {"tolerance": self.tolerance, "ok": self.ok}
+        return about | {"problems": [report.record() for report in self.problems], "not_tried": self.not_tried}
 
     def __repr__(self) -> str:
-        rows = [_HEADS, *map(_row, self.problems)]
+        rows = [_HEADS, *(report.row() for report in self.problems)]
         widths = [max(len(row[k]) for row in rows) for k in range(len(_HEADS))]
         table = [
             f"{row[0]:<{widths[0]}}  " + "  ".join(f"{c:>{w}}" for c, w in zip(row[1:], widths[1:], strict=True))
@@ -251,16 +251,3 @@ largest residual is 3.1e-01 (dissipation)
 
     def _repr_html_(self) -> str:
         return html_lines(repr(self).splitlines())
-
-
-def _row(report: ProblemReport) -> tuple[str, ...]:
-    entry = report.entry
-    counts = (
-        entry.roots + entry.families,
-        len(report.answers),
-        len(report.found_roots) + len(report.found_families),
-        len(report.missed_roots) + len(report.missed_families),
-        len(report.spurious),
-        report.repeated,
-    )
-    return (entry.name, *map(str, counts))

@@ -1,4 +1,4 @@
-"""What a solver found, in files: contact forces or displacements of one problem of the collection.
+"""Files with what a solver found: contact forces or displacements of one problem of the collection.
 
 A file belongs to the problem that its name begins with, up to the first dot. docs/collection.md describes the formats.
 """
@@ -49,7 +49,7 @@ class Submission:
 
 
 def read_submissions(place: Path) -> list[Submission]:
-    """All that a file, or a folder of files, holds; files that hold problems or are of other kinds are passed over.
+    """Solutions in a file, or in a folder of files; files that hold problems or are of other kinds are passed over.
 
     Raises
     ------
@@ -140,7 +140,7 @@ def _npz(file: Path) -> dict[str, Any]:
 
 
 def _json(file: Path) -> dict[str, Any]:
-    """One object with arrays, a list of objects, or what ``enumsol roots --json`` writes."""
+    """An object with arrays, a list of objects, or what ``enumsol roots --json`` writes."""
     content = json_from(file.read_bytes())
     if isinstance(content, dict) and isinstance(content.get("roots"), list):
         content = [*content["roots"], *_vertices(content.get("families", []))]

@@ -251,7 +251,7 @@ class Condensation(Sealed):
             Some rigid displacement moves no contact node.
         """
         if self.problem.held:
-            return np.zeros((0, 0))
+            return sealed(np.zeros((0, 0)))
         G = self.G / self.node_scale
         size = np.linalg.norm(G, axis=1)
         values, vectors = np.linalg.eigh(G @ G.T / np.outer(*(np.where(size > 0, size, 1.0),) * 2))

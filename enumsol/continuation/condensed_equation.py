@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 import scipy.sparse as sp
@@ -28,7 +29,6 @@ from enumsol.model.statuses import (
     active_within,
     contact_status,
 )
-from enumsol.roots.local_branch import LocalBranchTest, coherent_orientation
 from enumsol.support.arguments import instance_of, positive_number
 from enumsol.support.array_arguments import plain_array, real_array
 from enumsol.support.array_types import AlphaLike, ArrayLike, Codes, Floats, Mask, NDArray
@@ -164,7 +164,7 @@ class PiecewiseSmoothEquation:
 
 
 def pieces(rows: Mask) -> tuple[Mask, Floats, Floats]:
-    """What a selection takes, by the signs of its test functions, shape (p, 3), True where one is positive.
+    """Pieces of P that a selection takes, by the signs of its test functions, shape (p, 3), True where one is positive.
 
     Contact, the slip sign, and how often lambda_t + r u_t enters P: with P = [bound or trial] + [trial or -bound] -
     trial (1 for stick, 0 for slip, -1 for the fourth piece).
@@ -174,8 +174,9 @@ def pieces(rows: Mask) -> tuple[Mask, Floats, Floats]:
     return closed, slips, lower.astype(float) - upper.astype(float)
 
 
-#: Rows of the inequalities of every status, -1 where there is one only.
+#: Rows of the inequalities of every status, -1 where there is one only; and those over 1 + F.
 _KINDS = np.array([[*CONDITIONS[code].inequalities, -1][:2] for code in SIGNS])
+_CONES = [RowKind.CONE_PLUS, RowKind.CONE_MINUS]
 
 
 class CondensedEquation(ScaledEquation):
@@ -185,6 +186,9 @@ class CondensedEquation(ScaledEquation):
     """
 
     single_valued = True
+    neighbours = MappingProxyType(
+        {code: [[other for other, _ in ACROSS[code, kind]] for kind in CONDITIONS[code].inequalities] for code in SIGNS}
+    )
 
     # -- H and its selections ----------------------------------------------------------------------------------------
 
@@ -201,14 +205,6 @@ class CondensedEquation(ScaledEquation):
     def selection_at(self, x: Floats) -> Mask:
         """Sign rows of the selection that is active at x, shape (p, 3)."""
         return np.asarray(self.test_functions(x) > 0)
-
-    def residual(self, x: Floats) -> Floats:
-        """H(x) for each node's own r, shape (2p + r,)."""
-        return self._projected(x, np.ones(2 * self.p))
-
-    def merit(self, x: Floats) -> float:
-        """Norm of H(x) for the given r, which its Newton directions lower."""
-        return float(np.linalg.norm(self._projected(x, self.r)))
 
     def _projected(self, x: Floats, r: Floats) -> Floats:
         """H(x), piece by piece: no digits of w are lost where r is small, nor of lambda where it is large."""
@@ -261,88 +257,40 @@ class CondensedEquation(ScaledEquation):
         """Values of all rows in the order of RowKind, those of the cone over 1 + F, shape (7, p)."""
         F = self.at(x).F
         rows: Floats = row_values(x[: self.m], self.w(x), F)
-        rows[[RowKind.CONE_PLUS, RowKind.CONE_MINUS]] /= 1.0 + F
+        rows[_CONES] /= 1.0 + F
         return rows
 
     def _of_inequalities(self, codes: Codes, rows: Floats, missing: float) -> Floats:
         kinds = _KINDS[np.array(codes, dtype=np.intp)]
-        return np.where(kinds < 0, missing, rows[kinds, np.arange(self.p)[:, None]])
+        found: Floats = rows[kinds, np.arange(self.p)[:, None]]
+        found[kinds < 0] = missing
+        return found
 
     def slacks(self, codes: Codes, x: Floats) -> Floats:
-        """What must be >= 0 for the statuses to hold at a root, shape (p, 2); infinite where there is one condition."""
+        """Values that are >= 0 where the statuses hold, shape (p, 2); infinite where there is one condition."""
         return self._of_inequalities(codes, self._row_values(x), np.inf)
 
-    def slack_gradient(self, codes: Codes, x: Floats, which: tuple[int, int]) -> Floats:
-        """Gradient of one slack with respect to x, shape (2p + r + 1,)."""
-        (i, k), p, values = which, self.p, self.at(x)
-        row, kind = np.zeros(len(x)), CONDITIONS[codes[i]].inequalities[k]
-        if kind == RowKind.NORMAL_FORCE:
-            row[i] = 1.0
-        elif kind in (RowKind.CONE_PLUS, RowKind.CONE_MINUS):
-            F, dF = values.F[i], values.dF[i]
-            sign = -1.0 if kind == RowKind.CONE_PLUS else 1.0
-            row[i], row[p + i], row[-1] = F, sign, dF * x[i]
-            row /= 1.0 + F
-            row[-1] -= dF / (1.0 + F) ** 2 * (F * x[i] + sign * x[p + i])
-        else:
-            at, sign = (i, -1.0) if kind == RowKind.PENETRATION else (p + i, 1.0)
-            sign = -1.0 if kind == RowKind.SLIP_BACKWARD else sign
-            row[:-1], row[-1] = -sign * self.bordered[at], sign * values.dg[at]
-        return row
-
-    def slack_rates(self, codes: Codes, x: Floats, tangent: Floats) -> Floats:
-        """Derivatives of the slacks along a tangent, shape (p, 2); zero where there is one condition."""
-        p, values, da = self.p, self.at(x), tangent[-1]
-        F, dF, cone = values.F, values.dF * da, 1.0 + values.F
-        bound, t, dt = F * x[:p], x[p : 2 * p], tangent[p : 2 * p]
-        moved, turn = F * tangent[:p] + dF * x[:p], dF / cone
-        dw = (values.dg * da - self.bordered @ tangent[:-1])[: 2 * p]
-        plus, minus = (moved - dt - turn * (bound - t)) / cone, (moved + dt - turn * (bound + t)) / cone
-        rows = np.concatenate([tangent[: 2 * p], plus, minus, -dw[:p], dw[p:], -dw[p:]]).reshape(-1, p)
+    def slack_gradients(self, codes: Codes, x: Floats) -> Floats:
+        """Gradients of all slacks with respect to x, shape (p, 2, 2p + r + 1); zero where there is one condition."""
+        p, values = self.p, self.at(x)
+        rows: Floats = row_values(np.eye(self.m, len(x)), self._slopes(x), values.F[:, None])
+        rows[_CONES, :, -1] += values.dF * (x[:p] - self._row_values(x)[_CONES])
+        rows[_CONES] /= 1.0 + values.F[:, None]
         return self._of_inequalities(codes, rows, 0.0)
 
-    def across(self, code: int, k: int) -> Sequence[int]:
-        """The statuses on the other side of the k-th condition of a status."""
-        conditions = CONDITIONS[code].inequalities
-        return [other for other, _ in ACROSS[code, conditions[k]]] if k < len(conditions) else []
-
-    def flip(self, codes: Codes, x: Floats, which: tuple[int, int]) -> Codes:
-        """Statuses after one slack vanished: the selection whose sign row has that one sign changed."""
-        i, k = which
-        new = self.across(codes[i], k)[0]
-        if codes[i] == OPEN:
-            slip = self.w(x)[self.p + i]
-            new = FRICTIONLESS if self.frictionless[i] else (SLIP_PLUS if slip > 0 else SLIP_MINUS)
-        return (*codes[:i], new, *codes[i + 1 :])
+    def _touching(self, i: int, x: Floats) -> int:
+        return SLIP_PLUS if self.w(x)[self.p + i] > 0 else SLIP_MINUS
 
     def active(self, x: Floats, tolerance: float = STATUS_TOLERANCE) -> tuple[frozenset[int], ...]:
         """Per node the status codes whose equations and conditions hold within the tolerance."""
         return active_within(self._row_values(x), ~self.frictionless, tolerance)
 
-    def codes(self, x: Floats, prefer: Codes | None = None, tolerance: float = STATUS_TOLERANCE) -> Codes:
-        """Statuses at a solution by the signs of the test functions; ``prefer`` is kept where it holds too."""
-        # statuses of a solution do not depend on r
-        theta = self._test_functions(x, np.ones(2 * self.p))
-        active = None if prefer is None else self.active(x, tolerance)
-        out = []
-        for i in range(self.p):
-            if active is not None and prefer is not None and prefer[i] in active[i]:
-                out.append(prefer[i])
-            elif theta[i, 0] <= 0:
-                out.append(OPEN)
-            elif self.frictionless[i]:
-                out.append(FRICTIONLESS)
-            elif theta[i, 1] < 0 < theta[i, 2]:
-                out.append(STICK)
-            else:
-                out.append(SLIP_PLUS if theta[i, 1] + theta[i, 2] > 0 else SLIP_MINUS)
-        return tuple(out)
+    def _codes(self, x: Floats) -> Codes:
+        normal, upper, lower = self._test_functions(x, np.ones(2 * self.p)).T
+        slips = np.where(upper + lower > 0, SLIP_PLUS, SLIP_MINUS)
+        rubs = np.where((upper < 0) & (lower > 0), STICK, slips)
+        return tuple(np.where(normal <= 0, OPEN, np.where(self.frictionless, FRICTIONLESS, rubs)).tolist())
 
     def statuses(self, codes: Sequence[int], slip: Floats) -> tuple[ContactStatus, ...]:
         """Names of the statuses; a frictionless node in contact is named by the sign of its u_t."""
         return tuple(contact_status(code, float(u)) for code, u in zip(codes, slip, strict=True))
-
-    def local_test(self, x: Floats) -> LocalBranchTest:
-        """The local branch test at a point of a path; see ScaledEquation."""
-        F, slip = self.at(x).F, self.w(x)[self.p :]
-        return coherent_orientation(self.bordered, F, self.active(x), slip, self.alpha(x))

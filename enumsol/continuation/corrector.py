@@ -96,7 +96,7 @@ def smooth_newton(
     last = np.inf
     for _ in range(MAX_SMOOTH_ITERATIONS):
         if isinstance(row, tuple):
-            gradient = equation.slack_gradient(codes, x, row)
+            gradient = equation.slack_gradients(codes, x)[row]
             defect = equation.slacks(codes, x)[row] - value
         else:
             gradient, defect = row, row @ x - value

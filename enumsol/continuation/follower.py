@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 import numpy as np
 
 from enumsol.continuation.corrector import Correction, moore_penrose, smooth_newton
+from enumsol.continuation.landmarks import SAME_POINT, Landmarks
 from enumsol.continuation.path_data import PathData, PathStatus, PointKind
 from enumsol.continuation.recorder import PathRecorder
-from enumsol.continuation.scaled_equation import STATUS_TOLERANCE, ScaledEquation
+from enumsol.continuation.scaled_equation import STATUS_TOLERANCE
 from enumsol.continuation.tangents import RATE_TOLERANCE, Tangent, curve_tangent, orientation
 from enumsol.continuation.transitions import (
     FORWARD_TOLERANCE,
@@ -31,18 +32,16 @@ from enumsol.support.keeping import keeping
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Sequence
 
     from enumsol.continuation.start import Start
-    from enumsol.support.array_types import Codes, Floats
+    from enumsol.support.array_types import Floats
     from enumsol.support.keeping import Ending
 
 _Path = TypeVar("_Path", bound=PathData)
 
 #: Conditions may be negative by this much at a point that is converged to rounding.
 ROUNDING = 1e-12
-#: Two points closer than this are the same point of the solution set: located points agree to about 1e-10.
-SAME_POINT = 1e-7
 #: Without checks a transition point may lie behind by this times h_min or eps; steps are refused beyond it.
 UNCHECKED_REACH = 100.0
 #: Selection changes in a row without moving after which the path is stuck at a point where many selections meet.
@@ -63,6 +62,30 @@ class _Step:
 class _Stop:
     status: PathStatus
     message: str
+
+
+#: Why a path ended, in a sentence.
+_SENTENCES = {
+    PathStatus.STEP_LIMIT: "the limit of {steps} was reached at alpha = {alpha:g}; path.resume() continues",
+    PathStatus.FRICTION: "a friction coefficient becomes negative beyond alpha = {alpha:g}; expected F >= 0",
+    PathStatus.RIGID_BOUND: (
+        "the body moves as a whole along rigid mode {mode}, by which max_rigid_displacement was reached at "
+        "alpha = {alpha:g}: contact does not hold it there"
+    ),
+    PathStatus.INTERVAL_LEFT: (
+        "alpha left the interval ({low:g}, {high:g}) at {alpha:g}; path.resume(interval=...) continues"
+    ),
+    PathStatus.CLOSED: "the path returned to its start at alpha = {alpha:g}: a closed branch",
+    PathStatus.VISITED: "the path arrived at a point already visited, at alpha = {alpha:g}",
+    PathStatus.STALLED: (
+        "no step of length {least:g} or more was accepted at alpha = {alpha:g} ({reason}); a smaller h_min or h_init "
+        "may pass, and branch_graph shows which arcs meet there"
+    ),
+    PathStatus.DEAD_END: (
+        "no continuation keeps the orientation at alpha = {alpha:g}, where {others}; start anew there with "
+        "follow(tangent=k)"
+    ),
+}
 
 
 class Follower(Generic[_Path]):
@@ -87,12 +110,11 @@ class Follower(Generic[_Path]):
         self.equation, self.options, self.interval = start.equation, start.options, start.interval
         self.current, self.sign = first, sign
         self.h = self.options.h_init
-        self._origin = first
         self._in_place = 0
         self._friction_ends = False
         (low, high), margin, scale = self.interval, self.options.overshoot, self.equation.alpha_scale
         self._low, self._high = (low - margin) / scale, (high + margin) / scale
-        self._landmarks = list(_landmarks(self.equation, visited))
+        self._landmarks = Landmarks.of(self.equation, first, self.options.transition_tolerance, visited)
         self.record = PathRecorder(self.equation)
         self.record.add(first, PointKind.START)
 
@@ -127,18 +149,19 @@ class Follower(Generic[_Path]):
             _smooth_path=self._smooth_path,
         )
 
-    def _alpha(self) -> float:
-        return self.equation.alpha(self.current.x)
+    def _stop(self, status: PathStatus, alpha: float | None = None, **words: object) -> _Stop:
+        """The end of the path at an alpha, by default the current one."""
+        at = self.equation.alpha(self.current.x) if alpha is None else alpha
+        return _Stop(status, _SENTENCES[status].format(alpha=at, **words))
+
+    def _stalled(self, reason: str) -> _Stop:
+        return self._stop(PathStatus.STALLED, reason=reason, least=self.options.h_min)
 
     # -- one step of the paper's Algorithm 5.1 -----------------------------------------------------------------------
 
     def _advance(self) -> _Stop | None:
         if self.record.stats.accepted >= self.options.max_steps:
-            return _Stop(
-                PathStatus.STEP_LIMIT,
-                f"the limit of {counted(self.options.max_steps, 'step')} was reached at alpha = {self._alpha():g}; "
-                "path.resume() continues",
-            )
+            return self._stop(PathStatus.STEP_LIMIT, steps=counted(self.options.max_steps, "step"))
         if self.equation.moves_rigidly(self.current.tangent):
             return self._slide()
         step = self._step()
@@ -148,7 +171,7 @@ class Follower(Generic[_Path]):
         return self._take(step)
 
     def _slide(self) -> _Stop | None:
-        """Where the body moves as a whole at fixed forces: straight to the next transition point, or to the bound.
+        """Go straight to the next transition point, or to the bound, where the body moves as a whole at fixed forces.
 
         All conditions are affine along this line (theory, section 14.7).
         """
@@ -168,7 +191,7 @@ class Follower(Generic[_Path]):
         if stop is not None:
             return stop
         self._end(end)
-        return self._at_bound(int(np.argmin(room)))
+        return self._stop(PathStatus.RIGID_BOUND, mode=int(np.argmin(room)))
 
     def _step(self) -> _Step | None:
         """Steps 2-7 and 9: an accepted step, or None when even the shortest one fails."""
@@ -248,10 +271,7 @@ class Follower(Generic[_Path]):
         """Step 8: go to the next transition point of the current curve and leave it on another selection."""
         equation, options = self.equation, self.options
         if self._friction_ends:
-            return _Stop(
-                PathStatus.FRICTION,
-                f"a friction coefficient becomes negative beyond alpha = {self._alpha():g}; expected F >= 0",
-            )
+            return self._stop(PathStatus.FRICTION)
         arrival = next_kink(equation, self.current, self.sign, options.transition_tolerance)
         if arrival is None and not options.check_steps:
             reach = UNCHECKED_REACH * max(options.h_min, options.eps)
@@ -272,7 +292,9 @@ class Follower(Generic[_Path]):
         except TooLargeError as error:
             return self._stalled(str(error))
         if not keep:
-            return self._dead_end(arrival, len(others))
+            self._end(arrival)
+            count = counted(len(others), "other direction leaves", "other directions leave")
+            return self._stop(PathStatus.DEAD_END, others=count)
         index = self._index(keep)
         chosen = keep[index]
         alternatives = (*(t for k, t in enumerate(keep) if k != index), *others)
@@ -313,7 +335,7 @@ class Follower(Generic[_Path]):
         arrived = self._known(kink)
         self.record.add_kink(kink)
         self.current = kink.after
-        self._landmarks.append((kink.after.x, kink.after.codes, False))
+        self._landmarks.add(kink.after)
         return arrived
 
     def _piece(self, start: TangentPoint, end: TangentPoint) -> _Stop | None:
@@ -326,13 +348,27 @@ class Follower(Generic[_Path]):
             arrived = self._known(Kink(fold, fold))
             self.record.add_kink(Kink(fold, fold))
             self.current = start = fold
-            self._landmarks.append((fold.x, fold.codes, False))
+            self._landmarks.add(fold)
             if arrived is not None:
                 return arrived
         return self._border(start, end) or self._beyond(start, end) or self._return(start, end)
 
+    def _return(self, start: TangentPoint, end: TangentPoint) -> _Stop | None:
+        """The stop at the start or at a point of another path that lies between two points of one curve."""
+        found = self._landmarks.between(start, end, self.sign)
+        if found is None:
+            return None
+        point, status = found
+        self._end(point)
+        return self._stop(status, self.equation.alpha(point.x))
+
+    def _known(self, kink: Kink) -> _Stop | None:
+        """The stop at a transition point that is the start, or was passed before in either direction."""
+        status = self._landmarks.status_of(kink, moved=len(self.record.points) > 1)
+        return None if status is None else self._stop(status, self.equation.alpha(kink.before.x))
+
     def _beyond(self, start: TangentPoint, end: TangentPoint) -> _Stop | None:
-        """Where a body that nothing holds comes to the bound of its rigid displacement."""
+        """The stop where a body that nothing holds comes to the bound of its rigid displacement."""
         equation = self.equation
         here, there = equation.rigid(start.x), equation.rigid(end.x)
         sides = np.where(there < 0, -equation.reach, equation.reach)
@@ -343,15 +379,8 @@ class Follower(Generic[_Path]):
             x = smooth_newton(equation, end.codes, end.x, row, side, self.options.transition_tolerance)
             if x is not None:
                 self._end(TangentPoint(x, end.codes, end.tangent))
-            return self._at_bound(int(mode))
+            return self._stop(PathStatus.RIGID_BOUND, mode=int(mode))
         return None
-
-    def _at_bound(self, mode: int) -> _Stop:
-        return _Stop(
-            PathStatus.RIGID_BOUND,
-            f"the body moves as a whole along rigid mode {mode}, by which max_rigid_displacement was reached at "
-            f"alpha = {self._alpha():g}: contact does not hold it there",
-        )
 
     def _inside(self, x: Floats) -> bool:
         return bool(self._low <= x[-1] <= self._high)
@@ -368,102 +397,9 @@ class Follower(Generic[_Path]):
             x[-1] = value
             self._end(TangentPoint(x, end.codes, end.tangent))
         low, high = self.interval
-        return _Stop(
-            PathStatus.INTERVAL_LEFT,
-            f"alpha left the interval ({low:g}, {high:g}) at {self.equation.alpha_scale * value:g}; "
-            "path.resume(interval=...) continues",
-        )
-
-    def _return(self, start: TangentPoint, end: TangentPoint) -> _Stop | None:
-        if self._passes(start, end, self._origin.x, self._origin.codes):
-            self._end(self._origin)
-            return self._closed()
-        for x, codes, foreign in self._landmarks:
-            if foreign and self._passes(start, end, x, codes):
-                tangent = curve_tangent(self.equation, codes, x, self.sign)
-                self._end(TangentPoint(x, codes, start.tangent if tangent is None else tangent))
-                return self._visited(x)
-        return None
-
-    def _passes(self, start: TangentPoint, end: TangentPoint, x: Floats, codes: Codes) -> bool:
-        """True if the piece from start to end of one curve goes through a known point of the same selection."""
-        equation = self.equation
-        if codes != start.codes or equation.dot(x - start.x, start.tangent) <= FORWARD_TOLERANCE:
-            return False
-        if equation.dot(end.x - x, end.tangent) < -FORWARD_TOLERANCE:
-            return False
-        tangent = curve_tangent(equation, codes, x, self.sign)
-        if tangent is None:
-            return False
-        middle = TangentPoint(x, codes, tangent)
-        if not equation.single_valued and not self._on_piece(start, end, middle):
-            return False
-        return same_curve(equation, start, middle, sharp=True) and same_curve(equation, middle, end, sharp=True)
-
-    def _on_piece(self, start: TangentPoint, end: TangentPoint, point: TangentPoint) -> bool:
-        """True if the curve between two points runs through a third one, and not beside it on another curve."""
-        equation, row = self.equation, self.equation.metric @ point.tangent
-        chord = end.x - start.x
-        along = float(row @ chord)
-        share = float(row @ (point.x - start.x)) / along if along > 0 else 0.5
-        near = start.x + min(max(share, 0.0), 1.0) * chord
-        x = smooth_newton(equation, point.codes, near, row, float(row @ point.x), self.options.transition_tolerance)
-        return x is not None and equation.norm(x - point.x) <= SAME_POINT
-
-    def _known(self, kink: Kink) -> _Stop | None:
-        """A transition point that is the start, or was passed before in the same or the opposite direction."""
-        equation, x = self.equation, kink.before.x
-        if equation.norm(x - self._origin.x) <= SAME_POINT and kink.after.codes == self._origin.codes:
-            moved = len(self.record.points) > 1
-            if moved and equation.dot(kink.after.tangent, self._origin.tangent) > 0:
-                return self._closed()
-        for known, codes, foreign in self._landmarks:
-            same = codes == kink.after.codes or (foreign and codes == kink.before.codes)
-            if same and equation.norm(x - known) <= SAME_POINT:
-                return self._visited(x)
-        return None
+        return self._stop(PathStatus.INTERVAL_LEFT, self.equation.alpha_scale * value, low=low, high=high)
 
     def _end(self, point: TangentPoint) -> None:
         if self.equation.norm(point.x - self.record.last.x) > FORWARD_TOLERANCE:
             self.record.add(point, PointKind.END)
         self.current = point
-
-    def _closed(self) -> _Stop:
-        return _Stop(PathStatus.CLOSED, f"the path returned to its start at alpha = {self._alpha():g}: a closed branch")
-
-    def _visited(self, x: Floats) -> _Stop:
-        return _Stop(
-            PathStatus.VISITED, f"the path arrived at a point already visited, at alpha = {self.equation.alpha(x):g}"
-        )
-
-    def _stalled(self, reason: str) -> _Stop:
-        return _Stop(
-            PathStatus.STALLED,
-            f"no step of length {self.options.h_min:g} or more was accepted at alpha = {self._alpha():g} ({reason}); "
-            "a smaller h_min or h_init may pass, and branch_graph shows which arcs meet there",
-        )
-
-    def _dead_end(self, arrival: TangentPoint, others: int) -> _Stop:
-        self._end(arrival)
-        return _Stop(
-            PathStatus.DEAD_END,
-            f"no continuation keeps the orientation at alpha = {self._alpha():g}, where "
-            f"{counted(others, 'other direction leaves', 'other directions leave')}; start anew there with "
-            "follow(tangent=k)",
-        )
-
-
-def _landmarks(equation: ScaledEquation, visited: Sequence[PathData]) -> Iterator[tuple[Floats, Codes, bool]]:
-    """Starts, transition points and ends of other paths, with the statuses on both sides."""
-    for path in visited:
-        for k, kind in enumerate(path.kinds):
-            if kind is PointKind.STEP:
-                continue
-            forces = np.concatenate([path.lambda_n[k], path.lambda_t[k].ravel(order="F")])
-            rigid = None if path.rigid_coordinates is None else path.rigid_coordinates[k]
-            x = equation.point(float(path.alpha[k]), forces, rigid)
-            if not math.isfinite(float(np.sum(x))):
-                continue
-            codes = {tuple(int(c) for c in path.codes[k]), tuple(int(c) for c in path.codes[max(k - 1, 0)])}
-            for one in codes:
-                yield x, one, True

@@ -9,7 +9,7 @@ import numpy as np
 
 from enumsol.condensation.condensed import condensation_of
 from enumsol.continuation.condensed_equation import CondensedEquation
-from enumsol.continuation.space_equation import SpaceEquation
+from enumsol.continuation.disc_equation import DiscEquation
 from enumsol.continuation.start import check_problem, equation_on
 from enumsol.errors import EnumsolError, InvalidArgumentError
 from enumsol.model.statuses import OPEN, SLIP, STICK
@@ -96,7 +96,7 @@ def newton(
     smooth_path: SmoothPath | None = None,
     max_iterations: int = 100,
 ) -> Root:
-    """One root at alpha, by the piecewise smooth Newton method from any start.
+    """Root at alpha, by the piecewise smooth Newton method from any start.
 
     Every iteration solves the selection of H that is active at the iterate. Full steps are taken until a selection
     recurs; from then on a line search lowers the norm of H. Which root is found depends on the start; a start near a
@@ -150,7 +150,7 @@ def newton(
     forces, rigid = _start_values(start, problem.p, equation.m // problem.p, equation.modes)
     x = equation.point(value, forces, rigid)
     x = _iterate(equation, x, value, max_iterations)
-    if equation.modes or isinstance(equation, SpaceEquation):
+    if equation.modes or isinstance(equation, DiscEquation):
         return _root_of_floats(frozen, exact, equation, x)
     assert isinstance(equation, CondensedEquation)
     return build_root(frozen, exact if smooth_path is None else value, equation, x)

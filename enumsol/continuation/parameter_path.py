@@ -97,39 +97,32 @@ class PathValues:
     dF: Floats  # noqa: N815 (as above)
 
 
-class AffinePath:
-    """The problem's own friction and load, affine in alpha, also where friction would be negative (iterates)."""
+class ParameterPath:
+    """Friction and load over alpha, condensed to the contact nodes; a load by callables costs 2 p n products per alpha.
 
-    def __init__(self, problem: AnyProblem) -> None:
+    Parameters
+    ----------
+    problem : ContactProblem or ContactProblem3D
+    smooth : SmoothPath or None
+        None: the problem's own friction and load, affine in alpha, also where friction would be negative (iterates).
+    alpha : float
+        The start of the path, at which a smooth one is checked.
+
+    Raises
+    ------
+    InvalidArgumentError
+        A function of the smooth path gives no friction or no load at the start, or another derivative than its own.
+    """
+
+    def __init__(self, problem: AnyProblem, smooth: SmoothPath | None, alpha: float) -> None:
         self.problem: Any = problem
+        self._smooth, self._start = smooth, alpha
         self.condensed = condensed = condensation_of(problem)
-        self.friction = problem.affine_friction
-        h = condensed.h
-        self._load = np.append(condensed.g0, h[0]), np.append(condensed.g1, h[1])
-
-    def at(self, alpha: float) -> PathValues:
-        """Values at alpha."""
-        (g0, g1), (F0, F1) = self._load, self.friction
-        return PathValues(g0 + alpha * g1, F0 + alpha * F1, g1, F1)
-
-    @property
-    def frictionless(self) -> Mask:
-        """Nodes, in 3D nodes and axes, with F0 = F1 = 0."""
-        F0, F1 = self.friction
-        return np.asarray((F0 == 0) & (F1 == 0))
-
-
-class CallablePath:
-    """A SmoothPath condensed to the contact nodes; a load given by callables costs 2 p n multiplications per alpha."""
-
-    def __init__(self, problem: AnyProblem, smooth: SmoothPath, alpha: float) -> None:
-        self.problem: Any = problem
-        self._smooth = smooth
-        self._affine = AffinePath(problem)
-        self._start = alpha
-        self.condensed = self._affine.condensed
-        self._check_start(alpha)
-        self._check_derivatives(alpha)
+        (g0, g1), (h0, h1) = (condensed.g0, condensed.g1), condensed.h
+        self._load = np.append(g0, h0), np.append(g1, h1)
+        if smooth is not None:
+            self._check_start(alpha)
+            self._check_derivatives(smooth, alpha)
 
     def _check_start(self, alpha: float) -> None:
         """Refuse values that are not admissible friction or load at the start of the path."""
@@ -153,17 +146,16 @@ class CallablePath:
         for start in range(0, B.shape[0], RHS_BLOCK):
             block = B[start : start + RHS_BLOCK].T.toarray()
             rows[start : start + RHS_BLOCK] = problem.on_springs.factorization.solve(block).T
-        return rows if problem.held else np.vstack([rows, problem.modes.N.T])
+        return np.vstack([rows, problem.modes.N.T])
 
     def at(self, alpha: float) -> PathValues:
         """Values at alpha."""
-        values = self._affine.at(alpha)
-        g, F, dg, dF = values.g, values.F, values.dg, values.dF
         problem, smooth = self.problem, self._smooth
-        if smooth.F is not None and smooth.dF is not None:
-            F = _coefficients(smooth.F, alpha, "F", F.shape)
-            dF = _coefficients(smooth.dF, alpha, "dF", F.shape)
-        if smooth.f is not None and smooth.df is not None:
+        (g0, dg), (F0, dF) = self._load, problem.affine_friction
+        g, F = g0 + alpha * dg, F0 + alpha * dF
+        if smooth is not None and smooth.F is not None and smooth.dF is not None:
+            F, dF = _coefficients(smooth.F, alpha, "F", F.shape), _coefficients(smooth.dF, alpha, "dF", F.shape)
+        if smooth is not None and smooth.f is not None and smooth.df is not None:
             offset = np.concatenate([problem.gap, problem.slip_offset.ravel(order="F")])
             g = self._influence @ _evaluate(smooth.f, alpha, "f", (problem.n,))
             g[: len(offset)] -= offset
@@ -173,16 +165,14 @@ class CallablePath:
     @cached_property
     def frictionless(self) -> Mask:
         """Nodes, in 3D nodes and axes, with F = 0 and dF = 0 at the start, assumed to stay without friction."""
-        if self._smooth.F is None:
-            return self._affine.frictionless
         values = self.at(self._start)
         return np.asarray((values.F == 0) & (values.dF == 0))
 
-    def _check_derivatives(self, alpha: float) -> None:
+    def _check_derivatives(self, smooth: SmoothPath, alpha: float) -> None:
         """Compare the derivatives with central differences at the start: a wrong one stalls the corrections later."""
-        smooth, step = self._smooth, DIFFERENCE_STEP * max(abs(alpha), 1.0)
+        step = DIFFERENCE_STEP * max(abs(alpha), 1.0)
         for name, function, derivative, shape, evaluate in (
-            ("F", smooth.F, smooth.dF, self._affine.friction[0].shape, _coefficients),
+            ("F", smooth.F, smooth.dF, self.problem.affine_friction[0].shape, _coefficients),
             ("f", smooth.f, smooth.df, (self.problem.n,), _evaluate),
         ):
             if function is None or derivative is None:
@@ -199,10 +189,6 @@ class CallablePath:
                     f"SmoothPath.d{name} at alpha = {alpha:g} differs by {error:.2g} from a central difference of "
                     f"{name}; expected the derivative of {name} with respect to alpha"
                 )
-
-
-#: What the continuation needs to know about alpha.
-ParameterPath = AffinePath | CallablePath
 
 
 def _evaluate(function: PathFunction, alpha: float, name: str, shape: tuple[int, ...]) -> Floats:

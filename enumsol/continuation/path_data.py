@@ -246,7 +246,7 @@ class PathData(Sequence[PathPoint], Sealed):
     # -- output ------------------------------------------------------------------------------------------------------
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per point: alpha, kind, step, corrections, arclength; of every node X lambda_n_X, .., status_X.
+        """Table of points: alpha, kind, step, corrections, arclength; of every node X lambda_n_X, .., status_X.
 
         Of a body that nothing holds rigid_0, rigid_1, .. are the coordinates of its rigid displacement.
 

@@ -73,7 +73,7 @@ class PathRecorder:
         self.stats = replace(self.stats, **{name: getattr(self.stats, name) + n for name, n in changes.items()})
 
     def found(self) -> dict[str, Any]:
-        """What a PathData keeps of the points so far, by the names of its attributes."""
+        """Attributes of a PathData with the points so far, by the names of its attributes."""
         equation, p, points = self.equation, self.equation.p, [one.point for one in self.points]
         forces = np.array([equation.forces(point.x) for point in points])
         w = np.array([equation.displacements(point.x) for point in points])

@@ -28,13 +28,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.condensation.condensed import solved
+from enumsol.model.statuses import FRICTIONLESS, OPEN
+from enumsol.roots.local_branch import LocalBranchTest, coherent_orientation
+from enumsol.roots.slips import NodeSlips
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
     from enumsol.continuation.parameter_path import ParameterPath, PathValues
     from enumsol.model.statuses import ContactStatus
-    from enumsol.roots.local_branch import LocalBranchTest
     from enumsol.support.array_types import Codes, Floats, Mask
 
 
@@ -68,6 +70,8 @@ class ScaledEquation(ABC):
 
     #: A selection has one solution at most for an alpha at which it is regular.
     single_valued: bool
+    #: The statuses on the other side of the conditions of every status, in their order.
+    neighbours: Mapping[int, Sequence[Sequence[int]]]
 
     def __init__(
         self,
@@ -175,11 +179,11 @@ class ScaledEquation(ABC):
 
     @cached_property
     def reach(self) -> Floats:
-        """How large the components of q may be, (r,)."""
+        """Bounds of the components of q, (r,)."""
         return self.problem.modes.reach(self.problem.rigid_reach) if self.modes else np.zeros(0)
 
     def moves_rigidly(self, tangent: Floats) -> bool:
-        """Whether a curve with this unit tangent changes the rigid displacement alone."""
+        """True if a curve with this unit tangent changes the rigid displacement alone."""
         others = np.delete(tangent, slice(self.m, self.m + self.modes))
         return self.modes > 0 and bool(np.max(np.abs(others)) <= _RIGID_TOLERANCE)
 
@@ -197,6 +201,10 @@ class ScaledEquation(ABC):
     def w(self, x: Floats) -> Floats:
         """Scaled (u_n, u_t), shape (m,)."""
         return np.asarray(self.at(x).g[: self.m] - self.bordered[: self.m] @ x[:-1])
+
+    def _slopes(self, x: Floats) -> Floats:
+        """Gradients of w with respect to x, shape (m, m + r + 1)."""
+        return np.column_stack([-self.bordered, self.at(x).dg])[: self.m]
 
     def left(self, x: Floats) -> Floats:
         """Scaled h - G lambda, what contact does not carry of the load on the body as a whole, shape (r,)."""
@@ -216,17 +224,21 @@ class ScaledEquation(ABC):
 
     # -- H and its selections ----------------------------------------------------------------------------------------
 
-    @abstractmethod
     def residual(self, x: Floats) -> Floats:
         """H(x) for each node's own r, shape (m + r,).
 
         Solutions do not depend on r, and neither may the decision whether x is one: a tiny r would make any
         displacement small, and a huge one any rounding error large.
         """
+        return self._projected(x, np.ones(self.m))
 
-    @abstractmethod
     def merit(self, x: Floats) -> float:
         """Norm of H(x) for the given r, which its Newton directions lower."""
+        return float(np.linalg.norm(self._projected(x, self.r)))
+
+    @abstractmethod
+    def _projected(self, x: Floats, r: Floats) -> Floats:
+        """H(x) with these r by row, shape (m + r,)."""
 
     @abstractmethod
     def selection_at(self, x: Floats) -> Mask:
@@ -248,31 +260,48 @@ class ScaledEquation(ABC):
 
     @abstractmethod
     def slacks(self, codes: Codes, x: Floats) -> Floats:
-        """What must be >= 0 for the statuses to hold at a root, shape (p, 2); infinite where there is one condition."""
+        """Values that are >= 0 where the statuses hold, shape (p, 2); infinite where there is one condition."""
 
     @abstractmethod
-    def slack_gradient(self, codes: Codes, x: Floats, which: tuple[int, int]) -> Floats:
-        """Gradient of one slack with respect to x, shape (m + r + 1,)."""
+    def slack_gradients(self, codes: Codes, x: Floats) -> Floats:
+        """Gradients of all slacks with respect to x, shape (p, 2, m + r + 1); zero where there is one condition."""
 
-    @abstractmethod
     def slack_rates(self, codes: Codes, x: Floats, tangent: Floats) -> Floats:
         """Derivatives of the slacks along a tangent, shape (p, 2); zero where there is one condition."""
+        return np.asarray(self.slack_gradients(codes, x) @ tangent)
 
-    @abstractmethod
     def across(self, code: int, k: int) -> Sequence[int]:
         """The statuses on the other side of the k-th condition of a status; none where it has no such condition."""
+        conditions = self.neighbours[code]
+        return conditions[k] if k < len(conditions) else ()
+
+    def flip(self, codes: Codes, x: Floats, which: tuple[int, int]) -> Codes:
+        """Statuses after one slack vanished: a node that comes into contact slips at once."""
+        i, k = which
+        new = self.neighbours[codes[i]][k][0]
+        if codes[i] == OPEN:
+            new = FRICTIONLESS if self.frictionless[i] else self._touching(i, x)
+        return (*codes[:i], new, *codes[i + 1 :])
 
     @abstractmethod
-    def flip(self, codes: Codes, x: Floats, which: tuple[int, int]) -> Codes:
-        """Statuses after one slack vanished: the selection next to it across that condition."""
+    def _touching(self, i: int, x: Floats) -> int:
+        """Status of node i, which has friction and comes into contact."""
 
     @abstractmethod
     def active(self, x: Floats, tolerance: float = STATUS_TOLERANCE) -> tuple[frozenset[int], ...]:
         """Per node the status codes whose equations and conditions hold within the tolerance."""
 
-    @abstractmethod
     def codes(self, x: Floats, prefer: Codes | None = None, tolerance: float = STATUS_TOLERANCE) -> Codes:
         """Statuses at a solution by the signs of the test functions; ``prefer`` is kept where it holds too."""
+        found = self._codes(x)
+        if prefer is None:
+            return found
+        active = self.active(x, tolerance)
+        return tuple(old if old in held else new for old, new, held in zip(prefer, found, active, strict=True))
+
+    @abstractmethod
+    def _codes(self, x: Floats) -> Codes:
+        """Statuses at a solution, which do not depend on the r of H."""
 
     @abstractmethod
     def statuses(self, codes: Sequence[int], slip: Floats) -> tuple[ContactStatus, ...]:
@@ -289,7 +318,6 @@ class ScaledEquation(ABC):
             return 0
         return int(np.linalg.slogdet(J)[0])
 
-    @abstractmethod
     def local_test(self, x: Floats) -> LocalBranchTest:
         """The local branch test at a point of a path (theory, section 3.2).
 
@@ -298,3 +326,6 @@ class ScaledEquation(ABC):
         TooLargeError
             Too many selections hold there.
         """
+        F, (slip, force) = self.at(x).F, (self.split(part)[1] for part in (self.w(x), x[:-1]))
+        slips = NodeSlips.of(F, force, slip) if F.ndim == 2 else None
+        return coherent_orientation(self.bordered, F, self.active(x), slip, self.alpha(x), slips=slips)

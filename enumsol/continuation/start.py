@@ -9,9 +9,9 @@ import numpy as np
 
 from enumsol.continuation.condensed_equation import CondensedEquation
 from enumsol.continuation.continuation_options import ContinuationOptions
-from enumsol.continuation.parameter_path import AffinePath, CallablePath, SmoothPath
+from enumsol.continuation.disc_equation import DiscEquation
+from enumsol.continuation.parameter_path import ParameterPath, SmoothPath
 from enumsol.continuation.path_data import PathData
-from enumsol.continuation.space_equation import SpaceEquation
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import ContactProblem, check_is_problem
 from enumsol.support.arguments import alpha_value, instance_of, unbounded_interval
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import AlphaLike, Floats
 
 
-def check_problem(problem: Any, smooth_path: SmoothPath | None) -> None:
+def check_problem(problem: object, smooth_path: SmoothPath | None) -> None:
     """Refuse what continuation does not take.
 
     Raises
@@ -45,9 +45,8 @@ def equation_on(
     alpha_scale: float = 1.0,
 ) -> ScaledEquation:
     """The equation of a problem, on its own affine path or a smooth one; for the arguments see ScaledEquation."""
-    path = AffinePath(problem) if smooth_path is None else CallablePath(problem, smooth_path, start)
-    kind = CondensedEquation if isinstance(problem, ContactProblem) else SpaceEquation
-    return kind(path, interval, start, r, alpha_scale)
+    kind = CondensedEquation if isinstance(problem, ContactProblem) else DiscEquation
+    return kind(ParameterPath(problem, smooth_path, start), interval, start, r, alpha_scale)
 
 
 #: The default alpha scale is this fraction of the interval.

@@ -138,7 +138,7 @@ def describe(equation: ScaledEquation, codes: Codes, x: Floats, vector: Floats) 
 
 
 def _leaves_into(equation: ScaledEquation, codes: Codes, x: Floats, vector: Floats, tolerance: float) -> bool:
-    """Whether the conditions of the selection that vanish at x do not become negative along the vector."""
+    """True if no condition of the selection that vanishes at x becomes negative along the vector."""
     at_zero = equation.slacks(codes, x) <= tolerance
     rates = equation.slack_rates(codes, x, vector)
     return bool(np.all(rates[at_zero] >= -RATE_TOLERANCE))

@@ -16,6 +16,7 @@ import numpy as np
 from enumsol.continuation.corrector import smooth_newton
 from enumsol.continuation.scaled_equation import STATUS_TOLERANCE, ScaledEquation
 from enumsol.continuation.tangents import (
+    RANK_TOLERANCE,
     RATE_TOLERANCE,
     SAME_TANGENT,
     Tangent,
@@ -64,7 +65,7 @@ class Kink:
 
 
 def same_curve(equation: ScaledEquation, start: TangentPoint, end: TangentPoint, *, sharp: bool = False) -> bool:
-    """Whether ``end`` lies ahead of ``start`` on one smooth piece of a selection's curve, all of it admissible.
+    """True if ``end`` lies ahead of ``start`` on one smooth piece of a selection's curve, all of it admissible.
 
     The piece is judged by both tangents and by the cubic Hermite interpolants of all conditions: one that dips below
     zero in between shows that the curve was left and entered again. ``sharp`` allows turns up to a right angle.
@@ -88,7 +89,7 @@ def same_curve(equation: ScaledEquation, start: TangentPoint, end: TangentPoint,
 
 
 def _joined(equation: ScaledEquation, start: TangentPoint, end: TangentPoint, length: float) -> bool:
-    """Whether the curve runs near the cubic Hermite interpolant between two of its points, in its middle."""
+    """True if the curve runs near the cubic Hermite interpolant between two of its points, in its middle."""
     chord = end.x - start.x
     middle = start.x + 0.5 * chord + length / 8 * (start.tangent - end.tangent)
     row = equation.metric @ chord / length
@@ -241,10 +242,6 @@ def continuations(equation: ScaledEquation, arrival: TangentPoint, sign: int) ->
     return keep, [t for t in others if t.orientation != sign]
 
 
-#: Singular values of a selection's matrix below this fraction of the largest are zero: on a sheet they are so exactly.
-_RANK = 1e-10
-
-
 def selection_distance(equation: ScaledEquation, codes: Codes, x: Floats) -> float:
     """Distance of x from the solutions of one selection at the alpha of x; infinite when it has none there.
 
@@ -256,7 +253,7 @@ def selection_distance(equation: ScaledEquation, codes: Codes, x: Floats) -> flo
     rows = equation.selection(codes)
     to_metric = np.linalg.inv(np.linalg.cholesky(equation.metric[:-1, :-1]).T)
     left, sizes, right = np.linalg.svd(equation.jacobian(rows, x)[:, :-1] @ to_metric)
-    rank = int(np.sum(sizes > _RANK * sizes[0]))
+    rank = int(np.sum(sizes > RANK_TOLERANCE * sizes[0]))
     residual = left.T @ equation.selection_residual(rows, x)
     if np.linalg.norm(residual[rank:]) > STATUS_TOLERANCE:
         return math.inf
@@ -264,9 +261,9 @@ def selection_distance(equation: ScaledEquation, codes: Codes, x: Floats) -> flo
     kernel = to_metric @ right[rank:].T
     base = x + np.append(to_metric @ step, 0.0)
     slacks = equation.slacks(codes, base)
-    which = [(int(i), int(k)) for i, k in np.argwhere(np.isfinite(slacks))]
-    rates = np.array([equation.slack_gradient(codes, base, pair)[:-1] @ kernel for pair in which])
-    needed = -np.array([slacks[pair] for pair in which]) - STATUS_TOLERANCE
+    there = np.isfinite(slacks)
+    rates = equation.slack_gradients(codes, base)[there][:, :-1] @ kernel
+    needed = -slacks[there] - STATUS_TOLERANCE
     return math.hypot(float(np.linalg.norm(step)), _least_norm(rates, needed))
 
 

@@ -20,7 +20,7 @@ import scipy.sparse as sp
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem import mesh_checks
 from enumsol.fem.bases import FLAT, nodal_basis
-from enumsol.fem.restrained import Supports, axes_of, gathered, movable, plain_dofs, problem_of
+from enumsol.fem.restrained import Supports, axes_of, gathered, loaded, movable, problem_of, with_springs
 from enumsol.model.cells import numbers_of_nodes
 from enumsol.model.mesh import BodyMesh
 
@@ -260,16 +260,11 @@ def contact_problem(
     if np.any(entirely := np.all(supports.fixed[touching], axis=1)):
         node = int(touching[np.argmax(entirely)])
         raise InvalidArgumentError(f"contact names node {node}, which is held; expected free nodes only")
-    A = stiffness(nodes, bodies, lame)
-    if springs is not None:
-        A = sp.csc_array(A + sp.diags_array(mesh_checks.spring_stiffnesses(springs, nodes.shape).ravel()))
+    A = with_springs(stiffness(nodes, bodies, lame), springs, nodes.shape)
     normal = mesh_checks.unit_vectors(mesh_checks.vectors_of_all(normals, "normals", (len(touching), 2)), "normals")
     contact_nodes = movable(touching, normal, supports)
     problem = problem_of(
-        A,
-        mesh_checks.nodal_vectors(forces, "forces", nodes.shape),
-        None if forces_slope is None else mesh_checks.nodal_vectors(forces_slope, "forces_slope", nodes.shape),
-        plain_dofs(nodes.shape),
+        loaded(A, forces, forces_slope, nodes.shape),
         contact_nodes,
         axes_of(tangents, contact_nodes.normals),
         supports,

@@ -278,7 +278,7 @@ def facet_basis(basis: Any, facets: Integers, *, lumped: bool = False) -> Any:
     return FacetBasis(basis.mesh, basis.elem, facets=facets, intorder=FACET_DEGREE)
 
 
-def between_corners(element: Any) -> bool:
+def between_corners(element: object) -> bool:
     """True if facets are triangles of second order, of which the nodes between corners can be in contact."""
     from skfem import ElementTetP2  # as above
 

@@ -9,7 +9,7 @@ import numpy as np
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.bases import between_corners, facet_basis
 from enumsol.fem.mesh_checks import unit_vectors, vectors_of_all
-from enumsol.fem.restrained import Supports, axes_of, movable, problem_of
+from enumsol.fem.restrained import Body, Supports, axes_of, movable, problem_of
 from enumsol.support.arguments import shown
 from enumsol.support.array_arguments import plain_array, real_array, real_matrix
 
@@ -114,9 +114,8 @@ def basis_contact_problem(
     more = {"gap": [gap(place) for place in at] if callable(gap) else gap, "coordinates": at, **more}
     more.setdefault("node_ids", nodes.nodes.tolist())
     slope = None if forces_slope is None else _vector(forces_slope, "forces_slope", dofs.size)
-    return problem_of(
-        A, _vector(forces, "forces", dofs.size), slope, dofs, nodes, axes_of(tangents, nodes.normals), supports, **more
-    )
+    body = Body(A, _vector(forces, "forces", dofs.size), slope, dofs)
+    return problem_of(body, nodes, axes_of(tangents, nodes.normals), supports, **more)
 
 
 def _nodes_of(basis: Any) -> tuple[Integers, Floats]:
@@ -184,7 +183,7 @@ def _touching(basis: Any, facets: Integers, dofs: Integers) -> Integers:
     return np.flatnonzero(np.all(on_facets[dofs], axis=1))
 
 
-def _check_pressed(basis: Any, facets: Integers, dofs: Integers, touching: Integers) -> None:
+def _check_pressed(basis: object, facets: Integers, dofs: Integers, touching: Integers) -> None:
     """Refuse nodes that a uniform pressure pulls at, or does not act on."""
     shares = integrals_over(basis, facets, lambda v, _: v[0])[dofs[touching, 0]]
     if np.min(shares) <= _NO_PRESSURE * np.max(shares):
@@ -202,7 +201,7 @@ def _normals(basis: Any, facets: Integers, touching: Integers, dofs: Integers, p
     return unit_vectors(pressed(integrals, touching), "normals of the boundary")
 
 
-def integrals_over(basis: Any, facets: Integers, form: Callable[[Any, Any], Any]) -> Floats:
+def integrals_over(basis: object, facets: Integers, form: Callable[[Any, Any], Any]) -> Floats:
     """Integrals over facets of a linear form, by degrees of freedom; lumped as in `NodalBasis.on_part`."""
     from skfem import LinearForm  # here, too
 
@@ -227,7 +226,7 @@ def pressed(vectors: Floats, nodes: Integers) -> Floats:
     return vectors
 
 
-def _vector(value: Any, name: str, size: int) -> Floats:
+def _vector(value: object, name: str, size: int) -> Floats:
     if value is None:
         return np.zeros(size)
     array = real_array(value, name, error=InvalidArgumentError)

@@ -21,6 +21,7 @@ from enumsol.support.array_arguments import real_array, short_vector
 if TYPE_CHECKING:
     from enumsol.fem.bases import NodalBasis
     from enumsol.fem.meshes import PartedMesh
+    from enumsol.fem.options import Options
     from enumsol.support.array_types import Floats, Integers, Mask
 
 #: Positions in a plane of symmetry may differ from it by this share of the extent of the body.
@@ -42,7 +43,7 @@ _OBSTACLES: dict[str, dict[int, tuple[str, ...]]] = {
 }
 
 
-def names_of(value: Any, name: str) -> list[str]:
+def names_of(value: object, name: str) -> list[str]:
     """Value as names of parts: a text, or several."""
     names = [value] if isinstance(value, str) else value
     if not isinstance(names, (list, tuple)) or not all(isinstance(part, str) for part in names):
@@ -50,7 +51,7 @@ def names_of(value: Any, name: str) -> list[str]:
     return list(names)
 
 
-def by_part(value: Any, name: str) -> dict[str, Any]:
+def by_part(value: object, name: str) -> dict[str, Any]:
     """Value as a mapping of names of parts."""
     if value is None:
         return {}
@@ -77,6 +78,24 @@ class Held:
         #: Components across a plane of symmetry.
         self.mirrored = np.zeros(mesh.points.shape, dtype=bool)
 
+    @classmethod
+    def of(cls, mesh: PartedMesh, options: Options) -> Held:
+        """Displacements that the options clamp, symmetry and displacement give.
+
+        Raises
+        ------
+        InvalidArgumentError
+            One names no part or is not of its form, or they contradict each other.
+        """
+        held = cls(mesh)
+        for part in names_of(options.clamp, "clamp"):
+            held.clamp(part)
+        for part in names_of(options.symmetry, "symmetry"):
+            held.mirror(part)
+        for part, value in by_part(options.displacement, "displacement").items():
+            held.displace(part, value)
+        return held
+
     @property
     def supports(self) -> Supports:
         """All of them."""
@@ -87,7 +106,7 @@ class Held:
         for component in range(self._mesh.points.shape[1]):
             self._fix(part, self._mesh.nodes(part), component, 0.0)
 
-    def displace(self, part: str, value: Any) -> None:
+    def displace(self, part: str, value: object) -> None:
         """Move the nodes of a part by given components; ``free`` or None leaves one free.
 
         Raises
@@ -267,7 +286,7 @@ def rigid_motions(places: Floats) -> Floats:
 # -- loads and springs -----------------------------------------------------------------------------------------------
 
 
-def part_forces(body: NodalBasis, mesh: PartedMesh, loads: Any, pressures: Any, slope: str = "") -> Floats:
+def part_forces(body: NodalBasis, mesh: PartedMesh, loads: object, pressures: object, slope: str = "") -> Floats:
     """Nodal forces (N, d) of tractions and of pressures, which push into the body, on parts."""
     from skfem.helpers import dot  # as in nodal_basis
 
@@ -275,7 +294,7 @@ def part_forces(body: NodalBasis, mesh: PartedMesh, loads: Any, pressures: Any, 
     for part, value in by_part(loads, f"load{slope}").items():
         traction = short_vector(value, f"load{slope} of {part}", dimension)
 
-        def along(v: Any, _: Any, t: Floats = traction[:, None, None]) -> Any:
+        def along(v: object, _: object, t: Floats = traction[:, None, None]) -> Any:
             return dot(t, v)
 
         total += body.on_part(mesh.part(part), part, along)
@@ -289,7 +308,7 @@ def part_forces(body: NodalBasis, mesh: PartedMesh, loads: Any, pressures: Any, 
     return total
 
 
-def part_springs(body: NodalBasis, mesh: PartedMesh, springs: Any) -> sp.csc_array:
+def part_springs(body: NodalBasis, mesh: PartedMesh, springs: object) -> sp.csc_array:
     """Stiffness (dN, dN) of springs between parts and the ground, lumped at the nodes."""
     from skfem.helpers import dot  # as above
 
@@ -339,7 +358,7 @@ class Obstacle:
     radius: float = 0.0
 
     @classmethod
-    def of(cls, value: Any, dimension: int) -> Obstacle:
+    def of(cls, value: object, dimension: int) -> Obstacle:
         """The obstacle that a mapping of its kind to numbers describes.
 
         Raises
@@ -367,7 +386,7 @@ class Obstacle:
 
     @property
     def expected(self) -> str:
-        """What a user may have meant by an obstacle behind the boundary."""
+        """Words on what a user may have meant by an obstacle behind the boundary."""
         if self.kind == "plane":
             return "the direction from the plane to the body after its point"
         others = "circle or sphere" if self.kind == "hole" else "hole"

@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.basis_problems import outward_normal, pressed
-from enumsol.fem.conditions import Held, Obstacle
+from enumsol.fem.conditions import Held, Obstacle, names_of
 from enumsol.fem.mesh_checks import unit_vectors
 from enumsol.fem.pairs import Pair, faced
 from enumsol.fem.restrained import ContactNodes, means_of_nodes, movable
 from enumsol.model.cells import boundary_facets, contact_nodes, facet_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from enumsol.fem.bases import NodalBasis
     from enumsol.fem.meshes import PartedMesh
+    from enumsol.fem.options import Options
     from enumsol.support.array_types import Floats, Integers
 
 #: Cosine of the angle from which on a normal of the boundary points away from an obstacle, but for rounding.
@@ -81,9 +80,7 @@ class Contacts:
     groups: list[Group]
 
 
-def contacts_of(
-    body: NodalBasis, mesh: PartedMesh, parts: Sequence[str], pairs: Sequence[Pair], held: Held, obstacle: Any
-) -> Contacts:
+def contacts_of(body: NodalBasis, mesh: PartedMesh, options: Options, held: Held) -> Contacts:
     """Contact nodes on the facets of parts, and of the first part of every pair.
 
     A node that several of them share belongs to the contact parts, or to the first pair.
@@ -94,15 +91,18 @@ def contacts_of(
         There are no parts, one does not exist or is not on the boundary, or there is a node that cannot be one: held in
         some components only, without a normal, or at the centre of an obstacle; or no node of a pair faces anything.
     """
+    parts, pairs = names_of(options.contact, "contact"), Pair.all_of(options.pairs)
     if not parts and not pairs:
         raise InvalidArgumentError("contact names no part; expected the contact boundary, or pairs")
     found: list[tuple[ContactNodes, Floats, Group]] = []
-    groups: list[tuple[list[str], Pair | None]] = [(list(parts), None)] if parts else []
+    groups: list[tuple[list[str], Pair | None]] = [(parts, None)] if parts else []
     groups += [([pair.slave], pair) for pair in pairs]
     on, areas, taken = [], [], np.zeros(0, dtype=np.int64)
     for names, pair in groups:
         facets = _facets(body, mesh, names)
-        rows, gaps, group = _group(body, mesh, names, facets, held, obstacle if pair is None else None, pair, taken)
+        rows, gaps, group = _group(
+            body, mesh, names, facets, held, options.obstacle if pair is None else None, pair, taken
+        )
         found.append((rows, gaps, group))
         on.append(facets)
         areas.append(body.on_part(facets, names[0], lambda v, _: v[0], lumped=True)[rows.nodes, 0])
@@ -147,7 +147,7 @@ def _group(
     parts: list[str],
     facets: Integers,
     held: Held,
-    obstacle: Any,
+    obstacle: object,
     pair: Pair | None,
     taken: Integers,
 ) -> tuple[ContactNodes, Floats, Group]:

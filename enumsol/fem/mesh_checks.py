@@ -5,7 +5,7 @@ Each function gives the value in a plain type and raises InvalidArgumentError fo
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -71,7 +71,7 @@ def check_every_node_is_used(cells: Integers, count: int, name: str, kind: str) 
         raise InvalidArgumentError(f"{name} leave node {lone} out; expected every node in some {kind}")
 
 
-def lame_coefficients(value: Any, dimension: int) -> tuple[float, float]:
+def lame_coefficients(value: object, dimension: int) -> tuple[float, float]:
     """Value as the Lame coefficients (l, m) of a body, in plane strain or in 3D, that make its energy positive."""
     lam, mu = (float(entry) for entry in short_vector(value, "lame", 2))
     if not (mu > 0 and dimension * lam + 2 * mu > 0):

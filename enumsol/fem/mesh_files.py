@@ -105,7 +105,7 @@ def read_solid(source: str | os.PathLike[str] | Any, groups: str | None = None) 
     return cast("SolidMesh", _read(source, groups, 3))
 
 
-def _read(source: Any, groups: str | None, dimension: int | None) -> PartedMesh:
+def _read(source: object, groups: str | None, dimension: int | None) -> PartedMesh:
     meshio = MissingDependencyError.imported("meshio", "Meshes in files", "meshes")
     if isinstance(source, meshio.Mesh):
         return _checked(source, groups, dimension, None, "")
@@ -153,7 +153,7 @@ def _refuse_torn(place: Path) -> None:
         return  # damaged: meshio has said how
 
 
-def _checked(mesh: Any, groups: str | None, dimension: int | None, place: Path | None, said: str) -> PartedMesh:
+def _checked(mesh: object, groups: str | None, dimension: int | None, place: Path | None, said: str) -> PartedMesh:
     deck = None
     try:
         if place is not None and place.suffix.lower() == _DECK:
@@ -303,7 +303,7 @@ def _tags(
     return None, {}, False
 
 
-def _families(mesh: Any, name: str) -> dict[int, list[str]]:
+def _families(mesh: object, name: str) -> dict[int, list[str]]:
     """The names of the groups that each family of a MED file belongs to."""
     return {int(tag): [str(group) for group in members] for tag, members in getattr(mesh, name, {}).items()}
 

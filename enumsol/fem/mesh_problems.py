@@ -7,7 +7,8 @@ import inspect
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.fem.scenes import Scene, refuse_old_friction
+from enumsol.fem.options import Options, refuse_old_friction
+from enumsol.fem.scenes import Scene
 from enumsol.support.arguments import file_path, shown, text_of
 from enumsol.support.files import unreadable
 from enumsol.support.messages import shortened
@@ -20,12 +21,10 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from enumsol.fem.meshes import PartedMesh
+    from enumsol.fem.options import Names, Plane, Vectors
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import ArrayLike
 
-    Names = str | Sequence[str]
-    Vectors = Mapping[str, ArrayLike] | None
-    Plane = Literal["strain", "stress"]
 
 T = TypeVar("T")
 #: What ``pairs`` may be called in TOML files.
@@ -155,14 +154,13 @@ def mesh_problem(
     >>> problem.n, problem.p
     (24, 4)
     """
-    given = {
-        "young": young, "poisson": poisson, "contact": contact, "pairs": pairs, "plane": plane,
-        "thickness": thickness, "friction": friction, "friction_slope": friction_slope, "friction2": friction2,
-        "friction2_slope": friction2_slope, "axis": axis, "clamp": clamp, "symmetry": symmetry,
-        "displacement": displacement, "spring": spring, "load": load, "load_slope": load_slope, "pressure": pressure,
-        "pressure_slope": pressure_slope, "body_force": body_force, "gap": gap, "obstacle": obstacle,
-        "max_rigid_displacement": max_rigid_displacement, "groups": groups,
-    }  # fmt: skip
+    given = Options(
+        young=young, poisson=poisson, contact=contact, pairs=pairs, plane=plane, thickness=thickness,
+        friction=friction, friction_slope=friction_slope, friction2=friction2, friction2_slope=friction2_slope,
+        axis=axis, clamp=clamp, symmetry=symmetry, displacement=displacement, spring=spring,
+        load=load, load_slope=load_slope, pressure=pressure, pressure_slope=pressure_slope, body_force=body_force,
+        gap=gap, obstacle=obstacle, max_rigid_displacement=max_rigid_displacement, groups=groups,
+    )  # fmt: skip
     return Scene.of(mesh, given).problem()
 
 
@@ -202,7 +200,7 @@ def mesh_scene(mesh: PartedMesh | str | os.PathLike[str] | Any, **options: Any) 
     """
     check_keys(options)
     known = inspect.signature(mesh_problem).parameters.items()
-    return Scene.of(mesh, {name: options.get(name, of.default) for name, of in known if name != "mesh"})
+    return Scene.of(mesh, Options(**{name: options.get(name, of.default) for name, of in known if name != "mesh"}))
 
 
 def read_mesh_problem(path: str | os.PathLike[str]) -> AnyProblem:
@@ -254,7 +252,7 @@ def read_mesh_scene(path: str | os.PathLike[str]) -> Scene:
     return _of_file(path, lambda scene: scene)
 
 
-def _of_file(path: Any, made: Callable[[Scene], T]) -> T:
+def _of_file(path: object, made: Callable[[Scene], T]) -> T:
     place = file_path(path, "path")
     try:
         options = _toml(place)

@@ -93,7 +93,7 @@ def h1_norms(problem: ContactProblem3D) -> MeshNorms:
     if problem.mesh is None or problem.areas is None:
         raise InvalidArgumentError("problem has no mesh or no areas; expected one made of a mesh")
 
-    def product(u: Any, v: Any, _: Any) -> Any:
+    def product(u: object, v: object, _: object) -> Any:
         return dot(u, v) + ddot(grad(u), grad(v))
 
     # products of linear functions have degree two: exact on tetrahedra and parallelepipeds

@@ -66,7 +66,7 @@ class Pair:
         return cls(names[0], names[1], gap)
 
     @classmethod
-    def all_of(cls, value: Any) -> list[Pair]:
+    def all_of(cls, value: object) -> list[Pair]:
         """Every pair of a list.
 
         Raises
@@ -174,7 +174,7 @@ class _Shape:
 
     @classmethod
     def of(cls, dimension: int, nodes: int) -> _Shape:
-        """That of edges or of facets of solids."""
+        """Facing of edges, or of facets of solids."""
         import skfem  # as in nodal_basis
 
         if dimension == 2:
@@ -220,14 +220,14 @@ class _Facets:
 
     @classmethod
     def of(cls, points: Floats, facets: Integers) -> _Facets:
-        """Those of these nodes."""
+        """Facing of these nodes."""
         shape, places = _Shape.of(points.shape[1], facets.shape[1]), points[facets]
         centres = np.einsum("m,fmd->fd", shape.values(shape.centre[None])[:, 0], places)
         far = np.max(np.linalg.norm(places - centres[:, None], axis=2), axis=1, initial=0.0)
         return cls(shape, places, centres, _BULGE * far)
 
     def on_line(self, point: Floats, normal: Floats, tolerance: float) -> tuple[Floats, Floats, Integers]:
-        """Where a line meets them, by Newton's method: places in facets, distances along it, and which facets."""
+        """Places in facets where a line meets them, by Newton's method, distances along it, and which facets."""
         offset = self.centres - point
         ahead = offset @ normal
         across = np.linalg.norm(offset - ahead[:, None] * normal, axis=1)

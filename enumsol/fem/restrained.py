@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.mesh_checks import unit_vectors, vectors_of_all
+from enumsol.fem.mesh_checks import nodal_vectors, spring_stiffnesses, unit_vectors, vectors_of_all
 from enumsol.model.problem import ContactProblem
 from enumsol.support.arguments import shown
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from enumsol.model.mesh import BodyMesh
     from enumsol.model.problem3d import AnyProblem
-    from enumsol.support.array_types import Floats, Integers, Mask
+    from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
 
 #: Components of unit normals below this are rounding of a right angle.
 RIGHT_ANGLE = 1e-9
@@ -138,20 +138,33 @@ def check_axes(contact: ContactRows, tangents: tuple[Floats, ...]) -> None:
 
 
 @dataclass(frozen=True)
-class Restrained:
-    """Matrices and vectors by the degrees of freedom that are left.
+class Body:
+    """A body before its supports, by degrees of freedom.
 
     Attributes
     ----------
     A, f, load_slope : as in `ContactProblem`
-    left : (n,) int array
-        The degree of freedom of the body that each is.
+    dofs : (N, dimension) int array or None
+        The rows of A that the components of the nodes are; None: ``dimension node + component``.
     """
 
     A: sp.csc_array
     f: Floats
     load_slope: Floats | None
-    left: Integers
+    dofs: Integers | None = None
+
+
+def with_springs(stiffness: sp.csc_array, springs: ArrayLike | None, shape: tuple[int, ...]) -> sp.csc_array:
+    """Stiffness with springs from every node to the ground."""
+    if springs is None:
+        return stiffness
+    return sp.csc_array(stiffness + sp.diags_array(spring_stiffnesses(springs, shape).ravel()))
+
+
+def loaded(A: sp.csc_array, forces: ArrayLike | None, slope: ArrayLike | None, shape: tuple[int, ...]) -> Body:
+    """Body under forces on its nodes, and their derivative with respect to alpha."""
+    f = nodal_vectors(forces, "forces", shape)
+    return Body(A, f, None if slope is None else nodal_vectors(slope, "forces_slope", shape))
 
 
 def displacements_along(means: sp.csr_array, directions: Floats, dofs: Integers, left: Integers) -> sp.csr_array:
@@ -164,27 +177,6 @@ def displacements_along(means: sp.csr_array, directions: Floats, dofs: Integers,
     rows = sp.csr_array(every[:, left])
     rows.eliminate_zeros()
     return rows
-
-
-def restrained(
-    A: sp.csc_array, forces: Floats, forces_slope: Floats | None, dofs: Integers, supports: Supports, apart: Mask
-) -> Restrained:
-    """The body by the degrees of freedom that are left, in the order of the rows of A.
-
-    ``dofs`` (N, dimension) are the rows of A that the components of the nodes are.
-    """
-    fixed, uncoupled, moved = np.zeros(len(forces), bool), np.zeros(len(forces), bool), np.zeros(len(forces))
-    fixed[dofs], uncoupled[dofs], moved[dofs] = supports.fixed, apart, np.where(supports.fixed, supports.values, 0.0)
-    left = np.flatnonzero(~fixed | uncoupled)
-    load = forces - A @ moved if np.any(moved) else forces
-    kept = np.where(uncoupled, 0.0, 1.0)[left]
-    stiffness = sp.csc_array(A[left][:, left])
-    if np.any(uncoupled):
-        coupled = sp.diags_array(kept)
-        own = sp.diags_array(np.where(kept == 0, stiffness.diagonal(), 0.0))
-        stiffness = sp.csc_array(coupled @ stiffness @ coupled + own)
-    slope = None if forces_slope is None else kept * forces_slope[left]
-    return Restrained(stiffness, kept * load[left], slope, left)
 
 
 def gathered(cells: Integers, shares: Floats, density: Floats, count: int) -> Floats:
@@ -207,10 +199,7 @@ _NEAR_X = 0.9
 
 
 def problem_of(
-    A: sp.csc_array,
-    forces: Floats,
-    forces_slope: Floats | None,
-    dofs: Integers,
+    body: Body,
     contact: ContactRows,
     axes: tuple[Floats, ...],
     supports: Supports,
@@ -218,15 +207,15 @@ def problem_of(
     modes: Floats | None = None,
     **more: Any,
 ) -> AnyProblem:
-    """The problem of a body with these contact rows.
+    """Problem of a body with these contact rows, by the degrees of freedom that are left, in the order of its rows.
 
     Parameters
     ----------
-    A, forces, forces_slope, dofs, supports
-        As in `restrained`.
+    body : Body
     contact : ContactRows
     axes : tuple of one or two (p, dimension) arrays
         Tangents of the contact rows, see `axes_of`.
+    supports : Supports
     mesh : callable or None
         What the problem keeps of its mesh, from the degrees of freedom that are left.
     modes : (d N, r) array or None
@@ -246,11 +235,23 @@ def problem_of(
         The body is free to move as a rigid body, or the data are not admissible.
     """
     check_axes(contact, axes)
-    body = restrained(A, forces, forces_slope, dofs, supports, contact.apart)
-    rows = (displacements_along(contact.means, axis, dofs, body.left) for axis in (contact.normals, *axes))
-    arrays: tuple[Any, ...] = (body.A, *rows, body.f)
-    more |= {"load_slope": body.load_slope, "mesh": None if mesh is None else mesh(body.left)}
-    more["rigid_modes"] = None if modes is None else modes[body.left]
+    dofs, load = plain_dofs(supports.fixed.shape) if body.dofs is None else body.dofs, body.f
+    fixed, uncoupled, moved = np.zeros(len(load), bool), np.zeros(len(load), bool), np.zeros(len(load))
+    fixed[dofs], uncoupled[dofs] = supports.fixed, contact.apart
+    moved[dofs] = np.where(supports.fixed, supports.values, 0.0)
+    left = np.flatnonzero(~fixed | uncoupled)
+    if np.any(moved):
+        load = load - body.A @ moved
+    kept = np.where(uncoupled, 0.0, 1.0)[left]
+    A = sp.csc_array(body.A[left][:, left])
+    if np.any(uncoupled):
+        coupled = sp.diags_array(kept)
+        A = sp.csc_array(coupled @ A @ coupled + sp.diags_array(np.where(kept == 0, A.diagonal(), 0.0)))
+    rows = (displacements_along(contact.means, axis, dofs, left) for axis in (contact.normals, *axes))
+    arrays: tuple[Any, ...] = (A, *rows, kept * load[left])
+    more["load_slope"] = None if body.load_slope is None else kept * body.load_slope[left]
+    more["mesh"] = None if mesh is None else mesh(left)
+    more["rigid_modes"] = None if modes is None else modes[left]
     if dofs.shape[1] == 2:
         return ContactProblem(*arrays, **more)
     from enumsol.model.problem3d import ContactProblem3D  # not for problems in 2D
@@ -258,8 +259,8 @@ def problem_of(
     return ContactProblem3D(*arrays, **more)
 
 
-def axes_of(tangents: Any, normals: Floats) -> tuple[Floats, ...]:
-    """One tangent (p, 2) or two (p, 3) for normals (p, 2) or (p, 3).
+def axes_of(tangents: object, normals: Floats) -> tuple[Floats, ...]:
+    """Tangents for normals (p, 2) or (p, 3): one (p, 2), or two (p, 3).
 
     Parameters
     ----------
@@ -293,7 +294,7 @@ def _plane_axes(tangents: Any, normal: Floats) -> tuple[Floats]:
     return (tangent,)
 
 
-def _space_axes(tangents: Any, normal: Floats) -> tuple[Floats, Floats]:
+def _space_axes(tangents: object, normal: Floats) -> tuple[Floats, Floats]:
     if tangents is None:
         return default_axes(normal)
     if not (isinstance(tangents, (tuple, list)) and len(tangents) == 2):

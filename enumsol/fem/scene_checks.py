@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -16,6 +15,7 @@ from enumsol.fem.file_counts import taken_as
 from enumsol.fem.mesh_checks import unit_vectors
 from enumsol.fem.meshes import PartedMesh
 from enumsol.fem.pairs import faced
+from enumsol.fem.scene_data import SceneData
 from enumsol.fem.tangles import SAME, refuse_tangles, unjoined
 from enumsol.model.cells import boundary_facets
 from enumsol.support.array_types import Floats, Integers, Mask
@@ -41,12 +41,12 @@ _STEEP = 5.0
 _UNLIKE = 1e8
 
 
-def _bodies(scene: Any) -> Integers:
+def _bodies(scene: SceneData) -> Integers:
     """Number of the connected body of each node, (N,)."""
     return np.asarray(np.argmax([piece.nodes for piece in scene.pieces], axis=0))
 
 
-def refuse_overlaps(scene: Any) -> None:
+def refuse_overlaps(scene: SceneData) -> None:
     """Refuse meshes whose cells overlap, but for parts of bodies that are a pair.
 
     Raises
@@ -58,7 +58,7 @@ def refuse_overlaps(scene: Any) -> None:
     refuse_tangles(scene.mesh, _bodies(scene), np.any([np.zeros(len(scene.mesh.points), dtype=bool), *pairs], axis=0))
 
 
-def refuse_walls(scene: Any) -> None:
+def refuse_walls(scene: SceneData) -> None:
     """Refuse contact parts where another body touches them: the foundation would be a wall between the two.
 
     Raises
@@ -68,7 +68,7 @@ def refuse_walls(scene: Any) -> None:
     """
     mesh, dimension = scene.mesh, scene.dimension
     group = scene.contacts.groups[0]
-    if group.pair is not None or scene.options["obstacle"] is not None:
+    if group.pair is not None or scene.options.obstacle is not None:
         return
     nodes = scene.contacts.rows.nodes[: group.count]
     _refuse_cracks(scene, nodes, group.parts)
@@ -96,7 +96,7 @@ def refuse_walls(scene: Any) -> None:
                 )
 
 
-def refuse_pairs(scene: Any) -> None:
+def refuse_pairs(scene: SceneData) -> None:
     """Refuse pairs of two sides of one body that face away from each other, through the body.
 
     Raises
@@ -124,7 +124,7 @@ def refuse_pairs(scene: Any) -> None:
             )
 
 
-def _refuse_cracks(scene: Any, nodes: Any, parts: list[str]) -> None:
+def _refuse_cracks(scene: SceneData, nodes: Integers, parts: list[str]) -> None:
     """Refuse parts that are a face of a crack: nodes of the same body are where theirs are."""
     from scipy.spatial import cKDTree  # not needed for paths that read no mesh
 
@@ -149,7 +149,7 @@ def _refuse_cracks(scene: Any, nodes: Any, parts: list[str]) -> None:
             )
 
 
-def scene_notes(scene: Any) -> list[str]:
+def scene_notes(scene: SceneData) -> list[str]:
     """Notes on what may not have been intended."""
     checks = (
         *(_formulations, _unjoined, _unfaced, _shared, _alone, _rest, _loaded_contact),
@@ -159,12 +159,12 @@ def scene_notes(scene: Any) -> list[str]:
         return [note for check in checks for note in check(scene)]
 
 
-def _formulations(scene: Any) -> list[str]:
+def _formulations(scene: SceneData) -> list[str]:
     """Notes on elements of the file that others take the place of."""
     return taken_as(scene.mesh.types)
 
 
-def _unjoined(scene: Any) -> list[str]:
+def _unjoined(scene: SceneData) -> list[str]:
     """Notes on nodes that coincide, but for those of contacts."""
     joined = [_nodes_of(scene.mesh, group) for group in scene.contacts.groups]
     return unjoined(scene.mesh, _bodies(scene), [piece.name for piece in scene.pieces], joined)
@@ -179,48 +179,49 @@ def _nodes_of(mesh: PartedMesh, group: Group) -> Mask:
     return mask
 
 
-def _turning(scene: Any) -> list[str]:
+def _turning(scene: SceneData) -> list[str]:
     """Notes on pairs of a body that could roll, whose normals turn along the contact more than what they face does."""
     mesh, notes, first = scene.mesh, [], 0
     hold = holding(scene.held.supports, sp.csc_array(scene.springs.shape))
     loose = np.any([piece.nodes for piece in scene.pieces if piece.free_motions(mesh.points, hold)], axis=0)
     for group in scene.contacts.groups:
         rows, first = scene.contacts.rows.means[first : first + group.count], first + group.count
-        if group.pair is None or not np.any(loose & _nodes_of(mesh, group)):
+        pair = group.pair
+        if pair is None or not np.any(loose & _nodes_of(mesh, group)):
             continue
-        outward = scene.body.on_part(mesh.part(group.pair.master), group.pair.master, outward_normal)
+        outward = scene.body.on_part(mesh.part(pair.master), pair.master, outward_normal)
         facing = unit_vectors(np.asarray(sp.csr_array(-rows).maximum(0) @ outward), "normals of the other side")
         apart = float(np.degrees(np.max(np.arccos(np.clip(-np.sum(facing * group.normals, axis=1), -1.0, 1.0)))))
         if apart > _TURN:
             notes.append(
-                f"the normals of the pair {group.pair} turn along the contact, up to {apart:.0f} degrees away from the "
+                f"the normals of the pair {pair} turn along the contact, up to {apart:.0f} degrees away from the "
                 "normals of what they face: as they stay so, a body that could roll or slide along is caught as in a "
                 "pocket"
             )
     return notes
 
 
-def _unfaced(scene: Any) -> list[str]:
+def _unfaced(scene: SceneData) -> list[str]:
     """Nodes of pairs without contact."""
     return [
-        f"{group.missed} of {group.missed + group.count} nodes of {group.pair.slave} face nothing of "
-        f"{group.pair.master} and have no contact"
+        f"{group.missed} of {group.missed + group.count} nodes of {pair.slave} face nothing of "
+        f"{pair.master} and have no contact"
         for group in scene.contacts.groups
-        if group.missed
+        if (pair := group.pair) is not None and group.missed
     ]
 
 
-def _shared(scene: Any) -> list[str]:
+def _shared(scene: SceneData) -> list[str]:
     """Nodes of pairs that have the contact of another one."""
     return [
-        f"{counted(group.shared, 'node')} of {group.pair.slave} {'belong' if group.shared > 1 else 'belongs'} to "
-        f"another contact before, and not to the pair {group.pair}"
+        f"{counted(group.shared, 'node')} of {pair.slave} {'belong' if group.shared > 1 else 'belongs'} to "
+        f"another contact before, and not to the pair {pair}"
         for group in scene.contacts.groups
-        if group.shared
+        if (pair := group.pair) is not None and group.shared
     ]
 
 
-def _alone(scene: Any) -> list[str]:
+def _alone(scene: SceneData) -> list[str]:
     """Bodies that nothing connects with the others."""
     if len(scene.pieces) < 2:
         return []
@@ -233,7 +234,7 @@ def _alone(scene: Any) -> list[str]:
     ]
 
 
-def _rest(scene: Any) -> list[str]:
+def _rest(scene: SceneData) -> list[str]:
     """Nothing that acts on the bodies."""
     acting = np.any(scene.forces) or np.any(scene.slope) or np.any(scene.held.supports.values)
     if acting or np.any(scene.gaps < 0):
@@ -241,19 +242,19 @@ def _rest(scene: Any) -> list[str]:
     return ["nothing acts on the body: it has no load, press fit or given displacement, and rests"]
 
 
-def _loaded_contact(scene: Any) -> list[str]:
+def _loaded_contact(scene: SceneData) -> list[str]:
     """Loads on contact parts."""
     corners = {tuple(sorted(row)) for row in scene.contacts.facets.tolist()}
     notes = []
     for option in ("load", "load_slope", "pressure", "pressure_slope", "spring"):
-        for part in scene.options[option] or ():
+        for part in getattr(scene.options, option) or ():
             if any(tuple(sorted(row)) in corners for row in scene.mesh.part(part).tolist()):
                 what = "stiffens" if option == "spring" else "acts on"
                 notes.append(f"{option} of {part} {what} contact nodes, as {part} is in contact")
     return notes
 
 
-def _reach(scene: Any) -> list[str]:
+def _reach(scene: SceneData) -> list[str]:
     """Gaps and press fits as large as a body."""
     extent, notes = _extent(scene), []
     for group, gaps in scene.gaps_of_groups:
@@ -270,7 +271,7 @@ def _reach(scene: Any) -> list[str]:
     return notes
 
 
-def _strains(scene: Any) -> dict[str, float]:
+def _strains(scene: SceneData) -> dict[str, float]:
     """Approximate strains of the body by the loads and by their slopes."""
     thickness = 1.0 if scene.body.thickness is None else float(np.min(scene.body.thickness))
     force = float(np.min(_stiffness(scene))) * _extent(scene) ** (scene.dimension - 1) * thickness
@@ -280,15 +281,15 @@ def _strains(scene: Any) -> dict[str, float]:
     }
 
 
-def _stiffness(scene: Any) -> Floats:
+def _stiffness(scene: SceneData) -> Floats:
     """Moduli lambda + 2 mu of the cells."""
     return np.asarray(np.atleast_2d(scene.lame) @ (1.0, 2.0))
 
 
-def _proportions(scene: Any) -> list[str]:
+def _proportions(scene: SceneData) -> list[str]:
     """Notes on loads and press fits, or gaps that only strain can close, that are out of proportion."""
     strain, extent, notes = max(_strains(scene).values()), _extent(scene), []
-    held = not scene.options["spring"] and not any(p.free_motions(scene.mesh.points, scene.hold) for p in scene.pieces)
+    held = not scene.options.spring and not any(p.free_motions(scene.mesh.points, scene.hold) for p in scene.pieces)
     for group, gaps in scene.gaps_of_groups:
         length = float(gaps.min())
         ratio = abs(length) / extent / strain if strain > 0 else 1.0
@@ -301,7 +302,7 @@ def _proportions(scene: Any) -> list[str]:
     return notes
 
 
-def _units(scene: Any) -> list[str]:
+def _units(scene: SceneData) -> list[str]:
     """Loads, displacements and moduli of absurd size."""
     notes, extent, stiffness = [], _extent(scene), _stiffness(scene)
     for name, strain in _strains(scene).items():
@@ -328,16 +329,15 @@ def _units(scene: Any) -> list[str]:
     return notes
 
 
-def _extent(scene: Any) -> float:
+def _extent(scene: SceneData) -> float:
     """Extent of the largest body [length]."""
     return max(float(np.max(np.ptp(scene.mesh.points[piece.nodes], axis=0))) for piece in scene.pieces)
 
 
-def _friction(scene: Any) -> list[str]:
+def _friction(scene: SceneData) -> list[str]:
     """Coefficients that no pair of materials has."""
-    given: Mapping[str, Any] = {"friction": scene.options["friction"], "friction2": scene.options["friction2"]}
     notes = []
-    for name, value in given.items():
+    for name, value in (("friction", scene.options.friction), ("friction2", scene.options.friction2)):
         each = value.values() if isinstance(value, Mapping) else [value]
         steep = max((float(own) for own in each if own is not None), default=0.0)
         if steep > _STEEP:
@@ -345,9 +345,9 @@ def _friction(scene: Any) -> list[str]:
     return notes
 
 
-def _held(scene: Any) -> list[str]:
+def _held(scene: SceneData) -> list[str]:
     """A bound of rigid displacements where nothing can move as a whole."""
-    if scene.options["max_rigid_displacement"] is None:
+    if scene.options.max_rigid_displacement is None:
         return []
     if any(piece.free_motions(scene.mesh.points, scene.hold) for piece in scene.pieces):
         return []

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
+from enumsol.fem.options import FRICTION
+from enumsol.fem.scene_data import SceneData
 from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines
 from enumsol.model.shapes import acting_nodes, signs
 from enumsol.support.array_types import Floats, Integers
@@ -21,7 +23,7 @@ _TITLES = 10
 _ROUNDING = 1e-12
 
 
-def sections_of(scene: Any) -> dict[str, list[str]]:
+def sections_of(scene: SceneData, notes: list[str]) -> dict[str, list[str]]:
     """The lines of a `Scene` by their titles."""
     return {
         "mesh": _mesh(scene),
@@ -30,13 +32,13 @@ def sections_of(scene: Any) -> dict[str, list[str]]:
         "parts": _parts(scene),
         "loads": _loads(scene),
         "contact": _contact(scene),
-        "note": scene.notes,
+        "note": notes,
     }
 
 
-def described(scene: Any) -> str:
+def described(scene: SceneData, notes: list[str]) -> str:
     """The lines of a `Scene`."""
-    return "\n".join(_titled(sections_of(scene)))
+    return "\n".join(_titled(sections_of(scene, notes)))
 
 
 def _titled(sections: Mapping[str, Sequence[str]]) -> Iterable[str]:
@@ -45,14 +47,14 @@ def _titled(sections: Mapping[str, Sequence[str]]) -> Iterable[str]:
             yield f"{title if k == 0 or title == 'note' else '':{_TITLES}}{line}"
 
 
-def _mesh(scene: Any) -> list[str]:
+def _mesh(scene: SceneData) -> list[str]:
     mesh, d = scene.mesh, scene.dimension
     cells = [f"{len(rows)} {KINDS[d, nodes.shape[1]].name}" for rows, nodes in by_kind(d, mesh.cells)]
     extent = f"from {_vector(mesh.points.min(axis=0))} to {_vector(mesh.points.max(axis=0))}"
     return [f"{len(mesh.points)} nodes, {', '.join(cells)}, {extent}"]
 
 
-def _bodies(scene: Any) -> list[str]:
+def _bodies(scene: SceneData) -> list[str]:
     mesh = scene.mesh
     sizes = np.empty(len(mesh.cells))
     for block in scene.body.blocks:
@@ -71,12 +73,12 @@ def _bodies(scene: Any) -> list[str]:
     return [*lines, *(f"part {name}: {size(rows)}" for name, rows in mesh.bodies.items() if name not in said)]
 
 
-def _material(scene: Any) -> list[str]:
+def _material(scene: SceneData) -> list[str]:
     names = ("young", "poisson", *(("plane", "thickness") if scene.dimension == 2 else ()))
-    return [f"{name} {_said(scene.options[name])}" for name in names]
+    return [f"{name} {_said(getattr(scene.options, name))}" for name in names]
 
 
-def _parts(scene: Any) -> list[str]:
+def _parts(scene: SceneData) -> list[str]:
     plain, what = replace(scene.body, thickness=None), "length" if scene.dimension == 2 else "area"
     lines = []
     for name, facets in scene.mesh.facets.items():
@@ -93,7 +95,7 @@ def _parts(scene: Any) -> list[str]:
     return lines
 
 
-def _loads(scene: Any) -> list[str]:
+def _loads(scene: SceneData) -> list[str]:
     lines = [f"resultant {_resultant(scene.forces)}"]
     if np.any(scene.slope):
         lines.append(f"times alpha: resultant {_resultant(scene.slope)}")
@@ -106,14 +108,12 @@ def _resultant(forces: Floats) -> str:
     return _vector(np.where(np.abs(total) <= _ROUNDING * np.sum(np.abs(forces)), 0.0, total))
 
 
-def _contact(scene: Any) -> list[str]:
+def _contact(scene: SceneData) -> list[str]:
     lines = []
     for group, gaps in scene.gaps_of_groups:
         gap = f"gap {gaps[0]:.6g}" if np.ptp(gaps) == 0 else f"gaps from {gaps.min():.6g} to {gaps.max():.6g}"
         lines.append(f"{counted(group.count, 'contact node')} of {group}, {gap}")
-    coefficients = {
-        name: scene.options[name] for name in ("friction", "friction_slope", "friction2", "friction2_slope")
-    }
+    coefficients = {name: getattr(scene.options, name) for name in FRICTION}
     return [*lines, *(f"{name} {_said(value)}" for name, value in coefficients.items() if value is not None)]
 
 
@@ -133,7 +133,7 @@ _FORCE, _NORMAL = 0.16, 0.06
 _BODY, _EDGE, _LOAD, _SLOPE, _CONTACT = "#dfe6ee", "#aab6c3", "#b3202c", "#d9730d", "#1f5fa8"
 
 
-def draw_scene(scene: Any, units: tuple[str, str] | None = None) -> Any:
+def draw_scene(scene: SceneData, units: tuple[str, str] | None = None) -> Any:
     """A figure of a `Scene`."""
     from matplotlib.collections import LineCollection, PolyCollection  # with the first figure
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
@@ -154,8 +154,8 @@ def draw_scene(scene: Any, units: tuple[str, str] | None = None) -> Any:
             along = facets if facets.shape[1] == 2 else facets[:, [0, 2, 1]]
             ax.add_collection(LineCollection(list(mesh.points[along]), color=f"C{k}", linewidth=3, label=label))
         else:
-            outlines = list(mesh.points[facet_outlines(facets)])
-            ax.add_collection3d(Poly3DCollection(outlines, facecolor=f"C{k}", alpha=0.35, label=label))
+            sides = list(mesh.points[facet_outlines(facets)])
+            ax.add_collection3d(Poly3DCollection(sides, facecolor=f"C{k}", alpha=0.35, label=label))
     places = mesh.points[scene.contacts.rows.nodes]
     extent = float(np.max(np.ptp(mesh.points, axis=0)))
     ax.plot(*places.T, "o", color=_CONTACT, markersize=4, label="contact nodes and their normals", zorder=5)

@@ -100,7 +100,7 @@ class ContactSurface:
 
 
 @dataclass(frozen=True)
-class Multipliers:
+class SurfaceRows:
     """The p contact rows: the displacement that each stands for, and its position.
 
     Attributes
@@ -127,7 +127,7 @@ class Multipliers:
     rows_of_facets: Integers | None = None
 
 
-def on_nodes(surface: ContactSurface, held: Mask) -> Multipliers:
+def on_nodes(surface: ContactSurface, held: Mask) -> SurfaceRows:
     """A row for every node of the surface that is not held entirely (L^H = W^h).
 
     Raises
@@ -148,10 +148,10 @@ def on_nodes(surface: ContactSurface, held: Mask) -> Multipliers:
     facets, shares, count = surface.facets, surface.shares, len(surface.points)
     areas = restrained.gathered(facets, shares, np.ones((len(facets), 1)), count)[free, 0]
     vectors = restrained.gathered(facets, np.ones_like(shares), surface.vectors, count)[free]
-    return Multipliers(restrained.means_of_nodes(free, count), areas, surface.points[free], vectors, free.tolist())
+    return SurfaceRows(restrained.means_of_nodes(free, count), areas, surface.points[free], vectors, free.tolist())
 
 
-def on_patches(surface: ContactSurface, patches: ArrayLike, held: Mask) -> Multipliers:
+def on_patches(surface: ContactSurface, patches: ArrayLike, held: Mask) -> SurfaceRows:
     """A row for every patch of facets that is not held entirely: its mean displacement.
 
     Raises
@@ -182,7 +182,7 @@ def on_patches(surface: ContactSurface, patches: ArrayLike, held: Mask) -> Multi
     np.add.at(vectors, of_facet, surface.vectors)
     row_of_patch = np.full(len(names), -1)
     row_of_patch[kept] = np.arange(len(kept))
-    return Multipliers(
+    return SurfaceRows(
         means, areas[kept], means @ surface.points, vectors[kept], names[kept].tolist(), row_of_patch[of_facet]
     )
 
@@ -203,12 +203,12 @@ def _check_independent(means: sp.csr_array) -> None:
         )
 
 
-def local_axes(multipliers: Multipliers, normals: ArrayLike | None, axes: Any) -> tuple[Floats, Floats, Floats]:
+def local_axes(multipliers: SurfaceRows, normals: ArrayLike | None, axes: object) -> tuple[Floats, Floats, Floats]:
     """Normals and axes t1, t2 of the rows, each (p, 3); (t1, t2, n) is right-handed where t2 is not given.
 
     Parameters
     ----------
-    multipliers : Multipliers
+    multipliers : SurfaceRows
     normals : (3,) or (p, 3) array_like or None
         Scaled to length one; None: the outward normals of the facets around, averaged by area.
     axes : field, pair (t1, t2) of fields, or None
@@ -243,7 +243,7 @@ def local_axes(multipliers: Multipliers, normals: ArrayLike | None, axes: Any) -
     return normal, given[0], given[1] if len(given) == 2 else np.cross(normal, given[0])
 
 
-def _field(value: Any, places: Floats) -> Floats:
+def _field(value: object, places: Floats) -> Floats:
     if callable(value):
         value = [value(place) for place in places]
     return mesh_checks.vectors_of_all(real_array(value, "axes", error=InvalidArgumentError), "axes", places.shape)
@@ -362,14 +362,14 @@ def solid_contact_problem(
     *,
     contact: ArrayLike,
     normals: ArrayLike | None = None,
-    axes: Any = None,
+    axes: object = None,
     held: ArrayLike = (),
     springs: ArrayLike | None = None,
     forces: ArrayLike | None = None,
     forces_slope: ArrayLike | None = None,
     gap: ArrayLike = 0.0,
-    friction: Any = 0.5,
-    friction_slope: Any = 0.0,
+    friction: object = 0.5,
+    friction_slope: object = 0.0,
     slip_offset: ArrayLike = 0.0,
     node_ids: Sequence[Any] | None = None,
     multipliers: Literal["nodes", "elements"] = "nodes",
@@ -445,9 +445,7 @@ def solid_contact_problem(
     mask = mesh_checks.held_mask(held, nodes.shape)
     rows = _rows(surface, mask, one_of(multipliers, "multipliers", ("nodes", "elements")), ratio, patches)
     normal, first, second = local_axes(rows, normals, axes)
-    A = solid_stiffness(nodes, bodies, lame)
-    if springs is not None:
-        A = sp.csc_array(A + sp.diags_array(mesh_checks.spring_stiffnesses(springs, nodes.shape).ravel()))
+    A = restrained.with_springs(solid_stiffness(nodes, bodies, lame), springs, nodes.shape)
     dofs, free = restrained.plain_dofs(nodes.shape), np.flatnonzero(~mask.ravel())
     of_facets, mean = rows.rows_of_facets, None
     if of_facets is not None:
@@ -455,10 +453,7 @@ def solid_contact_problem(
         offset = real_array(slip_offset, "slip_offset")
         mean = SlipMean(*_slips(surface, of_facets, (first, second), offset, dofs, free), weights)
     problem = restrained.problem_of(
-        A,
-        mesh_checks.nodal_vectors(forces, "forces", nodes.shape),
-        None if forces_slope is None else mesh_checks.nodal_vectors(forces_slope, "forces_slope", nodes.shape),
-        dofs,
+        restrained.loaded(A, forces, forces_slope, nodes.shape),
         restrained.ContactRows(rows.means, normal, np.zeros_like(mask)),
         (first, second),
         restrained.Supports.held(mask),
@@ -481,7 +476,7 @@ def _contact_facets(contact: ArrayLike, count: int) -> Integers:
     return mesh_checks.elements(contact, "contact", (3, 4), count)
 
 
-def _rows(surface: ContactSurface, held: Mask, kind: str, ratio: int, patches: Any) -> Multipliers:
+def _rows(surface: ContactSurface, held: Mask, kind: str, ratio: int, patches: Any) -> SurfaceRows:
     width = positive_integer(ratio, "ratio")
     if kind == "nodes":
         if width != 1 or patches is not None:

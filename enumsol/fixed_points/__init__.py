@@ -2,9 +2,13 @@
 
 from enumsol.fixed_points.clarabel_solver import TrescaReference
 from enumsol.fixed_points.lipschitz import LipschitzEstimate, lipschitz_estimate
-from enumsol.fixed_points.residual import fixed_point_residual, is_fixed_point
 from enumsol.fixed_points.result import FixedPoint, Outcome
-from enumsol.fixed_points.successive import FixedPointProgress, successive_approximations
+from enumsol.fixed_points.successive import (
+    FixedPointProgress,
+    fixed_point_residual,
+    is_fixed_point,
+    successive_approximations,
+)
 from enumsol.fixed_points.tresca import TrescaSolution, solve_tresca
 from enumsol.fixed_points.tresca_newton import TrescaNotFeasible, TrescaNotSolved
 

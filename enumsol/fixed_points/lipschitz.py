@@ -63,12 +63,12 @@ class LipschitzEstimate:
 
     @property
     def contracts(self) -> bool:
-        """Whether Psi is known to contract; then successive approximations converge from every start."""
+        """True if Psi is known to contract; then successive approximations converge from every start."""
         return self.constant < 1.0 and not self.sampled
 
     @property
     def unique(self) -> bool:
-        """Whether uniqueness follows; where it does not, or where it would rest on samples, False."""
+        """True if uniqueness follows, and not from samples."""
         return min(self.constant, self.uniqueness) < 1.0 and not self.sampled
 
 
@@ -98,7 +98,7 @@ class _Slips:
 
     @classmethod
     def of(cls, body: Problem, S_tt: Floats) -> _Slips:
-        """Of a problem; compliances are condensed to the degrees of freedom that occur in the means."""
+        """Slips of a problem; compliances are condensed to the degrees of freedom that occur in the means."""
         mean = body.slip_mean if isinstance(body, ContactProblem3D) and body.depends_on_solution else None
         if mean is None:
             return cls(S_tt, None)
@@ -111,7 +111,7 @@ class _Slips:
         return cls(S_tt, mean, sp.csr_array(rows[:, used]), np.linalg.cholesky(0.5 * (compliance + compliance.T)))
 
     def reach(self, body: ContactProblem3D, alpha: Alpha, load: float, c_inf: Floats) -> Floats:
-        """What no slip of a solution exceeds, by the energy bound, shape (p,) [length]."""
+        """Bounds on the slips of a solution, by the energy bound, shape (p,) [length]."""
         if self.mean is None or self.rows is None or self.root is None:
             return c_inf * load
         q = len(self.mean.offset)
@@ -228,7 +228,7 @@ def _weights(inverse_nn: Floats, blocks: Floats, F: Floats, m: Floats) -> list[F
 
 
 def _coefficients(system: ContactSystem, reach: Floats, lipschitz: float | None) -> _Coefficients:
-    """What (theory, section 11.5) needs of the coefficients, for slips up to ``reach`` of shape (p,) [length]."""
+    """Coefficients as (theory, section 11.5) needs them, for slips up to ``reach`` of shape (p,) [length]."""
     body = system.problem
     if not isinstance(body, ContactProblem3D):
         return _Coefficients(body.friction_at(system.alpha)[:, None])

@@ -96,7 +96,7 @@ class TrescaState(Sealed):
 
     @property
     def rigid_displacement(self) -> Floats | None:
-        """Of a body that nothing holds: how it moves as a whole, N q, shape (n,) [length]; None of others."""
+        """Displacement N q of a body that nothing holds as a whole, shape (n,) [length]; None of others."""
         N, q = self.problem.rigid_modes, self.rigid_coordinates
         return None if N is None or q is None else np.asarray(N @ q)
 
@@ -130,7 +130,7 @@ class TrescaState(Sealed):
 
     @cached_property
     def residuals(self) -> Mapping[str, float]:
-        """How far the state is from a solution with Coulomb friction, |tau| <= lambda_n; all relative to the load [-].
+        """Distances from a solution with Coulomb friction, |tau| <= lambda_n; all relative to the load [-].
 
         ``equilibrium`` is |A u + B' lambda - f| / |f|; ``penetration`` the largest u_n and ``tension`` the largest
         -lambda_n, as forces and displacements of the contact nodes; ``complementarity`` the sum of |lambda_n u_n|;
@@ -173,7 +173,7 @@ class TrescaState(Sealed):
         return {name: value for name, value in self.__dict__.items() if name != "residuals"}
 
     def to_frame(self) -> pd.DataFrame:
-        """One row per contact node: label, coordinates, status, coefficients, forces and displacements."""
+        """Table with a row per contact node: label, coordinates, status, coefficients, forces and displacements."""
         import pandas as pd  # for frames only
 
         problem, p = self.problem, len(self.lambda_n)
@@ -190,7 +190,7 @@ class TrescaState(Sealed):
         return pd.DataFrame(columns)
 
 
-def scaled_unknowns(system: ContactSystem, state: Any, name: str = "start") -> Floats:
+def scaled_unknowns(system: ContactSystem, state: object, name: str = "start") -> Floats:
     """The x of a state or root: its scaled forces and rigid displacement, which is zero if it has none.
 
     Raises
@@ -227,7 +227,7 @@ def scaled_unknowns(system: ContactSystem, state: Any, name: str = "start") -> F
     return np.append(forces, rigid)
 
 
-def slips_of(state: Any, p: int, name: str) -> Floats:
+def slips_of(state: object, p: int, name: str) -> Floats:
     """The slips that a state or root has: its ``slip``, or |u_t|, shape (p,) [length].
 
     Raises

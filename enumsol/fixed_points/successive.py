@@ -199,7 +199,7 @@ class _Iteration:
         self.slip_weights = np.sqrt(areas) * system.length
         # sqrt(work) of the scaled system: the product of the force and the length factor is the same at every node
         self.work = float(np.sqrt(system.force[0] * system.length[0]))
-        self.depth, self.mixing = depth, AndersonMixing(depth) if depth else None
+        self.depth, self.mixing = depth, AndersonMixing(depth)
         self.recent: deque[Floats] = deque(maxlen=LONGEST_CYCLE + 1)
         self.increments: list[tuple[float, float]] = []
         self.sizes: list[float] = []
@@ -240,7 +240,7 @@ class _Iteration:
                 self.system = better
                 self.recent.clear()
                 self.sizes.clear()
-                self.mixing = AndersonMixing(self.depth) if self.depth else None
+                self.mixing = AndersonMixing(self.depth)
         except TrescaNotFeasible as error:
             self.motion = error.motion
             outcome = Outcome.NOT_HELD if outcome is Outcome.NOT_HELD else Outcome.NOT_FEASIBLE
@@ -323,7 +323,7 @@ class _Iteration:
         """Distance from the limit for an increment, by the contraction seen in the last ones (theory, (11.11))."""
         self.sizes.append(moved)
         recent = self.sizes[-_RATIOS - 1 :]
-        if self.mixing is not None or not recent[0]:  # mixed iterates do not shrink as those of Psi do
+        if self.depth or not recent[0]:  # mixed iterates do not shrink as those of Psi do
             return moved
         ratio = (moved / recent[0]) ** (1.0 / (len(recent) - 1)) if len(recent) > 1 else 1.0
         q = min(ratio, 1.0 - _SLOWEST)
@@ -342,7 +342,7 @@ class _Iteration:
 
     def _period(self, image: Floats) -> int | None:
         """Length of the cycle that the iterates run through, if they do."""
-        if self.mixing is not None:
+        if self.depth:
             return None
         earlier = list(self.recent)[::-1]
         self.recent.append(image)
@@ -353,8 +353,6 @@ class _Iteration:
         return int(same[0]) + 2 if len(same) else None
 
     def _next(self, bound: Floats, slip: Floats, image: Floats, image_slip: Floats) -> tuple[Floats, Floats]:
-        if self.mixing is None:
-            return image, image_slip
         if not self.depends:
             return self.mixing.next(bound, image), image_slip
         p = len(bound)
@@ -377,3 +375,65 @@ class _Iteration:
             period=period,
             free_motion=motion,
         )
+
+
+def fixed_point_residual(problem: Problem, root: Any) -> float:
+    """Distance by which Psi moves a root, relative to the load [-].
+
+    The largest change of a contact force when the Tresca problem with the root's normal forces as slip bounds, and
+    the coefficients at its slips, is solved, with displacements at the root as the body itself has them: what S has
+    lost by rounding does not count (theory, (11.12)).
+
+    Parameters
+    ----------
+    problem : ContactProblem or ContactProblem3D
+    root : Root, FixedPoint or other
+        With alpha, lambda_n, lambda_t and u_t.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The root has no forces, or belongs to another problem (its arrays have other shapes).
+    """
+    body = checked_problem(problem)
+    if not hasattr(root, "alpha"):
+        raise InvalidArgumentError(
+            f"root is a {type(root).__name__} without alpha; expected a root of enumerate_roots or a fixed point"
+        )
+    system = ContactSystem.at(body, root.alpha)
+    x = scaled_unknowns(system, root, "root")
+    slip = system.scaled(node_values(slips_of(root, body.p, "root"), "slip", body.p), system.length, "slip")
+    corrected, _ = system.corrected(x)
+    data = TrescaData(corrected, np.maximum(system.split(x)[0], 0.0), system.coefficients(slip))
+    image, _, _ = solve_scaled(data, x)
+    return float(np.max(np.abs(image - x)[: system.m]))
+
+
+def is_fixed_point(problem: Problem, root: Any, tolerance: float = 1e-8) -> bool:
+    """True if a root is a fixed point of Psi within a tolerance (theory, section 11.3).
+
+    With coefficients that do not depend on the solution the fixed points are exactly the solutions with Coulomb
+    friction; every root of `enumerate_roots` is one.
+
+    Parameters
+    ----------
+    problem : ContactProblem or ContactProblem3D
+    root : Root, FixedPoint or other
+        With alpha, lambda_n, lambda_t and u_t.
+    tolerance : float
+        Largest change of a contact force, relative to the load [-].
+
+    Raises
+    ------
+    InvalidArgumentError
+        The root has no forces, or belongs to another problem; the tolerance is not positive.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> problem = enumsol.gallery.one_node_triangle()
+    >>> [enumsol.is_fixed_point(problem, root) for root in enumsol.enumerate_roots(problem, 5)]
+    [True, True, True]
+    """
+    tolerance = positive_number(tolerance, "tolerance")
+    return fixed_point_residual(problem, root) <= tolerance

@@ -28,7 +28,7 @@ from enumsol.model.rigid_modes import modes_of
 from enumsol.support.arguments import alpha_value
 
 if TYPE_CHECKING:
-    from enumsol.support.array_types import Alpha, Floats
+    from enumsol.support.array_types import Alpha, AlphaLike, Floats
 
     Problem = ContactProblem | ContactProblem3D
 
@@ -38,7 +38,7 @@ _MOST_FORCE = 1e6
 _LARGEST = 1e100
 
 
-def checked_problem(value: Any) -> Problem:
+def checked_problem(value: object) -> Problem:
     """Value as a contact problem in 2D or 3D.
 
     Raises
@@ -92,7 +92,7 @@ class ContactSystem:
     compliance: float = 0.0
 
     @classmethod
-    def at(cls, problem: Problem, alpha: Any) -> ContactSystem:
+    def at(cls, problem: Problem, alpha: AlphaLike) -> ContactSystem:
         """The system of a problem at one alpha.
 
         Raises
@@ -112,18 +112,13 @@ class ContactSystem:
         S = condensed.S * everywhere[:, None] * everywhere[None, :]
         g = condensed.free_displacements(value) * everywhere
         cholesky = cholesky_factor(S)
-        r = problem.modes.r
-        G: Floats = np.zeros((r, len(S)))
-        h: Floats = np.zeros(r)
-        rigid: Floats = np.zeros((r, r))
-        if r:
-            still, slope = condensed.h
-            G = solve_triangular(condensed.mixing, condensed.G * everywhere, lower=True, check_finite=False)
-            h = solve_triangular(condensed.mixing, still + float(value) * slope, lower=True, check_finite=False)
-            rigid = np.asarray(np.linalg.inv(condensed.mixing.T))
-        size = load_unit(np.append(g, h), block_diag(cholesky, np.eye(r)))
+        (still, slope), L = condensed.h, condensed.mixing
+        G = solve_triangular(L, condensed.G * everywhere, lower=True, check_finite=False)
+        h = solve_triangular(L, still + float(value) * slope, lower=True, check_finite=False)
+        size = load_unit(np.append(g, h), block_diag(cholesky, np.eye(len(L))))
         force, length = factor * size, size / factor
-        return cls(problem, value, condensed, S, g / size, G, h / size, force, length, rigid * size, cholesky)
+        rigid = size * np.linalg.inv(L.T)
+        return cls(problem, value, condensed, S, g / size, G, h / size, force, length, rigid, cholesky)
 
     @property
     def p(self) -> int:
@@ -145,19 +140,13 @@ class ContactSystem:
         """Number r of rigid modes of a body that nothing holds; otherwise 0."""
         return len(self.h)
 
-    @property
-    def loaded(self) -> bool:
-        """Whether g or h is other than zero."""
-        return bool(np.any(self.g) or np.any(self.h))
-
     def moves(self, x: Floats) -> Floats:
         """Scaled displacements w of all rows, shape (m,)."""
-        w = np.asarray(self.g - self.S @ x[: self.m])
-        return w + self.G.T @ x[self.m :] if self.modes else w
+        return np.asarray(self.g - self.S @ x[: self.m] + self.G.T @ x[self.m :])
 
     def imbalance(self, x: Floats) -> Floats:
-        """What contact forces, and springs if there are any, leave of the load on the body as a whole, shape (r,)."""
-        return np.asarray(self.h - self.G @ x[: self.m] - self.compliance * x[self.m :]) if self.modes else self.h
+        """Load on the body as a whole less contact forces and, if there are any, springs, shape (r,)."""
+        return np.asarray(self.h - self.G @ x[: self.m] - self.compliance * x[self.m :])
 
     @cached_property
     def load_energy(self) -> float:
@@ -170,7 +159,7 @@ class ContactSystem:
 
     @cached_property
     def largest_forces(self) -> Floats:
-        """What no force of a solution exceeds, shape (m,): by the energy bound (theory, section 11.3).
+        """Bounds on the forces of a solution, shape (m,): by the energy bound (theory, section 11.3).
 
         Of a body that nothing holds there is no such bound; forces so large are taken for none (theory, section 14.10).
         """
@@ -205,8 +194,8 @@ class ContactSystem:
         mean = self.problem.slip_mean if isinstance(self.problem, ContactProblem3D) else None
         if mean is None:
             return np.asarray(np.linalg.norm(self.split(self.moves(x))[1], axis=1))
-        u, N = self._elastic(x), self.problem.rigid_modes
-        return np.asarray(mean(u if N is None else u + N @ self.rigid_of(x)) / self.length)
+        u = self._elastic(x) + self.problem.modes.N @ self.rigid_of(x)
+        return np.asarray(mean(u) / self.length)
 
     def rigid_of(self, x: Floats) -> Floats:
         """Coordinates of the rigid displacement in the problem's units, shape (r,)."""
@@ -214,8 +203,8 @@ class ContactSystem:
 
     def unit_motion(self, rigid: Floats) -> Floats:
         """Coordinates, in the problem's units, of a scaled rigid displacement, whose largest component becomes 1."""
-        given, N = self.rigid @ rigid, self.problem.rigid_modes
-        return given if N is None else np.asarray(given / np.max(np.abs(N @ given)))
+        given = self.rigid @ rigid
+        return np.asarray(given / np.max(np.abs(self.problem.modes.N @ given)))
 
     def scaled_rigid(self, coordinates: Floats) -> Floats:
         """Scaled coordinates of a rigid displacement, shape (r,)."""
@@ -240,7 +229,7 @@ class ContactSystem:
         return replace(self, g=g), np.asarray(cho_solve((self.cholesky, True), g - self.g, check_finite=False))
 
     def noise(self, x: Floats) -> Floats:
-        """What every scaled force changes by, in the mean, where S lambda is rounded (theory, (11.13))."""
+        """Mean change of every scaled force where S lambda is rounded (theory, (11.13))."""
         inverse = cho_solve((self.cholesky, True), np.eye(len(self.S)), check_finite=False)
         return np.asarray(UNIT * np.sqrt(inverse**2 @ (self.S**2 @ x[: self.m] ** 2)))
 

@@ -153,7 +153,7 @@ def solve_scaled(data: TrescaData, start: Floats, first: str = "newton") -> tupl
     """
     from enumsol.fixed_points.clarabel_solver import interior_point  # a fallback
 
-    if not data.system.loaded:
+    if not (np.any(data.system.g) or np.any(data.system.h)):
         return np.zeros(len(start)), 0.0, first
     found: list[tuple[float, str, Floats]] = []
     if first == "newton":

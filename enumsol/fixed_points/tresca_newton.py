@@ -211,7 +211,7 @@ class TrescaData:
         return w_n, np.where(self.occurs, self.F * w_t, 0.0), tau
 
     def _step(self, x: Floats, w: Floats) -> Floats:
-        """One Newton step of (11.3).
+        """Newton step of (11.3).
 
         Some directions of lambda move by known steps: normals that open, and sliding pairs along z = tau + r v. In the
         others, the columns of Q, the equation is Q' S dlambda + shift = Q' w weight, symmetric positive definite: for
@@ -244,7 +244,7 @@ class TrescaData:
         return lambda right: np.asarray(cho_solve(factor, right, check_finite=False))
 
     def _directions(self, x: Floats, w: Floats) -> tuple[Floats, sp.csc_array, Floats, Floats]:
-        """Of a Newton step: the known part of dlambda, Q, and the shift and the weight of its equations."""
+        """Known part of dlambda in a Newton step, Q, and the shift and the weight of its equations."""
         p, d = self.system.p, self.system.tangents
         normal, _ = self.system.split(x)
         w_n, v, tau = self._in_tau(x, w)

@@ -25,7 +25,7 @@ _MOST_TRIANGLES = 1_000_000
 
 
 def one_node_triangle(f: Pair = (1.5, -4.0), lame: Pair = (1.0, 1.0)) -> ContactProblem:
-    """One triangle with one contact node: the smallest problem with three roots, and all of it in closed form.
+    """Triangle with one contact node: the smallest problem with three roots, and all of it in closed form.
 
     A P1 triangle with legs of equal length; the corner (0, 0) at the right angle touches the floor, the corners (1, 0)
     and (0, 1) are fixed, friction is F(alpha) = alpha (the paper's Examples 6.1-6.3). In (normal, tangential)
@@ -406,7 +406,7 @@ def taper(
 
 
 def chain(p: int, coupling: float = 0.0, f: Pair = (1.5, -4.0), lame: Pair = (1.0, 1.0)) -> ContactProblem:
-    """One-node triangles in a row, weakly coupled: 3^p roots, to measure what an enumeration costs per root.
+    """Row of one-node triangles, weakly coupled: 3^p roots, to measure what an enumeration costs per root.
 
     Each of the p triangles is `one_node_triangle`; springs of stiffness ``coupling`` join the free nodes of neighbours
     in both directions. Friction is F(alpha) = alpha. Without coupling the nodes choose independently, and with the

@@ -25,7 +25,7 @@ _FREE_DISPLACEMENT = (-1.0, 2.0, 3.0)
 
 
 def one_node_3d(W: ArrayLike = _COMPLIANCE, q: ArrayLike = _FREE_DISPLACEMENT, friction: Any = 0.1) -> ContactProblem3D:
-    """One contact node by its compliance: u = W r + q with u_n >= 0, r_n >= 0, u_n r_n = 0, and friction against u_t.
+    """Contact node given by its compliance: u = W r + q with u_n >= 0, r_n >= 0, u_n r_n = 0, and friction against u_t.
 
     In (normal, first tangent, second tangent), with the signs of contact solvers: u_n is the opening, r_n the pressing
     force. Ours are lambda = r and w = -u, so that S = W and g = -q. No displacement of a body is known: A = [Bn; Bt1;
@@ -70,7 +70,7 @@ def block3d(
     ny: int,
     nz: int,
     pull: ArrayLike = (0.6, 0.4, -0.6),
-    friction: Any = None,
+    friction: object = None,
     lame: tuple[float, float] = (1.0, 1.0),
     *,
     size: ArrayLike = (1.0, 1.0, 1.0),
@@ -78,7 +78,7 @@ def block3d(
     gap: float = 0.0,
     multipliers: Literal["nodes", "elements"] = "nodes",
     ratio: int = 1,
-    friction_slope: Any = None,
+    friction_slope: object = None,
 ) -> ContactProblem3D:
     """Elastic block clamped at its left side (x = 0), pressed onto the floor z = 0 and sheared by a traction on top.
 
@@ -224,14 +224,14 @@ def wedge3d(
     pull: ArrayLike = (0.0, 0.0, 5e-4),
     press: float = 5e-4,
     springs: ArrayLike = (0.04, 0.04, 0.02),
-    friction: Any = None,
+    friction: object = None,
     lame: tuple[float, float] = (1.0, 1.0),
     *,
     size: ArrayLike = (1.0, 1.0, 1.0),
     half_angle: float = 20.0,
     multipliers: Literal["nodes", "elements"] = "elements",
     ratio: int = 1,
-    friction_slope: Any = None,
+    friction_slope: object = None,
 ) -> ContactProblem3D:
     """Elastic wedge pressed into a rigid notch and pulled out of it or along it: 3, 5 or 9 roots.
 
@@ -317,7 +317,7 @@ def wedge3d(
     )
 
 
-def _friction(friction: Any, slope: Any) -> dict[str, Any]:
+def _friction(friction: object, slope: object) -> dict[str, Any]:
     if friction is None and slope is None:
         slope = (1.0, 0.6)
     return dict(zip(("friction", "friction_slope"), given_friction(friction, slope), strict=True))

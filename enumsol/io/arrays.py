@@ -282,7 +282,7 @@ def _space_friction(arrays: Mapping[str, Any]) -> dict[str, Any]:
     return {}
 
 
-def _constant(value: Any, layout: Layout) -> Any:
+def _constant(value: object, layout: Layout) -> Any:
     """The array ``friction``, one number."""
     array = np.asarray(value)
     if array.ndim:

@@ -156,14 +156,14 @@ def _problem(
     )
 
 
-def _dimension(group: Any) -> int:
+def _dimension(group: object) -> int:
     spacedim = _integer(group, "spacedim")
     if spacedim not in _NUMBERS:
         raise InvalidProblemError(f"it is a problem in {spacedim} dimensions; expected spacedim = 2 or 3")
     return spacedim
 
 
-def _matrix(group: Any, name: str, room: int, *, symmetric: bool = False) -> sp.csc_array:
+def _matrix(group: object, name: str, room: int, *, symmetric: bool = False) -> sp.csc_array:
     parts = child(group, name)
     m, n, nz = (_integer(parts, key) for key in ("m", "n", "nz"))
     p, i, x = (numbers(parts, key).ravel() for key in ("p", "i", "x"))

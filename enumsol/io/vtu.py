@@ -147,7 +147,7 @@ def _empty(states: Sequence[SolvedState]) -> str:
     return f"a RootSet without isolated roots, whose {counted(len(families), 'family', 'families')} no file shows"
 
 
-def _picture(meshio: Any, problem: AnyProblem, state: SolvedState) -> Any:
+def _picture(meshio: object, problem: AnyProblem, state: SolvedState) -> Any:
     return _plane(meshio, problem, state) if isinstance(problem, ContactProblem) else _space(meshio, problem, state)
 
 

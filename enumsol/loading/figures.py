@@ -12,7 +12,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.loading.history_data import START, HistoryData, Node
 from enumsol.roots.root import summary
 from enumsol.support.arguments import shown
-from enumsol.support.plotting import axes_or_none, figure_of, in_units, new_figure
+from enumsol.support.plotting import area_entry, axes_of, figure_of, in_units, line_entry
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -41,10 +41,8 @@ _SHARED = "#555555"
 
 def draw_history(data: HistoryData, x: Any, y: Any, ax: Any, units: tuple[str, str] | None = None) -> Any:
     """A figure; see History.plot."""
-    axes_or_none(ax)
+    ax = axes_of(ax, (8.4, 4.6))
     across, up = _values(data, x, "x"), _values(data, y, "y")
-    if ax is None:
-        ax = new_figure(figsize=(8.4, 4.6)).add_subplot()
     colours = _colours(data)
     for before, node in data.graph.edges:
         ends = [place for place in (before, node) if place in across and place in up]
@@ -99,8 +97,6 @@ def _ways(data: HistoryData) -> dict[Node, int]:
 
 def _legend(data: HistoryData, colours: dict[tuple[Node, Node], str], ax: Any) -> None:
     """Beside the drawing: where every history with a colour of its own goes, and what else there is to be seen."""
-    from matplotlib.lines import Line2D
-
     handles = []
     for number, path in enumerate(data.paths() if _ways(data)[START] <= _COLOURED else ()):
         edges = zip((START, *path[:-1]), path, strict=True)
@@ -109,20 +105,15 @@ def _legend(data: HistoryData, colours: dict[tuple[Node, Node], str], ax: Any) -
             ends = " to ".join(f"{step}.{root}" for step, root in dict.fromkeys((own[0], path[-1])))
             statuses = summary(data.graph.nodes[path[-1]]["root"].statuses)
             text = shorten(f"{ends}: {statuses}", 34, placeholder=" ...")
-            handles.append(Line2D([], [], color=f"C{number}", label=text))
+            handles.append(line_entry(text, color=f"C{number}"))
     if _SHARED in colours.values():
-        handles.append(Line2D([], [], color=_SHARED, label="several histories"))
+        handles.append(line_entry("several histories", color=_SHARED))
     nodes = [(node, given["root"]) for node, given in data.graph.nodes(data=True) if given["root"] is not None]
-
-    def point(marker: str, face: str, label: str) -> Line2D:
-        return Line2D(
-            [], [], linestyle="", marker=marker, color=_SHARED, markerfacecolor=face, markersize=4, label=label
-        )
-
+    point = {"linestyle": "", "color": _SHARED, "markersize": 4}
     if any(not root.regular for _, root in nodes):
-        handles.append(point("D", _SHARED, "root that is not regular"))
+        handles.append(line_entry("root that is not regular", marker="D", markerfacecolor=_SHARED, **point))
     if any(node[0] < len(data.steps) and node not in data.followed for node, _ in nodes):
-        handles.append(point("o", "white", "not followed"))
+        handles.append(line_entry("not followed", marker="o", markerfacecolor="white", **point))
     if handles:
         where = {"loc": "upper left", "bbox_to_anchor": (1.01, 1.0)}
         ax.legend(handles=handles, title="histories", fontsize=8, title_fontsize=8, frameon=False, **where)
@@ -201,12 +192,9 @@ _UNIQUE, _PALE, _FOLD = "#2a8a4a", 0.45, "#222222"
 
 def draw_map(name: str, rows: Sequence[MapRow], curves: Sequence[Any], title: str, ax: Any) -> Any:
     """A figure; see MultiplicityMap.plot."""
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch, Rectangle
+    from matplotlib.patches import Rectangle
 
-    axes_or_none(ax)
-    if ax is None:
-        ax = new_figure(figsize=(7.0, 4.8)).add_subplot()
+    ax = axes_of(ax, (7.0, 4.8))
     order = sorted(range(len(rows)), key=lambda k: rows[k].value)
     edges = _edges([rows[k].value for k in order])
     seen: dict[int, bool] = {}
@@ -230,18 +218,18 @@ def draw_map(name: str, rows: Sequence[MapRow], curves: Sequence[Any], title: st
     for count, exact in sorted(seen.items()):
         words = f"{'' if exact else 'at least '}{count} solution{'' if count == 1 else 's'}"
         if count == 1 and exact:
-            handles.append(Line2D([], [], color=_UNIQUE, linewidth=2.2, label="one solution, proven at these values"))
+            handles.append(line_entry("one solution, proven at these values", color=_UNIQUE, linewidth=2.2))
         else:
-            handles.append(Patch(facecolor=_COLOURS[min(max(count, 1), len(_COLOURS)) - 1], label=words))
+            handles.append(area_entry(words, facecolor=_COLOURS[min(max(count, 1), len(_COLOURS)) - 1]))
     if curves:
-        handles.append(Line2D([], [], linestyle="--", color=_FOLD, marker=".", label="folds, linked by statuses"))
-    handles.append(Patch(facecolor="none", label="between the values: not proven"))
+        handles.append(line_entry("folds, linked by statuses", linestyle="--", color=_FOLD, marker="."))
+    handles.append(area_entry("between the values: not proven", facecolor="none"))
     ax.legend(handles=handles, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2, frameon=False)
     return figure_of(ax)
 
 
 def _edges(values: Sequence[float]) -> list[tuple[float, float]]:
-    """For every value from where to where the space around it is filled: half way to its neighbours."""
+    """Ends of the space that is filled around every value: half way to its neighbours."""
     if len(values) == 1:
         return [(values[0] - 0.5, values[0] + 0.5)]
     middles = [0.5 * (a + b) for a, b in pairwise(values)]

@@ -63,7 +63,7 @@ def save_history(data: history_data.HistoryData, file: str | Path) -> None:
     write_file(file_path(file, "file"), json.dumps(record), "file")
 
 
-def load_history(file: str | Path, problem: Any) -> history_data.HistoryData:
+def load_history(file: str | Path, problem: AnyProblem) -> history_data.HistoryData:
     """Read what save_history wrote (see History.load).
 
     Raises
@@ -154,7 +154,7 @@ def _step(step: LoadStep) -> dict[str, Any]:
     return {"alpha": None if step.alpha is None else str(step.exact_alpha), **parts}
 
 
-def _read_step(record: dict[str, Any], problem: Any) -> LoadStep:
+def _read_step(record: dict[str, Any], problem: AnyProblem) -> LoadStep:
     alpha = None if record["alpha"] is None else Fraction(record["alpha"])
     step = LoadStep(alpha, None if record["friction"] is None else np.array(record["friction"]), record["load"])
     return step.on(problem, 1)
@@ -182,7 +182,7 @@ def _stage(stage: history_data.Stage) -> dict[str, Any]:
 
 
 def _read_stage(
-    number: int, record: dict[str, Any], problem: Any, steps: tuple[LoadStep, ...], whole: dict[str, Any]
+    number: int, record: dict[str, Any], problem: AnyProblem, steps: tuple[LoadStep, ...], whole: dict[str, Any]
 ) -> history_data.Stage:
     exact = None if record["exact"] is None else tuple(map(Fraction, record["exact"]))
     radius = None if record["radius"] is None else np.array(record["radius"])
@@ -226,7 +226,7 @@ def _root(root: Root) -> dict[str, Any]:
     }
 
 
-def _read_root(record: dict[str, Any], alpha: Any, problem: Any) -> Root:
+def _read_root(record: dict[str, Any], alpha: Any, problem: AnyProblem) -> Root:
     bounds, slips, angles = (record[name] for name in ("bounds", "slips", "angles"))
     arrays: dict[str, Any] = {name: np.array(record[name], dtype=np.float64) for name in _ARRAYS}
     return Root(

@@ -19,6 +19,7 @@ from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
 from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.model.restart import SlipStart
 from enumsol.model.statuses import FRICTIONLESS, ContactStatus
+from enumsol.proof.proof_file import PROOF_VERSION
 from enumsol.proof.reading import rational_text
 from enumsol.proof.writer import ProofWriter
 from enumsol.roots.root import Root, summary
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Hashable, Iterator, Mapping
 
     from enumsol.loading.steps import LoadStep
+    from enumsol.model.problem3d import AnyProblem
     from enumsol.proof.proof_file import Proof
     from enumsol.roots.root_set import RootSet
     from enumsol.support.array_types import Floats
@@ -183,7 +185,7 @@ def dissipated(root: Root) -> float:
     return float(np.sum(root.lambda_t * root.u_t))
 
 
-def contact_displacements(problem: Any, root: Root) -> Floats:
+def contact_displacements(problem: AnyProblem, root: Root) -> Floats:
     """Bn u and Bt u in one column, by which roots of one step are near each other [length]."""
     return np.concatenate([root.u_n + problem.gap, (root.u_t + problem.slip_offset).ravel()])
 
@@ -357,7 +359,7 @@ def history_proof(data: HistoryData) -> Proof | None:
     writer.write(
         {
             "format": "enumsol-proof",
-            "version": 1,
+            "version": PROOF_VERSION,
             "kind": "history",
             "problem": data.problem.fingerprint,
             "p": data.problem.p,

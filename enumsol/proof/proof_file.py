@@ -1,6 +1,6 @@
 """Proofs as files: a streamed, compressed sequence of records under one checksum.
 
-File layout: the line ``enumsol-proof 1``, a zlib stream, and the SHA-256 digest (32 bytes) of everything before it.
+File layout: the line ``enumsol-proof 2``, a zlib stream, and the SHA-256 digest (32 bytes) of everything before it.
 The stream holds one JSON record per line, in ASCII: a header, the tree in preorder, and a footer. (Proofs of branch
 graphs have other records.) docs/proof_format.md says what the records are; ``proof.records`` has a class for each kind
 of leaf.
@@ -21,7 +21,7 @@ import json
 import math
 import stat
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -33,7 +33,9 @@ from enumsol.support.array_types import Floats, Indices
 from enumsol.support.files import check_replaceable, write_file
 from enumsol.support.messages import html_lines
 
-MAGIC = b"enumsol-proof 1\n"
+MAGIC = b"enumsol-proof 2\n"
+#: Version of the format, as headers have it.
+PROOF_VERSION = 2
 _DIGEST = 32
 _CHUNK = 1 << 16
 #: Most characters that a byte of a file may stand for. The level at which proofs are written does not go beyond 1 : 230
@@ -56,12 +58,14 @@ class ProofFormatError(EnumsolError, ValueError):
     """A proof file is damaged, truncated or of another version."""
 
 
-def packed(rows: Indices, values: Floats) -> tuple[str, str]:
-    """Multipliers as text."""
-    return (
-        base64.b64encode(rows.astype("<u4").tobytes()).decode(),
-        base64.b64encode(values.astype("<f8").tobytes()).decode(),
-    )
+#: A row of a problem in 2D and in 3D.
+PLANE_ROW, SPACE_ROW = np.dtype("<u4"), np.dtype([("kind", "<u4"), ("node", "<u4"), ("number", "<i8")])
+
+
+def packed(rows: Indices | Sequence[tuple[int, int, int]], values: Floats) -> tuple[str, str]:
+    """Rows, an array of numbers or in 3D a list, and their multipliers as two texts in base64."""
+    numbers = rows.astype(PLANE_ROW) if isinstance(rows, np.ndarray) else np.array([*map(tuple, rows)], SPACE_ROW)
+    return base64.b64encode(numbers.tobytes()).decode(), base64.b64encode(values.astype("<f8").tobytes()).decode()
 
 
 def coarse(values: Floats) -> Floats:

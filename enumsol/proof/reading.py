@@ -16,6 +16,7 @@ import numpy as np
 
 from enumsol.condensation.data import Data, exactly_at
 from enumsol.errors import InvalidArgumentError
+from enumsol.proof.proof_file import PLANE_ROW, PROOF_VERSION, SPACE_ROW
 from enumsol.trusted.exclusion import Terms
 from enumsol.trusted.status_rows import UNDECIDED
 
@@ -51,8 +52,9 @@ def data_of(header: Any, problem: ContactProblem, kind: str | None) -> Data:
     RefusedError
         It does not.
     """
-    if not isinstance(header, dict) or header.get("format") != "enumsol-proof" or not same(header.get("version"), 1):
-        raise RefusedError("the first record is not the header of an enumsol-proof of version 1")
+    known = isinstance(header, dict) and header.get("format") == "enumsol-proof"
+    if not known or not same(header.get("version"), PROOF_VERSION):
+        raise RefusedError(f"the first record is not the header of an enumsol-proof of version {PROOF_VERSION}")
     if header.get("problem") != problem.fingerprint:
         raise RefusedError("the proof belongs to another problem (its fingerprint is different)")
     if not same(header.get("p"), problem.p) or header.get("data") not in ("problem", "condensed"):
@@ -148,22 +150,27 @@ def bytes_from(text: str) -> bytes:
     return data
 
 
-def multipliers_from(texts: list[Any], most: int) -> Terms:
-    """Rows, whole numbers below ``most``, and their multipliers, as many and at most ``most`` of them, from base64."""
+def multipliers_from(texts: list[Any], most: int | None, ends: int = 1) -> Terms:
+    """Rows and their multipliers, from base64.
+
+    ``most``: the number of rows, of which there are no more in a record; in 2D. None: rows in 3D, as a list of kind,
+    node and number, and at so many ``ends`` of a piece of alpha as many multipliers each, one end after the other.
+    """
     if len(texts) != 2 or not all(isinstance(text, str) for text in texts):
         raise ValueError("its multipliers are not two texts")
-    rows, values = texts
-    row = np.frombuffer(bytes_from(rows), dtype="<u4").astype(np.intp)
-    value = np.frombuffer(bytes_from(values), dtype="<f8").astype(np.float64)
-    if len(row) != len(value):
+    row: Any = np.frombuffer(bytes_from(texts[0]), SPACE_ROW if most is None else PLANE_ROW)
+    value = np.frombuffer(bytes_from(texts[1]), dtype="<f8").astype(np.float64)
+    if ends * len(row) != len(value):
         raise ValueError(f"{len(row)} rows and {len(value)} multipliers")
+    if not np.all(np.isfinite(value)):
+        raise ValueError("a multiplier is not finite")
+    if most is None:
+        return Terms(row.tolist(), value if ends == 1 else value.reshape(ends, -1))
     if len(row) > most:
         raise ValueError(f"it has {len(row)} multipliers, and there are {most} rows")
     if np.any(row >= most):
         raise ValueError(f"row {np.max(row)} does not exist; there are {most}")
-    if not np.all(np.isfinite(value)):
-        raise ValueError("a multiplier is not finite")
-    return Terms(row, value)
+    return Terms(row.astype(np.intp), value)
 
 
 def numbers_from(values: Any, size: int) -> Floats:

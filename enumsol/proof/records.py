@@ -1,23 +1,26 @@
-"""Records of a proof as classes: one for each kind, which writes it and reads it strictly (docs/proof_format.md).
+"""Certificates of a proof as classes: one for each kind of record, which writes it and reads it strictly.
 
-The certifiers write a record by making one. Checkers, and a search that resumes from an earlier proof, read it by the
-class that a table gives for its first entry. Reading says whether a record makes sense, never that it is true.
+A search writes a record by making one of these. The checker, and a search that resumes from an earlier proof, read it
+by the class that its letter gives in the tree at hand (``proof.leaves``). Reading says whether a record makes sense,
+never that it is true. docs/proof_format.md says what each of them claims and how that is tested.
 
-A new kind of leaf begins here and in ``LEAVES``; docs/architecture.md lists the other places that it touches. Leaves of
-problems in 3D are in ``proof.space_records``. Records of graphs have no classes (see ``branches.proof_records``).
+A new kind of leaf begins here, with the trees in which its theorem holds; docs/architecture.md lists the other places
+that it touches. What stands in trees over pieces of alpha only is in ``proof.curve_records``. Records of graphs in 2D
+have no classes (see ``branches.proof_records``).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
-from typing import Any, ClassVar
+from enum import Flag, auto
+from typing import Any, ClassVar, cast
 
 import numpy as np
 
 from enumsol.proof.proof_file import packed
-from enumsol.proof.reading import codes_from, multipliers_from, numbers_from, quoted
-from enumsol.support.array_types import Codes, Floats
+from enumsol.proof.reading import multipliers_from, numbers_from, quoted
+from enumsol.support.array_types import Codes, Floats, Indices
 from enumsol.trusted.exclusion import Terms
 from enumsol.trusted.status_rows import (
     BACKWARD,
@@ -33,13 +36,32 @@ from enumsol.trusted.status_rows import (
 )
 from enumsol.trusted.uniqueness import numbers_of
 
+#: A row in 3D: its kind, its node, and the number of a direction or sector.
+Row = tuple[int, int, int]
+
 _SLIDING = FORWARD, BACKWARD
 #: Codes that are not final.
 _PARTIAL = CONTACT, UNDECIDED, *_SLIDING
+#: Last entry of a record that is to be tested in rational arithmetic.
+RATIONAL = "rational"
 
 
 class RecordError(ValueError):
     """A record makes no sense; what it says is a whole sentence about it."""
+
+
+class Tree(Flag):
+    """Trees of a proof: at one alpha in 2D and in 3D, and over an interval in 3D, of bodies held and not."""
+
+    PLANE, SPACE, PIECE = auto(), auto(), auto()
+    FLOATING_PLANE, FLOATING_SPACE, FLOATING_PIECE = auto(), auto(), auto()
+    #: Bodies with a stiffness that is positive definite, on which most theorems rest.
+    HELD = PLANE | SPACE | PIECE
+    FLOATING = FLOATING_PLANE | FLOATING_SPACE | FLOATING_PIECE
+    #: Problems in 3D; trees over pieces of alpha; trees at one alpha.
+    IN_SPACE = SPACE | PIECE | FLOATING_SPACE | FLOATING_PIECE
+    PIECES = PIECE | FLOATING_PIECE
+    POINTS = PLANE | SPACE | FLOATING_PLANE | FLOATING_SPACE
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,16 +71,18 @@ class Limits:
     Attributes
     ----------
     codes : status codes of the assignment that is due
-    friction : whether each contact node has any
+    tree : Tree
+    friction : whether each contact node has any; in 2D
     declared : forms that were declared before
     components : of all forces, in 3D
-    modes : rigid modes of a body that nothing holds
+    modes : number of rigid modes
     boxes : around curves, in a graph in 3D
     """
 
     codes: Codes
+    tree: Tree = Tree.PLANE
     friction: Sequence[bool] = ()
-    declared: Sequence[Any] = ()
+    declared: Sequence[DeclaredForm] = ()
     components: int = 0
     modes: int = 0
     boxes: int = 0
@@ -67,6 +91,16 @@ class Limits:
     def p(self) -> int:
         """Number of contact nodes."""
         return len(self.codes)
+
+    @property
+    def in_space(self) -> bool:
+        """True in 3D."""
+        return bool(self.tree & Tree.IN_SPACE)
+
+    @property
+    def held(self) -> bool:
+        """True for a body whose stiffness is positive definite."""
+        return bool(self.tree & Tree.HELD)
 
 
 class Record:
@@ -78,27 +112,24 @@ class Record:
         The first entry.
     sizes : how many entries a record may have
     unfit : what is said where it has another number of them
+    trees : where its theorem holds
     """
 
     kind: ClassVar[str]
     sizes: ClassVar[tuple[int, ...]]
     unfit: ClassVar[str] = "its record has {} entries; expected {}"
+    trees: ClassVar[Tree] = Tree.HELD | Tree.FLOATING
 
     @classmethod
     def read(cls, record: list[Any], limits: Limits) -> Any:
         """What a record of this kind says; ValueError where it makes no sense."""
-        cls.check(record, limits)
+        if len(record) not in cls.sizes:
+            raise RecordError(cls.unfit.format(len(record), " or ".join(map(str, cls.sizes))))
         return cls.of(record[1:], limits)
 
     @classmethod
-    def check(cls, record: list[Any], limits: Limits) -> None:
-        """Raise RecordError where a record has another number of entries, or may not stand at its place."""
-        if len(record) not in cls.sizes:
-            raise RecordError(cls.unfit.format(len(record), " or ".join(map(str, cls.sizes))))
-
-    @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> Any:
-        """The same from the entries after the first, of which there are as many as there must be."""
+        """The same from the entries after the first, of which there are as many as there may be."""
         return cls(*entries)
 
     def write(self) -> list[Any]:
@@ -106,28 +137,13 @@ class Record:
         return [self.kind, *(value.tolist() if isinstance(value, np.ndarray) else value for value in self.entries())]
 
     def entries(self) -> Iterable[Any]:
-        """What follows the kind: the fields, arrays as one list, multipliers as two texts and enclosures by parts."""
+        """What follows the kind: the fields, arrays as one list, enclosures by parts, and nothing for None."""
         for field in fields(self):  # type: ignore[arg-type]
             value = getattr(self, field.name)
-            if isinstance(value, Terms):
-                yield from packed(*value)
-            elif isinstance(value, EnclosureRecord):
+            if isinstance(value, EnclosureRecord):
                 yield from value
-            else:
+            elif value is not None:
                 yield value.ravel() if isinstance(value, np.ndarray) else value
-
-
-def table_of(*records: type[Record]) -> dict[str, type[Any]]:
-    """The table of some kinds of records."""
-    table = {record.kind: record for record in records}
-    if len(table) < len(records):
-        raise AssertionError(f"two of the kinds {', '.join(record.kind for record in records)} begin alike")
-    return table
-
-
-def kind_of(record: list[Any], kinds: dict[str, type[Any]]) -> type[Any] | None:
-    """The class of a record; None for one of another kind."""
-    return kinds.get(record[0]) if record and isinstance(record[0], str) else None
 
 
 # -- branchings and forms ----------------------------------------------------------------------------------------------
@@ -158,88 +174,6 @@ class Branching(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class DeclaredForm(Record):
-    """A form to which later leaves refer.
-
-    Attributes
-    ----------
-    codes : status codes of the assignment for which it is made
-    multipliers : (4, p) array
-    weight : float
-    """
-
-    kind, sizes, unfit = "q", (7,), "a form has {} entries; expected {}"
-
-    codes: Codes
-    multipliers: Floats
-    weight: float
-
-    def entries(self) -> Iterable[Any]:
-        """Codes as a text, and the rows of the multipliers."""
-        return ["".join(map(str, self.codes)), *self.multipliers, self.weight]
-
-    @classmethod
-    def of(cls, entries: list[Any], limits: Limits) -> DeclaredForm:
-        """The form in a record; ValueError where it makes no sense."""
-        text, *rows, weight = entries
-        try:
-            codes = tuple(codes_from([text], limits.p)[0].tolist())
-            multipliers = np.array([numbers_from(values, limits.p) for values in rows])
-            weight = float(numbers_from([weight], 1)[0])
-        except ValueError as error:
-            raise ValueError(f"a form cannot be read: {error}") from None
-        if np.any(multipliers[2:] < 0) or weight < 0:
-            raise ValueError("a multiplier of a form is negative and must not be")
-        return cls(codes, multipliers, weight)
-
-    def same(self, other: DeclaredForm) -> bool:
-        """Whether another record says the same."""
-        alike = self.codes == other.codes and self.weight == other.weight
-        return alike and np.array_equal(self.multipliers, other.multipliers)
-
-    def holds(self, codes: Sequence[int]) -> bool:
-        """Whether a partial assignment is part of the one that this form is made for."""
-        return all(refines(code, mine) for code, mine in zip(codes, self.codes, strict=True))
-
-
-# -- leaves in two and in three dimensions -----------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class UndecidedRecord(Record):
-    """A leaf of which nothing is shown, for this reason."""
-
-    kind, sizes = "u", (2,)
-
-    reason: Any
-
-
-@dataclass(frozen=True)
-class Unloaded(Record):
-    """The whole tree: the body is unloaded, so that nothing but lambda = 0 solves."""
-
-    kind, sizes = "z", (1,)
-
-
-class Solved(Record):
-    """Base of leaves that say all of a selection; they stand at complete assignments only."""
-
-    @classmethod
-    def check(cls, record: list[Any], limits: Limits) -> None:
-        """The same, and that the assignment is complete."""
-        super().check(record, limits)
-        if any(code in _PARTIAL for code in limits.codes):
-            raise RecordError("a root or a solved selection is claimed where statuses are still open")
-
-
-@dataclass(frozen=True)
-class NoRoot(Solved):
-    """A selection holds no root."""
-
-    kind, sizes = "n", (1,)
-
-
-@dataclass(frozen=True, eq=False)
 class EnclosureRecord:
     """Where a record says that its root is, and the root's index; read where they are compared with the root's own."""
 
@@ -263,71 +197,152 @@ class EnclosureRecord:
 
 
 @dataclass(frozen=True, eq=False)
-class RegularRoot(Solved):
-    """A selection holds one root, which is regular."""
+class DeclaredForm(Record):
+    """A form to which later leaves refer: of an assignment, or of a root of a body that nothing holds.
 
-    kind, sizes = "r", (4,)
+    Attributes
+    ----------
+    codes : of the assignment for which it is made, or of the leaf that holds the root
+    numbers : array
+        For a body that is held, in 2D the four rows of its multipliers one after the other; in 3D those of
+        ``trusted.space.slip_forms.SlipForm`` over the whole tree, else those of ``product_forms.Ellipsoid``. For
+        other bodies those of ``trusted.reference.Reference`` or ``trusted.space.space_reference.SpaceReference``.
+    more : array
+        In 2D the weight of the equations; of an ellipsoid a point near its centre; of a root balance and share.
+    enclosure : EnclosureRecord or None
+        Of the root, in 3D.
+    """
 
-    enclosure: EnclosureRecord
+    kind, sizes, unfit = "q", (4, 7), "a form has {} entries; expected {}"
+
+    codes: Codes
+    numbers: Floats
+    more: Floats
+    enclosure: EnclosureRecord | None = None
 
     @classmethod
-    def of(cls, entries: list[Any], limits: Limits) -> RegularRoot:
-        """The enclosure."""
-        return cls(EnclosureRecord(*entries))
+    def of(cls, entries: list[Any], limits: Limits) -> DeclaredForm:
+        """The form in a record; ValueError where it makes no sense."""
+        codes, numbers, more, *enclosure = entries
+        if bool(enclosure) != (limits.in_space and not limits.held):
+            raise RecordError(cls.unfit.format(len(entries) + 1, 4 if enclosure else 7))
+        try:
+            count, further = cls._counts(codes, numbers, limits)
+            given = numbers_from(numbers, count), numbers_from(more, further)
+        except ValueError as error:
+            raise ValueError(f"a form cannot be read: {error}") from None
+        if limits.tree & Tree.PLANE and (np.any(given[0][2 * limits.p :] < 0) or given[1][0] < 0):
+            raise ValueError("a multiplier of a form is negative and must not be")
+        return cls(tuple(codes), *given, EnclosureRecord(*enclosure) if enclosure else None)
+
+    @staticmethod
+    def _counts(codes: Any, numbers: Any, limits: Limits) -> tuple[int, int]:
+        """How many numbers there are of both kinds, of codes that a form may have."""
+        if not isinstance(codes, list) or len(codes) != limits.p or not all(type(code) is int for code in codes):
+            raise ValueError(f"its codes are not a list of {limits.p} codes")
+        whole = all(code == UNDECIDED for code in codes)
+        if not limits.in_space:
+            if limits.held:
+                if not all(0 <= code <= UNDECIDED for code in codes):
+                    raise ValueError(f"a status code is not among 0 to {UNDECIDED}")
+                return 4 * limits.p, 1
+            _selection(codes, limits.friction)
+            return limits.p + 3 * sum(limits.friction), 2
+        if not (whole and limits.held) and not all(map(is_code_of_leaf, codes)):
+            raise ValueError("it is about no assignment")
+        if not limits.held:
+            return limits.p + 2 * limits.components, 2
+        count = limits.p + limits.components if whole else len(numbers) if isinstance(numbers, list) else 0
+        return count, 0 if whole else limits.components
+
+    def same(self, other: DeclaredForm) -> bool:
+        """Whether another record says the same."""
+        pairs = (self.numbers, other.numbers), (self.more, other.more)
+        return self.codes == other.codes and all(np.array_equal(*pair) for pair in pairs)
+
+    def serves(self, codes: Sequence[int], *, in_space: bool = False) -> bool:
+        """Whether a partial assignment is part of the one that this form is made for."""
+        if in_space and any(code != UNDECIDED for code in self.codes):
+            from enumsol.trusted.space.product_forms import refines as is_below  # in 3D only
+
+            return is_below(tuple(codes), self.codes)
+        return all(mine == UNDECIDED or refines(code, mine) for code, mine in zip(codes, self.codes, strict=True))
 
 
-# -- leaves in two dimensions ------------------------------------------------------------------------------------------
+# -- leaves of which nothing, or all, is told --------------------------------------------------------------------------
 
 
-class Exclusion(Record):
-    """Base of leaves without a solution, by multipliers of rows."""
+@dataclass(frozen=True)
+class UndecidedRecord(Record):
+    """A leaf of which nothing is shown, for this reason."""
+
+    kind, sizes = "u", (2,)
+
+    reason: Any
+
+
+@dataclass(frozen=True)
+class Unloaded(Record):
+    """The whole tree: the body is unloaded, so that nothing but lambda = 0 solves."""
+
+    kind, sizes, trees = "z", (1,), Tree.HELD & Tree.POINTS
+
+
+# -- no solution -------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
-class Excluded(Exclusion):
-    """Multipliers of rows exclude the assignment."""
+class Excluded(Record):
+    """Multipliers of rows exclude the assignment.
 
-    kind, sizes = "x", (3,)
+    Attributes
+    ----------
+    rows : row numbers, kind * p + node; in 3D a list of rows
+    values : (k,) array
+        The multipliers; over a piece of alpha (2, k), at its lower and at its upper end, between which they are affine.
+    by : int, RATIONAL or None
+        They bound the energy; or the form declared so many before; or the energy, tested in rational arithmetic.
+    """
 
-    terms: Terms
+    kind, sizes = "x", (3, 4)
+
+    rows: Indices | list[Row]
+    values: Floats
+    by: int | str | None = None
 
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> Excluded:
-        """The multipliers from two texts."""
-        return cls(multipliers_from(entries, ROW_KINDS * limits.p))
+        """The multipliers from two texts, once there is the form and it holds for the assignment."""
+        by = entries[2] if len(entries) > 2 else None
+        if by == RATIONAL and not limits.tree & Tree.PLANE:
+            raise RecordError("it cannot be tested in rational arithmetic")
+        if len(entries) > 2 and by != RATIONAL:
+            _check_form(by, limits)
+        if not limits.in_space:
+            return cls(*multipliers_from(entries[:2], ROW_KINDS * limits.p), by)
+        rows, values = multipliers_from(entries[:2], None, ends=2 if limits.tree & Tree.PIECES else 1)
+        return cls([checked_row(row, limits.p) for row in rows], values, by)
 
+    @property
+    def lines(self) -> list[Row]:
+        """Rows in 3D."""
+        return cast("list[Row]", self.rows)
 
-class ExcludedInRationals(Excluded):
-    """The same, to be checked in rational arithmetic."""
+    @property
+    def terms(self) -> Terms:
+        """Rows and multipliers in 2D."""
+        return Terms(np.asarray(self.rows), self.values)
 
-    kind = "X"
-
-
-@dataclass(frozen=True, eq=False)
-class ExcludedByForm(Exclusion):
-    """The same with the form declared as the ``back``-th before."""
-
-    kind, sizes = "f", (4,)
-
-    back: int
-    terms: Terms
-
-    @classmethod
-    def of(cls, entries: list[Any], limits: Limits) -> ExcludedByForm:
-        """The multipliers, once there is the form and it holds for the assignment."""
-        back = entries[0]
-        if type(back) is not int or not 1 <= back <= len(limits.declared):
-            raise RecordError("its form was not declared")
-        if not limits.declared[-back].holds(limits.codes):
-            raise RecordError("its form was made for another assignment")
-        return cls(back, multipliers_from(entries[1:], ROW_KINDS * limits.p))
+    def entries(self) -> Iterable[Any]:
+        """Rows and multipliers as two texts."""
+        return (*packed(self.rows, self.values), *(() if self.by is None else (self.by,)))
 
 
 @dataclass(frozen=True, eq=False)
-class Unbalanced(Exclusion):
+class Unbalanced(Record):
     """Of a body that nothing holds: no forces below the assignment are in balance with its load."""
 
-    kind, sizes = "i", (2,)
+    kind, sizes, trees = "i", (2,), Tree.FLOATING
 
     direction: Floats
 
@@ -335,6 +350,49 @@ class Unbalanced(Exclusion):
     def of(cls, entries: list[Any], limits: Limits) -> Unbalanced:
         """A number for each rigid mode."""
         return cls(numbers_from(entries[0], limits.modes))
+
+
+# -- complete assignments ----------------------------------------------------------------------------------------------
+
+
+class Solved(Record):
+    """Base of leaves that say all of a selection; they stand at complete assignments only."""
+
+    @classmethod
+    def read(cls, record: list[Any], limits: Limits) -> Any:
+        """As of any record, once the assignment is complete."""
+        check_complete(limits.codes)
+        return super().read(record, limits)
+
+
+@dataclass(frozen=True)
+class NoRoot(Solved):
+    """A selection holds no root; by RATIONAL, that is tested in rational arithmetic."""
+
+    kind, sizes = "n", (1, 2)
+
+    by: str | None = None
+
+    @classmethod
+    def of(cls, entries: list[Any], limits: Limits) -> NoRoot:
+        """In 2D it may be tested in rationals."""
+        if entries and (entries != [RATIONAL] or limits.in_space):
+            raise RecordError("it cannot be tested in rational arithmetic")
+        return cls(*entries)
+
+
+@dataclass(frozen=True, eq=False)
+class RegularRoot(Solved):
+    """A selection holds one root, which is regular."""
+
+    kind, sizes, trees = "r", (4,), Tree.POINTS
+
+    enclosure: EnclosureRecord
+
+    @classmethod
+    def of(cls, entries: list[Any], limits: Limits) -> RegularRoot:
+        """The enclosure."""
+        return cls(EnclosureRecord(*entries))
 
 
 @dataclass(frozen=True, eq=False)
@@ -347,7 +405,7 @@ class SharedRoot(Solved):
     enclosure : EnclosureRecord
     """
 
-    kind, sizes = "g", (5,)
+    kind, sizes, trees = "g", (5,), Tree.FLOATING_PLANE
 
     slips: tuple[tuple[int, int], ...]
     enclosure: EnclosureRecord
@@ -373,17 +431,11 @@ class SharedRoot(Solved):
         return tuple(STICK if i in between else code for i, code in enumerate(codes))
 
 
-class NoRootInRationals(NoRoot):
-    """A selection holds no root, to be checked in rational arithmetic."""
-
-    kind = "N"
-
-
 @dataclass(frozen=True, eq=False)
 class RootSetRecord(Solved):
     """In rational arithmetic, the roots of a selection are the hull of these points: lists of fractions as texts."""
 
-    kind, sizes = "D", (3,)
+    kind, sizes, trees = "D", (3,), Tree.PLANE | Tree.FLOATING_PLANE
 
     points: list[list[str]]
     dimension: Any
@@ -399,183 +451,229 @@ class RootSetRecord(Solved):
         return cls(*entries)
 
 
+# -- one solution at most ----------------------------------------------------------------------------------------------
+
+
 class ClosingRecord(Record):
     """Base of leaves below which there can be one solution only."""
 
 
 @dataclass(frozen=True, eq=False)
 class Closed(ClosingRecord):
-    """With an enclosure that solution is a root, without one it is none.
+    """With an enclosure, or a count of 1, that solution is a root, else it is none.
 
     Attributes
     ----------
     selection : final codes; FORWARD and BACKWARD at nodes that slide
     free : nodes
     weights : numbers of the form
-    force : midpoint of the enclosure, or a point near the solution
+    at : array or int
+        Midpoint of the enclosure, or a point near the solution. In rational arithmetic, in which the solution solves
+        the selection, 1 if it is a root and 0 if it is none.
     enclosure : EnclosureRecord or None
     """
 
-    kind, sizes = "m", (5, 7)
+    kind, sizes, trees = "m", (5, 7), Tree.PLANE
 
     selection: Codes
     free: Codes
-    weights: Any
-    force: Floats
+    weights: Floats | list[float]
+    at: Floats | int
     enclosure: EnclosureRecord | None = None
 
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> Closed:
         """Nodes, codes and numbers, if they fit each other and the assignment."""
-        free = _nodes(entries[1], limits.p)
-        selection = _selection(entries[0], limits.friction, sliding=set(range(limits.p)) - set(free))
-        weights = _weights(entries[2], free, selection, limits.friction)
-        force = numbers_from(entries[3], 2 * limits.p)
-        if any(not refines(code, selection[i]) for i, code in enumerate(limits.codes) if i not in free):
+        given, nodes, weights, at, *_ = entries
+        codes, friction, free = limits.codes, limits.friction, _nodes(nodes, limits.p)
+        if len(entries) == 4 and type(at) is int:
+            selection = _selection(given, friction)
+            if free != tuple(i for i, code in enumerate(codes) if code in (CONTACT, UNDECIDED)):
+                raise RecordError("its free nodes are not those of its assignment")
+            if any(not refines(selection[i], code) for i, code in enumerate(codes) if i not in free):
+                raise RecordError("its selection does not lie below its assignment")
+            return cls(selection, free, _weights(weights, free, codes, friction), at)
+        selection = _selection(given, friction, sliding=set(range(limits.p)) - set(free))
+        numbers = _weights(weights, free, selection, friction)
+        force = numbers_from(at, 2 * limits.p)
+        if any(not refines(code, selection[i]) for i, code in enumerate(codes) if i not in free):
             raise RecordError("a node that has a status in its proof has another one in its assignment")
-        return cls(selection, free, weights, force, EnclosureRecord(*entries[3:]) if len(entries) > 4 else None)
+        return cls(selection, free, numbers, force, EnclosureRecord(*entries[3:]) if len(entries) > 4 else None)
 
     def entries(self) -> Iterable[Any]:
         """The midpoint is that of the enclosure."""
-        return self.selection, self.free, self.weights, *(self.enclosure or [self.force])
+        return self.selection, self.free, self.weights, *(self.enclosure or [self.at])
 
 
 @dataclass(frozen=True, eq=False)
-class ClosedInRationals(ClosingRecord):
-    """In rational arithmetic that solution solves this selection; ``count`` says whether it is a root."""
-
-    kind, sizes = "M", (4,)
-
-    selection: Codes
-    weights: Any
-    count: Any
-
-    @classmethod
-    def of(cls, entries: list[Any], limits: Limits) -> ClosedInRationals:
-        """Codes and numbers, if they fit each other and the assignment."""
-        codes, selection, free = limits.codes, _selection(entries[0], limits.friction), cls.free(limits.codes)
-        if any(not refines(selection[i], code) for i, code in enumerate(codes) if i not in free):
-            raise RecordError("its selection does not lie below its assignment")
-        return cls(selection, _weights(entries[1], free, codes, limits.friction), entries[2])
-
-    @staticmethod
-    def free(codes: Codes) -> Codes:
-        """The nodes of an assignment that are free: which they are is not written."""
-        return tuple(i for i, code in enumerate(codes) if code in (CONTACT, UNDECIDED))
-
-
-@dataclass(frozen=True, eq=False)
-class Alone(Record):
-    """The root of a selection is the only one below the assignment.
+class Alone(ClosingRecord):
+    """Below the assignment there is this solution only, or in 3D none; in 3D it may lie beyond its sectors.
 
     Attributes
     ----------
-    selection : final codes
-    weights, strengths, terms : arrays, as ``trusted.uniqueness.lone_root`` takes them
+    selection : final codes of the solution; in 3D those of a leaf, or none for the whole tree
+    numbers : of the form, as ``trusted.uniqueness.lone_root`` or ``space_uniqueness.SpaceWeights.of`` takes them
     enclosure : EnclosureRecord
+    strengths, terms : arrays, as ``trusted.uniqueness.lone_root`` takes them; None in 3D
     """
 
-    kind, sizes, unfit = "a", (9,), "its record cannot be followed (it has {} entries; expected {})"
+    kind, sizes, trees = "a", (6, 9), Tree.PLANE | Tree.SPACE
 
     selection: Codes
-    weights: Floats
-    strengths: Floats
-    terms: Terms
+    numbers: Floats
     enclosure: EnclosureRecord
+    strengths: Floats | None = None
+    terms: Terms | None = None
 
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> Alone:
         """Codes and numbers, if they fit each other and the assignment."""
-        selection = _selection(entries[0], limits.friction)
+        selection, numbers, mid, rad, index, *more = entries
+        if bool(more) == limits.in_space:
+            raise RecordError(cls.unfit.format(len(entries) + 1, 6 if limits.in_space else 9))
+        enclosure = EnclosureRecord(mid, rad, index)
+        if limits.in_space:
+            if not selection and any(code != UNDECIDED for code in limits.codes):
+                raise RecordError("its only solution is claimed below the root of the tree without a leaf")
+            values = numbers_from(numbers, limits.p + 2 * limits.components)
+            numbers_from(mid, limits.components)
+            if not isinstance(selection, list) or not all(type(code) is int for code in selection):
+                raise RecordError("its leaf is not a list of codes")
+            return cls(tuple(selection), values, enclosure)
+        chosen = _selection(selection, limits.friction)
         nodes, own = numbers_of(limits.codes, limits.friction)
-        weights = numbers_from(entries[1], len(nodes) + 3 * int(np.count_nonzero(own)))
-        strengths = numbers_from(entries[2], 2 * limits.p).reshape(2, -1)
-        terms = multipliers_from(entries[3:5], ROW_KINDS * limits.p)
-        return cls(selection, weights, strengths, terms, EnclosureRecord(*entries[5:]))
+        weights = numbers_from(numbers, len(nodes) + 3 * int(np.count_nonzero(own)))
+        strengths = numbers_from(more[0], 2 * limits.p).reshape(2, -1)
+        return cls(chosen, weights, enclosure, strengths, multipliers_from(more[1:], ROW_KINDS * limits.p))
 
-    @property
-    def arguments(self) -> tuple[Any, ...]:
-        """Those of ``trusted.uniqueness.lone_root`` after the assignment."""
-        return self.selection, self.weights, self.strengths, *self.terms
+    def entries(self) -> Iterable[Any]:
+        """Multipliers as two texts."""
+        yield from (self.selection, self.numbers, *self.enclosure)
+        if self.strengths is not None and self.terms is not None:
+            yield from (self.strengths.ravel(), *packed(*self.terms))
 
 
 @dataclass(frozen=True, eq=False)
-class DeclaredReference(Record):
-    """A root of a body that nothing holds and the numbers of its form, to which leaves refer.
+class BoxedRoot(ClosingRecord):
+    """All solutions lie in a box that holds one solution.
 
     Attributes
     ----------
-    selection : final codes
-    weights, balance, share : as ``trusted.reference.Reference.of`` takes them
+    mid, rad, rho : centre and radius of the box, and its weights of displacements, read where they are needed
+    enclosure : EnclosureRecord
+    by : int or None
+        All solutions below the assignment lie in the ellipsoid of the form declared so many before, which lies in the
+        box. Without it the assignment is complete.
     """
 
-    kind, sizes, unfit = DeclaredForm.kind, (5,), "a form has {} entries; expected {}"
+    kind, sizes, trees = "l", (7, 8), Tree.SPACE
 
-    selection: Codes
-    weights: Floats
-    balance: float
-    share: float
+    mid: Any
+    rad: Any
+    rho: Any
+    enclosure: EnclosureRecord
+    by: int | None = None
 
     @classmethod
-    def of(cls, entries: list[Any], limits: Limits) -> DeclaredReference:
-        """Codes and numbers, if they fit each other."""
-        selection = _selection(entries[0], limits.friction)
-        weights = numbers_from(entries[1], limits.p + 3 * sum(limits.friction))
-        return cls(selection, weights, *numbers_from(entries[2:], 2).tolist())
+    def of(cls, entries: list[Any], limits: Limits) -> BoxedRoot:
+        """The box and the enclosure."""
+        mid, rad, rho, *enclosure = entries[:6]
+        if entries[6:]:
+            _check_form(entries[6], limits)
+        else:
+            check_complete(limits.codes)
+        return cls(mid, rad, rho, EnclosureRecord(*enclosure), *entries[6:])
+
+    def box(self, size: int) -> tuple[Floats, Floats, Floats]:
+        """Centre, radius and rho of the box; ValueError where they are no ``size`` numbers each."""
+        return numbers_from(self.mid, size), numbers_from(self.rad, size), numbers_from(self.rho, size)
 
 
 @dataclass(frozen=True, eq=False)
-class OnlyReference(Record):
-    """No root but that of a form lies below the assignment; with an enclosure, this one does.
+class OnlyReference(ClosingRecord):
+    """No root but that of a form lies below the assignment; with an enclosure, in 2D, this one does.
 
     Attributes
     ----------
     back : int
         So many forms were declared since, and this one.
-    rows : list of int
-        Rows on displacements that are equations.
+    rows : list of rows on displacements that are equations
     products : list of (row, row, factor)
     enclosure : EnclosureRecord or None
     """
 
-    kind, sizes = Alone.kind, (4, 7)
+    kind, sizes, trees = "o", (4, 7), Tree.FLOATING & Tree.POINTS
 
     back: int
-    rows: list[int]
-    products: list[tuple[int, int, float]]
+    rows: list[Any]
+    products: list[tuple[Any, Any, float]]
     enclosure: EnclosureRecord | None = None
 
     @classmethod
     def of(cls, entries: list[Any], limits: Limits) -> OnlyReference:
         """Numbers that fit the problem."""
-        back, rows, products = entries[:3]
+        back, rows, products, *enclosure = entries
+        if enclosure and limits.in_space:
+            raise RecordError(cls.unfit.format(len(entries) + 1, 4))
         if type(back) is not int or not 0 < back <= len(limits.declared):
             raise RecordError("its form is not declared")
         if not all(isinstance(value, list) for value in (rows, products)):
             raise RecordError("its rows are not a list")
-        factors = [float(numbers_from(product, 3)[2]) for product in products]
-        pairs = [product[:2] for product in products]
-        if any(type(row) is not int or not 0 <= row < ROW_KINDS * limits.p for row in sum(pairs, rows)):
-            raise RecordError("its rows are not numbers of rows")
+        if not all(isinstance(product, list) and len(product) == 3 for product in products):
+            raise RecordError("its products are not pairs of rows with a factor")
+        factors = numbers_from([factor for *_, factor in products], len(products)).tolist()
+        pairs = [tuple(cls._row(row, limits) for row in pair) for *pair, _ in products]
         said = [(one, other, factor) for (one, other), factor in zip(pairs, factors, strict=True)]
-        return cls(back, rows, said, EnclosureRecord(*entries[3:]) if entries[3:] else None)
+        equations = [cls._row(row, limits) for row in rows]
+        return cls(back, equations, said, EnclosureRecord(*enclosure) if enclosure else None)
+
+    @staticmethod
+    def _row(row: Any, limits: Limits) -> Any:
+        if limits.in_space:
+            return checked_row(row, limits.p)
+        if type(row) is not int or not 0 <= row < ROW_KINDS * limits.p:
+            raise RecordError("its rows are not numbers of rows")
+        return row
 
     def entries(self) -> Iterable[Any]:
         """Without an enclosure where there is none."""
-        found = self.back, self.rows, [list(product) for product in self.products]
-        return (*found, *(self.enclosure or ()))
+        return self.back, self.rows, [list(product) for product in self.products], *(self.enclosure or ())
 
 
-#: All kinds of leaves in 2D.
-LEAVES = table_of(
-    *(Excluded, ExcludedInRationals, ExcludedByForm, NoRoot, NoRootInRationals, RegularRoot, RootSetRecord),
-    *(Closed, ClosedInRationals, Alone, Unloaded, UndecidedRecord),
-)
-#: The same of a body that nothing holds; others rest on a stiffness that is positive definite.
-FLOATING_LEAVES = table_of(
-    *(Excluded, Unbalanced, NoRoot, NoRootInRationals, RegularRoot, SharedRoot, RootSetRecord, OnlyReference),
-    UndecidedRecord,
-)
+def check_complete(codes: Codes) -> None:
+    """Raise RecordError where an assignment is not complete."""
+    if any(code in _PARTIAL for code in codes):
+        raise RecordError("a root or a solved selection is claimed where statuses are still open")
+
+
+def is_code_of_leaf(code: Any) -> bool:
+    """True for a status in 3D that is not undecided, or that of a sector."""
+    from enumsol.model.sectors import SECTORS, is_sector  # in 3D only
+
+    return type(code) is int and (0 <= code < UNDECIDED or (code > SECTORS and is_sector(code - SECTORS)))
+
+
+def checked_row(row: Any, p: int) -> Row:
+    """A row in 3D; ValueError where there is none such."""
+    from enumsol.model.sectors import DEEPEST, RUN  # in 3D only
+    from enumsol.trusted.space.sector_rows import FORCE, GAP, RIGHT
+
+    if not isinstance(row, list | tuple) or len(row) != 3 or not all(type(x) is int for x in row):
+        raise ValueError(f"{quoted(row)} is not a row")
+    kind, node, number = row
+    # numbers of directions and sectors are less; directions of tangents are less than RUN
+    known = 0 <= kind <= RIGHT and 0 <= node < p and -1 <= number < RUN << DEEPEST
+    if not known or (kind in (GAP, FORCE) and number):
+        raise ValueError(f"row {quoted(list(row))} does not exist")
+    return kind, node, number
+
+
+def _check_form(back: Any, limits: Limits) -> None:
+    """Raise RecordError unless a form was declared so many before which serves the assignment."""
+    if not limits.tree & (Tree.PLANE | Tree.SPACE) or type(back) is not int or not 1 <= back <= len(limits.declared):
+        raise RecordError("its form was not declared")
+    if not limits.declared[-back].serves(limits.codes, in_space=limits.in_space):
+        raise RecordError("its form was made for another assignment")
 
 
 def _selection(value: Any, friction: Sequence[bool], sliding: Iterable[int] = ()) -> Codes:

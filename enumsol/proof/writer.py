@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, Protocol
 
 import numpy as np
 
-from enumsol.proof.proof_file import MAGIC, Proof
+from enumsol.proof.proof_file import MAGIC, PROOF_VERSION, Proof
 from enumsol.proof.reading import rational_text
 from enumsol.support.files import check_replaceable, writing
 
@@ -317,7 +317,7 @@ def point_header(
     """
     return {
         "format": "enumsol-proof",
-        "version": 1,
+        "version": PROOF_VERSION,
         **kind,
         "problem": problem.fingerprint,
         "alpha": rational_text(Fraction(alpha), "alpha"),

@@ -132,8 +132,17 @@ class ActiveSetEngine(CompiledEngine):
 
         super().__init__(data, rule, 2 * p)
 
+    def bounding(self, scaled: ScaledSystem, form: EnclosedForm) -> CompiledEngine:
+        """An engine with the same rows whose relaxations bound a form, which is convex, in place of the energy."""
+        from enumsol.relaxation._active_set import QPData
+
+        data = QPData(form.H, form.h, -scaled.S, scaled.g, *self.rows)
+        other = CompiledEngine(data, lambda: self.rule, self.size, -form.k)
+        other.form = form
+        return other
+
     def _is_slow(self, F: NDArray[np.float64]) -> bool:
-        """Whether one dual step closes little of the gap at the root of the tree."""
+        """True if one dual step closes little of the gap at the root of the tree."""
         p, rows, modes = len(F), list[int](), list[int]()
         for node, friction in enumerate((F > 0).tolist()):
             for kind, mode in status_rows(UNDECIDED, friction=friction):
@@ -141,25 +150,6 @@ class ActiveSetEngine(CompiledEngine):
                 modes.append(mode)
         root = self.root(rows, modes)
         return not (root.stalled or root.pruned) and root.gap_closed((UNDECIDED,) * p) < _SLOW
-
-
-class FormEngine(CompiledEngine):
-    """Relaxations with a form in place of the energy, which bound it from below.
-
-    Parameters
-    ----------
-    engine : ActiveSetEngine
-        Relaxations with the energy.
-    scaled : ScaledSystem
-    form : EnclosedForm
-    """
-
-    def __init__(self, engine: ActiveSetEngine, scaled: ScaledSystem, form: EnclosedForm) -> None:
-        from enumsol.relaxation._active_set import QPData
-
-        data = QPData(form.H, form.h, -scaled.S, scaled.g, *engine.rows)
-        super().__init__(data, lambda: engine.rule, engine.size, -form.k)
-        self.form = form
 
 
 class ActiveSetRelaxation:

@@ -2,24 +2,29 @@
 
 The bound of a form over a partial assignment is concave in its multipliers, which may be what they like as long as the
 form is convex on the subspace of the assignment's equations. Newton's method maximises it together with barriers: the
-log of the determinant of the form there, and the logs of the multipliers that have a sign. It moves those logs: a step
-that moves the multipliers themselves is cut where the first of them vanishes. All terms are of rank two, so that
-gradients and second derivatives need products of matrices of size 2p only.
+log of the determinant of the form there, and those of the multipliers. In 2D these are the logs of the multipliers that
+have a sign, which a step moves: one that moves the multipliers themselves is cut where the first of them vanishes. In
+3D (theory, section 12.2) vectors c may be no longer than kappa, and their barrier is the log of kappa^2 - |c|^2. All
+terms are of rank two, so that gradients and second derivatives need products of matrices of the size of S only.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Generic, TypeVar
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, qr, solve_triangular
 
 from enumsol.arithmetic.balls import factor_above
-from enumsol.relaxation.active_set import ActiveSetEngine, ActiveSetRelaxation, FormEngine
+from enumsol.relaxation.active_set import ActiveSetRelaxation
 from enumsol.relaxation.imposed_rows import row_normals
+from enumsol.relaxation.space_relaxation import SpaceRelaxation
 from enumsol.support.deadlines import look
 from enumsol.trusted.quadratic_forms import EnclosedForm, Equations
+from enumsol.trusted.space.sector_rows import sector_row_terms
+from enumsol.trusted.space.slip_forms import SlipForm
 from enumsol.trusted.status_rows import CONTACT, UNDECIDED
 
 if TYPE_CHECKING:
@@ -27,60 +32,118 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.condensed import ScaledSystem
     from enumsol.condensation.enclosure import EnclosedSystem
-    from enumsol.support.array_types import Codes, Floats, Indices
+    from enumsol.condensation.space_condensed import EnclosedSpace
+    from enumsol.relaxation.active_set import ActiveSetEngine
+    from enumsol.relaxation.space_relaxation import SpaceEngine
+    from enumsol.support.array_types import Codes, Floats
 
     Rows = tuple[list[int], list[int]]
 
-#: Weights of the bound and of the logs of multipliers beside that of the determinant, for every unknown.
-_BOUND, _LOGS = 0.125, 0.05
-#: Multipliers with a sign are kept above this share of the largest.
-_LEAST = 1e-4
-#: A step ends the ascent when it promises less than this.
-_ENOUGH = 1.0
+_Form = TypeVar("_Form", EnclosedForm, SlipForm)
+_Relaxation = TypeVar("_Relaxation", ActiveSetRelaxation, SpaceRelaxation)
+
+#: Weights of the bound and of the barriers of multipliers beside that of the determinant, for every unknown.
+_BOUND, _BARRIER = 0.125, 0.05
 #: Lengths are shortened by this until the form is convex, then once more; then halved, so many times at most.
-_SHORTER, _INSIDE, _TRIALS = 0.7, 0.85, 8
-#: The least step length, and the furthest that one step moves the log of a multiplier.
-_SHORTEST, _FURTHEST = 1e-3, 2.0
-#: First weight of the equations by the mean curvature, and how often it is multiplied by ten.
-_WEIGHT, _HEAVIER = 10.0, 6
-#: Least curvature of a form by its mean curvature.
-_CURVATURE = 1e-9
+_SHORTER, _INSIDE, _TRIALS, _SHORTEST = 0.7, 0.85, 8, 1e-3
+#: In 2D: multipliers with a sign are kept above this share of the largest, one step moves their logs this far at most,
+#: and a step ends the ascent when it promises less than this.
+_LEAST, _FURTHEST, _ENOUGH = 1e-4, 2.0, 1.0
+#: First weight of the equations by the mean curvature, how often it is multiplied by ten, and the least curvature.
+_WEIGHT, _HEAVIER, _CURVATURE = 10.0, 6, 1e-9
 #: Part of a normal outside the span of others below which it counts as in it.
 _DEPENDENT = 1e-10
+#: In 3D: steps of the ascent, what two of them have to gain together, and how much shorter vectors c are than kappa.
+_STEPS, _GAIN, _WITHIN = 16, 0.1, 1.0 - 1e-9
 
 
 @dataclass(frozen=True)
-class _Subspace:
-    """lambda = anything with the equations of a partial assignment.
-
-    Attributes
-    ----------
-    across : (2p, r) array
-        Orthonormal columns that span what the equations leave free.
-    live : int array
-        Numbers of the multipliers (of all 4p) whose terms do not vanish there, and may be at most zero at a solution.
-    """
-
-    across: Floats
-    live: Indices
-
-
-@dataclass(frozen=True)
-class _Candidate:
+class _Candidate(Generic[_Form, _Relaxation]):
     """Multipliers at which the bound is known."""
 
     multipliers: Floats
-    form: EnclosedForm
+    form: _Form
     factor: Floats
-    relaxation: ActiveSetRelaxation
+    relaxation: _Relaxation
 
     @property
     def log_determinant(self) -> float:
         return 2.0 * float(np.sum(np.log(np.diagonal(self.factor))))
 
 
-class FormAscent:
-    """Finds forms for partial assignments of one problem.
+class FormAscent(ABC, Generic[_Form, _Relaxation]):
+    """Newton's method for the multipliers of a form that bounds one partial assignment."""
+
+    #: The length of a first step that leaves the form convex.
+    whole: float
+
+    @abstractmethod
+    def _form(self, multipliers: Floats) -> _Form | None:
+        """The form of these multipliers, if they are allowed."""
+
+    @abstractmethod
+    def _factor(self, form: _Form) -> Floats | None:
+        """The Cholesky factor of a form on the subspace of the assignment; None where it is not convex there."""
+
+    @abstractmethod
+    def _relaxed(self, form: _Form, factor: Floats, multipliers: Floats) -> tuple[_Form, _Relaxation] | None:
+        """The form as it is convex everywhere, and its relaxation; None where it is hardly convex."""
+
+    @abstractmethod
+    def _barrier(self, multipliers: Floats) -> float:
+        """The sum of the logs that keep multipliers where they are allowed."""
+
+    @abstractmethod
+    def _moved(self, multipliers: Floats, change: Floats) -> Floats:
+        """Multipliers after a step."""
+
+    @abstractmethod
+    def _derivatives(self, found: _Candidate[_Form, _Relaxation], scale: float) -> tuple[Floats, Floats]:
+        """Gradient, and minus the second derivative, of what is maximised."""
+
+    def _convex(self, multipliers: Floats) -> tuple[_Form, Floats] | None:
+        form = self._form(multipliers)
+        factor = None if form is None else self._factor(form)
+        return None if form is None or factor is None else (form, factor)
+
+    def _candidate(self, multipliers: Floats) -> _Candidate[_Form, _Relaxation] | None:
+        """The relaxation with these multipliers; None where their form is not convex, or that stalls."""
+        convex = self._convex(multipliers)
+        found = None if convex is None else self._relaxed(*convex, multipliers)
+        if convex is None or found is None or found[1].stalled:
+            return None
+        return _Candidate(multipliers, found[0], convex[1], found[1])
+
+    def _step(self, found: _Candidate[_Form, _Relaxation]) -> tuple[_Candidate[_Form, _Relaxation], float] | None:
+        """The end of one step of Newton's method, and what it promised; None where it gains nothing."""
+        # the bound in the scale of the barriers
+        scale = _BOUND * len(found.form.h) / max(-found.relaxation.bound, 1e-300)
+        newton = _newton_step(*self._derivatives(found, scale))
+        if newton is None:
+            return None
+        step, promised = newton
+
+        def merit(candidate: _Candidate[_Form, _Relaxation]) -> float:
+            barriers = candidate.log_determinant + _BARRIER * self._barrier(candidate.multipliers)
+            return scale * candidate.relaxation.bound + barriers
+
+        length = 1.0
+        while self._convex(self._moved(found.multipliers, length * step)) is None:
+            length *= _SHORTER
+            if length < _SHORTEST:
+                return None
+        length = self.whole if length == 1.0 else _INSIDE * length
+        for _ in range(_TRIALS):
+            look()
+            trial = self._candidate(self._moved(found.multipliers, length * step))
+            if trial is not None and (trial.relaxation.pruned or merit(trial) > merit(found)):
+                return trial, promised
+            length *= 0.5
+        return None
+
+
+class PlaneFormAscent(FormAscent[EnclosedForm, ActiveSetRelaxation]):
+    """Forms in 2D.
 
     Parameters
     ----------
@@ -89,10 +152,25 @@ class FormAscent:
         Balls for the same system.
     engine : ActiveSetEngine
         That of the energy, whose rows and branching rule serve the forms as well.
+    codes : status codes of the partial assignment
+    rows : numbers and modes of its rows
     """
 
-    def __init__(self, scaled: ScaledSystem, enclosed: EnclosedSystem, engine: ActiveSetEngine) -> None:
-        self._scaled, self._enclosed, self._engine = scaled, enclosed, engine
+    whole = _INSIDE
+
+    def __init__(
+        self, scaled: ScaledSystem, enclosed: EnclosedSystem, engine: ActiveSetEngine, codes: Codes, rows: Rows
+    ) -> None:
+        self._scaled, self._enclosed, self._engine, self._codes, self._rows = scaled, enclosed, engine, codes, rows
+        p, status = scaled.p, np.asarray(codes)
+        a = Equations.of(enclosed, codes).a
+        #: Orthonormal columns that span what the equations leave free, shape (2p, r).
+        self._across = _complement(a) if len(a) else np.eye(2 * p)
+        normal = status == UNDECIDED
+        tangential = (normal | (status == CONTACT)) & (scaled.F > 0)
+        #: Numbers of the multipliers (of all 4p) whose terms do not vanish there, and are at most zero at a solution.
+        self._live = np.flatnonzero(np.concatenate([normal, normal & tangential, tangential, tangential]))
+        self._signed = self._live >= 2 * p
 
     @property
     def energy(self) -> Floats:
@@ -100,135 +178,79 @@ class FormAscent:
         p = self._scaled.p
         return np.stack([np.ones(p), np.zeros(p), np.full(p, 0.5), np.full(p, 0.5)])
 
-    def improve(
-        self, codes: Codes, multipliers: Floats, rows: Rows, steps: int
-    ) -> tuple[EnclosedForm, ActiveSetRelaxation] | None:
-        """A form for a partial assignment and its solved relaxation; None where nothing is found.
+    def improve(self, multipliers: Floats, steps: int) -> tuple[EnclosedForm, ActiveSetRelaxation] | None:
+        """A form for the assignment and its solved relaxation; None where nothing is found.
 
         Parameters
         ----------
-        codes : status codes
         multipliers : (4, p) array
             Where the ascent begins: those of a form that serves the assignment.
-        rows : numbers and modes of the rows of the assignment
         steps : int
             Most steps.
         """
-        space = self._subspace(codes)
-        start = np.zeros(multipliers.size)
-        values = multipliers.ravel()[space.live]
-        if not len(space.live) or not space.across.shape[1]:
+        live, start = self._live, np.zeros(multipliers.size)
+        values = multipliers.ravel()[live]
+        if not len(live) or not self._across.shape[1]:
             return None
-        signed = space.live >= 2 * self._scaled.p
-        start[space.live] = np.where(signed, np.maximum(values, _LEAST * np.max(np.abs(values))), values)
+        start[live] = np.where(self._signed, np.maximum(values, _LEAST * np.max(np.abs(values))), values)
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-            found = self._candidate(codes, space, start, rows)
+            found = self._candidate(start)
             for _ in range(steps):
                 look()
-                if found is None or found.relaxation.pruned:
-                    break
-                better = self._step(codes, space, found, rows)
+                better = None if found is None or found.relaxation.pruned else self._step(found)
                 if better is None:
                     break
-                found, last = better
-                if last:
+                found, promised = better
+                if promised < _ENOUGH:
                     break
         return None if found is None else (found.form, found.relaxation)
 
-    def _subspace(self, codes: Codes) -> _Subspace:
-        p, status = self._scaled.p, np.asarray(codes)
-        a = Equations.of(self._enclosed, codes).a
-        across = _complement(a) if len(a) else np.eye(2 * p)
-        normal = status == UNDECIDED
-        tangential = (normal | (status == CONTACT)) & (self._scaled.F > 0)
-        live = np.flatnonzero(np.concatenate([normal, normal & tangential, tangential, tangential]))
-        return _Subspace(across, live)
+    def _form(self, multipliers: Floats, weight: float = 0.0) -> EnclosedForm:
+        return EnclosedForm.of(self._enclosed, self._codes, multipliers.reshape(4, -1), weight)
 
-    def _factor(self, form: EnclosedForm, space: _Subspace) -> Floats | None:
-        """The Cholesky factor of a form on the subspace; None where it is not convex there."""
-        whole = space.across.shape[1] == len(form.h)
-        return factor_above(form.H if whole else space.across.T @ form.H @ space.across)
+    def _factor(self, form: EnclosedForm) -> Floats | None:
+        whole = self._across.shape[1] == len(form.h)
+        return factor_above(form.H if whole else self._across.T @ form.H @ self._across)
 
-    def _plain(self, codes: Codes, multipliers: Floats, weight: float = 0.0) -> EnclosedForm:
-        return EnclosedForm.of(self._enclosed, codes, multipliers.reshape(4, -1), weight)
-
-    def _candidate(self, codes: Codes, space: _Subspace, multipliers: Floats, rows: Rows) -> _Candidate | None:
-        """The relaxation with these multipliers; None where their form is not convex."""
-        proven = self._plain(codes, multipliers)
-        factor = self._factor(proven, space)
-        if factor is None:
-            return None
+    def _relaxed(
+        self, form: EnclosedForm, factor: Floats, multipliers: Floats
+    ) -> tuple[EnclosedForm, ActiveSetRelaxation] | None:
         mean = float(np.sum(factor * factor)) / len(factor)
-        if len(factor) < len(proven.h):
-            for k in range(_HEAVIER):
-                proven = self._plain(codes, multipliers, _WEIGHT * mean * 10.0**k)
-                if _is_convex(proven.H, mean):
-                    break
-            else:
-                return None
-        elif not _is_convex(proven.H, mean):
-            return None
-        relaxation = FormEngine(self._engine, self._scaled, proven).root(*rows)
-        if relaxation.stalled or not isinstance(relaxation, ActiveSetRelaxation):
-            return None
-        return _Candidate(multipliers, proven, factor, relaxation)
-
-    def _step(self, codes: Codes, space: _Subspace, found: _Candidate, rows: Rows) -> tuple[_Candidate, bool] | None:
-        """One step of Newton's method; with it whether it is to be the last."""
-        z, live = found.multipliers, space.live
-        signed = live >= 2 * self._scaled.p
-        # the bound in the scale of the barriers
-        scale = _BOUND * 2 * self._scaled.p / max(-found.relaxation.bound, 1e-300)
-        newton = self._direction(space, found, scale)
-        if newton is None:
-            return None
-        step, promised = newton
-
-        def moved(length: float) -> Floats:
-            values, change = z.copy(), length * step
-            grown = z[live] * np.exp(np.clip(change, -_FURTHEST, _FURTHEST))
-            values[live] = np.where(signed, grown, z[live] + change)
-            return values
-
-        def merit(candidate: _Candidate) -> float:
-            logs = float(np.sum(np.log(candidate.multipliers[live][signed])))
-            return scale * candidate.relaxation.bound + candidate.log_determinant + _LOGS * logs
-
-        length = 1.0
-        while self._factor(self._plain(codes, moved(length)), space) is None:
-            length *= _SHORTER
-            if length < _SHORTEST:
-                return None
-        length *= _INSIDE
-        for _ in range(_TRIALS):
-            look()
-            trial = self._candidate(codes, space, moved(length), rows)
-            if trial is not None and (trial.relaxation.pruned or merit(trial) > merit(found)):
-                return trial, promised < _ENOUGH
-            length *= 0.5
+        weights = [_WEIGHT * mean * 10.0**k for k in range(_HEAVIER)] if len(factor) < len(form.h) else [0.0]
+        for weight in weights:
+            trial = self._form(multipliers, weight) if weight else form
+            if factor_above(trial.H, _CURVATURE * mean) is not None:
+                return trial, self._engine.bounding(self._scaled, trial).root(*self._rows)
         return None
 
-    def _direction(self, space: _Subspace, found: _Candidate, scale: float) -> tuple[Floats, float] | None:
-        """Newton's step, in the logs of multipliers that have a sign, and what it promises; None where it fails."""
-        scaled, live = self._scaled, space.live
-        signed = live >= 2 * scaled.p
+    def _barrier(self, multipliers: Floats) -> float:
+        return float(np.sum(np.log(multipliers[self._live][self._signed])))
+
+    def _moved(self, multipliers: Floats, change: Floats) -> Floats:
+        values, live = multipliers.copy(), self._live
+        grown = multipliers[live] * np.exp(np.clip(change, -_FURTHEST, _FURTHEST))
+        values[live] = np.where(self._signed, grown, multipliers[live] + change)
+        return values
+
+    def _derivatives(self, found: _Candidate[EnclosedForm, ActiveSetRelaxation], scale: float) -> tuple[Floats, Floats]:
+        """With respect to the logs of multipliers that have a sign."""
+        scaled, live, signed = self._scaled, self._live, self._signed
         numbers, _ = found.relaxation.multipliers()
-        normals = row_normals(scaled.p, scaled.F, scaled.S, numbers) @ space.across
+        normals = row_normals(scaled.p, scaled.F, scaled.S, numbers) @ self._across
         terms = FormProducts(
             scaled.S, scaled.g, lambda rows: self._left(rows)[live], lambda rows: self._right(rows)[live]
         )
         forces = found.relaxation.forces
-        gradient, hessian = terms.derivatives(found.form.H, found.factor, forces, scale, normals, space.across)
+        gradient, hessian = terms.derivatives(found.form.H, found.factor, forces, scale, normals, self._across)
         slope = np.where(signed, found.multipliers[live], 1.0)
         gradient *= slope
         hessian *= slope[:, None] * slope
         diagonal = np.diagonal(hessian).copy()
         # what the logs add to the curvature, where it is concave
-        diagonal[signed] += np.maximum(-gradient[signed], _LOGS)
-        gradient[signed] += _LOGS
+        diagonal[signed] += np.maximum(-gradient[signed], _BARRIER)
+        gradient[signed] += _BARRIER
         hessian[np.diag_indices(len(live))] = diagonal
-        step = newton_step(gradient, hessian)
-        return None if step is None else (step, float(gradient @ step))
+        return gradient, hessian
 
     # -- the terms of all 4p multipliers: products of a factor in lambda and one in S lambda - g -----------------------
 
@@ -242,6 +264,116 @@ class FormAscent:
         """Factors w_n, w_n, w_t, w_t, given rows for w."""
         normal, tangential = rows[: self._scaled.p], rows[self._scaled.p :]
         return np.concatenate([normal, normal, tangential, tangential])
+
+
+class SlipFormAscent(FormAscent[SlipForm, SpaceRelaxation]):
+    """Forms in 3D, at the root of the search.
+
+    Parameters
+    ----------
+    engine : SpaceEngine
+        That of the energy, whose rows serve the forms as well.
+    enclosed : EnclosedSpace
+        Balls for its system.
+    rows : numbers and modes of the rows of the root
+    """
+
+    whole = 1.0
+
+    def __init__(self, engine: SpaceEngine, enclosed: EnclosedSpace, rows: Rows) -> None:
+        self._engine, self._enclosed, self._system, self._rows = engine, enclosed, engine.system, rows
+        system, p, size = self._system, self._system.p, len(self._system.g)
+        node, axis = np.nonzero(system.tau >= 0)
+        tau = system.tau[node, axis]
+        #: Products of a force and a slip, in the order of mu, kappa and c: their factors' places, and multipliers.
+        self._left, self._right = np.concatenate([np.arange(p), tau, node]), np.concatenate([np.arange(p), tau, tau])
+        number = np.concatenate([np.arange(p), p + node, p + tau])
+        #: Multipliers that have a product, and what a product gets of each of them.
+        self._live = np.unique(number)
+        value = np.concatenate([np.ones(size), -1.0 / system.unit[tau]])
+        self._shares = np.where(self._live[:, None] == number, value, 0.0)
+        #: Places of kappa and c of the nodes with friction; a c that does not occur has the last place, a zero.
+        rubs = np.flatnonzero(np.any(system.tau >= 0, axis=1))
+        self._cones = np.column_stack([p + rubs, np.where(system.tau[rubs] >= 0, p + system.tau[rubs], size + p)])
+        self._products = FormProducts(system.S, system.g, lambda rows: rows[self._left], lambda rows: rows[self._right])
+
+    def ascended(self) -> tuple[SlipForm, SpaceRelaxation] | None:
+        """The tightest form that was found, with the mean curvature of the energy, and its relaxation; or None."""
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            p, size = self._system.p, len(self._system.g)
+            found = self._candidate(np.concatenate([np.ones(2 * p), np.zeros(size - p)]))
+            gaps: list[float] = []
+            while found is not None and not found.relaxation.pruned and len(gaps) < _STEPS:
+                look()
+                gaps.append(-found.relaxation.bound / self._curvature(found.multipliers))
+                if len(gaps) > 2 and gaps[-1] > (1.0 - _GAIN) * gaps[-3]:
+                    break
+                better = self._step(found)
+                if better is None:
+                    break
+                found = better[0]
+            if found is None or not gaps:
+                return None
+            found = self._candidate(found.multipliers / self._curvature(found.multipliers))
+        return None if found is None else (found.form, found.relaxation)
+
+    def _curvature(self, numbers: Floats) -> float:
+        """The mean eigenvalue of H relative to S: c has no part in it."""
+        return float(np.sum(self._shares[:, : len(self._system.g)].T @ numbers[self._live])) / len(self._system.g)
+
+    def _lengths(self, numbers: Floats) -> tuple[Floats, Floats]:
+        """kappa and c of the nodes with friction."""
+        cones = np.append(numbers, 0.0)[self._cones]
+        return cones[:, 0], cones[:, 1:]
+
+    def _form(self, multipliers: Floats) -> SlipForm | None:
+        kappa, c = self._lengths(multipliers)
+        if not np.all(np.linalg.norm(c, axis=1) <= _WITHIN * kappa):
+            return None
+        return SlipForm.of(self._enclosed, multipliers)
+
+    def _factor(self, form: SlipForm) -> Floats | None:
+        return factor_above(form.H)
+
+    def _relaxed(self, form: SlipForm, factor: Floats, multipliers: Floats) -> tuple[SlipForm, SpaceRelaxation]:
+        return form, self._engine.bounding(form).root(*self._rows)
+
+    def _barrier(self, multipliers: Floats) -> float:
+        kappa, c = self._lengths(multipliers)
+        return float(np.sum(np.log(kappa * kappa - np.sum(c * c, axis=1))))
+
+    def _moved(self, multipliers: Floats, change: Floats) -> Floats:
+        values = multipliers.copy()
+        values[self._live] += change
+        return values
+
+    def _derivatives(self, found: _Candidate[SlipForm, SpaceRelaxation], scale: float) -> tuple[Floats, Floats]:
+        numbers, relaxation = found.multipliers, found.relaxation
+        whole, normals = np.eye(len(found.form.h)), self._normals(relaxation)
+        gradient, hessian = self._products.derivatives(
+            found.form.H, found.factor, relaxation.forces, scale, normals, whole
+        )
+        slope, curved = np.zeros(len(numbers) + 1), np.zeros((len(numbers) + 1,) * 2)
+        slope[self._live] = self._shares @ gradient
+        curved[np.ix_(self._live, self._live)] = self._shares @ hessian @ self._shares.T
+        for cone in self._cones:
+            signed = np.append(numbers, 0.0)[cone] * np.array([1.0, -1.0, -1.0])
+            square = float(signed[0] ** 2 - signed[1] ** 2 - signed[2] ** 2)
+            own = 2.0 * signed / square
+            slope[cone] += _BARRIER * own
+            curved[np.ix_(cone, cone)] += _BARRIER * (np.outer(own, own) - 2.0 * np.diag([1.0, -1.0, -1.0]) / square)
+        return slope[self._live], curved[np.ix_(self._live, self._live)]
+
+    def _normals(self, relaxation: SpaceRelaxation) -> Floats:
+        """Normals of the rows that have multipliers, of length one."""
+        system, size = self._system, len(self._system.g)
+        numbers = relaxation.multipliers()[0].tolist()
+        terms = np.zeros((len(numbers), 2 * size))
+        for term, number in zip(terms, numbers, strict=True):
+            places, coefficients = sector_row_terms(self._engine.rows[number], system.tau, size)
+            term[list(places)] = np.array(coefficients) * system.row_unit[list(places)]
+        normals = terms[:, :size] - terms[:, size:] @ system.S
+        return np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))
 
 
 @dataclass(frozen=True)
@@ -299,19 +431,16 @@ class FormProducts:
         return np.asarray(0.5 * (moved.T @ moved))
 
 
-def newton_step(gradient: Floats, hessian: Floats) -> Floats | None:
-    """The step of Newton's method, given minus the second derivative; None where that is not definite."""
+def _newton_step(gradient: Floats, hessian: Floats) -> tuple[Floats, float] | None:
+    """The step of Newton's method, given minus the second derivative, and what it promises; None: not definite."""
     hessian[np.diag_indices(len(hessian))] *= 1.0 + 1e-8
     if not (np.all(np.isfinite(hessian)) and np.all(np.isfinite(gradient))):
         return None
     try:
-        return np.asarray(cho_solve(cho_factor(hessian, overwrite_a=True), gradient))
+        step = np.asarray(cho_solve(cho_factor(hessian, overwrite_a=True), gradient))
     except np.linalg.LinAlgError:
         return None
-
-
-def _is_convex(H: Floats, mean: float) -> bool:
-    return factor_above(H, _CURVATURE * mean) is not None
+    return step, float(gradient @ step)
 
 
 def _complement(rows: Floats) -> Floats:

@@ -5,9 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, Protocol
 
-import numpy as np
-
-from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.support.array_types import Codes, Floats, Indices
 
 #: Largest violation of a row (rows of unit length in the norm of S^{-1}) that the QP ignores.
@@ -19,7 +16,7 @@ BRANCHING_CANDIDATES = 24
 
 
 def not_compiled(error: ImportError) -> str:
-    """What is the case where the compiled solver cannot be imported, and what to do, in one sentence.
+    """Sentence that the compiled solver cannot be imported, and what to do.
 
     Python imports the first enumsol that it finds: in a source tree the one there, where nothing may be compiled.
     """
@@ -63,18 +60,6 @@ class Relaxation(Protocol):
 
     def child(self, rows: list[int], modes: list[int], *, last: bool) -> Relaxation:
         """The relaxation with further rows switched on; ``last``: this object is not used again."""
-
-
-def largest_violation(codes: Codes, F: Floats, forces: Floats, w: Floats) -> int:
-    """The undecided node at which complementarity is violated most, -1 when all are decided."""
-    array, p = np.array(codes), len(F)
-    open_nodes = np.flatnonzero((array == CONTACT) | (array == UNDECIDED))
-    if not len(open_nodes):
-        return -1
-    slip = F * forces[:p] * np.abs(w[p:]) - forces[p:] * w[p:]
-    # an undecided node's slip counts double: deciding it now saves the slack that it leaves in the energy
-    score = np.where(array == UNDECIDED, slip - forces[:p] * w[:p], 0.0) + slip
-    return int(open_nodes[np.argmax(score[open_nodes])])
 
 
 class Engine(Protocol):

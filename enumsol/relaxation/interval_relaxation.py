@@ -113,7 +113,7 @@ class IntervalSystem:
 
     @property
     def loaded(self) -> bool:
-        """Whether g varies over the interval."""
+        """True if g varies over the interval."""
         return bool(np.any(self.half))
 
 

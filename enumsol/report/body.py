@@ -152,7 +152,7 @@ def _surface(shape: BodyShape, faces: Integers, new: Integers) -> dict[str, Any]
 
 
 def _edges(faces: Integers) -> Integers:
-    """All edges of the outlines of facets, (k, 2)."""
+    """Edges of the outlines of facets, (k, 2)."""
     edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
     return np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0)
 

@@ -1,4 +1,4 @@
-"""What a report shows, as plain values that JSON can hold; the page's script draws it."""
+"""Contents of the page of a graph, as plain values that JSON can hold; the page's script draws them."""
 
 from __future__ import annotations
 
@@ -146,7 +146,7 @@ def _vertex(v: Vertex, graph: BranchGraph) -> dict[str, Any]:
 
 
 def _beside(graph: BranchGraph, drawn: Mapping[int, Curve]) -> dict[str, dict[str, list[int]]]:
-    """By columns of the quantities, arcs that coincide with others: rank among them, and how many they are."""
+    """Arcs that coincide with others, by columns of the quantities: rank among them, and how many they are."""
     if not drawn:
         return {}
     overviews = sum(not item.by_node for item in QUANTITIES.values())

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     import os
     from collections.abc import Sequence
 
-    from enumsol.branches.elements import Vertex
+    from enumsol.branches.elements import Branch, Vertex
     from enumsol.fem import Scene
     from enumsol.model.problem3d import ContactProblem3D
 
@@ -125,7 +125,7 @@ def write_report(
     write_file(place, page, "file")
 
 
-def _checked_scene(scene: Any) -> Scene | None:
+def _checked_scene(scene: object) -> Scene | None:
     if scene is None:
         return None
     from enumsol.fem import Scene  # scikit-fem takes a while
@@ -188,7 +188,7 @@ def _friction(problem: ContactProblem | ContactProblem3D) -> str:
 
 
 def _branches(graph: BranchGraph) -> str:
-    def shape(branch: Any) -> str:
+    def shape(branch: Branch) -> str:
         if branch.sheet:
             return "sheet (a continuum over an interval)"
         if branch.closed:

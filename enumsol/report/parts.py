@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from enumsol.fem import Scene
     from enumsol.loading.history import History
     from enumsol.roots.root_set import RootSet
+    from enumsol.support.array_types import Floats
 
 #: Scripts of pages with bodies, before those of one kind.
 DRAWING = ("page.theme.js", "page.common.js", "page.body.js", "page.solid.js", "page.cards.js")
@@ -37,7 +38,7 @@ CERTIFIED_DATA = {
 
 
 class Heading(NamedTuple):
-    """What the user of `write_report` says of a page: title, units, commands that check the proof, and the scene."""
+    """Arguments of `write_report` about any page: title, units, commands that check the proof, and the scene."""
 
     title: str
     units: tuple[str, str] | None
@@ -46,7 +47,7 @@ class Heading(NamedTuple):
 
 
 class Statement(NamedTuple):
-    """What a page says of its solutions: why they are incomplete, facts, answers, and what is certified.
+    """Sentences of a page about its solutions: why they are incomplete, facts, answers, and what is certified.
 
     Attributes
     ----------
@@ -68,7 +69,7 @@ class Statement(NamedTuple):
 
 
 def proof_commands(command: str, place: str, more: str) -> str:
-    """How to get a proof and to check it, in HTML."""
+    """Commands that write a proof and check it, in HTML."""
     steps = (f"enumsol {command} PROBLEM {place} --proof FILE", "enumsol verify PROBLEM FILE")
     return ", then ".join(f"<code>{step}</code>" for step in steps) + more
 
@@ -109,7 +110,7 @@ def _kept(name: str) -> str:
 
 
 def status_codes(statuses: Iterable[ContactStatus]) -> str:
-    """One digit per node."""
+    """Statuses as a text of one digit per node."""
     return "".join(str(STATUS_NAMES.index(status.value)) for status in statuses)
 
 
@@ -125,7 +126,7 @@ def packed_plotly() -> str:
     return base64.b64encode(gzip.compress(script.encode(), 9, mtime=0)).decode()
 
 
-def span_words(values: Any) -> str:
+def span_words(values: Floats) -> str:
     """The range of numbers as text."""
     low, high = float(np.min(values)), float(np.max(values))
     return f"{low:g}" if low == high else f"{low:g} to {high:g}"
@@ -211,7 +212,7 @@ def given_section(scene: Scene | None, units: tuple[str, str] | None) -> str:
         return ""
     rows = [
         ("", (name, _said(value), unit_text(units, *_POWERS[name]) if name in _POWERS else ""))
-        for name, value in scene.options.items()
+        for name, value in vars(scene.options).items()
         if value is not None and not (np.ndim(value) == 1 and len(value) == 0)
         if scene.dimension == 2 or name not in _PLANE
     ]
@@ -225,7 +226,7 @@ def given_section(scene: Scene | None, units: tuple[str, str] | None) -> str:
 
 
 def _said(value: Any) -> str:
-    """What an option was given, in words."""
+    """The value of an option, in words."""
     if isinstance(value, Mapping):
         return "; ".join(f"{part}: {_said(own)}" for part, own in value.items())
     if isinstance(value, (list, tuple, np.ndarray)):

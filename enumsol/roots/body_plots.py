@@ -21,12 +21,12 @@ from enumsol.model.shapes import (
 )
 from enumsol.model.statuses import ContactStatus
 from enumsol.support.arguments import positive_number
-from enumsol.support.plotting import axes_or_none, figure_of, in_units, new_figure
+from enumsol.support.plotting import axes_of, axes_or_none, figure_of, in_units, line_entry, new_figure
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import AnyProblem, ContactProblem3D
     from enumsol.support.array_types import Floats, Indices
 
 
@@ -49,7 +49,7 @@ _ACROSS, MOST_BODIES = 3, 12
 
 
 def draw_body(
-    root: Any, problem: Any, ax: Any = None, scale: float | None = None, units: tuple[str, str] | None = None
+    root: Any, problem: AnyProblem, ax: Any = None, scale: float | None = None, units: tuple[str, str] | None = None
 ) -> Any:
     """A figure of one deformed body; see Root.plot_body."""
     axes_or_none(ax)
@@ -57,7 +57,7 @@ def draw_body(
     (factor,), arrows = _factors([root], problem, shape, scale)
     if ax is None:
         figure = new_figure(figsize=(6.4, 5.0))
-        ax = _axes(figure, 111, shape)
+        ax = _axes(figure, (1, 1, 1), shape)
     elif shape.points.shape[1] == 3 and not hasattr(ax, "set_zlim"):
         raise InvalidArgumentError("ax is plane and the body is not; expected Axes with projection '3d', or None")
     _draw(ax, root, problem, shape, factor, arrows)
@@ -114,19 +114,18 @@ def _strongest(roots: Sequence[Any], problem: object, shape: BodyShape) -> float
 def _factors(
     roots: Sequence[Any], problem: object, shape: BodyShape, scale: float | None
 ) -> tuple[tuple[float, ...], float]:
-    """By what the displacements of each root are multiplied, and the forces of all."""
+    """Factors of the displacements of each root, and one of all forces."""
     arrows = arrow_scale(_strongest(roots, problem, shape), shape.size)
     if scale is not None:
         return (positive_number(scale, "scale"),) * len(roots), arrows
     return own_scales([largest_length(shape.moves(root)) for root in roots], shape.size), arrows
 
 
-def _axes(figure: Any, place: Any, shape: BodyShape) -> Any:
-    options = {"projection": "3d"} if shape.points.shape[1] == 3 else {}
-    return figure.add_subplot(*place, **options) if isinstance(place, tuple) else figure.add_subplot(place, **options)
+def _axes(figure: Any, place: tuple[int, int, int], shape: BodyShape) -> Any:
+    return figure.add_subplot(*place, projection="3d" if shape.points.shape[1] == 3 else None)
 
 
-def _draw(ax: Any, root: Any, problem: Any, shape: BodyShape, scale: float, arrows: float) -> None:
+def _draw(ax: Any, root: Any, problem: AnyProblem, shape: BodyShape, scale: float, arrows: float) -> None:
     moves = scale * shape.moves(root)
     points = shape.points + moves
     places = shape.at_rows(points)
@@ -201,21 +200,19 @@ def _name_axes(ax: object, dimension: int, units: tuple[str, str] | None) -> Non
 
 
 def _legend(place: Any, roots: Sequence[Any], strongest: float, units: tuple[str, str] | None) -> None:
-    from matplotlib.lines import Line2D
-
     found = {status for root in roots for status in root.statuses}
     handles = [
-        Line2D([], [], linestyle="", marker=marker, markerfacecolor=face, markeredgecolor="black", label=status.value)
+        line_entry(status.value, linestyle="", marker=marker, markerfacecolor=face, markeredgecolor="black")
         for status, (marker, face) in MARKS.items()
         if status in found
     ]
     if strongest > 0:
         most = "" if units is None else f", up to {strongest:.4g} {units[0]}"
-        handles.append(Line2D([], [], color=_FORCE, label=f"contact force on the body{most}"))
+        handles.append(line_entry(f"contact force on the body{most}", color=_FORCE))
     if ContactStatus.SLIP in found:
-        handles.append(Line2D([], [], color=_SLIP, linewidth=1.8, label="direction of slip"))
+        handles.append(line_entry("direction of slip", color=_SLIP, linewidth=1.8))
     if roots[0].lambda_t.ndim == 2:
-        handles.append(Line2D([], [], color=_BEFORE_IN_SPACE, linewidth=0.8, linestyle="dashed", label="undeformed"))
+        handles.append(line_entry("undeformed", color=_BEFORE_IN_SPACE, linewidth=0.8, linestyle="dashed"))
     where: dict[str, Any] = {"loc": "best"}
     if hasattr(place, "add_subplot"):
         where = {"loc": "outside lower center", "ncols": 6}
@@ -224,7 +221,7 @@ def _legend(place: Any, roots: Sequence[Any], strongest: float, units: tuple[str
     place.legend(handles=handles, fontsize=8, frameon=False, **where)
 
 
-def draw_root(root: object, problem: ContactProblem3D, ax: object, units: tuple[str, str] | None = None) -> Any:
+def draw_root(root: Any, problem: ContactProblem3D, ax: object, units: tuple[str, str] | None = None) -> Any:
     """See Root.plot."""
     if axes_or_none(ax) is not None or problem.mesh is None:
         return draw_slips(root, problem, ax, units)
@@ -242,8 +239,7 @@ def draw_slips(root: Any, problem: ContactProblem3D, ax: Any, units: tuple[str, 
     # the two coordinate axes along which the contact surface extends most
     shown = np.sort(np.argsort(np.ptp(places, axis=0), kind="stable")[1:])
     moves = np.einsum("pk,pkc->pc", root.u_t, _tangents(problem, shown))[:, shown]
-    if axes_or_none(ax) is None:
-        ax = new_figure(figsize=(6.4, 5.0)).subplots()
+    ax = axes_of(ax, (6.4, 5.0))
     for status, (marker, face) in MARKS.items():
         at = places[[found is status for found in root.statuses]][:, shown]
         if len(at):

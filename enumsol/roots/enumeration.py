@@ -101,7 +101,7 @@ class Enumeration(ABC, Generic[_Solvers]):
         """The result of what was found before something ended ``run``, wherever that was."""
         self.outcome.stopped = Stop(StopReason.of(ending), self._examined())
         if self.tree is not None and not self.unloaded and not issubclass(ending, MemoryError):
-            self.tree.add_known()
+            self.tree.rest.add_known()
         return self._result()
 
     def _at_least(self, known: int) -> int:
@@ -116,7 +116,7 @@ class Enumeration(ABC, Generic[_Solvers]):
         self.outcome = search.outcome
         search.at_limit = solvers.at_limit
         search.rest.otherwise = AWAY if search.at_limit is not None else "" if self.problem.held else HOLD
-        search.continua = self._continua
+        search.rest.continua = self._continua
         if solvers.unloaded():
             self.certifier.unloaded()
             self.unloaded = True

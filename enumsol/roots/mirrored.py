@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from enumsol.support.messages import counted, visible
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from enumsol.model.problem3d import AnyProblem
     from enumsol.model.statuses import ContactStatus
     from enumsol.roots.root import Root
     from enumsol.support.array_types import Alpha, Floats
@@ -114,7 +115,7 @@ class MirrorImages(Sealed):
         return lines
 
 
-def problem_asymmetry(problem: Any, alpha: Alpha, mirror: Mirror, tolerance: float) -> Asymmetry:
+def problem_asymmetry(problem: AnyProblem, alpha: Alpha, mirror: Mirror, tolerance: float) -> Asymmetry:
     """Distance of the condensed problem from its mirror image.
 
     Raises
@@ -161,7 +162,7 @@ def problem_asymmetry(problem: Any, alpha: Alpha, mirror: Mirror, tolerance: flo
     return Asymmetry(bound, proven, differs)
 
 
-def _condensed(problem: Any, alpha: Alpha) -> tuple[Floats, Floats, Floats, Floats, bool]:
+def _condensed(problem: AnyProblem, alpha: Alpha) -> tuple[Floats, Floats, Floats, Floats, bool]:
     """S and g at alpha with radii, and whether these are proven."""
     try:
         ones = np.ones(len(problem.condensed.g0))
@@ -171,7 +172,7 @@ def _condensed(problem: Any, alpha: Alpha) -> tuple[Floats, Floats, Floats, Floa
         return S, np.zeros_like(S), g, np.zeros_like(g), False
 
 
-def _relative_friction(problem: Any, alpha: Alpha, mirror: Mirror) -> Floats:
+def _relative_friction(problem: AnyProblem, alpha: Alpha, mirror: Mirror) -> Floats:
     """By how much the coefficients of friction change, relative to the largest, (p,); exact but for a rounding."""
     changes = np.zeros(problem.p)
     for pair in zip(*(np.atleast_2d(part.T) for part in problem.affine_friction), strict=True):

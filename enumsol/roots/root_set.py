@@ -19,6 +19,7 @@ from enumsol.support.plotting import checked_units, kept
 
 if TYPE_CHECKING:
     from pathlib import Path
+
     import pandas as pd
 
     from enumsol.model.statuses import ContactStatus
@@ -264,7 +265,7 @@ class RootSet(Sequence[Root], Immutable):
 
     @property
     def unique(self) -> bool | None:
-        """True if there is one solution, False if not, both proven; None if that stayed open, and in fast arithmetic."""
+        """True if there is one solution, False if not, both proven; None if it stayed open, and in fast arithmetic."""
         if self.arithmetic == "fast":
             return None
         if self.families or self.at_least > 1:

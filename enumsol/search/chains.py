@@ -25,10 +25,6 @@ if TYPE_CHECKING:
 
 #: Where a chain begins, beside the end of its interval, by its length; steps to an event, and how close is near enough.
 _BESIDE, _STEPS, _CLOSE = 1e-7, 40, 1e-12
-#: Selections of a chain, by contact nodes.
-_MOST = 16
-#: A condition that vanishes at an event falls behind it by more than this, by its size, where the branch turns back.
-_TURNS = 1e-9
 
 
 @dataclass(frozen=True)
@@ -126,7 +122,8 @@ class Chains:
 
     @cached_property
     def _most(self) -> int:
-        return _MOST * (self.system.p + 4)
+        # selections of a chain; more are given up
+        return 16 * (self.system.p + 4)
 
     def _followed(self, first: float) -> list[Link]:
         """The branch of the solution beside an alpha."""
@@ -156,7 +153,7 @@ class Chains:
         return None if found is None else tuple(found[1])
 
     def _event(self, curve: SelectionCurve, alpha: float) -> tuple[float, int | None] | None:
-        """Where a condition vanishes next, and which; the end of the interval and None where none does."""
+        """Alpha at which a condition vanishes next, and which; the end of the interval and None where none does."""
         first = alpha
         for _ in range(_STEPS):
             *_, values, _, _, slopes = curve.at(alpha)
@@ -187,5 +184,6 @@ class Chains:
         *_, values, _, _, slopes = beyond.at(alpha)
         own = [k for k, (i, _) in enumerate(beyond.rows.conditions) if i == node]
         vanishing = min(own, key=lambda k: abs(float(values[k])))
-        turns = slopes[vanishing] < -_TURNS * np.max(np.abs(slopes), initial=0.0)
+        # by more than this, relative to its size, a condition falls behind an event where the branch turns back
+        turns = slopes[vanishing] < -1e-9 * np.max(np.abs(slopes), initial=0.0)
         return None if turns else beyond.rows.codes

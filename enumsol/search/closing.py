@@ -65,6 +65,6 @@ class TreeCloser:
         """Take note of what a complete selection holds."""
 
     def begins_again(self, nodes: int) -> bool:
-        """Whether so much has become known after some nodes that a search had better begin again."""
+        """True if so much has become known after some nodes that a search had better begin again."""
         del nodes
         return False

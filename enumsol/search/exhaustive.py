@@ -26,8 +26,6 @@ EXACT_LIMIT = 4**7
 BLOCK = 2048
 #: Selections whose float solution breaks a condition by more than this are dropped without a second look.
 _SCREEN = 1e-6
-#: Reciprocal condition below which the screen does not trust a float solution.
-_SCREEN_RANK = 1e-9
 
 
 def all_codes(F_positive: tuple[bool, ...]) -> Iterator[Codes]:
@@ -81,7 +79,8 @@ def _candidates(system: ScaledSystem, block: NDArray[np.int8]) -> Mask:
     scale = np.max(np.abs(M), axis=2)
     M /= scale[:, :, None]
     singular = np.linalg.svd(M, compute_uv=False)
-    doubtful = singular[:, -1] <= _SCREEN_RANK * singular[:, 0]
+    # with a smaller reciprocal condition the screen does not trust a float solution
+    doubtful = singular[:, -1] <= 1e-9 * singular[:, 0]
     M[doubtful] = np.eye(2 * p)
     force = np.linalg.solve(M, (b / scale)[:, :, None])[:, :, 0]
     w = g - force @ S

@@ -40,13 +40,6 @@ if TYPE_CHECKING:
 _MANY = 3
 #: With fewer contact nodes other numbers than plain ones are sought only once the tree has so many nodes.
 _FEW, _LONG = 48, 512
-#: Assignments above a known root are tried once the tree has so many nodes: a try costs as much as some of them.
-_TALL = 256
-#: After a try above a known root, the next one is made once so much more of the contact nodes is decided (one in four),
-#: or once the relaxation's bound is closer to zero by this factor.
-_TRIES, _NEARER = 4, 0.5
-#: With so many the solution is sought along a path, too, before there is a tree.
-_PATH = 24
 
 
 @dataclass(frozen=True)
@@ -170,8 +163,9 @@ class Closer(TreeCloser):
         return found
 
     def begins_again(self, nodes: int) -> bool:
-        """Whether so much has become known after some nodes that a search had better begin again."""
-        if nodes >= _TALL and self._system.p >= _FEW:
+        """True if so much has become known after some nodes that a search had better begin again."""
+        # a try costs as much as some nodes: short trees are none the better for it
+        if nodes >= 256 and self._system.p >= _FEW:
             self.known = self._regular
         if self._due(nodes):
             self._whole = self._proposed(self._tries.pop(0)[1])
@@ -187,11 +181,12 @@ class Closer(TreeCloser):
         return bool(self._tries) and nodes >= self._tries[0][0]
 
     def _proposed(self, sought: WeightSource) -> Proposal | None:
-        """What may be the only solution of the whole problem; takes note of where it is degenerate."""
+        """Proposal of the only solution of the whole problem; takes note of where it is degenerate."""
         system, p = self._system, self._system.p
         codes, exactly = (UNDECIDED,) * p, self._certifier.exactly
         proposal = propose(system, codes, (np.zeros(2 * p), system.g), exactly=exactly, sought=sought)
-        if proposal is None and (p >= _PATH or sought is WeightSource.DESCENT):
+        # with many contact nodes the solution is sought along a path, too
+        if proposal is None and (p >= 24 or sought is WeightSource.DESCENT):
             proposal = propose(system, codes, None, exactly=exactly, sought=sought)
         if proposal is None:
             return None
@@ -252,7 +247,8 @@ class Closer(TreeCloser):
         told = sum(code != UNDECIDED for code in codes)
         if (told < self._told and relaxation.bound < self._bound) or not known.below(codes):
             return None
-        self._told, self._bound = told + max(1, p // _TRIES), _NEARER * relaxation.bound
+        # the next try comes with a quarter more of the nodes decided, or with half the distance of the bound from zero
+        self._told, self._bound = told + max(1, p // 4), 0.5 * relaxation.bound
         return self._alone(codes, known, relaxation if relaxation.form is None else self.relaxed(codes))
 
     def alone(self, codes: Codes, proposal: LoneProposal, bound: Bound) -> list[SelectionSolution] | None:
@@ -269,7 +265,7 @@ class Closer(TreeCloser):
 
 
 def _touches(codes: Codes, relaxation: Relaxation | None) -> bool:
-    """Whether undecided nodes touch without load at the minimiser."""
+    """True if undecided nodes touch without load at the minimiser."""
     if relaxation is None:
         return False
     p = len(codes)
@@ -278,7 +274,7 @@ def _touches(codes: Codes, relaxation: Relaxation | None) -> bool:
 
 
 def holds_below(codes: Codes, active: ActiveSets) -> bool:
-    """Whether a solution lies below an assignment: at every node a final code holds that refines its code."""
+    """True if a solution lies below an assignment: at every node a final code holds that refines its code."""
     return all(
         bool(held - {OPEN}) if code == CONTACT else bool(held) if code > FRICTIONLESS else code in held
         for code, held in zip(codes, active, strict=True)
@@ -293,7 +289,7 @@ def propose(
     exactly: bool,
     sought: WeightSource = WeightSource.CENTRES,
 ) -> Proposal | None:
-    """What may close a subtree, or None.
+    """Proposal that may close a subtree, or None.
 
     Parameters
     ----------

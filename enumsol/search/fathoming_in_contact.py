@@ -9,8 +9,7 @@ import numpy as np
 
 from enumsol.arithmetic.balls import factor_above
 from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
-from enumsol.search.definite import DEFINITE, Nodes
-from enumsol.search.descent import Descent
+from enumsol.search.definite import DEFINITE, Descent, Nodes
 from enumsol.trusted.selection import Unknowns
 from enumsol.trusted.status_rows import refines, slip_directions
 from enumsol.trusted.uniqueness import numbers_of
@@ -21,8 +20,6 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Codes, Floats, Indices
 
 
-#: mu for all nodes, if kappa is one: what loaded nodes lose by a gap grows with it, the share of the slip falls.
-_FACTORS = (1.0, 3.0, 10.0)
 #: Strength of what vanishes: S has a diagonal near one.
 _STIFF = 1e3
 #: Of the strengths that are allowed: small forces are known to 1e-4 of their size. What is added to squares of gaps.
@@ -39,7 +36,7 @@ class KnownRoot:
     w: Floats
 
     def below(self, codes: Codes) -> bool:
-        """Whether it lies below an assignment."""
+        """True if the root lies below an assignment."""
         return all(refines(mine, code) for mine, code in zip(self.selection, codes, strict=True))
 
 
@@ -89,7 +86,7 @@ class Lone:
         return Nodes(len(nodes), normal, tangential, F, share, wide, np.where(codes == OPEN, -w_n, 0.0), slip)
 
     def _spare(self, relaxation: Relaxation) -> Floats:
-        """What mu and nu of each node allow its square at most; where that vanishes they need not allow any."""
+        """Strengths of squares that mu and nu of each node allow at most; zero where they need not allow any."""
         nodes, p, system, spare = self._nodes, self._system.p, self._system, np.zeros((2, len(self._nodes)))
         if relaxation.form is not None:
             return spare
@@ -111,7 +108,8 @@ class Lone:
         fixed[self.nodes.normal] -= (share * self.nodes.F)[:, None] * tangential
         by_mu = normal.T @ (self.spare[0][:, None] * normal)
         by_mu[:count] += normal
-        for mu in _FACTORS:
+        # what loaded nodes lose by a gap grows with mu, the share of the slip falls
+        for mu in (1.0, 3.0, 10.0):
             form = fixed + mu * by_mu
             if factor_above(0.5 * (form + form.T), DEFINITE) is not None:
                 return np.concatenate([np.full(count, mu), np.ones(b), np.zeros(b), share, np.zeros(b)])
@@ -123,7 +121,7 @@ class Lone:
             return None
 
     def proposal(self, *, descent: bool = False) -> LoneProposal | None:
-        """What may be proven, or None."""
+        """Proposal that may be proven, or None."""
         numbers = self.numbers(descent=descent)
         if numbers is None:
             return None

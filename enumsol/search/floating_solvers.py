@@ -15,14 +15,11 @@ import numpy as np
 from enumsol.condensation.condensed import ScaledSystem
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, RigidRows, enclosure_of
 from enumsol.proof import records
-from enumsol.search.balance import in_balance
-from enumsol.search.certifiers.protocol import NO_BOUND, Bound, Certifier, UndecidedPart
+from enumsol.search.certifiers.protocol import Bound, Certifier, UndecidedPart
 from enumsol.search.certifiers.rational_certifier import ExactCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier, proven
 from enumsol.search.closing import TreeCloser
 from enumsol.search.reference_closer import LeadingCloser, reference_numbers
-from enumsol.search.resume import PlaneReader, Reader
-from enumsol.search.setup import HeldByNothing
 from enumsol.search.solvers import Solvers
 from enumsol.search.splitting import PlaneSplitting
 from enumsol.selections.solution import SelectionSolution
@@ -32,7 +29,8 @@ from enumsol.trusted.exclusion import Terms, exclusion_margin
 from enumsol.trusted.floating_bounds import is_unbalanced
 from enumsol.trusted.joint_roots import JointRoot, joint_root
 from enumsol.trusted.reference import Reference
-from enumsol.trusted.status_rows import CONDITIONS, SLIP_MINUS, SLIP_PLUS, STICK
+from enumsol.trusted.selection import PENETRATION, SLIP_BACKWARD, SLIP_FORWARD
+from enumsol.trusted.status_rows import CONDITIONS, FORBIDDEN, FREE, SLIP_MINUS, SLIP_PLUS, STICK, row_signs
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -41,16 +39,20 @@ if TYPE_CHECKING:
     from enumsol.search.certifiers.protocol import Margin
     from enumsol.search.reference_closer import OnlyRoot
     from enumsol.selections.rational_selections import ExactSelections
-    from enumsol.support.array_types import Codes, Floats
+    from enumsol.support.array_types import Codes, Floats, Indices
     from enumsol.trusted.at_alpha import VerifiedSelection
 
 #: How a node slips, or is about to, where one of these kinds of rows is zero.
 _SLIPS = {2: SLIP_PLUS, 5: SLIP_PLUS, 3: SLIP_MINUS, 6: SLIP_MINUS}
 #: Stiffness of the springs of the relaxations, relative to that of the body (theory, section 14.5).
 WEAK = 2.0**-20
+#: Weight of multipliers that are zero, relative to the largest: they change only where the others cannot do it.
+_SPARE = 2.0**-20
+#: How often multipliers that would change their sign are set to zero, and what is left is balanced again.
+_BALANCES = 8
 
 
-class FloatingSolvers(HeldByNothing, Solvers):
+class FloatingSolvers(Solvers):
     """Solvers and certifier for a body that nothing holds, at one alpha; parameters as of Solvers."""
 
     @cached_property
@@ -133,40 +135,6 @@ class FloatingSolvers(HeldByNothing, Solvers):
     def _closer(self, certifier: Certifier) -> TreeCloser:
         return LeadingCloser(certifier, lambda: self.known_root)
 
-    def reader(self) -> FloatingReader:
-        """Understands the records of an earlier proof."""
-        held = PlaneReader((self.scaled.F > 0).tolist(), self.enclosed)
-        return FloatingReader(held, records.FLOATING_LEAVES, len(self.rows.unit))
-
-
-class FloatingReader:
-    """Of proofs about a body that nothing holds, in 2D and 3D: those of other bodies, but for forms and balance.
-
-    Parameters
-    ----------
-    held : Reader
-        Of proofs about a body that is held.
-    kinds : dict
-        The kinds of leaves, by their letters.
-    modes : number of rigid modes
-    """
-
-    def __init__(self, held: Reader, kinds: dict[str, type[Any]], modes: int) -> None:
-        self.kinds = kinds
-        self.form_over, self.lone = held.form_over, held.lone
-        self._held, self._modes = held, modes
-
-    def declare(self, record: list[Any]) -> None:
-        """Pass over the form of a root: it is made again."""
-
-    def bound(self, codes: Codes, record: list[Any]) -> Bound:
-        """What is said to exclude a partial assignment; ValueError where the record makes no sense."""
-        if record[0] != records.Unbalanced.kind:
-            return self._held.bound(codes, record)
-        records.Unbalanced.read(record, records.Limits(codes, modes=self._modes))
-        # the certifier finds a direction of its own
-        return NO_BOUND
-
 
 def on_weak_springs(scaled: ScaledSystem, rows: RigidRows, stiffness: float = WEAK) -> ScaledSystem:
     """The body on weak springs, which the relaxations of the search are about (theory, section 14.5)."""
@@ -181,6 +149,37 @@ def weakly_held(S: Floats, g: Floats, rows: RigidRows, stiffness: float = WEAK) 
     soft = G.T / stiffness
     S = S + soft @ G
     return 0.5 * (S + S.T), g + soft @ h
+
+
+def in_balance(system: EnclosedSystem, codes: Codes, rows: Indices, values: Floats) -> tuple[Indices, Floats]:
+    """Multipliers next to given ones with G y = h, up to rounding, or these where there are none.
+
+    Those of the body on weak springs satisfy this up to the springs only, times the rigid displacement.
+    """
+    p, G, h = system.p, system.rows.G.mid, system.rows.h.mid
+    signs = row_signs(np.array(codes), system.F)
+    normal, forward, backward = (signs[:, kind] for kind in (PENETRATION, SLIP_FORWARD, SLIP_BACKWARD))
+    low = np.concatenate([normal == FREE, forward != FORBIDDEN])
+    high = np.concatenate([normal != FORBIDDEN, backward != FORBIDDEN])
+    table = np.bincount(rows, values, minlength=signs.size).reshape(-1, p)
+    y = np.concatenate([table[PENETRATION], table[SLIP_BACKWARD] - table[SLIP_FORWARD]])
+    size = np.abs(y)
+    weight = np.where(low | high, size + _SPARE * np.max(size), 0.0)
+    for _ in range(_BALANCES):
+        step = np.linalg.lstsq((G * weight) @ G.T, h - G @ y, rcond=1e-13)[0]
+        y = y + weight * (step @ G)
+        wrong = np.where(y < 0, ~low, ~high) & (y != 0)
+        if not np.any(wrong):
+            break
+        y, weight = np.where(wrong, 0.0, y), np.where(wrong, 0.0, weight)
+    else:
+        return rows, values
+    forces = rows < PENETRATION * p
+    kind = np.repeat([PENETRATION, SLIP_BACKWARD], p)
+    kind[p:][y[p:] < 0] = SLIP_FORWARD
+    given, of = np.flatnonzero(y), np.tile(np.arange(p), 2)
+    sizes = np.where(kind == PENETRATION, y, np.abs(y))
+    return np.concatenate([rows[forces], kind[given] * p + of[given]]), np.concatenate([values[forces], sizes[given]])
 
 
 class Exclusions:
@@ -205,13 +204,15 @@ class Exclusions:
         self.system, self.free = enclosed, without_bound(enclosed)
         self._references: dict[Codes, Reference | None] = {}
         #: How the forms of roots are declared, by their selections.
-        self.declared: dict[Codes, records.DeclaredReference] = {}
+        self.declared: dict[Codes, records.DeclaredForm] = {}
         self._margins: tuple[Margin, Margin] = (
             partial(exclusion_margin, self.free, errors=2.0),
             partial(exclusion_margin, enclosed, errors=2.0),
         )
 
-    def record(self, codes: Codes, bound: Bound, *, within: bool) -> tuple[records.Exclusion, bool] | None:
+    def record(
+        self, codes: Codes, bound: Bound, *, within: bool
+    ) -> tuple[records.Excluded | records.Unbalanced, bool] | None:
         """A record that excludes a partial assignment, and whether it needs the bound; or None.
 
         Whether the bound is needed must not depend on the numbers that a relaxation arrives at. So an assignment that
@@ -236,16 +237,16 @@ class Exclusions:
     def _excluded(self, margin: int, codes: Codes, tried: list[Terms]) -> records.Excluded | None:
         """The first multipliers that prove something, with bounds beyond which there are no solutions, or its own."""
         kept = ((terms, proven(self._margins[margin], codes, *terms)) for terms in tried)
-        return next((records.Excluded(Terms(terms.rows, values)) for terms, values in kept if values is not None), None)
+        return next((records.Excluded(terms.rows, values) for terms, values in kept if values is not None), None)
 
     def reference(self, selection: Codes) -> Reference | None:
         """The form of a root, if one is proven definite."""
         if selection not in self._references:
             self._references[selection] = None
-            for numbers in reference_numbers(self.system, selection):
-                found = Reference.of(self.system, selection, *numbers)
+            for weights, *more in reference_numbers(self.system, selection):
+                found = Reference.of(self.system, selection, weights, *more)
                 if found is not None:
-                    self.declared[selection] = records.DeclaredReference(selection, *numbers)
+                    self.declared[selection] = records.DeclaredForm(selection, weights, np.array(more))
                     self._references[selection] = found
                     break
         return self._references[selection]
@@ -285,8 +286,6 @@ class FloatingCertifier(VerifiedCertifier):
     ) -> None:
         super().__init__(scaled, None, exact, recorder, node_ids)
         self._exclusions, self._exactly = exclusions, exact
-        #: Selections of roots whose forms were declared, in the order of their declarations.
-        self._declared: list[Codes] = []
 
     def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """True if the relaxation's multipliers are proven to exclude the partial assignment."""
@@ -311,22 +310,16 @@ class FloatingCertifier(VerifiedCertifier):
         self.bounded |= needs
         self._escalations.balls += 1
         selection = reference.selection
-        if selection not in self._declared:
-            self._declared.append(selection)
-            self.recorder.write(exclusions.declared[selection].write())
-        back = len(self._declared) - self._declared.index(selection)
+        back = self._back(selection, lambda: exclusions.declared[selection])
         leaf = partial(records.OnlyReference, back, proposal.rows, proposal.products)
         if reference.lies_below(codes):
             return [self._regular(selection, reference.root, leaf)]
         self._leaf(leaf())
         return []
 
-    def forget(self) -> None:
-        """Forget what was proven."""
-        super().forget()
-        self._declared.clear()
-
-    def _excluded_by_record(self, record: records.Exclusion | records.NoRoot, *, bounded: bool) -> None:
+    def _excluded_by_record(
+        self, record: records.Excluded | records.Unbalanced | records.NoRoot, *, bounded: bool
+    ) -> None:
         self.bounded |= bounded
         self._escalations.balls += 1
         self._leaf(record)
@@ -340,7 +333,7 @@ class FloatingCertifier(VerifiedCertifier):
             if ball is not None and ball.is_root:
                 self._escalations.balls += 1
                 return self._regular(codes, ball)
-            found: records.Exclusion | records.NoRoot | None = self._exclusions.unbalanced(codes)
+            found: records.Excluded | records.Unbalanced | records.NoRoot | None = self._exclusions.unbalanced(codes)
             if found is None and _holds_none(self._exclusions.free, codes):
                 found = records.NoRoot()
             if found is not None:

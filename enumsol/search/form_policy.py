@@ -14,7 +14,7 @@ import numpy as np
 
 from enumsol.condensation.enclosure import EnclosedSystem
 from enumsol.model.statuses import UNDECIDED
-from enumsol.relaxation.active_set import ActiveSetEngine, ActiveSetRelaxation, FormEngine
+from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.search.splitting import ImposedRows, PlaneSplitting
 
 if TYPE_CHECKING:
@@ -30,8 +30,6 @@ if TYPE_CHECKING:
 
 #: Nodes examined with the energy before a form is tried: more than what that costs.
 NODES = 1000
-#: A form is tried where at least this share of the tree is left.
-_LEFT = 0.5
 #: Steps of the ascent on trial, and those that follow once it pays.
 TRIAL, STEPS = 4, 2
 #: A form pays when it closes so much more of the gap at the root, or so many times as much.
@@ -61,11 +59,12 @@ class Forms:
         self.form: Any = None
 
     def due(self, nodes: int, covered: float) -> bool:
-        """Whether it is time to try a form."""
-        return self.tried(nodes) and covered < 1.0 - _LEFT
+        """True if it is time to try a form."""
+        # a form is tried where at least half of the tree is left
+        return self.tried(nodes) and covered < 0.5
 
     def tried(self, nodes: int) -> bool:
-        """Whether a search of so many nodes has tried a form."""
+        """True if a search of so many nodes has tried a form."""
         return nodes >= self._nodes
 
     def use(self, engine: Engine, form: Any) -> None:
@@ -76,7 +75,7 @@ class Forms:
         self.form, self.engine = form, self._bounding(engine, form) if convex else None
 
     def pay(self, engine: Engine, codes: Codes, rows: ImposedRows) -> bool:
-        """Whether a form at the root of the search is clearly tighter than the energy; if so it is in use."""
+        """True if a form at the root of the search is clearly tighter than the energy; it is then in use."""
         form = self._better(engine, codes, rows.over(codes, range(len(codes))))
         if form is None or not form.smallest_eigenvalue > 0:
             return False
@@ -91,7 +90,7 @@ def plane_forms(scaled: ScaledSystem, enclosed: EnclosedSystem) -> Forms:
         return ascended(scaled, enclosed, engine, codes, rows) if isinstance(engine, ActiveSetEngine) else None
 
     def bounding(engine: Engine, form: EnclosedForm) -> Engine | None:
-        return FormEngine(engine, scaled, form) if isinstance(engine, ActiveSetEngine) else None
+        return engine.bounding(scaled, form) if isinstance(engine, ActiveSetEngine) else None
 
     return Forms(better, bounding, NODES)
 
@@ -111,18 +110,18 @@ def ascended(
     codes : status codes
     rows : numbers and modes of the rows of the assignment
     """
-    from enumsol.relaxation.convex_forms import FormAscent
+    from enumsol.relaxation.convex_forms import PlaneFormAscent
 
-    ascent = FormAscent(scaled, enclosed, engine)
+    ascent = PlaneFormAscent(scaled, enclosed, engine, codes, rows)
     plain = engine.root(*rows)
-    found = ascent.improve(codes, ascent.energy, rows, TRIAL)
-    if found is None or not isinstance(plain, ActiveSetRelaxation) or plain.stalled or plain.pruned:
+    found = ascent.improve(ascent.energy, TRIAL)
+    if found is None or plain.stalled or plain.pruned:
         return None
     if not found[1].pruned:
         before, after = plain.gap_closed(codes), found[1].gap_closed(codes)
         if after < min(before + MORE, TIMES * before):
             return None
-        found = ascent.improve(codes, found[0].multipliers, rows, STEPS) or found
+        found = ascent.improve(found[0].multipliers, STEPS) or found
     return found[0]
 
 

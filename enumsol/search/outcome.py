@@ -119,15 +119,18 @@ class SearchOutcome:
 
 
 class StopReason(enum.Enum):
-    """What ended a search before its tree did."""
+    """An event that ended a search before its tree did: the sentence that tells it, and advice how to go on."""
 
-    NODE_LIMIT = enum.auto()
-    ENOUGH_ROOTS = enum.auto()
-    TIME_LIMIT = enum.auto()
-    INTERRUPTED = enum.auto()
-    OUT_OF_MEMORY = enum.auto()
-    GRAPH_INCOMPLETE = enum.auto()
-    AT_LIMIT = enum.auto()
+    NODE_LIMIT = "stopped after max_nodes = {done}", "raise the limit of {unit}s"
+    ENOUGH_ROOTS = "stopped after enough roots", "search without stop_after"
+    TIME_LIMIT = "stopped by the time limit{after}", "raise the time limit"
+    INTERRUPTED = "interrupted{after}", "let it run to its end"
+    OUT_OF_MEMORY = "out of memory{after}", "use more memory or a smaller problem"
+    GRAPH_INCOMPLETE = "the branch graph is not complete", "use enumerate_roots"
+    AT_LIMIT = "stopped{after} at the limit of what contact can hold, where rounding decides", AWAY
+
+    def __init__(self, sentence: str, remedy: str) -> None:
+        self.sentence, self.remedy = sentence, remedy
 
     @classmethod
     def of(cls, ending: type[BaseException]) -> StopReason:
@@ -171,28 +174,11 @@ class Stop:
     @property
     def remedy(self) -> str:
         """Advice on how a search gets to what this one left."""
-        return {
-            StopReason.NODE_LIMIT: f"raise the limit of {self.unit}s",
-            StopReason.ENOUGH_ROOTS: "search without stop_after",
-            StopReason.TIME_LIMIT: "raise the time limit",
-            StopReason.INTERRUPTED: "let it run to its end",
-            StopReason.OUT_OF_MEMORY: "use more memory or a smaller problem",
-            StopReason.GRAPH_INCOMPLETE: "use enumerate_roots",
-            StopReason.AT_LIMIT: AWAY,
-        }[self.reason]
+        return self.reason.remedy.format(unit=self.unit)
 
     def __str__(self) -> str:
         done = "" if self.count is None else counted(self.count, self.unit)
         if self.arcs_of is not None:
             done = f"the arcs of {self.count} of {self.arcs_of} selections"
-        after = f" after {done}" if done else ""
-        text = {
-            StopReason.NODE_LIMIT: f"stopped after max_nodes = {done}",
-            StopReason.ENOUGH_ROOTS: "stopped after enough roots",
-            StopReason.TIME_LIMIT: f"stopped by the time limit{after}",
-            StopReason.INTERRUPTED: f"interrupted{after}",
-            StopReason.OUT_OF_MEMORY: f"out of memory{after}",
-            StopReason.GRAPH_INCOMPLETE: "the branch graph is not complete",
-            StopReason.AT_LIMIT: f"stopped{after} at the limit of what contact can hold, where rounding decides",
-        }[self.reason]
+        text = self.reason.sentence.format(done=done, after=f" after {done}" if done else "")
         return text if self.unexamined is None else f"{text}, {counted(self.unexamined, 'subtree')} not examined"

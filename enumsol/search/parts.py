@@ -133,7 +133,7 @@ class Spread(ABC):
 
     @abstractmethod
     def _worker(self) -> Worker:
-        """What is sent to workers."""
+        """The object that is sent to workers."""
 
     @abstractmethod
     def _is_current(self, *, afresh: bool) -> bool:

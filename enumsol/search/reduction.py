@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STICK
-from enumsol.search.definite import DEFINITE, AnalyticCentres, Nodes
-from enumsol.search.descent import Descent
+from enumsol.search.definite import DEFINITE, AnalyticCentres, Descent, Nodes
 from enumsol.support.deadlines import look
 from enumsol.trusted.selection import Selection, Unknowns
 from enumsol.trusted.status_rows import slip_directions
@@ -25,10 +24,6 @@ if TYPE_CHECKING:
 NEAR = 1e-9
 #: Steps of Newton's method for few nodes; one more for so many more of these; at most.
 _NEWTON_STEPS, _NODES_A_STEP, _MOST_STEPS = 16, 4, 40
-#: The least part of a step, and of what a step promises by which the residual has to fall.
-_LEAST_PART, _FALL = 1 / 64, 1e-4
-#: Shares of the friction: the first one, and the least step.
-_FIRST_SHARE, _LEAST_SHARE = 0.25, 1 / 64
 
 
 class WeightSource(enum.Enum):
@@ -74,7 +69,7 @@ class Reduction:
 
     @cached_property
     def sensitivity(self) -> float:
-        """How much a fixed node's force changes at most with a component of w."""
+        """Largest change of a fixed node's force with a component of w."""
         return float(np.max(np.abs(np.linalg.inv(self.M)), initial=0.0))
 
     def forces(self, x: Floats) -> Floats:
@@ -100,10 +95,11 @@ class Reduction:
             if found is not None and ahead == 1.0:
                 return found
             if found is not None:
-                x, share, step = found, ahead, 1.5 * step if step else _FIRST_SHARE
+                x, share, step = found, ahead, 1.5 * step if step else 0.25
             else:
                 step *= 0.5
-                if step < _LEAST_SHARE:
+                # the least step
+                if step < 1 / 64:
                     return None
 
     def _newton(self, x: Floats, v: Floats, share: float) -> Floats | None:
@@ -130,9 +126,10 @@ class Reduction:
     def _shortened(self, x: Floats, ahead: Floats, residual: float, share: float) -> Floats | None:
         """A point on the way at which the residual is less."""
         part = 1.0
-        while part >= _LEAST_PART:
+        # the least part of a step; the residual has to fall by a share of what a step promises
+        while part >= 1 / 64:
             point = x + part * (ahead - x)
-            if self._residual(point, self.h - self.R @ point, share) < (1.0 - _FALL * part) * residual:
+            if self._residual(point, self.h - self.R @ point, share) < (1.0 - 1e-4 * part) * residual:
                 return point
             part *= 0.5
         return None
@@ -164,7 +161,7 @@ class Reduction:
         return x
 
     def _residual(self, x: Floats, v: Floats, share: float) -> float:
-        """What the point is off at most: its conditions are min(lambda_n, -w_n) = 0, and of the slip likewise."""
+        """Largest error of a point: its conditions are min(lambda_n, -w_n) = 0, and of the slip likewise."""
         m, t = len(self.free), self.tangential[self.rubbing]
         bound = share * self._F * np.maximum(x[:m][self.rubbing], 0.0)
         apart = np.abs(np.minimum(x[:m], -v[:m])), np.abs(x[t] - np.clip(x[t] + v[t], -bound, bound))

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from functools import partial
 from typing import TYPE_CHECKING
 
 from enumsol.proof.writer import KeptRecords
 from enumsol.search.certifiers.protocol import UndecidedPart
-from enumsol.support.deadlines import TimeOverError
+from enumsol.search.outcome import StopReason
+from enumsol.support.deadlines import Deadline, TimeOverError, within
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -16,6 +18,7 @@ if TYPE_CHECKING:
     from enumsol.search.outcome import SearchOutcome
     from enumsol.search.splitting import Splitting
     from enumsol.support.array_types import Codes
+    from enumsol.support.deadlines import Limited
 
 
 class Remainder:
@@ -28,9 +31,14 @@ class Remainder:
     outcome : SearchOutcome
     settle : callable
         Has the certifier decide a complete selection.
+    known_root : callable, optional
+        Gives the codes of a complete selection that is known to hold a root, or None.
 
     Attributes
     ----------
+    continua : callable
+        Gives the codes of complete selections that hold on continua of which solutions were found: a result lists whole
+        families, its proof too.
     otherwise : str
         Advice if limits are reached, besides raising them.
     """
@@ -41,9 +49,11 @@ class Remainder:
         splitting: Splitting,
         outcome: SearchOutcome,
         settle: Callable[[Codes], object],
+        known_root: Callable[[], Codes | None] | None = None,
     ) -> None:
         self._certifier, self._splitting, self._outcome, self._settle = certifier, splitting, outcome, settle
-        self._recorder, self.otherwise = certifier.recorder, ""
+        self._recorder, self._known_root, self.otherwise = certifier.recorder, known_root, ""
+        self.continua: Callable[[], Sequence[Codes]] = list
         #: Subtrees, and the records that follow each of them.
         self._left: list[tuple[Codes, KeptRecords]] = []
 
@@ -53,17 +63,46 @@ class Remainder:
         self._left.append((codes, KeptRecords(packed=True)))
         self._certifier.recorder = self._left[-1][1]
 
-    def finish(self, wanted: Callable[[], Sequence[Codes]]) -> None:
+    def known(self, limits: Limited | None = None) -> Codes | None:
+        """Codes of a selection that holds a root, if one is found within limits, by default in a second."""
+        if self._known_root is None:
+            return None
+        try:
+            with within(limits or Deadline.after(time.perf_counter(), 1.0)):
+                return self._known_root()
+        except TimeOverError:
+            self._known_root = None
+            return None
+
+    def add_known(self) -> None:
+        """Add the root that is known, in a search that was interrupted before it came there."""
+        root = self.known()
+        if root is not None and root not in self._certifier.certified.verified:
+            self._settle(root)
+
+    def finish(self) -> None:
         """Leave undecided what was left, except for complete selections, which are decided if there is time."""
         left, self._left = self._left, []
         if not left:
             return
         self._certifier.recorder = self._recorder
-        selections = wanted()
+        selections = self._wanted()
         for codes, after in left:
             self._leave_but(codes, selections)
             after.release(self._recorder)
         self._outcome.count_unexamined()
+
+    def _wanted(self) -> list[Codes]:
+        """Complete selections that are decided although the search was stopped."""
+        stopped, root = self._outcome.stopped, None
+        if stopped is None or stopped.reason is not StopReason.ENOUGH_ROOTS:
+            root = self.known()
+        wanted = [] if root is None else [root]
+        try:
+            wanted += self.continua()
+        except TimeOverError:
+            self._outcome.late = True
+        return wanted
 
     def _leave_but(self, codes: Codes, wanted: Sequence[Codes]) -> None:
         stack = [(codes, wanted)]

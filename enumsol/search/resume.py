@@ -7,22 +7,19 @@ written to the new proof; what cannot be proven again, was left undecided, or is
 from __future__ import annotations
 
 import time
-from typing import TYPE_CHECKING, Any, Protocol
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from enumsol.model.statuses import CONTACT, SLIDING, UNDECIDED
 from enumsol.proof import records
-from enumsol.search.certifiers.protocol import RecordedBound
+from enumsol.proof.leaves import kind_of
+from enumsol.search.certifiers.protocol import NO_BOUND, RecordedBound
 from enumsol.search.fathoming_in_contact import LoneProposal
 from enumsol.search.nodes import TreeNode
 from enumsol.search.tree import TreeSearch
-from enumsol.trusted.quadratic_forms import EnclosedForm
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
-    from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.proof.begun import BegunProof
     from enumsol.search.certifiers.protocol import Bound
     from enumsol.support.array_types import Codes
@@ -31,79 +28,50 @@ if TYPE_CHECKING:
 _REPORT_EVERY = 64
 
 
-class Reader(Protocol):
+class Reader:
     """Understands the records of one proof.
-
-    Attributes
-    ----------
-    kinds : dict
-        Its kinds of leaves, by their letters.
-    """
-
-    kinds: dict[str, type[Any]]
-
-    def declare(self, record: list[Any]) -> None:
-        """Take note of a form; ValueError where the record makes no sense."""
-
-    def form_over(self, codes: Codes) -> Any:
-        """The form that was used last of those that hold over a partial assignment."""
-
-    def bound(self, codes: Codes, record: list[Any]) -> Bound:
-        """What is said to exclude a partial assignment; ValueError where the record makes no sense."""
-
-    def lone(self, codes: Codes, record: list[Any]) -> tuple[LoneProposal, Bound]:
-        """What is said to show that a root is alone below it; ValueError where the record makes no sense."""
-
-
-class PlaneReader:
-    """Of proofs in 2D.
 
     Parameters
     ----------
-    friction : whether each contact node has any
-    enclosed : EnclosedSystem or None
-        Balls for the system, by which forms are proven.
+    limits : Limits
+        Of the root of its tree, without the forms that are declared.
+    made : callable giving the form of a declaration, or None; ValueError where it makes no sense
     """
 
-    kinds = records.LEAVES
-
-    def __init__(self, friction: Sequence[bool], enclosed: EnclosedSystem | None) -> None:
-        self._friction, self._enclosed = friction, enclosed
+    def __init__(self, limits: records.Limits, made: Callable[[records.DeclaredForm], Any]) -> None:
+        self._limits, self._made = limits, made
         self._declared: list[records.DeclaredForm] = []
         #: Forms that were used, the last one last.
-        self._used: dict[records.DeclaredForm, EnclosedForm] = {}
+        self._used: dict[records.DeclaredForm, Any] = {}
 
     def declare(self, record: list[Any]) -> None:
         """Take note of a form; ValueError where the record makes no sense."""
-        said = records.DeclaredForm.read(record, records.Limits((UNDECIDED,) * len(self._friction)))
+        said = records.DeclaredForm.read(record, self._limits)
         # parts of one search declare the same form
         self._declared.append(next((known for known in self._used if known.same(said)), said))
 
+    def read(self, codes: Codes, record: list[Any]) -> Any:
+        """A leaf; None or ValueError where the record makes no sense."""
+        kind = kind_of(record, self._limits.tree)
+        return kind and kind.read(record, replace(self._limits, codes=codes, declared=self._declared))
+
     def form_over(self, codes: Codes) -> Any:
-        """The form that was used last of those that hold over a partial assignment."""
-        return next((form for said, form in reversed(self._used.items()) if said.holds(codes)), None)
+        """The form that was used last of those that serve a partial assignment in place of the energy."""
+        # in 3D those of the whole tree do, and others are ellipsoids
+        own = self._limits.codes if self._limits.in_space else None
+        used = reversed(self._used.items())
+        return next((form for said, form in used if said.serves(codes) and own in (None, said.codes)), None)
 
-    def bound(self, codes: Codes, record: list[Any]) -> Bound:
-        """What is said to exclude a partial assignment; ValueError where the record makes no sense."""
-        limits = records.Limits(codes, self._friction, self._declared)
-        if record[0] != records.ExcludedByForm.kind:
-            return RecordedBound(*records.Excluded.read(record, limits).terms)
-        said = records.ExcludedByForm.read(record, limits)
-        rows, values = said.terms
-        return RecordedBound(rows, values, self._enclosed_form(self._declared[-said.back]))
-
-    def lone(self, codes: Codes, record: list[Any]) -> tuple[LoneProposal, Bound]:
-        """What is said to show that a root is alone below it; ValueError where the record makes no sense."""
-        said = records.Alone.read(record, records.Limits(codes, self._friction))
-        return LoneProposal(said.selection, said.weights, said.strengths), RecordedBound(*said.terms)
-
-    def _enclosed_form(self, said: records.DeclaredForm) -> EnclosedForm:
-        if self._enclosed is None:
-            raise ValueError("there are no balls")
-        if said not in self._used:
-            with np.errstate(over="ignore", invalid="ignore"):
-                self._used[said] = EnclosedForm.of(self._enclosed, said.codes, said.multipliers, said.weight)
-        return self._used[said]
+    def bound(self, leaf: records.Excluded) -> Bound:
+        """What is said to exclude a partial assignment; ValueError where that is a form which is not proven."""
+        if not isinstance(leaf.by, int):
+            return RecordedBound(leaf.rows, leaf.values)
+        said = self._declared[-leaf.by]
+        form = self._used.pop(said) if said in self._used else self._made(said)
+        if form is None:
+            raise ValueError("its form is not proven")
+        self._used[said] = form
+        return RecordedBound(leaf.rows, leaf.values, form)
 
 
 def resume(search: TreeSearch, reader: Reader, begun: BegunProof, passed: Callable[[], None]) -> None:
@@ -193,21 +161,22 @@ class Replay:
 
     def _proven(self, item: TreeNode, record: list[Any]) -> bool:
         """Whether a leaf is proven again, and written."""
-        kind, search = records.kind_of(record, self._reader.kinds) or records.Record, self._search
-        if issubclass(kind, records.Exclusion):
-            try:
-                bound = self._reader.bound(item.codes, record)
-            except ValueError:
-                return False
-            return search.excluded(item, bound)
-        if issubclass(kind, records.Alone):
-            try:
-                return search.alone(item, *self._reader.lone(item.codes, record))
-            except ValueError:
-                return False
-        if issubclass(kind, records.OnlyReference):
+        search = self._search
+        try:
+            leaf = self._reader.read(item.codes, record)
+            if isinstance(leaf, records.Unbalanced):
+                # the certifier finds a direction of its own
+                return search.excluded(item, NO_BOUND)
+            if isinstance(leaf, records.Excluded):
+                return search.excluded(item, self._reader.bound(leaf))
+            if isinstance(leaf, records.Alone) and leaf.strengths is not None and leaf.terms is not None:
+                proposal = LoneProposal(leaf.selection, leaf.numbers, leaf.strengths)
+                return search.alone(item, proposal, RecordedBound(*leaf.terms))
+        except ValueError:
+            return False
+        if isinstance(leaf, records.OnlyReference):
             return search.closed(item, None, again=True)
-        if issubclass(kind, records.ClosingRecord):
+        boxed = isinstance(leaf, records.BoxedRoot) and leaf.by is None
+        if isinstance(leaf, records.ClosingRecord) and not boxed:
             return search.closed(item, search.relaxations.energy(item.codes), again=True)
-        partial = any(code in (CONTACT, UNDECIDED, *SLIDING) for code in item.codes)
-        return issubclass(kind, records.Solved) and not partial and search.settled(item)
+        return (boxed or isinstance(leaf, records.Solved)) and search.settled(item)

@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from enumsol.errors import InvalidArgumentError
+from enumsol.proof.writer import point_header, unit_exponents
 from enumsol.search.certifiers.protocol import Refine, UndecidedPart, Unrecorded
 from enumsol.search.load_limit import LoadLimit, load_limit
 from enumsol.search.nodes import Relaxations
@@ -15,6 +16,7 @@ from enumsol.search.tree import TreeSearch
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from enumsol.model.problem3d import AnyProblem
     from enumsol.proof.writer import Recorder
     from enumsol.relaxation.engine import Engine
     from enumsol.search.certifiers.protocol import Certifier
@@ -30,24 +32,31 @@ _SPRINGS = tuple(2.0**-k for k in range(0, 21, 4))
 
 
 class SearchSetup(ABC):
-    """Base of the solvers of one problem at one alpha in one arithmetic: a search is made of their parts."""
+    """Base of the solvers of one problem at one alpha in one arithmetic: a search is made of their parts.
 
-    #: There is a solution for certain (theory, sections 6.7 and 12.6).
-    has_solution = True
-    problem: Any
-    alpha: Alpha
-    arithmetic: Any
+    Parameters
+    ----------
+    problem : ContactProblem or ContactProblem3D
+    alpha : float or Fraction
+    arithmetic : str
+
+    Raises
+    ------
+    InvalidArgumentError
+        Arithmetic is "fast", which has no solver for a body that nothing holds.
+    """
+
+    #: Arithmetics for a body that nothing holds.
+    _offered = '"verified" or "exact"'
+    #: The scaled system: a ScaledSystem, in 3D a SpaceSystem.
+    scaled: Any
     _engine: Any
 
-    @property
-    @abstractmethod
-    def relaxed(self) -> Any:
-        """Scaled system that the relaxations are about."""
-
-    @property
-    @abstractmethod
-    def undecidable(self) -> str | None:
-        """Reason why nothing can be proven about this problem, or None."""
+    def __init__(self, problem: AnyProblem, alpha: Alpha, arithmetic: Any) -> None:
+        if arithmetic == "fast" and not problem.held:
+            raise InvalidArgumentError(f'arithmetic is "fast" for a body that nothing holds; expected {self._offered}')
+        self.problem: Any = problem
+        self.alpha, self.arithmetic = alpha, arithmetic
 
     def search(
         self,
@@ -57,8 +66,10 @@ class SearchSetup(ABC):
     ) -> TreeSearch:
         """A search of the tree with a certifier made here."""
         splitting, p = self._splitting(certifier), self.problem.p
+        # bounds of bodies that nothing holds are of the energy
+        forms = self._forms if self.problem.held else None
         return TreeSearch(
-            Relaxations(self._engine, splitting, p, self._forms(), self._fallback),
+            Relaxations(self._engine, splitting, p, forms, self._fallback),
             certifier,
             limits=limits,
             progress=progress,
@@ -66,32 +77,37 @@ class SearchSetup(ABC):
             known_root=lambda: self.known_root,
         )
 
+    # -- the problem -----------------------------------------------------------------------------------------------
+
     @property
+    def relaxed(self) -> Any:
+        """The system that the relaxations are about."""
+        return self.scaled
+
+    @property
+    @abstractmethod
+    def undecidable(self) -> str | None:
+        """Reason why nothing can be proven about this problem, or None."""
+
+    @property
+    def data(self) -> str:
+        """Data that a proof is about: "problem" (the matrices as given) or "condensed" (S and g as computed)."""
+        return "problem"
+
+    @property
+    def has_solution(self) -> bool:
+        """True if there is a solution for certain (theory, sections 6.7 and 12.6)."""
+        return bool(self.problem.held)
+
+    @cached_property
     def at_limit(self) -> LoadLimit | None:
         """The limit of what contact can hold, if the load of a body that nothing holds is there."""
-        return None
+        return None if self.problem.held else load_limit(self.problem, self.alpha)
 
-    @abstractmethod
-    def certifier(self, recorder: Recorder | None) -> Certifier:
-        """The certifier of this arithmetic, which writes to a recorder."""
-
-    @abstractmethod
-    def remake(self) -> Callable[[], SearchSetup]:
-        """Makes the same again, also in another process."""
-
-    def fresh(self) -> SearchSetup:
-        """The same without anything that searches leave behind and others would depend on: nothing here."""
-        return self
-
-    @abstractmethod
     def unloaded(self) -> bool:
-        """True if g = 0, so that only lambda = 0 solves."""
+        """True if g = 0 for the data as given, so that only lambda = 0 solves: not of a body that may be moved then."""
+        return bool(self.problem.held and self.problem.is_unloaded(self.alpha))
 
-    @abstractmethod
-    def reader(self) -> Reader:
-        """Understands the records of an earlier proof."""
-
-    @abstractmethod
     def proof_header(self) -> dict[str, Any]:
         """First record of a proof (see enumsol.proof.proof_file).
 
@@ -100,6 +116,50 @@ class SearchSetup(ABC):
         InvalidArgumentError
             alpha is a fraction of more digits than a proof may hold.
         """
+        units = unit_exponents(self.scaled.force, self.scaled.length)
+        header = point_header(self.problem, self.alpha, self.data, units, **self._kind)
+        return header if self.problem.held else header | {"max_rigid_displacement": self.problem.rigid_reach}
+
+    #: Entries of a proof's header beside those of 2D.
+    _kind: dict[str, str] = {}  # noqa: RUF012 (never changed)
+
+    # -- parts of a search -----------------------------------------------------------------------------------------
+
+    @abstractmethod
+    def certifier(self, recorder: Recorder | None) -> Certifier:
+        """The certifier of this arithmetic, which writes to a recorder."""
+
+    @abstractmethod
+    def reader(self) -> Reader:
+        """Understands the records of an earlier proof."""
+
+    @abstractmethod
+    def remake(self) -> Callable[[], SearchSetup]:
+        """Makes the same again, also in another process."""
+
+    def fresh(self) -> SearchSetup:
+        """Solvers without anything that searches leave behind and others would depend on: these have nothing of it."""
+        return self
+
+    @abstractmethod
+    def _splitting(self, certifier: Certifier) -> Splitting:
+        """Children and rows of partial assignments."""
+
+    @property
+    def _fallback(self) -> Callable[[], Engine] | None:
+        """Makes a slower engine for relaxations that stall; None where there is none."""
+        return None
+
+    @abstractmethod
+    def _closer(self, certifier: Certifier) -> TreeCloser | None:
+        """Proposals of an only solution of the problem, or of subtrees."""
+
+    @property
+    @abstractmethod
+    def _forms(self) -> Forms | None:
+        """Forms with which a long search may bound in place of the energy."""
+
+    # -- a root without the tree -----------------------------------------------------------------------------------
 
     @cached_property
     def known_root(self) -> Codes | None:
@@ -115,83 +175,24 @@ class SearchSetup(ABC):
         return None
 
     def _suggested(self) -> list[Codes]:
-        """Complete selections that may hold a root, as far as floats tell, the likeliest first."""
-        found = self._solved(self.relaxed, None)
-        return [] if found is None else found[0]
+        """Complete selections that may hold a root, as far as floats tell, the likeliest first.
 
-    @abstractmethod
-    def _solved(self, system: Any, near: Any) -> tuple[list[Codes], Any] | None:
-        """Selections, one of which holds at a solution of a system in floats, and that solution, near another one."""
-
-    @abstractmethod
-    def _splitting(self, certifier: Certifier) -> Splitting:
-        """How a partial assignment is split, and which rows it imposes."""
-
-    @property
-    def _fallback(self) -> Callable[[], Engine] | None:
-        """Makes a slower engine for relaxations that stall; None where there is none."""
-        return None
-
-    @abstractmethod
-    def _closer(self, certifier: Certifier) -> TreeCloser | None:
-        """Proposals of an only solution of the problem, or of subtrees."""
-
-    @abstractmethod
-    def _forms(self) -> Forms | None:
-        """Forms with which a long search may bound in place of the energy."""
-
-
-class HeldByNothing:
-    """Of the solvers of a body that nothing holds, beside those of a body that is held: there may be no solution.
-
-    Raises
-    ------
-    InvalidArgumentError
-        Arithmetic is "fast", which has no solver for such a body, or as of a body that is held.
-    """
-
-    has_solution = False
-    alpha: Any
-    offered = '"verified" or "exact"'
-    problem: Any
-    #: The system on springs, relative to the body's own stiffness; and as of the solvers of a body that is held.
-    _on_springs: Callable[[float], Any]
-    _solved: Callable[[Any, Any], tuple[list[Codes], Any] | None]
-
-    def __init__(self, problem: Any, alpha: Any, arithmetic: Any, *options: Any) -> None:
-        if arithmetic == "fast":
-            raise InvalidArgumentError(f'arithmetic is "fast" for a body that nothing holds; expected {self.offered}')
-        super().__init__(problem, alpha, arithmetic, *options)  # type: ignore[call-arg]
-
-    @cached_property
-    def at_limit(self) -> LoadLimit | None:
-        """The limit of what contact can hold, if the load is there."""
-        return load_limit(self.problem, self.alpha)
-
-    def _suggested(self) -> list[Codes]:
-        """Selections of the body on springs that become weaker and weaker, those on the weakest first.
-
-        The one of a family at the limit comes before them.
+        Of a body that nothing holds, that of a family at the limit, then those on springs, the weakest first.
         """
         suggested, near = list[Any](), None
-        for stiffness in _SPRINGS:
+        for stiffness in (0.0,) if self.problem.held else _SPRINGS:
             found = self._solved(self._on_springs(stiffness), near)
             if found is not None:
                 codes, near = found
                 suggested = codes + [other for other in suggested if other not in codes]
-        return suggested if self.at_limit is None or self.at_limit.codes is None else [self.at_limit.codes, *suggested]
+        limit = self.at_limit
+        return suggested if limit is None or limit.codes is None else [limit.codes, *suggested]
 
-    def _closer(self, certifier: Certifier) -> Any:
-        """There may be no solution: what takes the place of the tree is a root that is known."""
+    def _on_springs(self, stiffness: float) -> Any:
+        """The system on springs, by their stiffness relative to that of the body; of a body that is held, its own."""
+        del stiffness
+        return self.relaxed
 
-    def _forms(self) -> None:
-        """Bounds of these bodies are of the energy."""
-
-    def unloaded(self) -> bool:
-        """Without load the body may be moved: there is no one solution."""
-        return False
-
-    def proof_header(self) -> dict[str, Any]:
-        """First record of a proof: with the bound of the rigid displacement."""
-        header: dict[str, Any] = super().proof_header()  # type: ignore[misc]
-        return header | {"max_rigid_displacement": self.problem.rigid_reach}
+    @abstractmethod
+    def _solved(self, system: Any, near: Any) -> tuple[list[Codes], Any] | None:
+        """Selections, one of which holds at a solution of a system in floats, and that solution, near another one."""

@@ -13,7 +13,9 @@ from enumsol.condensation.data import EXACT_DOF_LIMIT, exactly_at
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.model.statuses import UNDECIDED
-from enumsol.proof.writer import Recorder, point_header, unit_exponents
+from enumsol.proof.declared_forms import plane_form
+from enumsol.proof.records import Limits, Tree
+from enumsol.proof.writer import Recorder
 from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.relaxation.engine import Engine, not_compiled
 from enumsol.relaxation.interior_point import InteriorPointEngine
@@ -24,7 +26,7 @@ from enumsol.search.fathoming import Closer, Closing, propose
 from enumsol.search.form_policy import Forms, plane_forms
 from enumsol.search.nodes import Relaxations
 from enumsol.search.reduction import WeightSource
-from enumsol.search.resume import PlaneReader, Reader
+from enumsol.search.resume import Reader
 from enumsol.search.setup import SearchSetup
 from enumsol.search.splitting import PlaneSplitting
 from enumsol.search.tree import TreeSearch
@@ -107,7 +109,9 @@ class Solvers(SearchSetup):
     def __init__(
         self, problem: ContactProblem, alpha: Alpha, arithmetic: Arithmetic, tolerance: float, engine: str | None = None
     ) -> None:
-        self.problem, self.alpha, self.arithmetic, self.engine = problem, alpha, arithmetic, engine
+        super().__init__(problem, alpha, arithmetic)
+        self.arithmetic: Arithmetic = arithmetic
+        self.engine = engine
         body = problem.on_springs
         system = body.condensed.at(alpha)
         self._in_rationals = problem.n <= EXACT_DOF_LIMIT and problem.known_exactly
@@ -182,7 +186,7 @@ class Solvers(SearchSetup):
 
     @property
     def data(self) -> str:
-        """What a proof is about: "problem" (the matrices as given) or "condensed" (S and g as computed)."""
+        """Data that a proof is about: "problem" (the matrices as given) or "condensed" (S and g as computed)."""
         return self._enclosed[1] if self.arithmetic == "verified" else "problem"
 
     @property
@@ -223,11 +227,6 @@ class Solvers(SearchSetup):
             return None
         return PreciseAtAlpha.of(self.problem, Fraction(self.alpha), self.scaled.force, self.scaled.length)
 
-    @property
-    def relaxed(self) -> ScaledSystem:
-        """What the relaxations are about."""
-        return self.scaled
-
     @cached_property
     def _engine(self) -> Engine:
         return make_engine(self.relaxed, self.engine)
@@ -250,11 +249,8 @@ class Solvers(SearchSetup):
     def _closer(self, certifier: Certifier) -> TreeCloser | None:
         return Closer(self.scaled, cast("Closing", certifier))
 
-    def _forms(self) -> Forms | None:
-        return self._own_forms
-
     @cached_property
-    def _own_forms(self) -> Forms | None:
+    def _forms(self) -> Forms | None:
         """Forms for a long search; None where the energy is the only one, or there are no balls to prove them by."""
         scaled = self.scaled
         fast = self.arithmetic == "fast"
@@ -269,24 +265,16 @@ class Solvers(SearchSetup):
         """True if g = 0, so that only lambda = 0 solves: in the data (verified, exact) or as computed (fast)."""
         if self.arithmetic == "fast":
             return not np.any(self.scaled.g)
-        if self.arithmetic == "exact":
+        if self.arithmetic == "exact" and self.problem.held:
             return not any(_present(self.exact).system.g)
-        return bool(self.problem.is_unloaded(self.alpha))
+        return super().unloaded()
 
     def reader(self) -> Reader:
         """Understands the records of an earlier proof."""
-        return PlaneReader((self.scaled.F > 0).tolist(), self.enclosed)
-
-    def proof_header(self) -> dict[str, Any]:
-        """First record of a proof (see enumsol.proof.proof_file).
-
-        Raises
-        ------
-        InvalidArgumentError
-            alpha is a fraction of more digits than a proof may hold.
-        """
-        units = unit_exponents(self.scaled.force, self.scaled.length)
-        return point_header(self.problem, self.alpha, self.data, units)
+        system, F = self.enclosed, (self.scaled.F > 0).tolist()
+        tree = Tree.PLANE if self.problem.held else Tree.FLOATING_PLANE
+        limits = Limits((UNDECIDED,) * self.problem.p, tree, F, modes=self.problem.modes.r)
+        return Reader(limits, lambda said: None if system is None else plane_form(system, said))
 
 
 def _positive(system: EnclosedSystem) -> bool:

@@ -23,7 +23,7 @@ from enumsol.search.nodes import Relaxations, TreeNode
 from enumsol.search.outcome import SearchLimits, SearchOutcome, SearchProgress, Stop, StopReason
 from enumsol.search.remainder import Remainder
 from enumsol.search.splitting import branching_node
-from enumsol.support.deadlines import Deadline, Limited, TimeOverError, over, tell, within
+from enumsol.support.deadlines import Deadline, TimeOverError, over, tell, within
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 
 #: Progress is reported and limits on time are looked at after this many nodes.
 _REPORT_EVERY = 64
-#: Number of contact nodes from which a root is sought before the tree; seconds to seek one when the tree is stopped.
-_MANY, _LATE = 24, 1.0
+#: Number of contact nodes from which a root is sought before the tree: of fewer the tree finds one sooner.
+_MANY = 24
 #: Nodes at the limit of what contact can hold, if nothing else is to end the search: blocks in 3D with 4 contact nodes
 #: take some 1,000 and in 2D with 21 some 1,600; others had not come to an end after 8,000 and 18,000.
 _AT_LIMIT = 2000
@@ -67,12 +67,6 @@ class TreeSearch:
     known_root : callable, optional
         Gives the codes of a complete selection that is known to hold a root, or None. Where the search is stopped
         before it came there, this root is proven by itself.
-
-    Attributes
-    ----------
-    continua : callable
-        Gives the codes of complete selections that hold on continua of which solutions were found. Where the search is
-        stopped before it came there, these are solved by themselves: a result lists whole families, its proof too.
     """
 
     def __init__(
@@ -91,11 +85,9 @@ class TreeSearch:
         self.progress = progress
         self.closer = closer or TreeCloser()
         self.closer.relaxed = relaxations.energy
-        self._known_root = known_root
-        self.continua: Callable[[], Sequence[Codes]] = list
         self._recorder = certifier.recorder
         self.outcome = SearchOutcome()
-        self.rest = Remainder(certifier, self.splitting, self.outcome, self._settle_late)
+        self.rest = Remainder(certifier, self.splitting, self.outcome, self._settle_late, known_root)
         #: The limit of what contact can hold, if the load is there: what stays undecided is what rounding decides.
         self.at_limit: LoadLimit | None = None
         self.covered = 0.0
@@ -116,7 +108,7 @@ class TreeSearch:
         if self._one(start[0]):
             return self.outcome
         if len(start[0].codes) >= _MANY:
-            self.known(self.limits)
+            self.rest.known(self.limits)
         if self.forms is not None:
             held = self.certifier.recorder = KeptRecords()
             try:
@@ -137,11 +129,11 @@ class TreeSearch:
                 found = self.closer.whole()
         except TimeOverError:
             return False
-        if found is not None:
-            self.outcome.nodes += 1
-            self._close(item, found)
-            self.report()
-        return found is not None
+        if not self._close(item, found):
+            return False
+        self.outcome.nodes += 1
+        self.report()
+        return True
 
     def _begin(self, start: list[TreeNode], held: KeptRecords, forms: Forms) -> list[Any]:
         """Search until it is known how the search goes on: from the beginning, if that is better; what still waits."""
@@ -260,40 +252,11 @@ class TreeSearch:
     def finish(self) -> None:
         """Leave what was skipped undecided, except for the known root and the selections of continua in it."""
         with within(Deadline(self.limits.deadline).extended(self._start)):
-            self.rest.finish(self._wanted)
-
-    def _wanted(self) -> list[Codes]:
-        """Complete selections that are decided although the search was stopped."""
-        stopped, root = self.outcome.stopped, None
-        if stopped is None or stopped.reason is not StopReason.ENOUGH_ROOTS:
-            root = self.known(Deadline.after(time.perf_counter(), _LATE))
-        wanted = [] if root is None else [root]
-        try:
-            wanted += self.continua()
-        except TimeOverError:
-            self.outcome.late = True
-        return wanted
+            self.rest.finish()
 
     def _settle_late(self, codes: Codes) -> None:
         """Have the certifier decide a complete selection after the search was stopped."""
         self._settle(TreeNode(None, codes, -1, last=False, weight=0.0))
-
-    def known(self, limits: Limited) -> Codes | None:
-        """Codes of a selection that holds a root, if one is found within limits."""
-        if self._known_root is None:
-            return None
-        try:
-            with within(limits):
-                return self._known_root()
-        except TimeOverError:
-            self._known_root = None
-            return None
-
-    def add_known(self) -> None:
-        """Add the root that is known, in a search that was interrupted before it came there."""
-        root = self.known(Deadline.after(time.perf_counter(), _LATE))
-        if root is not None and root not in self.certifier.certified.verified:
-            self._settle_late(root)
 
     def examine(self, item: TreeNode) -> list[TreeNode]:
         """Settle one node of the tree, or give its children, the one that is examined first last."""
@@ -357,24 +320,19 @@ class TreeSearch:
 
     def closed(self, item: TreeNode, relaxation: Relaxation | None, *, again: bool = False) -> bool:
         """True if the subtree is closed by its only possible solution; ``again``: it was, in an earlier search."""
-        found = (self.closer.again if again else self.closer.closed)(item.codes, relaxation)
-        if found is None:
-            return False
-        self._close(item, found)
-        return True
+        return self._close(item, (self.closer.again if again else self.closer.closed)(item.codes, relaxation))
 
     def alone(self, item: TreeNode, proposal: LoneProposal, bound: Bound) -> bool:
         """True if the subtree is closed by a root that is proven to be the only one."""
-        found = self.closer.alone(item.codes, proposal, bound)
+        return self._close(item, self.closer.alone(item.codes, proposal, bound))
+
+    def _close(self, item: TreeNode, found: list[Any] | None) -> bool:
         if found is None:
             return False
-        self._close(item, found)
-        return True
-
-    def _close(self, item: TreeNode, found: list[Any]) -> None:
         self.outcome.closed += 1
         self.outcome.solutions += found
         self.covered += item.weight
+        return True
 
     def settled(self, item: TreeNode) -> bool:
         """True if the certifier decides a complete selection, or leaves it undecided for good."""

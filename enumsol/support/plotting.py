@@ -83,6 +83,38 @@ def in_units(name: str, dimension: str | None, units: tuple[str, str] | None) ->
     return f"{name} [{ {'force': force, 'length': length, 'work': f'{force} {length}'}[dimension] }]"
 
 
+def axes_of(ax: Any, figsize: tuple[float, float]) -> Any:
+    """The axes that a picture is drawn into: those given, or those of a new figure [inches].
+
+    Raises
+    ------
+    InvalidArgumentError, MissingDependencyError
+        As `axes_or_none` and `new_figure`.
+    """
+    return new_figure(figsize=figsize).add_subplot() if axes_or_none(ax) is None else ax
+
+
+def plain_axes(axis: Any) -> None:
+    """A light grid behind what is drawn, and lines on the left and below only."""
+    axis.grid(visible=True, color="#e4e4e4", linewidth=0.6)
+    axis.set_axisbelow(True)
+    axis.spines[["top", "right"]].set_visible(False)
+
+
+def line_entry(label: str, **look: Any) -> Any:
+    """An entry of a legend: a line that looks like that, or with ``marker`` and linestyle "" a mark."""
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], label=label, **look)
+
+
+def area_entry(label: str, **look: Any) -> Any:
+    """An entry of a legend: an area that looks like that."""
+    from matplotlib.patches import Patch
+
+    return Patch(label=label, **look)
+
+
 def figure_of(ax: Any) -> Any:
     """The whole figure that axes belong to, through subfigures."""
     return ax.figure.canvas.figure

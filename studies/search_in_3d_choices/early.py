@@ -61,7 +61,7 @@ class Engine(SpaceEngine):
         self.enclosed, self.level, self.again = enclosed, level, again
         self.undecided, self.suggested = undecided, suggested
         self.answers, self.closed, self.failed, self.roots = {}, {}, {}, []
-        self.first, self.examined, self.branched = 0, 0, []
+        self.first_root, self.examined, self.branched = 0, 0, []
 
     def root(self, rows, modes):
         """The relaxation with the given rows on."""
@@ -74,7 +74,7 @@ class Engine(SpaceEngine):
         if codes not in self.answers:
             answer = self.answers[codes] = settle(enclosed, codes)
             if isinstance(answer, SpaceRoot):
-                self.first = self.first or self.examined
+                self.first_root = self.first_root or self.examined
                 self.roots.append((codes, answer))
         return self.answers[codes]
 
@@ -205,7 +205,12 @@ class Solvers(SpaceSolvers):
             outcome = self.search(self.certifier(None), limits).run()
         seconds = process_time() - started
         wasted = sum(isinstance(answer, Open) for answer in engine.answers.values())
-        taken = {"nodes": outcome.nodes, "tests": len(engine.answers), "wasted": wasted, "first root": engine.first}
+        taken = {
+            "nodes": outcome.nodes,
+            "tests": len(engine.answers),
+            "wasted": wasted,
+            "first root": engine.first_root,
+        }
         taken |= {"roots": len(distinct_roots(engine.roots)[0])}
         return taken | {"complete": outcome.stopped is None and not outcome.undecided, "s": seconds}, engine
 

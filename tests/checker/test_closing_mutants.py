@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from effort import some
 from generators import integer_problem, random_problem
-from proof_tools import copied, proof_of, put, records_of, replaced
+from proof_tools import copied, in_rationals, proof_of, put, records_of, replaced
 from rational_checker import check_records
 from rational_forms import Refused
 from touching import beside_a_loaded_node, row_of_discs, touching_problem
@@ -22,7 +22,7 @@ MUTANTS = some(30, of=75)
 @functools.cache
 def cases(kind):
     """Problems with records of proofs that have such leaves."""
-    found, most = [], {"m": some(2, of=5), "M": some(2, of=5), "a": some(5, of=15)}.get(kind, 5)
+    found, most = [], {"m": some(2, of=5), "counted": some(2, of=5), "a": some(5, of=15)}.get(kind, 5)
     with pytest.MonkeyPatch.context() as patch:
         for problem in problems(kind, patch):
             roots = enumerate_roots(problem, 0)
@@ -63,14 +63,21 @@ def numbers_in(record):
 
 
 def leaves(records, kind):
-    """Numbers of the records of a kind: "m", "M", "m" with sliding nodes, or any theta; "b" with sides."""
+    """Numbers of the records of a kind: "m", "m" in rationals, "m" with sliding nodes, or any theta; "b" with sides."""
     chosen = [(k, record) for k, record in enumerate(records) if isinstance(record, list)]
     if kind == "any theta":
-        return [k for k, record in chosen if record[0] == "m" and any(numbers_in(record)[1][3])]
+        return [
+            k
+            for k, record in chosen
+            if record[0] == "m" and k not in in_rationals(records, "m") and any(numbers_in(record)[1][3])
+        ]
     if kind == "slides":
         return [k for k, record in chosen if record[0] == "m" and max(record[1]) > 6]
     if kind == "sides":
         return [k for k, record in chosen if record[0] == "b" and max(record[2]) > 6]
+    if kind in ("m", "counted"):
+        counted = in_rationals(records, "m")
+        return [k for k, record in chosen if record[0] == "m" and (k in counted) == (kind == "counted")]
     return [k for k, record in chosen if record[0] == kind]
 
 
@@ -82,7 +89,7 @@ def accepted(problem, records):
     return report.ok
 
 
-KINDS = ["a", "m", "M", "slides", "sides", "any theta"]
+KINDS = ["a", "m", "counted", "slides", "sides", "any theta"]
 
 
 @pytest.mark.few(0, 1)
@@ -168,8 +175,8 @@ def test_a_lone_root_is_no_other_and_no_wider():
     for problem, records in cases("a"):
         for k in leaves(records, "a"):
             record, p, rubbing = records[k], problem.p, int(np.count_nonzero(problem.friction))
-            forgeries = [record[:-1], [*record, 1], put(record, (8,), -record[8]), put(record, (7,), [-1.0] * (2 * p))]
-            forgeries += [put(record, (3,), wrong) for wrong in ([-1.0] * (2 * p), [1.0] * p, [1e3] * (2 * p))]
+            forgeries = [record[:-1], [*record, 1], put(record, (5,), -record[5]), put(record, (4,), [-1.0] * (2 * p))]
+            forgeries += [put(record, (6,), wrong) for wrong in ([-1.0] * (2 * p), [1.0] * p, [1e3] * (2 * p))]
             for forged in forgeries:
                 others = replaced(records, k, forged)
                 assert not accepted(problem, others) or check_records(problem, others)
@@ -177,17 +184,21 @@ def test_a_lone_root_is_no_other_and_no_wider():
             footer = {"roots": 1, "families": 0, "undecided": 0, "leaves": 1}
             numbers = [1.0] * (p + rubbing) + [0.0] * (2 * rubbing)
             for strength in (0.0, 1.0, 1e3):
-                whole = [records[0], ["a", record[1], numbers, [strength] * p + [0.0] * p, *record[4:]], footer]
+                whole = [
+                    records[0],
+                    ["a", record[1], numbers, *record[3:6], [strength] * p + [0.0] * p, *record[7:]],
+                    footer,
+                ]
                 assert not accepted(problem, whole) or check_records(problem, whole)
 
 
 @pytest.mark.slow
 def test_forged_counts_are_refused():
     """By the independent checker as well."""
-    for problem, records in cases("M"):
-        for k in leaves(records, "M"):
-            forged = put(records, (k, 3), 1 - records[k][3])
-            for others in (forged, put(forged, (-1, "roots"), records[-1]["roots"] + 1 - 2 * records[k][3])):
+    for problem, records in cases("counted"):
+        for k in leaves(records, "counted"):
+            forged = put(records, (k, 4), 1 - records[k][4])
+            for others in (forged, put(forged, (-1, "roots"), records[-1]["roots"] + 1 - 2 * records[k][4])):
                 assert not accepted(problem, others)
                 with pytest.raises(Refused):
                     check_records(problem, others)

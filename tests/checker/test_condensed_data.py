@@ -38,7 +38,7 @@ def test_a_ball_of_slip_offsets_is_not_computed():
     assert "of a problem whose slip offset is a ball" in why_refused(wide, said)
     rational = put(said, (0, "data"), "problem")
     for k in of_kind(said, "x"):
-        rational = put(rational, (k, 0), "X")
+        rational = put(rational, (k,), [*rational[k], "rational"])
     assert "a rational leaf in a proof about a problem whose slip offset is a ball" in why_refused(wide, rational)
 
 

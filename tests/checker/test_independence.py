@@ -2,6 +2,7 @@
 
 import ast
 import json
+import re
 import subprocess
 import sys
 from functools import cache
@@ -25,7 +26,7 @@ CHECKERS = inside("checker", "verify", "plane_checker", "graph_checker", "histor
 IN_SPACE = {
     *("enumsol.checker.space_checker", "enumsol.condensation.space_condensed", "enumsol.model.sectors"),
     *inside("trusted.space", "resultants", "sector_rows", "slip_forms", "leaves", "boxed_solution"),
-    *inside("trusted.space", "product_forms", "natural_map", "space_reference", "space_uniqueness", "turning"),
+    *inside("trusted.space", "product_forms", "natural_map", "space_uniqueness", "turning"),
     *inside("trusted.space", "leaf_conditions", "leaf_equations"),
 }
 #: The search: its rooms, and what it alone uses of rooms that it shares with the checkers.
@@ -94,10 +95,12 @@ SHARED = {
         *("equations", "lone_root", "only_root", "only_solution_in_space"),
     },
     "proof.begun": None,
-    "proof.proof_file": {"Proof", "fraction_text", "packed", "coarse"},
+    "proof.proof_file": {"PROOF_VERSION", "Proof", "fraction_text", "packed", "coarse"},
     "proof.reading": {"fits", "rational_text"},
     "proof.records": None,
-    "proof.space_records": None,
+    "proof.curve_records": None,
+    "proof.declared_forms": None,
+    "proof.leaves": None,
     "proof.writer": None,
     "model.sectors": None,
 }
@@ -171,6 +174,23 @@ def test_the_guard_sees_the_search_where_it_is():
     assert all(map(path_of, SEARCH))
 
 
+def listed():
+    """The page that lists what a proof rests on."""
+    return (ROOT.parent / "docs" / "trust.md").read_text(encoding="utf-8")
+
+
+def test_the_help_fits_a_screen_and_says_how_many_lines_are_trusted():
+    text = checker.__doc__
+    assert text.count("\n") < 45
+    code = "import sys; sys.path.insert(0, 'tools'); import trusted_lines; print(trusted_lines.by_room())"
+    done = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True, cwd=ROOT.parent)
+    rooms = ast.literal_eval(done.stdout)
+    said = re.findall(r"([\d,]+) in ``(\w+)``", text)
+    assert {room for _, room in said} == rooms.keys() - {"errors"}
+    for number, room in said:
+        assert abs(int(number.replace(",", "")) - rooms[room]) < 60 + 0.05 * rooms[room], room
+
+
 def test_what_the_checkers_load_is_listed():
     # whatever they rest on besides their own modules is said in one place
     others = {m for m in closure_of(CHECKERS) if not m.startswith("enumsol.checker")}
@@ -178,7 +198,7 @@ def test_what_the_checkers_load_is_listed():
     for module in others:
         if path_of(module).name == "__init__.py" and not imports_of(module):
             continue  # a room's docstring
-        assert f"``{module.removeprefix('enumsol.')}``" in checker.__doc__
+        assert f"`{module.removeprefix('enumsol.')}`" in listed()
 
 
 def test_what_the_search_uses_of_what_is_trusted_is_listed():
@@ -192,7 +212,7 @@ def test_what_the_search_uses_of_what_is_trusted_is_listed():
                     used.setdefault(part, set()).add(what)
     for part, names in used.items():
         assert SHARED.get(part, set()) is None or names <= SHARED[part], f"the search uses {names} of {part}"
-        assert f"``{part}``" in checker.__doc__
+        assert f"`{part}`" in listed()
     assert set(used) == set(SHARED)
 
 

@@ -1,4 +1,4 @@
-"""Forged leaves "m" of proofs in 3D: refused, or true all the same, by a judge in floats of its own."""
+"""Forged leaves "a" of proofs in 3D: refused, or true all the same, by a judge in floats of its own."""
 
 import functools
 
@@ -14,7 +14,7 @@ from trees import by_the_tree
 from enumsol import enumerate_roots, gallery, verify
 
 NAMES = ("block", "degenerate", "few tau")
-_NUMBERS, _LEAF, _MID, _RAD, _INDEX = range(1, 6)
+_LEAF, _NUMBERS, _MID, _RAD, _INDEX = range(1, 6)
 
 
 @functools.cache
@@ -30,7 +30,7 @@ def proven(name):
         friction = (np.array([0.5, 0.0, 0.3]), np.array([0.0, 0.0, 0.2]))
         problem = from_compliance(np.eye(9), np.array([1.0, 2, -1, 0.8, 1, 0.5, 0.1, 0.2, 0.3]), friction)
     records = records_of(enumerate_roots(problem, 0, max_nodes=1).proof)
-    assert [record[0] for record in records[1:-1]] == ["m"]
+    assert [record[0] for record in records[1:-1]] == ["a"]
     assert (len(records[1][_LEAF]) == 0) == (name == "degenerate")
     return problem, records
 
@@ -194,7 +194,7 @@ def test_below_the_root_of_the_tree():
     reports = [verify(problem, proof_of([records[0], way, records[1], ["u", ""], end])) for way in ways]
     assert sorted(report.ok for report in reports) == [False, True]
     assert "the only one in it" in str(min(reports, key=lambda report: report.ok))
-    without = ["m", records[1][1], [], *records[1][3:]]
+    without = ["a", [], *records[1][2:]]
     report = verify(problem, proof_of([records[0], ways[0], without, ["u", ""], end]))
     assert "below the root of the tree without a leaf" in " ".join(report.failures)
     # twice, and after the end of the tree
@@ -215,7 +215,7 @@ def test_a_root_among_several_is_never_the_only_one(name):
             theta = np.array(record[1][p:]).reshape(p, 2)
             theta /= np.maximum(np.linalg.norm(theta, axis=1, keepdims=True), 1e-9)
             numbers = [*np.exp(rng.normal(size=2 * p)), *[0.0] * p, *[0.0] * (m - p), *theta.ravel()]
-            forged = ["m", [float(x) for x in numbers], [], *record[1:3], 1]
+            forged = ["a", [], [float(x) for x in numbers], *record[1:3], 1]
             report = verify(problem, proof_of([records[0], forged, {"roots": 1, "undecided": 0, "leaves": 1}]))
             assert "not proven to be the only one" in " ".join(report.failures)
 
@@ -246,5 +246,5 @@ def test_the_leaf_of_another_problem():
     with by_the_tree():
         header = records_of(enumerate_roots(other, 0).proof)[0]
     records = records_of(enumerate_roots(first, 0).proof)
-    if records[1][0] == "m":
+    if records[1][0] == "a":
         assert not verify(other, proof_of([header, *records[1:]])).ok

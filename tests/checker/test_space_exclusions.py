@@ -10,13 +10,12 @@ import pytest
 import scipy.sparse as sp
 from exact_balls import holds
 from problems3d import from_compliance, random_coupled
-from proof_tools import copied, leaves_of, of_kind, proof_of, records_of
+from proof_tools import by_forms, copied, in_file, leaves_of, of_kind, proof_of, records_of
 from space_proofs import arc_of_sector, case, values_of, with_values
 from trees import by_the_tree, forms_at_once
 
 from enumsol import ContactProblem3D, enumerate_roots, verify
 from enumsol.checker.space_checker import SpaceChecker
-from enumsol.proof.reading import RefusedError
 
 
 def solved(A, B):
@@ -207,16 +206,12 @@ def test_exclusions_by_a_form_hold_in_rationals_and_no_others_are_accepted():
     problem = from_compliance(S, g, (F[:, 0], F[:, 1]))
     with by_the_tree(), forms_at_once():
         records = records_of(enumerate_roots(problem, 0).proof)
-    (declared, *_), places = of_kind(records, "q"), of_kind(records, "f")
+    (declared, *_), places = of_kind(records, "q"), by_forms(records)
     space, codes, (checker, units), counts = Space(problem), dict(leaves_of(records)), begun(problem, records), [0, 0]
     for factor in (1.0, 0.8, 1.05, 0.0):
-        numbers = [x if k < 2 * problem.p else factor * x for k, x in enumerate(records[declared][1])]
+        numbers = [x if k < 2 * problem.p else factor * x for k, x in enumerate(records[declared][2])]
         form = space.form(numbers)
-        try:
-            checker._declare(["q", numbers])
-        except RefusedError:
-            assert form is None
-            continue
+        checker._declare(["q", [6] * problem.p, numbers, []])
         for k in places:
             rows = records[k][1]
             if factor == 1.0:
@@ -224,7 +219,7 @@ def test_exclusions_by_a_form_hold_in_rationals_and_no_others_are_accepted():
             for _ in range(6):
                 values = values_of(records[k])
                 values[int(rng.integers(len(values)))] *= float(rng.choice((0.0, 0.5, 1.01, 2.0, -1.0)))
-                accepted = checker._leaf(codes[k], with_values(records[k], values)) is None
+                accepted = checker._leaf(codes[k], in_file([*with_values(records[k], values)[:3], 1])) is None
                 bound = form and space.bound(codes[k], rows, values, *units, form)
                 assert accepted == (bound is not None and bound > 0)
                 counts[accepted] += 1
@@ -252,7 +247,7 @@ def test_what_is_accepted_of_changed_multipliers_holds_in_rationals():
                     number = int(rng.integers(4, 40)) + run
                     a, b = arc_of_sector(number)
                     rows[j][2] = number if floor(4 * a) == ceil(4 * b) - 1 else rows[j][2]
-                accepted = checker._leaf(codes[k], with_values(["x", rows, ""], values)) is None
+                accepted = checker._leaf(codes[k], in_file(with_values(["x", rows, ""], values))) is None
                 bound = space.bound(codes[k], rows, values, *units)
                 assert accepted == (bound is not None and bound > 0)
                 counts[accepted] += 1

@@ -36,7 +36,7 @@ def leaf_by_leaf(p, seed):
 ARCS, ROWS, NONE = (2, 7), (1, 5), (0, 0)
 
 
-@pytest.mark.parametrize(("name", "kinds"), [(ARCS, "abrx"), (ROWS, "bkx"), (NONE, "bknx")])
+@pytest.mark.parametrize(("name", "kinds"), [(ARCS, "pbtx"), (ROWS, "bkx"), (NONE, "bknx")])
 def test_leaves_say_that_all_solutions_lie_on_a_curve(name, kinds):
     problem, records = leaf_by_leaf(*name)
     assert {record[0] for record in records if isinstance(record, list)} >= {"w", *kinds}
@@ -69,7 +69,7 @@ def cut_short(records):
 def test_where_a_curve_ends_inside_the_interval_an_arc_says_nothing():
     problem, records = leaf_by_leaf(*ARCS)
     short = put(cut_short(records), (-1, "gaps"), 1)
-    assert why_refused(problem, short).count("not proven to be an arc through its box") == len(of_kind(records, "r"))
+    assert why_refused(problem, short).count("not proven to be an arc through its box") == len(of_kind(records, "t"))
 
 
 def test_an_end_inside_the_interval_is_a_gap():
@@ -94,34 +94,34 @@ def test_a_curve_alone_says_nothing():
 @pytest.mark.parametrize(
     ("name", "kind", "forged", "why"),
     [
-        (ARCS, "r", lambda record: ["r", record[1] - 1, *record[2:]], "not proven to be an arc through its box"),
-        (ARCS, "r", lambda record: [*record[:4], record[2], record[5]], "not proven to be an arc through its box"),
+        (ARCS, "t", lambda record: ["t", record[1] - 1, *record[2:]], "not proven to be an arc through its box"),
+        (ARCS, "t", lambda record: [*record[:4], record[2], record[5]], "not proven to be an arc through its box"),
         (
             ARCS,
-            "r",
+            "t",
             lambda record: [*record[:2], *[record[4]] * 3, record[5]],
             "not proven to be an arc through its box",
         ),
-        (ARCS, "r", lambda record: [*record[:5], [0] * len(record[5])], "not proven to be an arc through its box"),
-        (ARCS, "r", lambda record: [*record[:4], "7", record[5]], "a point of an arc is not over its piece"),
-        (ARCS, "r", lambda record: [*record[:4], 0.5, record[5]], "an arc is over no piece"),
-        (ARCS, "r", lambda record: [*record[:5], [6] * len(record[5])], "the leaf of a point of an arc is none"),
-        (ARCS, "r", lambda record: ["r", 1000, *record[2:]], "there is no box 1000"),
-        (ARCS, "r", lambda record: ["r", True, *record[2:]], "there is no box True"),
-        (ARCS, "r", lambda _: ["n"], "not proven to hold no root"),
+        (ARCS, "t", lambda record: [*record[:5], [0] * len(record[5])], "not proven to be an arc through its box"),
+        (ARCS, "t", lambda record: [*record[:4], "7", record[5]], "a point of an arc is not over its piece"),
+        (ARCS, "t", lambda record: [*record[:4], 0.5, record[5]], "an arc is over no piece"),
+        (ARCS, "t", lambda record: [*record[:5], [6] * len(record[5])], "the leaf of a point of an arc is none"),
+        (ARCS, "t", lambda record: ["t", 1000, *record[2:]], "there is no box 1000"),
+        (ARCS, "t", lambda record: ["t", True, *record[2:]], "there is no box True"),
+        (ARCS, "t", lambda _: ["n"], "not proven to hold no root"),
         (NONE, "n", lambda _: ["q"], "unknown kind of record 'q'"),
         (NONE, "n", lambda _: [], "unknown kind of record None"),
         (ARCS, "x", lambda _: ["x", [], "", ""], "its multipliers do not exclude it"),
         (ARCS, "x", lambda record: ["x", record[1][1:], *record[2:]], "rows and"),
-        (ARCS, "x", lambda record: ["x", *record[2:], record[2]], "not a list of rows and a text"),
+        (ARCS, "x", lambda record: ["x", *record[2:], record[2]], "its form was not declared"),
         (ROWS, "k", lambda _: ["n"], "not proven to hold no root"),
         (ROWS, "k", lambda record: ["k", record[2], record[2]], "not proven to lie in its boxes"),
         (ROWS, "k", lambda record: ["k", record[2], record[1]], "not proven to lie in its boxes"),
         (ROWS, "k", lambda record: ["k", record[1], -1], "there is no box -1"),
-        (ROWS, "k", lambda record: ["m", [1.0], *record[1:]], "a form over a piece cannot be read: expected"),
-        (ARCS, "a", lambda _: ["a", "1"], "a piece is not cut within"),
-        (ARCS, "a", lambda _: ["a", "1/0"], "a piece is cut nowhere"),
-        (ARCS, "a", lambda _: ["a", 0.5], "a piece is cut nowhere"),
+        (ROWS, "k", lambda record: [*record, [1.0]], "a form over a piece cannot be read: expected"),
+        (ARCS, "p", lambda _: ["p", "1"], "a piece is not cut within"),
+        (ARCS, "p", lambda _: ["p", "1/0"], "a piece is cut nowhere"),
+        (ARCS, "p", lambda _: ["p", 0.5], "a piece is cut nowhere"),
         (ROWS, "b", lambda record: ["b", 0, record[2][1:]], "does not cover the assignment"),
     ],
 )
@@ -134,7 +134,7 @@ def test_forged_leaves_are_refused(name, kind, forged, why):
 def test_the_check_ends_after_many_failures():
     problem, records = leaf_by_leaf(*ROWS)
     place, parts, nothing = records.index({"tree": True}) + 1, 64, ["x", [], "", ""]
-    cuts = [part for k in range(1, parts) for part in (["a", f"{k}/{parts}"], nothing)]
+    cuts = [part for k in range(1, parts) for part in (["p", f"{k}/{parts}"], nothing)]
     claim = {"curves": 1, "arcs": None, "leaves": parts, "gaps": 0}
     said = why_refused(problem, [*records[:place], *cuts, nothing, claim])
     assert said.count("its multipliers do not exclude it") == 20

@@ -57,7 +57,7 @@ def block_by_certificates():
 
 def test_one_certificate_says_that_a_curve_has_all_solutions_of_a_piece():
     cover = block_by_certificates()
-    assert {record.kind for record in cover.records} <= {"a", "m"}
+    assert {record.kind for record in cover.records} <= {"p", "k"}
     report = verify(cover.problem, cover.proof())
     assert (report.curves, cover.gaps, report.complete) == (1, [], True)
     assert all(len(enumerate_roots(cover.problem, alpha)) == 1 for alpha in (0.5, 0.75, 1))
@@ -67,16 +67,16 @@ def test_one_certificate_says_that_a_curve_has_all_solutions_of_a_piece():
 def test_forged_certificates_over_a_piece_are_refused(way):
     cover = block_by_certificates()
     records = records_of(cover.proof())
-    k = of_kind(records, "m")[0]
-    _, numbers, first, last = records[k]
+    k = of_kind(records, "k")[0]
+    _, first, last, numbers = records[k]
     forged = {
-        "numbers": put(records, (k, 1, 0), -numbers[0]),
+        "numbers": put(records, (k, 3, 0), -numbers[0]),
         # nu, the square of which overflows
-        "huge": put(records, (k, 1, 2 * cover.problem.p), 1e200),
-        "theta": put(records, (k, 1), numbers[:8] + [number + 30.0 for number in numbers[8:]]),
-        "run": put(records, (k, 3), first),
-        "backwards": put(records, (k,), ["m", numbers, last, first]),
-        "no box": put(records, (k, 3), len(cover.chains[0].links)),
+        "huge": put(records, (k, 3, 2 * cover.problem.p), 1e200),
+        "theta": put(records, (k, 3), numbers[:8] + [number + 30.0 for number in numbers[8:]]),
+        "run": put(records, (k, 2), first),
+        "backwards": put(records, (k,), ["k", last, first, numbers]),
+        "no box": put(records, (k, 2), len(cover.chains[0].links)),
         # the same said of more than the curve passes
         "piece": put(records, (0, "interval"), ["1/1000", "50"]),
         "none": replaced(records, k),
@@ -89,7 +89,7 @@ def test_a_certificate_below_an_assignment_speaks_of_its_statuses_only():
     """A curve without these statuses proves nothing about them."""
     cover = block_by_certificates()
     records = records_of(cover.proof())
-    k = of_kind(records, "m")[0]
+    k = of_kind(records, "k")[0]
     roots = [root for alpha in (0.5, 0.75, 1) for root in enumerate_roots(cover.problem, alpha)]
     assert all(root.statuses[0].value != "open" for root in roots)
     below = [["b", 0, [5, 0]], records[k], records[k]]
@@ -105,7 +105,7 @@ def test_a_block_has_one_curve_by_a_few_certificates(cells):
     cover = SpaceCover(problem, (Fraction(0), Fraction(2)))
     cover.search(max_nodes=20)
     assert (len(cover.chains), cover.gaps, cover.stopped) == (1, [], None)
-    assert {record.kind for record in cover.records} <= {"a", "m"}
+    assert {record.kind for record in cover.records} <= {"p", "k"}
     complete_report(problem, cover.proof())
     assert all(len(enumerate_roots(problem, alpha)) == 1 for alpha in (0.1, 0.3, 0.7, 1.5))
 

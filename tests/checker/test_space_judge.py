@@ -13,7 +13,7 @@ import pytest
 import space_judge
 from floating_space import known_body, lying_block
 from problems3d import OneNode, degenerate_integers, in_space, random_over_alpha, random_plane_over_alpha
-from proof_tools import bytes_of, of_kind, proof_of, put, records_of
+from proof_tools import bytes_of, closed, of_kind, proof_of, put, records_of
 from space_graph_proofs import closed_branch
 from space_judge_mutants import checked, judged, mutant, mutant_of_graph
 from space_proofs import RANDOM, case, random_problem, values_of, with_values
@@ -245,7 +245,7 @@ def test_the_judge_sees_wrong_claims():
 
     def reason(*change):
         with pytest.raises(space_judge.Refused) as refusal:
-            space_judge.judge_records(problem, put(records, *change))
+            space_judge.judge_records(problem, closed(put(records, *change)))
         return str(refusal.value)
 
     assert "there is a solution" in reason((root,), ["n"])

@@ -1,4 +1,4 @@
-"""Forged leaves "l", forms of products and leaves "e" and "j" of proofs in 3D: refused, or what they say is true."""
+"""Forged leaves "l", forms of products and what refers to them in 3D: refused, or what they say is true."""
 
 import functools
 
@@ -7,7 +7,7 @@ import pytest
 from complete import all_roots
 from effort import some
 from problems3d import degenerate_integers, from_compliance, soft_or_coupled
-from proof_tools import copied, of_kind, proof_of, put, put_in_all, records_of, refused, replaced
+from proof_tools import by_forms, copied, of_kind, proof_of, put, put_in_all, records_of, refused, replaced
 from trees import by_the_tree, products_at_once
 
 from enumsol import verify
@@ -121,7 +121,7 @@ def test_random_changes(part):
 # -- forms of products, and their leaves -------------------------------------------------------------------------------
 
 
-_CODES, _CENTRE, _NUMBERS = 1, 2, 3
+_CODES, _NUMBERS, _CENTRE = 1, 2, 3
 
 
 @functools.cache
@@ -135,14 +135,19 @@ def proven_by_products():
 
 def products(records):
     """Places of the forms of products."""
-    return [k for k in of_kind(records, "q") if len(records[k]) == 4]
+    return [k for k in of_kind(records, "q") if records[k][_CENTRE]]
+
+
+def boxes(records):
+    """Places of the boxes that hold an ellipsoid."""
+    return [k for k in of_kind(records, "l") if len(records[k]) == 8]
 
 
 def test_the_proof_has_all_of_them_and_is_accepted():
     problem, records = proven_by_products()
     assert len(of_kind(records, "q")) >= 2
-    assert of_kind(records, "j")
-    assert len(of_kind(records, "e")) > 3
+    assert boxes(records)
+    assert len(by_forms(records)) > 3
     assert verify(problem, proof_of(records)).complete
 
 
@@ -170,7 +175,7 @@ def test_changed_forms_are_refused(entry, function):
 )
 def test_changed_boxes_are_refused(entry, function):
     problem, records = proven_by_products()
-    assert refused(problem, put_in_all(records, of_kind(records, "j"), entry, function))
+    assert refused(problem, put_in_all(records, boxes(records), entry, function))
 
 
 def test_a_form_that_is_left_out_or_stands_elsewhere():
@@ -185,9 +190,9 @@ def test_leaves_that_say_something_else():
     """A leaf that holds a root is said to hold none; one of the energy is said to be one of a form."""
     problem, records = proven_by_products()
     first = of_kind(records, "q")[0]
-    for k in of_kind(records, "j", "x"):
+    for k in {*boxes(records), *of_kind(records, "x")} - {*by_forms(records)}:
         # one of the energy may be one of a form, but not before any form was declared
-        assert refused(problem, replaced(records, k, ["e"])) or (records[k][0] == "x" and k > first)
+        assert refused(problem, replaced(records, k, ["x", [], "", 1])) or (records[k][0] == "x" and k > first)
 
 
 @pytest.mark.few(1, 2)

@@ -21,7 +21,7 @@ import space_proofs
 from complete import proven_roots
 from generators import fe_compliance, from_condensed, integer_problem, random_problem, through_the_unloaded_state
 from graph_proofs import cut_in_two, forms_at_once, triangle
-from proof_tools import MAGIC, bytes_of, of_kind, proof_of, put, records_of, sealed
+from proof_tools import MAGIC, bytes_of, closed, of_kind, proof_of, put, records_of, sealed
 from rational_checker import check
 from rational_forms import Refused
 from refusals import bad_argument
@@ -31,7 +31,8 @@ from trees import above_known_roots, by_the_tree
 from enumsol import Proof, ProofFormatError, branch_graph, enumerate_roots, gallery, verify
 from enumsol.checker.plane_checker import Checker
 from enumsol.checker.space_checker import SpaceChecker
-from enumsol.proof.records import LEAVES
+from enumsol.proof.leaves import leaves_of
+from enumsol.proof.records import Tree
 from enumsol.search import form_policy as forms
 
 POINTS = {
@@ -89,7 +90,9 @@ def case(name):
         roots = enumerate_roots(problem, alpha, max_nodes=4 if name == "cut short" else None)
     header, *records, footer = records_of(roots.proof)
     if name == "in rationals":
-        records = [[record[0].upper() if record[0] in "xn" else record[0], *record[1:]] for record in records]
+        records = [
+            [*record, "rational"] if record[0] in "xn" and record[-1] != "rational" else record for record in records
+        ]
     return problem, [header, *records, footer]
 
 
@@ -178,10 +181,8 @@ def variants(records):
 
 
 def free(record, k, path, value):
-    """Whether the document leaves it free: further names of a header, and how a claim is checked."""
+    """Whether the document leaves it free: further names of a header, and a reason."""
     if k == 0 and not path and isinstance(value, dict) and set(record) <= set(value):
-        return True
-    if path == (0,) and value in ("X", "N") and type(value) is str:  # the same claim, to be checked in rationals
         return True
     return isinstance(record, list) and record[0] == "u" and path == (1,) and type(value) is str  # any reason
 
@@ -209,12 +210,12 @@ def test_at_every_place_one_value_of_another_type_is_refused(name):
 @pytest.mark.slow
 def test_every_kind_of_record_is_among_them():
     kinds = {record[0] for name in CASES for record in case(name)[1] if isinstance(record, list)}
-    assert kinds == {*LEAVES, "b", "q", "s", "c", "t"}
+    assert kinds == {*leaves_of(Tree.PLANE), "b", "q", "f", "s", "c", "t"}
 
 
 @pytest.mark.parametrize("checker", [Checker, SpaceChecker])
 def test_every_kind_of_leaf_has_a_test_in_its_checker(checker):
-    kinds = {*checker.held_kinds.values(), *checker.floating_kinds.values()}
+    kinds = {kind for tree in checker.trees for kind in leaves_of(tree).values()}
     assert kinds <= set(checker.tests.func(object.__new__(checker)))
 
 
@@ -284,7 +285,7 @@ ALLOWED = {
 
 
 def text_of(records):
-    return "".join(line_of(record) + "\n" for record in records).encode()
+    return "".join(line_of(record) + "\n" for record in closed(records)).encode()
 
 
 @pytest.mark.parametrize("how", [*LINES, *ALLOWED])

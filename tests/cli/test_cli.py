@@ -323,7 +323,7 @@ def test_warnings_are_lines_without_source_code(capsys, monkeypatch):
             raise ImportError
 
     # an installation without the compiled engine
-    monkeypatch.setattr("enumsol.search.tree.ActiveSetEngine", Missing)
+    monkeypatch.setattr("enumsol.search.solvers.ActiveSetEngine", Missing)
     status, out, err = run(capsys, *EXAMPLE, 5, "--arithmetic", "fast")
     assert (status, "3 roots" in out) == (0, True)
     assert err.startswith("enumsol: warning: the compiled active-set solver cannot be loaded")

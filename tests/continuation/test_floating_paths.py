@@ -12,7 +12,7 @@ from refusals import bad_argument, refusal
 
 import enumsol
 from enumsol.continuation import SmoothPath, follow, newton
-from enumsol.continuation.space_equation import SLIP
+from enumsol.continuation.disc_equation import SLIP
 from enumsol.continuation.start import equation_on
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 
@@ -163,7 +163,7 @@ def test_gradients_are_those_of_differences(problem, selections):
             rates, both = equation.slack_rates(codes, x, axis), np.isfinite(ahead)
             assert rates[both] == pytest.approx((ahead[both] - behind[both]) / (2 * step), abs=1e-7)
             for which in np.argwhere(both):
-                gradient = equation.slack_gradient(codes, x, tuple(which))
+                gradient = equation.slack_gradients(codes, x)[tuple(which)]
                 assert gradient[k] == pytest.approx(rates[tuple(which)], abs=1e-12)
 
 

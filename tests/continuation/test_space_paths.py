@@ -11,7 +11,7 @@ from refusals import bad_argument
 
 import enumsol
 from enumsol.continuation import SmoothPath, follow, newton, start_tangents
-from enumsol.continuation.space_equation import SLIP, SpaceEquation
+from enumsol.continuation.disc_equation import SLIP, DiscEquation
 from enumsol.continuation.start import equation_on
 from enumsol.model.statuses import OPEN, STICK
 
@@ -70,7 +70,7 @@ def test_gradients_are_those_of_differences(seed, r):
     rng = np.random.default_rng(seed)
     problem = from_compliance(*random_coupled(rng, 2)[:2], (1.3, [0.7, 0.0]), friction_slope=(0.4, [-0.2, 0.0]))
     equation = equation_on(problem, None, 0.3, (-1, 1), r, 0.7)
-    assert isinstance(equation, SpaceEquation)
+    assert isinstance(equation, DiscEquation)
     x, step = rng.normal(size=7), 1e-6
     x[:2] = np.abs(x[:2])
     for codes in ((STICK, SLIP), (SLIP, STICK), (SLIP, SLIP), (OPEN, SLIP), (STICK, OPEN)):
@@ -84,7 +84,7 @@ def test_gradients_are_those_of_differences(seed, r):
         direction = rng.normal(size=7)
         rates = np.einsum("jik,j->ik", np.array(slopes) / (2 * step), direction)
         assert equation.slack_rates(codes, x, direction) == pytest.approx(rates, abs=1e-6)
-        assert equation.slack_gradient(codes, x, (1, 0)) @ direction == pytest.approx(rates[1, 0], abs=1e-6)
+        assert equation.slack_gradients(codes, x)[1, 0] @ direction == pytest.approx(rates[1, 0], abs=1e-6)
 
 
 # -- one node: alpha is a function of the angle of slip ----------------------------------------------------------------

@@ -191,14 +191,15 @@ def _numbers(rng, records, _):
     """Multipliers."""
     changed = copied(records)
     lists = [k for k, record in enumerate(changed) if isinstance(record, list) and record]
-    # the rows of those of 3D are a list, which the mutations of fields reach
-    texts = {k: [isinstance(part, str) for part in changed[k][-2:]] for k in lists}
-    places = [k for k in lists if changed[k][0] in ("x", "X") and all(texts[k])]
+    # the rows of those of 3D are a list, which the mutations of fields reach; in graphs in 2D codes come before them
+    begin = 2 if records[0].get("kind") == "graph" else 1
+    texts = {k: [isinstance(part, str) for part in changed[k][begin : begin + 2]] for k in lists}
+    places = [k for k in lists if changed[k][0] == "x" and len(texts[k]) == 2 and all(texts[k])]
     if not places:
         return _nudge(rng, records, _)
     at = _pick(rng, places)
-    head = changed[at][:-2]
-    rows, values = multipliers(["x", *changed[at][-2:]])
+    head, tail = changed[at][:begin], changed[at][begin + 2 :]
+    rows, values = multipliers(["x", *changed[at][begin : begin + 2]])
     for _ in range(int(rng.integers(1, 3))):
         how = int(rng.integers(7))
         j = int(rng.integers(len(values))) if values else 0
@@ -216,10 +217,10 @@ def _numbers(rng, records, _):
             values = [v * 1e300 for v in values]
         else:
             values = [-v for v in values]
-    changed[at] = [*head, *with_multipliers(["x", "", ""], rows, values)[1:]]
+    changed[at] = [*head, *with_multipliers(["x", "", ""], rows, values)[1:], *tail]
     if rng.random() < 0.1:
         text = base64.b64encode(struct.pack("<3I", 1, 2, 3)).decode()
-        changed[at][-2] = _pick(rng, (text, text[:-1], text + "=", text + "\u00e9", 5, None))
+        changed[at][begin] = _pick(rng, (text, text[:-1], text + "=", text + "\u00e9", 5, None))
     return _sealed_lines(_lines(changed))
 
 

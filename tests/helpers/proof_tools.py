@@ -1,6 +1,7 @@
 """Proofs taken apart and put together again, and judged by rational arithmetic that shares no code with enumsol."""
 
 import base64
+import contextlib
 import copy
 import hashlib
 import json
@@ -15,18 +16,32 @@ from rational_forms import Refused
 
 from enumsol import Proof, ProofFormatError, verify
 
-MAGIC = b"enumsol-proof 1\n"
+MAGIC = b"enumsol-proof 2\n"
 
 
 def records_of(proof):
     """All records of a proof as Python objects."""
     data = proof if isinstance(proof, bytes) else bytes_of(proof)
-    return [json.loads(line) for line in zlib.decompress(data[len(MAGIC) : -32]).splitlines()]
+    return opened(json.loads(line) for line in zlib.decompress(data[len(MAGIC) : -32]).splitlines())
 
 
 def kinds_of(proof):
     """The kinds of the records between the header and the counts at the end, one by one."""
     return [record[0] for record in records_of(proof)[1:-1]]
+
+
+def in_rationals(records, *kinds):
+    """Places of the records of these kinds, "x", "n" or "m", that are to be tested in rational arithmetic."""
+    return [k for k in of_kind(records, *kinds) if records[k][-1] == "rational" or _is_counted(records[k])]
+
+
+def _is_counted(record):
+    return record[0] == "m" and len(record) == 5 and type(record[4]) is int
+
+
+def by_forms(records):
+    """Places of the exclusions that refer to a form."""
+    return [k for k in of_kind(records, "x") if type(records[k][-1]) is int]
 
 
 def bytes_of(proof):
@@ -43,20 +58,72 @@ def sealed(body, magic=MAGIC):
 
 def proof_of(records, magic=MAGIC):
     """A proof of these records with a right checksum; strings are taken as lines of text."""
-    lines = [record if isinstance(record, str) else json.dumps(record) for record in records]
+    lines = [record if isinstance(record, str) else json.dumps(record) for record in closed(records)]
     return sealed(zlib.compress("".join(line + "\n" for line in lines).encode(), 1), magic)
 
 
 def multipliers(record):
     """Rows and multipliers of an exclusion."""
-    rows, values = (base64.b64decode(text) for text in record[1:])
+    rows, values = (base64.b64decode(text) for text in record[1:3])
     return list(struct.unpack(f"<{len(rows) // 4}I", rows)), list(struct.unpack(f"<{len(values) // 8}d", values))
 
 
 def with_multipliers(record, rows, values):
     """The exclusion with other rows and multipliers."""
     packed = struct.pack(f"<{len(rows)}I", *rows), struct.pack(f"<{len(values)}d", *values)
-    return [record[0], *(base64.b64encode(data).decode() for data in packed)]
+    return [record[0], *(base64.b64encode(data).decode() for data in packed), *record[3:]]
+
+
+def opened(records):
+    """Records with the rows of exclusions in 3D as lists, and over pieces of alpha a text for either end."""
+    found, kind = [], None
+    for record in records:
+        kind = _dimension_of(record, kind)
+        found.append(_opened(record, kind) if _is_exclusion(record) and kind else record)
+    return found
+
+
+def closed(records):
+    """Such records as they stand in a file; what cannot be written there stays as it is."""
+    found, kind = [], None
+    for record in records:
+        kind = _dimension_of(record, kind)
+        found.append(in_file(record, kind) if _is_exclusion(record) and kind else record)
+    return found
+
+
+def in_file(record, kind="space"):
+    """An exclusion of a point proof or of a graph in 3D as it stands in a file."""
+    with contextlib.suppress(struct.error, TypeError, ValueError):
+        rows = base64.b64encode(b"".join(struct.pack("<IIq", *row) for row in record[1])).decode()
+        return ["x", rows, *(record[2:] if kind == "space" else [_joined(*record[2:])])]
+    return record
+
+
+def _is_exclusion(record):
+    return isinstance(record, list) and record[:1] == ["x"] and len(record) > 2
+
+
+def _opened(record, kind):
+    octets = base64.b64decode(record[1])
+    rows = [list(struct.unpack_from("<IIq", octets, k)) for k in range(0, len(octets), 16)]
+    return ["x", rows, *([record[2]] if kind == "space" else _halves(record[2])), *record[3:]]
+
+
+def _dimension_of(record, kind):
+    """ "space" or "graph" for what follows a header in 3D, None in 2D."""
+    if not isinstance(record, dict) or "format" not in record:
+        return kind
+    return record.get("kind") if record.get("kind") == "space" or ("steps" in record and "interval" in record) else None
+
+
+def _halves(text):
+    octets = base64.b64decode(text)
+    return [base64.b64encode(part).decode() for part in (octets[: len(octets) // 2], octets[len(octets) // 2 :])]
+
+
+def _joined(low, high):
+    return base64.b64encode(base64.b64decode(low, validate=True) + base64.b64decode(high, validate=True)).decode()
 
 
 def leaves_of(records):
@@ -147,7 +214,7 @@ class Judge:
         are splits by sides.
         """
         lists = [record for record in records if isinstance(record, list)]
-        if any(record[0] in ("m", "M") or (record[0] == "b" and max(record[2]) > 6) for record in lists):
+        if any(record[0] == "m" or (record[0] == "b" and max(record[2]) > 6) for record in lists):
             return _accepted(self.problem, records)
         header, footer = records[0], records[-1]
         alpha = Fraction(header["alpha"])
@@ -168,9 +235,9 @@ class Judge:
                 continue
             leaves += 1
             undecided += kind == "u"
-            if kind in ("x", "X") and not self._excluded(codes, *multipliers(record)):
+            if kind == "x" and not self._excluded(codes, *multipliers(record)):
                 return False
-            if kind in ("n", "N") and (max(codes) > 4 or _vertices(*self._forms(codes))):
+            if kind == "n" and (max(codes) > 4 or _vertices(*self._forms(codes))):
                 return False
             if kind == "r":
                 if max(codes) > 4 or not self._root(codes, *record[1:]):

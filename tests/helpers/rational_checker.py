@@ -34,7 +34,7 @@ from rational_forms import (
 from rational_pieces import ClosedPiece
 from rational_references import References
 
-MAGIC = b"enumsol-proof 1\n"
+MAGIC = b"enumsol-proof 2\n"
 DIGEST = 32
 LARGEST_TEXT = 1 << 24
 #: [4.3] What a multiplier may be, by code and kind of row: E any number, + nonnegative, . none.
@@ -127,7 +127,7 @@ class Proof:
     """Header, units and rules of multipliers."""
 
     def __init__(self, problem, header):
-        need(header["format"] == "enumsol-proof" and integer(header["version"]) == 1, "another format or version")
+        need(header["format"] == "enumsol-proof" and integer(header["version"]) == 2, "another format or version")
         need(header["problem"] == fingerprint(problem) and integer(header["p"]) == problem.p, "another problem")
         need(header["data"] == "problem", "S and g as computed are not at hand")
         self.data, self.p = data_of(problem), problem.p
@@ -219,11 +219,12 @@ class Point(Proof):
 
     def leaf(self, codes, kind, *rest):
         """[5.3]"""
-        if kind in ("x", "X"):
-            terms = self.terms(codes, rest, self.scale, self.friction)
-            need(self.forms.excludes(terms), "multipliers do not exclude a leaf")
-        elif kind == "f":
-            self.excluded_by(codes, *rest)
+        if kind == "x" and (len(rest) == 2 or rest[2] == "rational"):
+            terms = self.terms(codes, rest[:2], self.scale, self.friction)
+            need(len(rest) < 4 and self.forms.excludes(terms), "multipliers do not exclude a leaf")
+        elif kind == "x":
+            *packed, back = rest
+            self.excluded_by(codes, back, *packed)
         elif kind == "u":
             need(len(rest) == 1 and isinstance(rest[0], str), "no reason")
             self.undecided += 1
@@ -231,29 +232,30 @@ class Point(Proof):
             need(set(codes) == {6} and not rest and not any(self.forms.g), "the body is loaded")
             self.polytopes.append(((0,) * self.p, 0))
         else:
-            need(kind in ("n", "N", "r", "D", "a", "m", "M"), "an unknown leaf")
-            if kind == "m":
+            need(kind in ("n", "r", "D", "a", "m"), "an unknown leaf")
+            if kind == "m" and type(rest[3]) is not int:
                 self.closings.leaf(codes, *rest)
                 return
             if kind == "a":
-                selection, numbers, strengths, rows, values, *claim = rest
+                selection, numbers, *claim, strengths, rows, values = rest
                 terms = self.terms(codes, [rows, values], self.scale, self.friction)
                 self.closings.alone(codes, selection, numbers, strengths, terms)
                 self.root(selection, *claim)
                 return
-            if kind == "M":
+            if kind == "m":
                 self.polytopes += self.closings.exact_leaf(codes, *rest)
                 return
             need(max(codes) < 5, "a selection is not complete")
-            {"n": self.empty, "N": self.empty, "r": self.root, "D": self.polytope}[kind](codes, *rest)
+            {"n": self.empty, "r": self.root, "D": self.polytope}[kind](codes, *rest)
 
-    def declare(self, text, mu, nu, alpha, beta, weight):
+    def declare(self, codes, numbers, more):
         """[5.5]"""
-        need(len(text) == self.p and set(text) <= set("0123456"), "codes of a form are none")
-        multipliers = [[exact(value) for value in values] for values in (mu, nu, alpha, beta)]
-        need(all(len(values) == self.p for values in multipliers), "a form has other multipliers")
+        need(len(codes) == self.p and all(0 <= integer(code) <= 6 for code in codes), "codes of a form are none")
+        need(len(numbers) == 4 * self.p, "a form has other multipliers")
+        numbers, (weight,) = [exact(value) for value in numbers], more
+        multipliers = [numbers[k * self.p : (k + 1) * self.p] for k in range(4)]
         need(min(multipliers[2] + multipliers[3]) >= 0 and exact(weight) >= 0, "a form is not allowed")
-        self.declared.append(([int(digit) for digit in text], multipliers))
+        self.declared.append((codes, multipliers))
 
     def excluded_by(self, codes, back, *packed):
         """[5.5]"""
@@ -270,7 +272,8 @@ class Point(Proof):
         form = self.forms.own_form(multipliers)
         need(self.forms.excludes_by(form, equations, terms), "a form does not exclude a leaf")
 
-    def empty(self, codes):
+    def empty(self, codes, *rational):
+        need(rational in ((), ("rational",)), "an unknown way to test a leaf")
         need(not self.forms.hull(codes), "a selection has a solution")
 
     def root(self, codes, mid, rad, index):
@@ -316,20 +319,23 @@ class FloatingPoint(Point):
         self.references = References(self.forms, self.friction, self.scale)
 
     def leaf(self, codes, kind, *rest):
-        need(kind in ("x", "n", "r", "N", "D", "u", "i", "a"), "an unknown leaf")
-        if kind == "a":
+        need(kind in ("x", "n", "r", "D", "u", "i", "o"), "an unknown leaf")
+        if kind == "o":
             back, rows, pairs, *claim = rest
             selection = self.references.leaf(codes, back, rows, pairs, claimed=bool(claim))
             if selection is not None:
                 self.root(selection, *claim)
+        elif kind == "x":
+            need(len(rest) == 2, "an exclusion that rests on a definite stiffness")
+            super().leaf(codes, kind, *rest)
         elif kind == "i":
             (z,) = rest
             need(self.forms.unbalanced(codes, z, self.scale[0]), "forces of a leaf may be in balance with the load")
         else:
             super().leaf(codes, kind, *rest)
 
-    def declare(self, *record):
-        self.references.declare(*record)
+    def declare(self, selection, weights, more):
+        self.references.declare(selection, weights, *more)
 
 
 class Graph(Proof):

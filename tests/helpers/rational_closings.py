@@ -1,4 +1,4 @@
-"""[5.3, a, m and M] Leaves that close a subtree by its only possible solution, for rational_checker, in rationals.
+"""[5.3, a and m] Leaves that close a subtree by its only possible solution, for rational_checker, in rationals.
 
 Nothing of enumsol is imported. That a solution is the only one is not believed because a form is definite: all
 selections of the free nodes are tried as well. Numbers in brackets are sections of docs/proof_format.md.
@@ -44,8 +44,9 @@ class Closings:
         need(integer(index) == (1 if reduced.determinant > 0 else -1), "an index is wrong")
         self.points[as_point(point)] = point
 
-    def exact_leaf(self, codes, selection, numbers, count):
+    def exact_leaf(self, codes, selection, given, numbers, count):
         """The selection as a polytope to be counted, if the leaf holds its solution."""
+        need(given == [i for i, code in enumerate(codes) if code in (5, 6)], "other nodes are free")
         free, sliding = ([i for i, code in enumerate(codes) if code in some] for some in ((5, 6), (7, 8)))
         refined = [selection[i] if selection[i] in SIDES.get(code, ()) else code for i, code in enumerate(codes)]
         self.check(selection, free, refined)

@@ -48,7 +48,7 @@ class Parts:
 
     def count(self):
         """Make the counts at the end those of the records."""
-        leaves = [record for record in self.tree if record[0] not in "ab"]
+        leaves = [record for record in self.tree if record[0] not in "pb"]
         gaps = sum(record[0] == "u" for record in leaves)
         self.counts = {"curves": len(self.curves), "arcs": None, "leaves": len(leaves), "gaps": gaps}
 
@@ -65,13 +65,13 @@ class Parts:
         waiting = 1
         while waiting and k < len(self.tree):
             record = self.tree[k]
-            waiting += 1 if record[0] == "a" else len(record[2]) - 1 if record[0] == "b" else -1
+            waiting += 1 if record[0] == "p" else len(record[2]) - 1 if record[0] == "b" else -1
             k += 1
         return k
 
     def renumber(self, number):
         """Other numbers for all boxes in leaves, by a function that gives None where there is none any more."""
-        for k in self.places("k", "r", "m"):
+        for k in self.places("k", "t"):
             record = self.tree[k]
             boxes = [number(box) for box in _boxes_of(record)]
             self.tree[k] = ["n"] if None in boxes else copied(record)
@@ -80,7 +80,7 @@ class Parts:
 
 
 #: Where records have the numbers of boxes.
-_BOXES = {"k": slice(1, 3), "r": slice(1, 2), "m": slice(2, 4)}
+_BOXES = {"k": slice(1, 3), "t": slice(1, 2)}
 
 
 def _boxes_of(record):
@@ -93,29 +93,29 @@ def _boxes_of(record):
 def _leaf(rng, parts, near=None):
     """A leaf that claims much, of numbers that occur somewhere."""
     count = parts.first_boxes()[-1]
-    kind = str(rng.choice(["n", "x", "k", "r", "m", "k", "u"], p=[0.2, 0.2, 0.2, 0.1, 0.15, 0.1, 0.05]))
+    kind = str(rng.choice(["n", "x", "k", "t", "u"], p=[0.2, 0.2, 0.45, 0.1, 0.05]))
     donors = [parts.tree[k] for k in (near or range(len(parts.tree))) if parts.tree[k][0] == kind]
     donors = donors or [parts.tree[k] for k in parts.places(kind)]
     if kind == "k" and rng.random() < 0.6:
         first = int(rng.integers(count))
         return ["k", first, min(first + int(rng.integers(4)), count - 1)]
-    if kind == "r" and rng.random() < 0.6:
+    if kind == "t" and rng.random() < 0.6:
         return _arc(rng, parts, int(rng.integers(count)))
     return copied(_pick(rng, donors)) if donors and kind not in "nu" else ["n"] if kind != "u" else ["u", ""]
 
 
 def _arc(rng, parts, box):
     """A leaf whose roots are said to be an arc through a box, with the numbers of another one."""
-    known = parts.places("r")
+    known = parts.places("t")
     if known:
-        return ["r", box, *copied(parts.tree[_pick(rng, known)][2:])]
+        return ["t", box, *copied(parts.tree[_pick(rng, known)][2:])]
     low, high = parts.header["interval"]
-    return ["r", box, low, high, low, [1] * parts.header["p"]]
+    return ["t", box, low, high, low, [1] * parts.header["p"]]
 
 
 def _arc_numbers(rng, parts):
     """Another piece, alpha, or leaf of an arc."""
-    places = parts.places("r")
+    places = parts.places("t")
     if places:
         record = parts.tree[_pick(rng, places)]
         low, high, alpha = (Fraction(number) for number in record[2:5])
@@ -135,7 +135,7 @@ def _arc_numbers(rng, parts):
 
 def _prune(rng, parts):
     """One leaf in place of a subtree."""
-    inner = parts.places("a", "b")
+    inner = parts.places("p", "b")
     if inner:
         k = _pick(rng, inner)
         end = parts.end(k)
@@ -149,13 +149,13 @@ def _graft(rng, parts):
 
 
 def _other_leaf(rng, parts):
-    k = _pick(rng, parts.places("x", "n", "k", "r", "m", "u"))
+    k = _pick(rng, parts.places("x", "n", "k", "t", "u"))
     parts.tree[k] = _leaf(rng, parts)
 
 
 def _same_leaf(rng, parts):
     """Another kind of leaf about the same boxes, or none."""
-    places = parts.places("k", "r", "m")
+    places = parts.places("k", "t")
     if places:
         k = _pick(rng, places)
         boxes = _boxes_of(parts.tree[k])
@@ -167,17 +167,17 @@ def _same_leaf(rng, parts):
 
 def _no_child(rng, parts):
     """A branching without one of its children, or a cut without one of its halves."""
-    inner = parts.places("a", "b")
+    inner = parts.places("p", "b")
     if not inner:
         return
     k = _pick(rng, inner)
     children, at = [], k + 1
-    for _ in range(2 if parts.tree[k][0] == "a" else len(parts.tree[k][2])):
+    for _ in range(2 if parts.tree[k][0] == "p" else len(parts.tree[k][2])):
         children.append((at, parts.end(at)))
         at = parts.end(at)
     lost = int(rng.integers(len(children)))
     del parts.tree[slice(*children[lost])]
-    if parts.tree[k][0] == "a":
+    if parts.tree[k][0] == "p":
         del parts.tree[k]
     else:
         del parts.tree[k][2][lost]
@@ -202,7 +202,7 @@ def _codes(rng, parts):
 
 
 def _cut(rng, parts):
-    places = parts.places("a")
+    places = parts.places("p")
     if places:
         record = parts.tree[_pick(rng, places)]
         low, high = map(Fraction, parts.header["interval"])
@@ -244,7 +244,7 @@ def _fewer_rows(rng, parts):
 
 
 def _box_numbers(rng, parts):
-    places = parts.places("k", "r", "m")
+    places = parts.places("k", "t")
     if places:
         record = parts.tree[_pick(rng, places)]
         j = int(_pick(rng, range(len(record))[_BOXES[record[0]]]))
@@ -252,9 +252,9 @@ def _box_numbers(rng, parts):
 
 
 def _form(rng, parts):
-    places = parts.places("m")
+    places = [k for k in parts.places("k") if len(parts.tree[k]) > 3]
     if places:
-        numbers = parts.tree[_pick(rng, places)][1]
+        numbers = parts.tree[_pick(rng, places)][3]
         j = int(rng.integers(len(numbers)))
         numbers[j] = float(numbers[j] * 10 ** rng.uniform(-2, 2) * _pick(rng, (-1, 1)) + _pick(rng, (0, 0.1, 1e-3)))
 
@@ -314,9 +314,9 @@ def _round(rng, parts):
         return
     parts.curves[k] = _turned(curve)
     parts.renumber(lambda box: starts[k] + starts[k + 1] - 1 - box if box in here else box)
-    for j in parts.places("k", "m"):
-        if parts.tree[j][-1] in here:
-            parts.tree[j][-2:] = parts.tree[j][:-3:-1]
+    for j in parts.places("k"):
+        if parts.tree[j][2] in here:
+            parts.tree[j][1:3] = parts.tree[j][2:0:-1]
 
 
 def _shorter(rng, parts):

@@ -49,7 +49,7 @@ def judge_records(problem, records):
     try:
         header, kind = records[0], records[0].get("kind")
         need(kind in ("space", "graph"), "an unknown kind of proof")
-        need(header["format"] == "enumsol-proof" and integer(header["version"]) == 1, "another format or version")
+        need(header["format"] == "enumsol-proof" and integer(header["version"]) == 2, "another format or version")
         need(header["problem"] == fingerprint(problem) and integer(header["p"]) == problem.p, "another problem")
         need(header["data"] == "problem", "other data")
         data = SpaceData(problem)
@@ -91,7 +91,7 @@ class Point:
         self.full = self.system.bordered
         self.unit = [force[i] for i in self.system.node_of]
         self.tangents = [len(places) for places in self.system.tau]
-        self.form = self.products = self.reference = None
+        self.declared = []
         self.roots, self.undecided, self.leaves = [], 0, 0
 
     def run(self, records):
@@ -107,7 +107,7 @@ class Point:
                 due.append(codes)
             else:
                 self.leaves += 1
-                need(record[0] in ("xinrau" if self.system.rigid else "xfenrljmzu"), "no such leaf")
+                need(record[0] in ("xinrou" if self.system.rigid else "xnrlazu"), "no such leaf")
                 getattr(self, f"leaf_{record[0]}")(codes, *record[1:])
         counts = {"roots": len(self.roots), "undecided": self.undecided, "leaves": self.leaves}
         need(are(records[position:], [counts]), f"the counts are {counts}")
@@ -121,12 +121,19 @@ class Point:
 
     # -- exclusions ----------------------------------------------------------------------------------------------------
 
-    def terms(self, codes, rows, *texts):
-        return Terms(self.system, self.scale, codes, rows, texts)
+    def terms(self, codes, rows, text):
+        return Terms(self.system, self.scale, codes, rows, text)
 
-    def leaf_x(self, codes, rows, text):
-        """[4.5]"""
+    def leaf_x(self, codes, rows, text, back=None):
+        """[4.5], [7.5] By the energy, or by a form."""
         terms = self.terms(codes, rows, text)
+        if back is not None:
+            form = self.form_about(codes, back)
+            if isinstance(form, ProductForm):
+                need(not terms.rows and form.excludes(codes), "the form does not exclude the assignment")
+            else:
+                self.excluded(*margin(terms, *form))
+            return
         self.excluded(*(floating_margin(terms) if self.system.rigid else margin(terms)))
 
     def leaf_i(self, codes, z):
@@ -149,19 +156,29 @@ class Point:
             f"the margin is {float((value / (size + arb(2) ** -900)).mid()):.1e} of its terms",
         )
 
-    def declare(self, *numbers):
-        """[7.5] Forms, and forms of products."""
+    def declare(self, codes, numbers, more, *claim):
+        """[7.5] Forms, and forms of products; [7.7] roots."""
         if self.system.rigid:
-            self.reference = self.declared_root(*numbers)
-        elif len(numbers) == 1:
-            self.form = self.plain_form(floats(*numbers, self.system.m + self.p))
+            self.declared.append(self.declared_root(codes, numbers, more, *claim))
+            return
+        need(not claim, "an enclosure of no root")
+        if codes == [6] * self.p:
+            need(more == [], "a form has more numbers")
+            self.declared.append(self.plain_form(floats(numbers, self.system.m + self.p)))
         else:
-            self.products = self.product_form(*numbers)
+            self.declared.append(self.product_form(codes, more, numbers))
 
-    def declared_root(self, leaf, numbers, balance, share, mid, rad, index):
+    def form_about(self, codes, back):
+        """[5.5], [7.5] The form declared so many before, which has to be about the assignment."""
+        need(not self.system.rigid and 1 <= integer(back) <= len(self.declared), "no form is declared")
+        form = self.declared[-back]
+        need(not isinstance(form, ProductForm) or form.serves(codes), "no form is about the assignment")
+        return form
+
+    def declared_root(self, leaf, numbers, more, mid, rad, index):
         """[7.7] The root of a leaf, which counts, and its form."""
         numbers = floats(numbers, self.p + 2 * self.system.m)
-        balance, share = floats([balance, share], 2)
+        balance, share = floats(more, 2)
         need(balance >= 0, "a factor of a square is negative")
         need(isinstance(leaf, list) and len(leaf) == self.p and all(map(is_code, leaf, self.tangents)), "no such leaf")
         need(is_complete(leaf), "the leaf is still open")
@@ -170,10 +187,10 @@ class Point:
         balance = weights_of_balance(self.data, self.scale, balance)
         return RootForm(self.system, Weights(self.system, numbers), root, leaf, balance, share)
 
-    def leaf_a(self, codes, rows, products):
-        """[7.7] No other root than the one that was declared last."""
-        form, (length, force) = self.reference, self.scale
-        need(form is not None, "no root is declared")
+    def leaf_o(self, codes, back, rows, products):
+        """[7.7] No other root than the one that was declared so many before."""
+        need(1 <= integer(back) <= len(self.declared), "no root is declared")
+        form, (length, force) = self.declared[-back], self.scale
         need(isinstance(rows, list) and isinstance(products, list), "no lists of rows and products")
         places, factors = [], []
         for *pair, z in products:
@@ -208,10 +225,6 @@ class Point:
         need(is_definite(H), "a form is not positive definite")
         return H, (W * column(system.g0)).entries()
 
-    def leaf_f(self, codes, rows, text):
-        need(self.form is not None, "no form is declared")
-        self.excluded(*margin(self.terms(codes, rows, text), *self.form))
-
     def product_form(self, codes, point, multipliers):
         """[7.5] A form of products."""
         need(isinstance(codes, list) and len(codes) == self.p and all(map(is_code, codes, self.tangents)), "no codes")
@@ -220,23 +233,16 @@ class Point:
         length, force = ([arb(2) ** value for value in part] for part in self.scale)
         return ProductForm(self.system, codes, point, floats(multipliers, len(multipliers)), force, length)
 
-    def form_about(self, codes):
-        need(self.products is not None and self.products.serves(codes), "no form is about the assignment")
-        return self.products
-
-    def leaf_e(self, codes):
-        need(self.form_about(codes).excludes(codes), "the form does not exclude the assignment")
-
-    def leaf_j(self, codes, centre, radius, rho, mid, rad, index):
+    def in_ellipsoid(self, codes, back, box):
         """[7.5] All solutions of an assignment in a box that holds one, by their ellipsoid."""
-        form, box = self.form_about(codes), Boxed(self, centre, radius, rho, mid, rad, index)
+        form = self.form_about(codes, back)
+        need(isinstance(form, ProductForm), "the form is none of products")
         rows, unit = self.system.S.tolist(), box.steps
         for k, step in enumerate(unit):
             row = [step * value for value in rows[k]]
             row[k] += 1
             off = form.bounds(form.about(row, -step * self.system.g0[k] - box.middle[k]))
             need(form.is_empty or abs(off) <= box.radius[k], "the ellipsoid is not in the box")
-        self.count(box)
 
     # -- complete assignments ------------------------------------------------------------------------------------------
 
@@ -294,7 +300,7 @@ class Point:
 
     # -- certificates and boxes ----------------------------------------------------------------------------------------
 
-    def leaf_m(self, codes, numbers, leaf, mid, rad, index):
+    def leaf_a(self, codes, leaf, numbers, mid, rad, index):
         """[7.5] One solution by one certificate."""
         numbers = floats(numbers, self.p + 2 * self.system.m)
         for i, (force, length) in enumerate(zip(*reversed(self.scale), strict=True), 2 * self.p):
@@ -318,10 +324,14 @@ class Point:
         else:
             self.roots.append(None)
 
-    def leaf_l(self, codes, centre, radius, rho, mid, rad, index):
-        """[7.5] All solutions of a complete assignment in a box that holds one."""
-        need(is_complete(codes), "the assignment is still open")
+    def leaf_l(self, codes, centre, radius, rho, mid, rad, index, back=None):
+        """[7.5] All solutions of a complete assignment, or of an ellipsoid, in a box that holds one."""
         box = Boxed(self, centre, radius, rho, mid, rad, index)
+        if back is not None:
+            self.in_ellipsoid(codes, back, box)
+            self.count(box)
+            return
+        need(is_complete(codes), "the assignment is still open")
 
         def settled(angles, _, view):
             return view is not None and box.holds(view.zeta(box.steps))

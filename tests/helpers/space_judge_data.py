@@ -12,7 +12,7 @@ from itertools import pairwise
 
 import numpy as np
 from flint import arb, arb_mat, fmpq
-from rational_forms import Refused, exact, integer, need, octets
+from rational_forms import Refused, exact, need, octets
 
 DEEPEST = 29
 BEYOND = 1 << 31
@@ -359,16 +359,24 @@ def numbers_of(text, count):
     return [exact(value) for value in struct.unpack(f"<{count}d", data)]
 
 
+def rows_of(text):
+    """[2] Rows in 3D: kind, node and number."""
+    data = octets(text)
+    need(len(data) % 16 == 0, "no rows")
+    return list(struct.iter_unpack("<IIq", data))
+
+
 class Terms:
     """The rows of an exclusion and its multipliers, tested and in the problem's units."""
 
-    def __init__(self, system, scale, codes, rows, texts):
+    def __init__(self, system, scale, codes, rows, text, ends=1):
         self.system, self.rows = system, []
-        self.values = [[] for _ in texts]
-        need(isinstance(rows, list), "no list of rows")
-        lists = [numbers_of(text, len(rows)) for text in texts]
+        self.values = [[] for _ in range(ends)]
+        rows = rows_of(rows)
+        numbers = numbers_of(text, ends * len(rows))
+        lists = [numbers[k * len(rows) : (k + 1) * len(rows)] for k in range(ends)]
         for row, *values in zip(rows, *lists, strict=True):
-            kind, node, number = map(integer, row)
+            kind, node, number = row
             need(0 <= kind <= 9 and 0 <= node < len(codes), "there is no such row")
             found = row_of(system.tau[node], system.axes[node], kind, number)
             sign = sign_of(codes[node], kind, number)

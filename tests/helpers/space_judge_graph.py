@@ -146,7 +146,7 @@ class Graph:
             record = records[position]
             position += 1
             need(isinstance(record, list) and record, "the tree breaks off")
-            if record[0] == "a":
+            if record[0] == "p":
                 (alpha,) = map(decimal_fraction, record[1:])
                 need(low < alpha < high, "a cut beyond its piece")
                 due += [(alpha, high, codes), (low, alpha, codes)]
@@ -161,9 +161,8 @@ class Graph:
                 test = {
                     "x": self.leaf_x,
                     "n": self.leaf_n,
-                    "r": self.leaf_r,
+                    "t": self.leaf_t,
                     "k": self.leaf_k,
-                    "m": self.leaf_m,
                     "u": self.leaf_u,
                 }[record[0]]
                 test(low, high, codes, *record[1:])
@@ -175,11 +174,10 @@ class Graph:
 
     # -- exclusions ----------------------------------------------------------------------------------------------------
 
-    def leaf_x(self, low, high, codes, rows, *texts):
+    def leaf_x(self, low, high, codes, rows, text):
         """[7.8] (4.2) at every alpha of the piece: a polynomial of degree four."""
-        need(len(texts) == 2, "no multipliers of both ends")
         system, m = self.system, self.system.m
-        terms = Terms(system, self.scale, codes, rows, texts)
+        terms = Terms(system, self.scale, codes, rows, text, ends=2)
         sums = [terms.sums(end) for end in (0, 1)]
         loads = [system.load(arb(alpha)) for alpha in (low, high)]
         radii = [[system.radius(i, arb(alpha)) if i < self.p else arb(0) for i in range(m)] for alpha in (low, high)]
@@ -283,13 +281,16 @@ class Graph:
 
         explore(self.system, codes, between(low, high), settled, piece=(arb(low), arb(high)))
 
-    def leaf_k(self, low, high, codes, first, last):
+    def leaf_k(self, low, high, codes, first, last, numbers=None):
+        if numbers is not None:
+            self.by_form(low, high, codes, numbers, first, last)
+            return
         curve, begin = self.box(first)
         other, end = self.box(last)
         need(curve is other and begin <= end, "boxes of no one run")
         self.on(low, high, codes, curve.boxes[begin : end + 1])
 
-    def leaf_r(self, low, high, codes, number, first, last, alpha, leaf):
+    def leaf_t(self, low, high, codes, number, first, last, alpha, leaf):
         curve, k = self.box(number)
         first, last, alpha = map(decimal_fraction, (first, last, alpha))
         need(self.problem.low <= first <= alpha <= last <= self.problem.high, "alphas in the wrong order")
@@ -305,7 +306,7 @@ class Graph:
 
     # -- certificates --------------------------------------------------------------------------------------------------
 
-    def leaf_m(self, low, high, codes, numbers, first, last):
+    def by_form(self, low, high, codes, numbers, first, last):
         curve, begin = self.box(first)
         other, end = self.box(last)
         need(curve is other and (begin <= end or curve.closed), "boxes of no one run")

@@ -14,7 +14,7 @@ from enumsol import NotHeldError, ProofFormatError, verify
 
 def _number(rng, records):
     """A number of a certificate, a box or a form."""
-    places = of_kind(records, "m", "l", "j", "q", "r")
+    places = of_kind(records, "a", "l", "q", "r")
     if places:
         record = records[_pick(rng, places)]
         lists = [part for part in record[1:] if isinstance(part, list) and part and isinstance(part[0], float)]
@@ -27,7 +27,7 @@ def _number(rng, records):
 
 def _named(rng, records):
     """The codes or the index of a certificate."""
-    places = of_kind(records, "m", "l", "j")
+    places = of_kind(records, "a", "l")
     if places:
         record = records[_pick(rng, places)]
         codes = [part for part in record[1:] if isinstance(part, list) and part and isinstance(part[0], int)]
@@ -35,22 +35,24 @@ def _named(rng, records):
             j = int(rng.integers(len(codes[0])))
             codes[0][j] = int(_pick(rng, (codes[0][j] + int(rng.integers(-2, 3)), *range(7), 12)))
         else:
-            record[-1] = int(_pick(rng, (-record[-1], 0, 2)))
+            place = 5 if record[0] == "a" else 6
+            record[place] = int(_pick(rng, (-record[place], 0, 2)))
 
 
 def _referred(rng, records):
     """What is said of the root of a body that nothing holds: rows, products, their factors, and its form."""
-    places = of_kind(records, "a", "q")
+    places = of_kind(records, "o", "q")
     record = records[_pick(rng, places)]
     if record[0] == "q":
-        part = int(rng.integers(1, 5))
+        part = int(rng.integers(1, 4))
         if part > 2:
-            record[part] = float(_pick(rng, (0.0, -record[part], 2 * record[part], 1e-3 * record[part])))
+            j, more = int(rng.integers(len(record[3]))), record[3]
+            more[j] = float(_pick(rng, (0.0, -more[j], 2 * more[j], 1e-3 * more[j])))
         else:
             j = int(rng.integers(len(record[part])))
             record[part][j] = _pick(rng, (record[part][int(rng.integers(len(record[part])))], -record[part][j]))
         return
-    rows, products = record[1:]
+    rows, products = record[2:]
     how = int(rng.integers(6))
     if how == 0:
         del rows[int(rng.integers(len(rows)))]
@@ -92,7 +94,7 @@ def _cut_short(rng, records):
             record = records[end]
             waiting += len(record[2]) - 1 if record[0] == "b" else -1 if record[0] != "q" else 0
             end += 1
-        donors = [records[j] for j in range(k, end) if records[j][0] in ("x", "f", "n", "m", "a")] + [["n"], ["u", ""]]
+        donors = [records[j] for j in range(k, end) if records[j][0] in ("x", "n", "a", "o")] + [["n"], ["u", ""]]
         records[k:end] = [copied(_pick(rng, donors))]
         _counted(records)
 
@@ -105,11 +107,11 @@ def _counted(records):
 
 def _recounted(rng, records):
     """A claim changed with counts that fit, the number of roots as well."""
-    places = of_kind(records, "x", "f", "n", "r", "m", "l", "u", "z", "a")
+    places = of_kind(records, "x", "n", "r", "l", "u", "z", "a", "o")
     k = _pick(rng, places)
     before = records[k][0]
     records[k] = _pick(rng, (["n"], ["u", ""], copied(records[_pick(rng, places)])))
-    solved = ("r", "m", "l")
+    solved = ("r", "a", "l")
     records[-1]["roots"] += (records[k][0] in solved) - (before in solved) if rng.random() < 0.7 else 0
     _counted(records)
 

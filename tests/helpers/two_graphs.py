@@ -8,9 +8,8 @@ from enumsol.arithmetic.rationals import rational
 from enumsol.branches.enclosed.following import TracedProblem, follow_selections
 from enumsol.branches.enclosed.joining import EventPlaceKind
 from enumsol.branches.enclosed.make_traced import make_traced
-from enumsol.branches.exact.gluing import glue
+from enumsol.branches.exact.gluing import glue, make_vertices
 from enumsol.branches.exact.known_selections import KnownSelections
-from enumsol.branches.exact.make_elements import make_arcs, make_vertices
 from enumsol.branches.ways import ByAlgebra
 from enumsol.condensation.exact import ExactCondensed
 
@@ -46,9 +45,8 @@ def two_graphs(problem, interval):
     search.run()
     followed = follow_selections(traced, search.pieces, cut_short=search.stopped is not None)
     gluing = glue(KnownSelections(exact, rational(a), rational(b), cut_short=False), search.selections)
-    arcs = make_arcs(gluing)
     ours = make_traced(traced, followed.joined)
-    theirs = make_vertices(gluing, arcs), arcs
+    theirs = make_vertices(gluing), gluing.edges
     return TwoGraphs(theirs, ours, followed.joined, followed.reasons, gluing.reasons)
 
 

@@ -95,7 +95,7 @@ def test_what_workers_have_compressed_is_in_the_proof_byte_by_byte(monkeypatch):
     with Watched(2) as executor:
         proof = enumerate_roots(entry.build(), entry.alpha, executor=executor).proof
     data = bytes_of(proof)
-    parts = [answer.records for answer in answers if answer is not None]
+    parts = [answer.found[-1] for answer in answers if answer is not None]
     assert len(parts) > 8
     assert all(part.data in data for part in parts)
     # the rest are those nodes that were examined here, the header and the footer

@@ -1,6 +1,7 @@
 """What the entries of a record may not be, each refused with a reason of its own."""
 
 import base64
+import json
 import re
 from fractions import Fraction
 
@@ -9,8 +10,9 @@ import pytest
 from refusals import bad_argument
 
 from enumsol.model.statuses import CONTACT, FORWARD, OPEN, SLIP_PLUS, STICK, UNDECIDED
-from enumsol.proof import reading, records
-from enumsol.proof.records import Limits, table_of
+from enumsol.proof import curve_records, reading, records
+from enumsol.proof.leaves import leaves_of
+from enumsol.proof.records import Limits
 
 
 def texts(rows, values):
@@ -20,9 +22,9 @@ def texts(rows, values):
     ]
 
 
-FORM = ["q", "66", [1.0, 2.0], [0.0, 1.0], [0.5, 0.0], [0.0, 0.0], 1.5]
+FORM = ["q", [6, 6], [1.0, 2.0, 0.0, 1.0, 0.5, 0.0, 0.0, 0.0], [1.5]]
 DECLARED = records.DeclaredForm.read(FORM, Limits((UNDECIDED,) * 2))
-IN_CONTACT = records.DeclaredForm.read(["q", "65", *FORM[2:]], Limits((UNDECIDED,) * 2))
+IN_CONTACT = records.DeclaredForm.read(["q", [6, 5], *FORM[2:]], Limits((UNDECIDED,) * 2))
 LIMITS = Limits((UNDECIDED, STICK), friction=[True, True], declared=[DECLARED, IN_CONTACT])
 #: One weight for every free node, and four more where it has friction.
 WEIGHTS = [1.0] * 5
@@ -36,15 +38,19 @@ WEIGHTS = [1.0] * 5
         (records.Excluded, texts([0] * 15, [1.0] * 15), "it has 15 multipliers, and there are 14 rows"),
         (records.Excluded, texts([14], [1.0]), "row 14 does not exist; there are 14"),
         (records.Excluded, texts([0], [np.inf]), "a multiplier is not finite"),
-        (records.DeclaredForm, ["6", *FORM[2:]], "a form cannot be read: expected status codes as texts of 2 digits"),
-        (records.DeclaredForm, ["6\u0661", *FORM[2:]], "a form cannot be read: a status code is not a digit"),
-        (records.DeclaredForm, ["67", *FORM[2:]], "a form cannot be read: a status code is not among 0 to 6"),
-        (records.DeclaredForm, [*FORM[1:6], float("inf")], "a form cannot be read: a number is not finite"),
-        (records.DeclaredForm, [*FORM[1:6], -1.0], "a multiplier of a form is negative"),
-        (records.DeclaredForm, [*FORM[1:4], [-0.5, 0.0], *FORM[5:]], "a multiplier of a form is negative"),
-        (records.ExcludedByForm, [3, *texts([0], [1.0])], "its form was not declared"),
-        (records.ExcludedByForm, [0, *texts([0], [1.0])], "its form was not declared"),
-        (records.ExcludedByForm, [True, *texts([0], [1.0])], "its form was not declared"),
+        (records.DeclaredForm, [[6], *FORM[2:]], "a form cannot be read: its codes are not a list of 2 codes"),
+        (records.DeclaredForm, [[6, "6"], *FORM[2:]], "a form cannot be read: its codes are not a list of 2 codes"),
+        (records.DeclaredForm, [[6, 7], *FORM[2:]], "a form cannot be read: a status code is not among 0 to 6"),
+        (records.DeclaredForm, [*FORM[1:3], [float("inf")]], "a form cannot be read: a number is not finite"),
+        (records.DeclaredForm, [*FORM[1:3], [-1.0]], "a multiplier of a form is negative"),
+        (
+            records.DeclaredForm,
+            [FORM[1], [*FORM[2][:4], -0.5, 0.0, 0.0, 0.0], FORM[3]],
+            "a multiplier of a form is negative",
+        ),
+        (records.Excluded, [*texts([0], [1.0]), 3], "its form was not declared"),
+        (records.Excluded, [*texts([0], [1.0]), 0], "its form was not declared"),
+        (records.Excluded, [*texts([0], [1.0]), True], "its form was not declared"),
         (records.Closed, [[OPEN], [0], WEIGHTS, [0.0] * 4], "its selection is not a list of 2 codes"),
         (records.Closed, [[OPEN, 9], [0], WEIGHTS, [0.0] * 4], "a node cannot have the code"),
         (records.Closed, [[FORWARD, STICK], [0], WEIGHTS, [0.0] * 4], "a node cannot have the code"),
@@ -52,7 +58,9 @@ WEIGHTS = [1.0] * 5
         (records.Closed, [[OPEN, STICK], [1, 0], WEIGHTS, [0.0] * 4], "its free nodes are not ascending"),
         (records.Closed, [[OPEN, STICK], [0], WEIGHTS[1:], [0.0] * 4], "expected 5 numbers"),
         (records.Closed, [[OPEN, OPEN], [0], WEIGHTS, [0.0] * 4], "a node that has a status in its proof has another"),
-        (records.ClosedInRationals, [[OPEN, SLIP_PLUS], WEIGHTS, 1], "its selection does not lie below its assignment"),
+        (records.Closed, [[OPEN, SLIP_PLUS], [0], WEIGHTS, 1], "its selection does not lie below its assignment"),
+        (records.Closed, [[OPEN, STICK], [], WEIGHTS, 1], "its free nodes are not those of its assignment"),
+        (records.NoRoot, ["exactly"], "a root or a solved selection is claimed where statuses are still open"),
     ],
 )
 def test_what_an_entry_may_not_be(kind, entries, why):
@@ -70,25 +78,44 @@ def test_what_a_point_may_not_be(point, why):
 def test_a_form_serves_what_is_below_its_assignment():
     """The second form before was declared where all is undecided, the last one where a node is in contact."""
     entries = texts([0], [1.0])
-    assert records.ExcludedByForm.read(["f", 2, *entries], LIMITS).back == 2
-    assert records.ExcludedByForm.read(["f", 1, *entries], LIMITS).back == 1
+    assert records.Excluded.read(["x", *entries, 2], LIMITS).by == 2
+    assert records.Excluded.read(["x", *entries, 1], LIMITS).by == 1
     above = Limits((UNDECIDED, UNDECIDED), friction=[True, True], declared=[DECLARED, IN_CONTACT])
     with pytest.raises(ValueError, match="its form was made for another assignment"):
-        records.ExcludedByForm.read(["f", 1, *entries], above)
+        records.Excluded.read(["x", *entries, 1], above)
     below = Limits((UNDECIDED, CONTACT), friction=[True, True], declared=[DECLARED, IN_CONTACT])
-    assert records.ExcludedByForm.read(["f", 1, *entries], below).terms.values.tolist() == [1.0]
+    assert records.Excluded.read(["x", *entries, 1], below).terms.values.tolist() == [1.0]
 
 
 def test_forms_that_say_the_same():
-    again = records.DeclaredForm.read(DECLARED.write(), Limits((UNDECIDED,) * 2))
+    again = records.DeclaredForm.read(json.loads(json.dumps(DECLARED.write())), Limits((UNDECIDED,) * 2))
     assert again.same(DECLARED)
     assert not IN_CONTACT.same(DECLARED)
-    assert not records.DeclaredForm.read([*FORM[:5], [0.0, 1.0], 1.5], Limits((UNDECIDED,) * 2)).same(DECLARED)
+    assert not records.DeclaredForm.read([*FORM[:2], [*FORM[2][:6], 0.0, 1.0], [1.5]], Limits((UNDECIDED,) * 2)).same(
+        DECLARED
+    )
 
 
 def test_no_two_kinds_begin_alike():
-    with pytest.raises(AssertionError, match="two of the kinds x, x begin alike"):
-        table_of(records.Excluded, records.Excluded)
+    """Whatever has a letter has it alone, in all trees."""
+    kinds = [kind for tree in records.Tree for kind in {*leaves_of(tree).values()}]
+    others = [records.Branching, records.DeclaredForm, curve_records.CutPiece, curve_records.CurveBoxRecord]
+    every = {*kinds, *others}
+    assert len({kind.kind for kind in every}) == len(every) == 18
+
+
+@pytest.mark.parametrize("kind", [records.Closed, records.Alone, records.BoxedRoot, records.Unloaded])
+def test_what_rests_on_a_definite_stiffness_is_no_leaf_of_other_bodies(kind):
+    assert all(kind not in leaves_of(tree).values() for tree in records.Tree.FLOATING)
+    assert any(kind in leaves_of(tree).values() for tree in records.Tree.HELD)
+
+
+@pytest.mark.parametrize("by", [1, records.RATIONAL])
+@pytest.mark.parametrize("tree", [*records.Tree.FLOATING, records.Tree.PIECE])
+def test_only_bodies_that_are_held_have_exclusions_by_other_forms(tree, by):
+    limits = Limits((UNDECIDED, STICK), tree, [True, True], [DECLARED, IN_CONTACT], modes=1)
+    with pytest.raises(ValueError, match=r"its form was not declared|it cannot be tested in rational arithmetic"):
+        records.Excluded.read(["x", *texts([0], [1.0]), by], limits)
 
 
 def test_a_proof_holds_no_longer_fractions():

@@ -9,8 +9,8 @@ from space_proofs import arc_of_sector
 
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.statuses import CONTACT, UNDECIDED
+from enumsol.relaxation.convex_forms import SlipFormAscent
 from enumsol.relaxation.engine import PRUNE_MARGIN
-from enumsol.relaxation.space_convex_forms import SpaceFormAscent
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space.sector_rows import sector_margin
@@ -130,23 +130,23 @@ def begun(seed, p=2):
     F[0, 1] = 0.0 if seed % 2 else F[0, 1]
     solvers = SpaceSolvers(from_compliance(S, g, (F[:, 0], F[:, 1])), 0.0, "verified")
     search = solvers.search(solvers.certifier(None))
-    rows = search._rows.over((UNDECIDED,) * p, range(p))
-    return solvers, SpaceFormAscent(search.engine, solvers.enclosed), rows
+    rows = search.relaxations.rows.over((UNDECIDED,) * p, range(p))
+    return solvers, SlipFormAscent(search.relaxations.engine, solvers.enclosed, rows), rows
 
 
 @pytest.mark.parametrize("seed", range(2))
 def test_derivatives_are_those_of_what_is_maximised(seed):
-    solvers, ascent, rows = begun(seed)
+    solvers, ascent, _ = begun(seed)
     p, size, rng = 2, len(solvers.system.g), np.random.default_rng(seed)
     numbers = np.concatenate([rng.uniform(0.9, 1.1, 2 * p), rng.uniform(-0.1, 0.1, size - p)])
     live, shares, scale = ascent._live, ascent._shares, 3.0
 
     def value(numbers):
-        found = ascent._candidate(numbers, rows)
+        found = ascent._candidate(numbers)
         return scale * found.relaxation.bound + 2.0 * np.sum(np.log(np.diagonal(found.factor)))
 
     def derivatives(numbers):
-        found = ascent._candidate(numbers, rows)
+        found = ascent._candidate(numbers)
         normals, forces = ascent._normals(found.relaxation), found.relaxation.forces
         one, two = ascent._products.derivatives(found.form.H, found.factor, forces, scale, normals, np.eye(size))
         return shares @ one, shares @ two @ shares.T
@@ -161,7 +161,7 @@ def test_derivatives_are_those_of_what_is_maximised(seed):
 @pytest.mark.parametrize("seed", range(2))
 def test_the_form_is_convex_tighter_than_the_energy_and_of_its_curvature(seed):
     solvers, ascent, rows = begun(seed)
-    form, relaxation = ascent.ascended(rows)
+    form, relaxation = ascent.ascended()
     assert form.smallest_eigenvalue > 0
     curvatures = np.linalg.eigvals(np.linalg.solve(solvers.system.S, form.H)).real
     assert np.mean(curvatures) == pytest.approx(1.0)

@@ -32,7 +32,7 @@ def test_the_same_roots_as_by_the_tree_and_by_newton():
         with closed_in_the_tree():
             roots = enumerate_roots(problem, 0)
         assert_same_in_space(problem, roots, plain, data, seed)
-        lone = of_kind(records_of(roots.proof), "m")
+        lone = of_kind(records_of(roots.proof), "a")
         used += bool(lone)
         several += bool(lone) and len(roots) > 1
     assert used > some(3, of=12)
@@ -46,20 +46,20 @@ def with_lone_root():
     with closed_in_the_tree():
         roots = enumerate_roots(problem, 0)
     records = records_of(roots.proof)
-    assert of_kind(records, "m")
+    assert of_kind(records, "a")
     return problem, roots, records
 
 
 def test_proofs_that_say_something_else_are_refused(with_lone_root):
     problem, _, records = with_lone_root
-    (place, *_), p = of_kind(records, "m"), problem.p
+    (place, *_), p = of_kind(records, "a"), problem.p
     assert verify(problem, proof_of(records)).complete
     assert dict(leaves_of(records))[place] != (UNDECIDED,) * p
-    _, numbers, leaf, mid, _, index = records[place]
+    _, leaf, numbers, mid, _, index = records[place]
     theta = 3 * p + (len(numbers) - 3 * p) // 2
     for entry, value in (
-        *((1, numbers[:theta] + [0.5 * x for x in numbers[theta:]]), (1, numbers[:-1])),
-        *((2, [STICK if code == OPEN else OPEN for code in leaf]), (2, []), (2, leaf[:-1])),
+        *((2, numbers[:theta] + [0.5 * x for x in numbers[theta:]]), (2, numbers[:-1])),
+        *((1, [STICK if code == OPEN else OPEN for code in leaf]), (1, []), (1, leaf[:-1])),
         *((3, [x + 0.1 for x in mid]), (5, -index)),
     ):
         assert not verify(problem, proof_of(put(records, (place, entry), value))).ok, (entry, value)
@@ -111,8 +111,8 @@ def test_no_numbers_close_an_assignment_with_two_roots(name):
 
 def test_statuses_that_an_assignment_does_not_allow(with_lone_root):
     problem, _, records = with_lone_root
-    (place, *_) = of_kind(records, "m")
-    enclosed, numbers, leaf = SpaceSolvers(problem, 0.0, "verified").enclosed, *records[place][1:3]
+    (place, *_) = of_kind(records, "a")
+    enclosed, leaf, numbers = SpaceSolvers(problem, 0.0, "verified").enclosed, *records[place][1:3]
     codes, numbers = dict(leaves_of(records))[place], np.array(numbers)
     assert lone_root(enclosed, codes, numbers, leaf) is not None
     for i in range(problem.p):

@@ -9,8 +9,7 @@ from floating_oracle import block_on_table
 
 import enumsol
 from enumsol.model.statuses import UNDECIDED
-from enumsol.search.balance import in_balance
-from enumsol.search.floating_solvers import FloatingSolvers
+from enumsol.search.floating_solvers import FloatingSolvers, in_balance
 from enumsol.trusted.status_rows import FORBIDDEN, NONNEGATIVE, row_signs
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "studies"))

@@ -11,7 +11,7 @@ from exact_balls import holds
 from flint import fmpq, fmpq_mat
 from generators import fe_compliance, from_condensed, integer_problem, named, random_problem
 from graph_proofs import refused
-from proof_tools import copied, kinds_of, of_kind, proof_of, put, records_of
+from proof_tools import by_forms, copied, of_kind, proof_of, put, records_of
 from rational_checker import check_records
 from rational_forms import Data, Forms, _value, exact
 
@@ -49,7 +49,7 @@ def test_the_roots_are_the_same(eager, monkeypatch):
         make = (random_problem, integer_problem, lambda _, p, seed=seed: slipping(seed, p))[seed % 3]
         problem = make(rng, int(rng.integers(2, 5)))
         found = enumerate_roots(problem, 1.0)
-        used += kinds_of(found.proof).count("f")
+        used += len(by_forms(records_of(found.proof)))
         with monkeypatch.context() as patch:
             patch.setattr(policy, "NODES", 10**9)
             plain = enumerate_roots(problem, 1.0)
@@ -66,7 +66,7 @@ def test_a_long_search_is_shorter_with_forms(monkeypatch):
     plain = enumerate_roots(problem, 0.3)
     monkeypatch.setattr(policy, "NODES", 100)
     found = proven_roots(problem, 0.3)
-    assert kinds_of(found.proof).count("f") > 20
+    assert len(by_forms(records_of(found.proof))) > 20
     assert found.stats.nodes < 0.7 * plain.stats.nodes
     assert [root.statuses for root in found] == [root.statuses for root in plain]
 
@@ -210,13 +210,22 @@ def test_changed_forms_prove_nothing_false(eager, seed):
 @pytest.mark.parametrize("seed", range(4))
 def test_leaves_refer_to_forms_that_serve_them(eager, seed):
     problem, records = proven(seed)
-    for k in of_kind(records, "f"):
+    for k in by_forms(records):
         for back in (0, -1, 10**6, 1.0, "1", None):
-            assert not agrees(problem, put(records, (k, 1), back))
-        agrees(problem, put(records, (k, 1), records[k][1] + 1))
-        assert not agrees(problem, put(records, (k,), lambda record: record[:3] + record[4:]))
+            assert not agrees(problem, put(records, (k, 3), back))
+        agrees(problem, put(records, (k, 3), records[k][3] + 1))
+        assert not agrees(problem, put(records, (k,), lambda record: record[:2] + record[3:]))
     for k in of_kind(records, "q"):
-        spoilt = ((1, "66"), (1, 666), (1, "66é"), (2, [1.0]), (3, None), (4, [-1.0] * 3), (6, "1"), (6, -1.0))
+        spoilt = (
+            (1, "66"),
+            (1, [6, 6]),
+            (1, [7] * problem.p),
+            (2, [1.0]),
+            (2, None),
+            (2, [-1.0] * 4 * problem.p),
+            (3, "1"),
+            (3, [-1.0]),
+        )
         for part, value in spoilt:
             assert refused(problem, put(records, (k, part), value))
 
@@ -224,7 +233,7 @@ def test_leaves_refer_to_forms_that_serve_them(eager, seed):
 def test_forms_are_no_records_in_space():
     problem = gallery.one_node_3d()
     records = records_of(enumerate_roots(problem, 0).proof)
-    form = ["q", "6", [1.0], [0.0], [0.5], [0.5], 0.0]
+    form = ["q", [6], [1.0, 0.0, 0.5, 0.5], [0.0]]
     assert verify(problem, proof_of(records)).ok
     assert not verify(problem, proof_of([records[0], form, *records[1:]])).ok
 
@@ -315,5 +324,5 @@ def test_workers_make_the_same_proof(monkeypatch):
     with ThreadPoolExecutor(1) as alone, ThreadPoolExecutor(2) as two:
         one, other = (enumerate_roots(problem, 0.3, executor=executor) for executor in (alone, two))
     assert records_of(one.proof) == records_of(other.proof)
-    assert "f" in kinds_of(one.proof)
+    assert by_forms(records_of(one.proof))
     assert verify(problem, one.proof).complete

@@ -17,7 +17,7 @@ from trees import above_known_roots, by_the_tree
 
 from enumsol import enumerate_roots, gallery, is_unique, verify
 from enumsol.model.statuses import UNDECIDED
-from enumsol.search import descent, fathoming as closing, parallel, reduction
+from enumsol.search import definite, fathoming as closing, parallel, reduction
 from enumsol.search.definite import Nodes
 from enumsol.search.fathoming_in_contact import KnownRoot
 from enumsol.search.reduction import Reduction
@@ -122,9 +122,9 @@ def test_slopes_of_the_descent(seed, squares):
     rng = np.random.default_rng(seed)
     S = fe_compliance(rng, 4)
     spare = rng.uniform(0.0, 0.5, (2, 4)) if squares else None
-    sought = descent.Descent(S / np.mean(np.diag(S)), nodes_of(rng, 4, rng.random(4) < 0.5), spare)
+    sought = definite.Descent(S / np.mean(np.diag(S)), nodes_of(rng, 4, rng.random(4) < 0.5), spare)
     z, weight = 0.1 * rng.normal(size=12), 30.0
-    assert sought._objective(z, weight)[0] < descent._BEYOND
+    assert sought._objective(z, weight)[0] < definite._BEYOND
     slopes = [sought._objective(z + h, weight)[0] - sought._objective(z - h, weight)[0] for h in 1e-5 * np.eye(12)]
     assert np.allclose(np.array(slopes) / 2e-5, sought._objective(z, weight)[1], atol=1e-7)
 
@@ -137,7 +137,7 @@ def test_what_descent_finds_is_definite(seed):
     for _ in range(20):
         S = fe_compliance(rng, 4)
         nodes = nodes_of(rng, 4, rng.random(4) < 0.5)
-        numbers = descent.Descent(S, nodes).numbers()
+        numbers = definite.Descent(S, nodes).numbers()
         if numbers is None:
             continue
         found += 1
@@ -194,7 +194,7 @@ def test_time_that_ends_while_numbers_are_sought(monkeypatch):
     def late(self):
         raise TimeOverError
 
-    monkeypatch.setattr(descent.Descent, "numbers", late)
+    monkeypatch.setattr(definite.Descent, "numbers", late)
     roots = enumerate_roots(gallery.clamped_block(48, 8, traction=(1.0, -0.3)), 5.0, max_nodes=3)
     assert (roots.complete, roots.stats.nodes) == (False, 3)
 

@@ -167,7 +167,7 @@ def test_points_on_a_floor_have_one_root(pushes, held):
     spare = [0.5 - force for force in np.abs(root.lambda_t)]
     assert [abs(slip) > 1e-12 for slip in root.u_t] == [room < 1e-12 for room in spare]
     kinds = kinds_of(found.proof)
-    assert "a" in kinds
+    assert "o" in kinds
     assert len(Oracle(problem).points) == 1
 
 

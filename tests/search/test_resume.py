@@ -24,6 +24,7 @@ from proof_fuzz import mutant
 from proof_tools import (
     bytes_of,
     copied,
+    in_rationals,
     kinds_of,
     multipliers,
     of_kind,
@@ -41,7 +42,8 @@ import enumsol
 from enumsol import ContactProblem, Interrupted, InvalidArgumentError, Proof, enumerate_roots, gallery, verify
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.proof.begun import BegunProof
-from enumsol.proof.records import FLOATING_LEAVES, LEAVES
+from enumsol.proof.leaves import leaves_of
+from enumsol.proof.records import Tree
 from enumsol.proof.writer import BESIDE, FLUSH_EVERY
 from enumsol.search import form_policy as policy
 from enumsol.search.resume import Replay
@@ -138,8 +140,8 @@ def resumed(name, data, path, **options):
 @pytest.mark.slow
 def test_the_problems_have_all_kinds_of_records():
     kinds = {kind for name in PROBLEMS for kind in kinds_of(known(name)[2].proof)}
-    # "X": below; "g": loads that are held, in tests of histories
-    assert kinds == {*LEAVES, *FLOATING_LEAVES, "b", "q"} - {"X", "g"}
+    # "g": loads that are held, in tests of histories
+    assert kinds == {*leaves_of(Tree.PLANE), *leaves_of(Tree.FLOATING_PLANE), "b", "q"} - {"g"}
 
 
 def test_exclusions_in_rationals(tmp_path, monkeypatch):
@@ -147,7 +149,7 @@ def test_exclusions_in_rationals(tmp_path, monkeypatch):
     problem, alpha = PROBLEMS["border"]()
     whole = enumerate_roots(problem, alpha)
     records, data = records_of(whole.proof), bytes_of(whole.proof)
-    assert of_kind(records, "X")
+    assert in_rationals(records, "x")
     path = tmp_path / "x.proof"
     for size in (len(data) // 2, len(data)):
         path.write_bytes(data[:size])
@@ -366,12 +368,12 @@ def test_files_of_other_searches(tmp_path):
     records = records_of(whole.proof)
     for change, message in (
         ({"data": "condensed"}, "another data"),
-        ({"version": 2}, "another version"),
+        ({"version": 3}, "another version"),
         ({"force": [x + 1 for x in records[0]["force"]]}, "other units"),
     ):
         path.write_bytes(bytes_of(proof_of([records[0] | change, *records[1:]])))
         refused(path, message, problem, alpha)
-    path.write_bytes(b"enumsol-proof 2\n" + bytes_of(whole.proof)[16:])
+    path.write_bytes(b"enumsol-proof 3\n" + bytes_of(whole.proof)[16:])
     refused(path, "is of another version", problem, alpha)
     for content in (b"My notes on contact.\n", bytes_of(proof_of([[1, 2], ["x"]]))):
         path.write_bytes(content)

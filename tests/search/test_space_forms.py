@@ -8,7 +8,18 @@ from compare import assert_same_in_space
 from complete import proven_roots
 from exact_balls import holds
 from problems3d import forces, from_compliance, random_coupled
-from proof_tools import bytes_of, leaves_of, of_kind, proof_of, put, put_in_all, records_of, replaced, why_refused
+from proof_tools import (
+    by_forms,
+    bytes_of,
+    in_file,
+    leaves_of,
+    of_kind,
+    proof_of,
+    put,
+    records_of,
+    replaced,
+    why_refused,
+)
 from space_proofs import values_of, with_values
 from trees import by_the_tree, forms_at_once
 
@@ -43,7 +54,7 @@ def with_form():
     records = records_of(roots.proof)
     assert len(roots)
     assert of_kind(records, "q")
-    assert len(of_kind(records, "f")) > 3
+    assert len(by_forms(records)) > 3
     return problem, roots, records
 
 
@@ -58,7 +69,7 @@ def test_the_same_roots_as_by_the_energy_and_by_newton():
             with forms_at_once():
                 roots = enumerate_roots(problem, 0)
         assert_same_in_space(problem, roots, plain, data, seed)
-        used += bool(of_kind(records_of(roots.proof), "f"))
+        used += bool(by_forms(records_of(roots.proof)))
     assert used >= 4
 
 
@@ -134,18 +145,18 @@ def test_no_vector_is_longer_than_its_kappa(numbers):
 def test_proofs_that_say_something_else_of_a_form_are_refused(with_form):
     problem, _, records = with_form
     assert verify(problem, proof_of(records)).complete
-    ((declared, *_), (first, *_)), p = (of_kind(records, "q"), of_kind(records, "f")), problem.p
-    numbers, without = records[declared][1], replaced(records, declared)
-    longer = put(records, (declared, 1, 2 * p), numbers[p])
+    ((declared, *_), (first, *_)), p = (of_kind(records, "q"), by_forms(records)), problem.p
+    numbers, without = records[declared][2], replaced(records, declared)
+    longer = put(records, (declared, 2, 2 * p), numbers[p])
     assert "longer than its kappa" in why_refused(problem, longer)
     for changed in (
-        put(records, (declared, 1), numbers[:-1]),
-        put(records, (declared, 1), numbers[: 2 * p] + [-x for x in numbers[2 * p :]]),
-        put(records, (declared, 1, 0), 3.0 * numbers[0]),
+        put(records, (declared, 2), numbers[:-1]),
+        put(records, (declared, 2), numbers[: 2 * p] + [-x for x in numbers[2 * p :]]),
+        put(records, (declared, 2, 0), 3.0 * numbers[0]),
         without,
         # too late, by the energy, with multipliers that prove nothing
         [*without[:first], records[declared], *without[first:]],
-        put_in_all(records, of_kind(records, "f"), 0, "x"),
+        [record[:3] if k in by_forms(records) else record for k, record in enumerate(records)],
         replaced(records, first, with_values(records[first], [0.0 for _ in values_of(records[first])])),
     ):
         assert why_refused(problem, changed)
@@ -155,12 +166,13 @@ def test_a_form_that_is_not_convex_proves_nothing(with_form):
     problem, _, records = with_form
     checker = SpaceChecker(problem, None)
     checker._read_header(records[0])
-    (place, *_), codes = of_kind(records, "f"), dict(leaves_of(records))
+    (place, *_), codes = by_forms(records), dict(leaves_of(records))
     checker._declare(records[of_kind(records, "q")[0]])
-    assert checker._leaf(codes[place], records[place]) is None
-    object.__setattr__(checker.form, "H", checker.form.H - 10.0 * np.eye(len(checker.form.h)))
-    del checker.form.__dict__["smallest_eigenvalue"]
-    assert "do not exclude" in checker._leaf(codes[place], records[place])
+    assert checker._leaf(codes[place], in_file(records[place])) is None
+    form = checker._form(1)
+    object.__setattr__(form, "H", form.H - 10.0 * np.eye(len(form.h)))
+    del form.__dict__["smallest_eigenvalue"]
+    assert "do not exclude" in checker._leaf(codes[place], in_file(records[place]))
 
 
 @pytest.mark.slow
@@ -189,5 +201,5 @@ def test_a_body_on_weak_springs_takes_few_nodes():
     )  # fmt: skip
     with by_the_tree():
         roots = proven_roots(problem, 0)
-    assert of_kind(records_of(roots.proof), "f")
+    assert by_forms(records_of(roots.proof))
     assert roots.stats.nodes <= 600

@@ -38,27 +38,27 @@ def test_a_pressed_cube_has_one_root(cube):
     report = enumsol.verify(cube, roots.proof)
     assert report.complete
     assert report.roots == 1
-    assert of_kind(records_of(roots.proof), "a")
+    assert of_kind(records_of(roots.proof), "o")
 
 
 def test_what_is_said_of_the_root_is_tested(cube):
     records = records_of(enumsol.enumerate_roots(cube, 0).proof)
-    (form,), (leaf,) = of_kind(records, "q"), of_kind(records, "a")
-    row = records[leaf][1][0]
+    (form,), (leaf,) = of_kind(records, "q"), of_kind(records, "o")
+    row = records[leaf][2][0]
 
     def refused(*change):
         return why_refused(cube, put(records, *change))
 
-    assert "is not proven to be the only one" in refused((leaf, 1), [])
-    assert "is not proven to be the only one" in refused((leaf, 1, 0), [3, *row[1:]])
-    assert "cannot be followed" in refused((leaf, 1, 0), [3, row[1], 5])
-    assert "is not proven to be the only one" in refused((leaf, 2), [[row, row, -1.0]])
+    assert "is not proven to be the only one" in refused((leaf, 2), [])
+    assert "is not proven to be the only one" in refused((leaf, 2, 0), [3, *row[1:]])
+    assert "cannot be followed" in refused((leaf, 2, 0), [3, row[1], 5])
+    assert "is not proven to be the only one" in refused((leaf, 3), [[row, row, -1.0]])
     assert "whose form is definite" in refused((form, 1, 0), 0)
     assert "whose form is definite" in refused((form, 2, 0), -1.0)
-    assert "its enclosure does not hold the root" in refused((form, 5, 0), 2.0)
-    assert "its index is wrong" in refused((form, 7), -1)
+    assert "its enclosure does not hold the root" in refused((form, 4, 0), 2.0)
+    assert "its index is wrong" in refused((form, 6), -1)
     assert "the counts at the end" in refused((-1, "roots"), 0)
-    assert "no root was declared" in why_refused(cube, [record for k, record in enumerate(records) if k != form])
+    assert "its form is not declared" in why_refused(cube, [record for k, record in enumerate(records) if k != form])
 
 
 def test_it_is_unique(cube):
@@ -111,5 +111,5 @@ def test_a_search_that_was_stopped_goes_on(tmp_path):
     assert roots.complete
     assert len(roots) == 1
     assert roots.stats.resumed
-    assert of_kind(records_of(roots.proof), "a")
+    assert of_kind(records_of(roots.proof), "o")
     assert enumsol.verify(body, roots.proof).complete

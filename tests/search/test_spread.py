@@ -8,7 +8,7 @@ from compare import differences
 from complete import accepted_report, all_roots
 from generators import named
 from interruptions import CtrlC, interrupted
-from proof_tools import bytes_of, kinds_of
+from proof_tools import by_forms, bytes_of, records_of
 
 from enumsol import enumerate_roots, gallery, verify
 from enumsol.search import form_policy as policy, parallel
@@ -110,7 +110,7 @@ def test_one_proof_with_forms(small_parts, tree_only, monkeypatch, nodes):
     problem = gallery.clamped_block(32, 16)
     whole = enumerate_roots(problem, 0.3)
     found = check_one_proof(problem, 0.3, whole)
-    assert kinds_of(found.proof).count("f") > 20
+    assert len(by_forms(records_of(found.proof))) > 20
     # begun again, not only went on: the records of the search with the energy are gone
     assert found.stats.nodes == pytest.approx(whole.stats.nodes, rel=0.1)
 

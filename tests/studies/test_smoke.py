@@ -14,7 +14,7 @@ import enumsol
 STUDIES = Path(__file__).parents[2] / "studies"
 NAMES = sorted(file.parent.name for file in STUDIES.glob("*/run.py"))
 #: Studies that compare versions; this interpreter stands for that of an older one.
-VERSIONS = ("proven_graphs", "requirements", "search_profile")
+VERSIONS = ("proven_graphs", "requirements")
 #: Study -> the library of its peer, what it says when that is not installed, and a column that is there all the same.
 PEERS = {
     "against_scip": ("pyscipopt", "pyscipopt is not installed: SCIP is left out", "roots"),
@@ -46,7 +46,6 @@ CONCLUSIONS = {
         "two bodies: the same roots to 1e-09, all complete: yes",
     ),
     "samples_vs_graph": ("branches of length 0.001 are missed by 50 samples", "20 of 20 root sets agree"),
-    "search_profile": ("both interpreters import the same enumsol", "the times"),
     "workers": ("all complete and checked: yes; one proof whatever the number of workers: yes",),
     "uniqueness_vs_mesh": ("bound on F: 2D, nodes H^0.58, 0.54 between the finest (paper 0.5)",),
 }
@@ -72,7 +71,6 @@ LONG = (
     "samples_vs_graph",
     "search_in_3d",
     "search_in_3d_choices",
-    "search_profile",
     "search_size",
     "uniqueness_vs_mesh",
     "workers",
@@ -146,20 +144,6 @@ def test_a_study_without_its_peer_does_the_rest_and_says_so(name, tmp_path):
     rows = rows_of(tmp_path / f"{name}.csv")
     assert rows
     assert all(int(row[column]) > 0 for row in rows)
-
-
-@pytest.mark.slow
-def test_the_profile_knows_every_function_that_it_names(tmp_path):
-    """After a renaming in the package the table of functions must follow, or their time counts for others."""
-    code = (
-        f"import sys; sys.path.insert(0, {str(STUDIES)!r}); import enumsol; "
-        "from search_profile.sampler import unknown_functions; "
-        "problem = enumsol.gallery.one_node_triangle(); "
-        "print(unknown_functions(lambda: enumsol.enumerate_roots(problem, 5.0))); "
-        "problem = enumsol.gallery.get('wedge-8-5').build(); "
-        "print(unknown_functions(lambda: enumsol.enumerate_roots(problem, 2.2)))"
-    )
-    assert run("-c", code).splitlines()[1] == "[]"
 
 
 @pytest.mark.long

@@ -33,7 +33,7 @@ Interval = tuple[Number, Number]
 
 
 class ArcPartKind(enum.StrEnum):
-    """What a selection does on a part of an interval; as in proofs (docs/proof_format.md)."""
+    """Behaviour of a selection on a part of an interval; as in proofs (docs/proof_format.md)."""
 
     HOLDS = "h"
     NONE = "n"
@@ -117,7 +117,7 @@ Result = tuple[AlphaBox, list[Interval]]
 
 @dataclass
 class Trace:
-    """What a selection does on an interval.
+    """Behaviour of a selection on an interval.
 
     Attributes
     ----------
@@ -191,7 +191,7 @@ _HALVINGS = 5
 
 
 class Cutting:
-    """One box cut into parts, from left to right until a part needs a box of its own.
+    """A box cut into parts, from left to right until a part needs a box of its own.
 
     Parameters
     ----------
@@ -289,7 +289,7 @@ class Cutting:
         return tidied
 
     def _reasons(self, part: ArcPart) -> Shared:
-        """What neighbours of the same kind must have in common to be joined."""
+        """Facts of which neighbours of the same kind must share one to be joined."""
         if part.kind is ArcPartKind.EVENT:
             return frozenset()
         known = self._known.get(part)
@@ -303,7 +303,7 @@ class Cutting:
         )
 
     def _questions(self, first: ArcPart, last: ArcPart) -> list[Interval]:
-        """What has to be known to join neighbours, or about what should be an event's bounds."""
+        """Parts that have to be examined to join neighbours, or at the presumed bounds of an event."""
         if first.kind is ArcPartKind.EVENT:
             low, high = self._expansion.near(first.condition, first.low, first.high)
             narrow = first.low <= low < high <= first.high and high - low <= self._narrow * max(abs(low), abs(high))
@@ -326,7 +326,7 @@ class Cutting:
         return [replace(first, high=last.high, doubtful=doubtful)]
 
     def _rest(self, low: Number, high: Number) -> list[Interval]:
-        """What is left when a part cannot be decided: the part and what lies behind it, or two halves."""
+        """Intervals left when a part cannot be decided: the part and what lies behind it, or two halves."""
         middle = between(low, self.high)
         # had the part come off the box's beginning, the rest would be as long as the box, again and again
         if self._expansion.rough or low == self.low:
@@ -334,7 +334,7 @@ class Cutting:
         return [(low, high), *([(high, self.high)] if high < self.high else [])]
 
     def _ends(self) -> list[Any]:
-        """Where the box is cut first: around groups of zeros."""
+        """Ends of the parts into which the box is cut first: around groups of zeros."""
         reach = self._expansion.apart
         groups: list[list[Any]] = []
         for zero, _ in self._zeros:
@@ -354,20 +354,20 @@ class Cutting:
         return [x for k, x in enumerate(ends) if not k or x > ends[k - 1]]
 
     def _tight(self, low: Number, high: Number, known: OverInterval) -> bool:
-        """Whether halving does not help: several zeros close together, or a condition that is flat."""
+        """True if halving does not help: several zeros close together, or a condition that is flat."""
         if self._is_flat(known):
             return True
         inside = [(zero, k) for zero, k in self._zeros if low < zero < high]
         return len(inside) > 1 and inside[-1][0] - inside[0][0] <= self._expansion.apart
 
     def _stays_open(self, low: Number, high: Number, known: OverInterval) -> bool:
-        """Whether a box of its own would not decide a part."""
+        """True if a box of its own would not decide a part."""
         if self._keep_level and all(k in self._flat for k in _in_doubt(known)):
             return True
         return (self._expansion.final and self._tight(low, high, known)) or (self._keep_flat and self._is_flat(known))
 
     def _is_flat(self, known: OverInterval) -> bool:
-        """Whether a condition cannot be distinguished from zero."""
+        """True if a condition cannot be distinguished from zero."""
         return any(k in self._flat for k in _in_doubt(known))
 
     def _decided(self, low: Number, high: Number, known: OverInterval) -> ArcPart | None:

@@ -36,13 +36,6 @@ if TYPE_CHECKING:
     Bounds = tuple[Fraction, Fraction]
 
 
-#: Events are not sharpened when their bounds are this narrow, relative to alpha.
-_NARROW = 2.0**-60
-#: Error of the values at a vertex, relative to the largest, up to which balls in double arithmetic will do where many
-#: digits cost much.
-_CLOSE = 2.0**-20
-
-
 class TracedProblem:
     """Selections of one problem over alpha, in double arithmetic and, where that is affordable, in many digits.
 
@@ -127,7 +120,7 @@ class TracedProblem:
         return found
 
     def trace(self, where: Mapping[Codes, Iterable[Bounds]], found: list[Trace]) -> None:
-        """Where selections hold on pieces of the interval, of every selection its own.
+        """Trace selections over pieces of the interval, of every selection its own.
 
         ``found`` takes the traces; on Ctrl-C those of the selections that are finished.
         """
@@ -144,7 +137,8 @@ class TracedProblem:
     def sharpen(self, found: Trace, part: ArcPart) -> Bounds | None:
         """Narrower bounds of an event's zero; None where there is no need or no means."""
         low, high = (Fraction(end) for end in part.zero)
-        width = Fraction(_NARROW * max(abs(float(low)), abs(float(high))))
+        # events are not sharpened when their bounds are this narrow, relative to alpha
+        width = Fraction(2.0**-60 * max(abs(float(low)), abs(float(high))))
         if high - low <= width:
             return None
         precise = self.precise(found.selection.rows.codes, found.side)
@@ -186,7 +180,9 @@ class TracedProblem:
 
 
 def _is_close(middle: Floats, radius: Floats) -> bool:
-    return bool(np.max(radius) <= _CLOSE * np.max(np.abs(middle)))
+    # error of the values at a vertex, relative to the largest, up to which balls in double arithmetic will do where
+    # many digits cost much
+    return bool(np.max(radius) <= 2.0**-20 * np.max(np.abs(middle)))
 
 
 def _down(value: Fraction) -> float:
@@ -325,7 +321,7 @@ def follow_selections(
 
 
 def _taken_over(traced: TracedProblem, where: dict[Codes, list[Bounds]], known: Sequence[Trace]) -> list[Trace]:
-    """Of the known traces those of selections that have all of theirs; these are taken out of ``where``."""
+    """Known traces of selections that have all of theirs; these are taken out of ``where``."""
     found: dict[Codes, list[Trace]] = {}
     for one in known:
         found.setdefault(one.selection.rows.codes, []).append(one)

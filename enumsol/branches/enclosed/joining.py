@@ -26,12 +26,9 @@ if TYPE_CHECKING:
 
     Bounds = tuple[Fraction, Fraction]
 
-#: What was left open at an end of the interval and is shorter, beside it, would be decided if it were not at the end.
-_AT_END = Fraction(1, 2**30)
-
 
 class EventPlaceKind(enum.StrEnum):
-    """Where arcs end."""
+    """Kind of a place at which arcs end."""
 
     #: The first or last alpha.
     BORDER = "border"
@@ -78,7 +75,7 @@ class EventPlace:
 
 @dataclass
 class JoinedArc:
-    """Where one selection holds between two places.
+    """Interval between two places in which one selection holds.
 
     Attributes
     ----------
@@ -125,7 +122,7 @@ class Joined:
 
     @property
     def ordered(self) -> bool:
-        """Whether the order of all places is known."""
+        """True if the order of all places is known."""
         return not self.unordered
 
     @property
@@ -163,7 +160,7 @@ class _Found:
         return frozenset((self.condition[0],)) if self.part.kind is ArcPartKind.EVENT else self.part.doubtful
 
     def inside(self, other: _Found) -> bool:
-        """Whether the zero lies in the other's part."""
+        """True if the zero lies in the other's part."""
         return Fraction(other.part.low) <= self.low and self.high <= Fraction(other.part.high)
 
 
@@ -290,7 +287,7 @@ class _Joining:
         return low, high
 
     def _gather(self) -> None:
-        """One place for what was left open and may be connected."""
+        """Make one place of all that was left open and may be connected."""
         left = sorted((found for found in self._found.values() if found.place is None), key=lambda f: (f.low, f.codes))
         union: UnionFind = UnionFind(range(len(left)))
         lows = [found.low for found in left]
@@ -307,7 +304,8 @@ class _Joining:
             low, high = min(found.low for found in group), max(found.high for found in group)
             causes = {found.part.cause for found in group}
             cause = next((cause for cause in OpenCause if cause in causes), OpenCause.PARTNER)
-            if high - low <= _AT_END * (self._interval[1] - self._interval[0]) and any(
+            # what is shorter, beside the interval, and left open at its end would be decided elsewhere
+            if high - low <= Fraction(1, 2**30) * (self._interval[1] - self._interval[0]) and any(
                 low <= end <= high for end in self._interval
             ):
                 cause = OpenCause.END
@@ -319,7 +317,7 @@ class _Joining:
             self._joined.places.append(place)
 
     def _border(self, trace: Trace, alpha: float, *, upper: bool) -> EventPlace | None:
-        """Where a trace that holds up to its end ends there; None inside the interval."""
+        """Place at the end of a trace that holds up to it; None inside the interval."""
         origin = self._origin
         towards = origin is not None and trace.side == (-1.0 if upper else 1.0)
         if origin is not None and towards and ((alpha >= origin.low) if upper else (alpha <= origin.low)):
@@ -405,6 +403,6 @@ def _begun(trace: Trace, place: EventPlace, part: ArcPart) -> JoinedArc:
 
 
 def _connected(one: _Found, other: _Found) -> bool:
-    """Whether two selections may have a solution in common: where they differ, conditions of both may vanish."""
+    """True if two selections may have a solution in common: where they differ, conditions of both may vanish."""
     differ = {i for i, (a, b) in enumerate(zip(one.codes, other.codes, strict=True)) if a != b}
     return differ <= one.doubtful & other.doubtful

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
     Spans = list[tuple[Codes, float, float]]
 
-#: Selections of a piece: each is traced over the whole of it.
-_MOST_LINKS = 6
 #: Halvings of the interval, and of a piece some of whose arcs are not proven to hold all solutions.
 _HALVINGS, _VAIN_HALVINGS = 14, 4
 #: Alphas at which no numbers are found, after which they are sought no more: so many, and one for so many nodes.
@@ -40,8 +38,6 @@ _VAIN, _NODES_FOR_ONE = 2, 16
 #: Pieces tried in vain after which none is halved any more: so many, and one for so many nodes. Trees of few nodes are
 #: fast, and where there are several solutions nothing comes of smaller pieces.
 _VAIN_TRIES = 3
-#: How far around a link the test goes, by the length of the interval: its ends are known in floats only.
-_AROUND = 1e-9
 #: Bounds of errors are multiplied by the first, and the form must be definite by the second, so that a checker that
 #: rounds otherwise agrees.
 _ERRORS, _MARGIN = 2.0, 1e-9
@@ -112,7 +108,7 @@ def _stretches(proposals: Sequence[_Proposed]) -> list[list[_Proposed]]:
 
 
 def _is_chain(joined: Joined) -> bool:
-    """Whether the arcs follow each other from one end to the other."""
+    """True if the arcs follow each other from one end to the other."""
     doubtful = joined.reasons or joined.unordered or joined.open
     if doubtful or not joined.arcs or len(joined.places) != len(joined.arcs) + 1:
         return False
@@ -122,7 +118,7 @@ def _is_chain(joined: Joined) -> bool:
 
 
 def _was_tested(joined: Joined, proposed: _Proposed) -> bool:
-    """Whether every arc was tested wherever it may run in a piece."""
+    """True if every arc was tested wherever it may run in a piece."""
     a, b = proposed.piece.a, proposed.piece.b
     spans = {codes: (low, high) for codes, low, high in proposed.spans}
     for arc in joined.arcs:
@@ -134,7 +130,7 @@ def _was_tested(joined: Joined, proposed: _Proposed) -> bool:
 
 
 class _Proposals:
-    """What is proposed for one side of an alpha at which g vanishes, or for the whole interval.
+    """Proposals for one side of an alpha at which g vanishes, or for the whole interval.
 
     Parameters
     ----------
@@ -147,7 +143,8 @@ class _Proposals:
         self._side = traced.spans([(whole.a, whole.b)])[0][2]
         self._system = LoadedSystem(traced.problem.condensed, traced.units, self._side)
         self._chains = Chains(self._system, float(whole.b))
-        self._around = _AROUND * float(whole.b - whole.a)
+        # how far around a link the test goes, by the length of the interval: its ends are known in floats only
+        self._around = 1e-9 * float(whole.b - whole.a)
         ones = np.ones(self._system.p)
         self._numbers = [PieceNumbers(ones, ones, 0.0 * ones)]
         self._vain = _VAIN + self._system.p // _NODES_FOR_ONE
@@ -160,7 +157,8 @@ class _Proposals:
             look()
             piece, halvings, vain = waiting.pop()
             links = self._chains.over(float(piece.a), float(piece.b))
-            many = links is not None and len(links) > _MOST_LINKS and halvings > 0
+            # selections of a piece: each is traced over the whole of it
+            many = links is not None and len(links) > 6 and halvings > 0
             proposed, some = (None, True) if links is None or many else self._tried(piece, links)
             if proposed is not None:
                 found.append(proposed)

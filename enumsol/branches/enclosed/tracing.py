@@ -1,4 +1,4 @@
-"""Where selections hold over intervals of alpha, found by the polynomials of the trusted core (theory, section 7.14).
+"""Traces of selections over intervals of alpha, by the polynomials of the trusted core (theory, section 7.14).
 
 An interval is cut into boxes, on each of which the conditions are known with bounds of their errors, and the boxes into
 parts: the selection holds throughout, or nowhere, or exactly one condition changes its sign. What is left stays open.
@@ -35,24 +35,12 @@ ERRORS = 2.0
 _SMALLEST_UNITS, _SMALLEST_PRECISE = 64.0, 2.0**-60
 #: Boxes shorter than this share of the interval are traced in many digits.
 _PRECISE_BOX, _PRECISE_ANYWHERE = 2.0**-10, 2.0**-40
-#: Many digits are tried, too, on a box at most so many times as long as the last one that they decided.
-_GROWTH = 2.0
-#: A length that they did not decide grows by this with every box that they do.
-_FORGOTTEN = 1.1
-#: Boxes on which a selection seems to be singular are not cut below this share.
-_SINGULAR = 2.0**-26
 #: Boxes of one selection of which nothing is decided, beyond the number of the others, and these others, after which
 #: what is left stays open.
 _MOST_TRIES, _MOST_BOXES = 200, 900
 #: Boxes of which nothing is decided after which it is looked whether the selection is singular at every alpha, and
 #: singular values beside the largest that count as zero.
 _VAIN_TRIES, _ZERO = 8, 2.0**-44
-#: Boxes shorter than this share of the interval are not cut because of a condition that cannot be told from zero.
-_FLAT_BOX = 2.0**-12
-#: Nor is any, after so many boxes in a row of which nothing else was left open: it vanishes everywhere.
-_LEVEL = 8
-#: Why such boxes stay open: one condition, or several.
-_FLAT_CAUSES = OpenCause.FLAT, OpenCause.TOGETHER
 
 
 def trace(
@@ -107,7 +95,7 @@ def _answers(questions: list[Question]) -> list[Any]:
 
 
 class _Tracing:
-    """One selection being traced."""
+    """A selection being traced."""
 
     def __init__(self, found: Trace, precise: Precise, *, sharpened: bool) -> None:
         self._sharpened = sharpened
@@ -140,10 +128,12 @@ class _Tracing:
         share = length / self._length
         # short beside alpha too, or so short that this does not matter
         beside = length / max(abs(float(first)), abs(float(last)))
+        # boxes on which a selection seems to be singular are not cut below this share
         short, tiny = (
-            share < limit and (share < _PRECISE_ANYWHERE or beside < limit) for limit in (_PRECISE_BOX, _SINGULAR)
+            share < limit and (share < _PRECISE_ANYWHERE or beside < limit) for limit in (_PRECISE_BOX, 2.0**-26)
         )
-        beside_decided = length <= _GROWTH * self._decided and length < self._too_long
+        # many digits are tried, too, on a box that is at most so many times as long as the last one that they decided
+        beside_decided = length <= 2.0 * self._decided and length < self._too_long
         # halving has as many boxes that were not decided as there are parts in the end
         boxes = len(self._found.boxes)
         if self._tries == _VAIN_TRIES and not boxes:
@@ -156,14 +146,17 @@ class _Tracing:
         if not exhausted and isinstance(first, float) and isinstance(last, float):
             (expansion,) = yield [(self._selection, first, last)]
             if expansion is not None:
-                flat = short and share < _FLAT_BOX and precise is None
+                # boxes shorter than this share of the interval are not cut because of a condition that cannot be told
+                # from zero
+                flat = short and share < 2.0**-12 and precise is None
                 tried.append((yield from self._cut(expansion, whole=whole, flat=flat)))
         if precise is not None and not (tried and _decides(*tried[0])):
             found = precise.expansion(first, last)
             if found is not None:
                 tried.insert(0, (yield from self._cut(found, whole=whole, flat=share < _PRECISE_BOX)))
                 if _decides(*tried[0]):
-                    self._decided, self._too_long = length, self._too_long * _FORGOTTEN
+                    # a length that they did not decide grows by this with every box that they do
+                    self._decided, self._too_long = length, self._too_long * 1.1
                 else:
                     self._too_long = length
         self._tries += not (tried and tried[0][0].parts)
@@ -171,7 +164,9 @@ class _Tracing:
             box, rest = tried[0]
             if box.parts:
                 self._found.boxes.append(box)
-                self._level = self._level + 1 if all(part.cause in _FLAT_CAUSES for part in box.parts) else 0
+                # they stay open because of one condition, or several
+                causes = OpenCause.FLAT, OpenCause.TOGETHER
+                self._level = self._level + 1 if all(part.cause in causes for part in box.parts) else 0
             return rest
         if whole or tiny:
             everywhere = frozenset(range(len(self._selection.rows.codes)))
@@ -187,7 +182,8 @@ class _Tracing:
         self, expansion: AlphaExpansion, *, whole: bool, flat: bool
     ) -> Generator[list[Question], list[Any], tuple[AlphaBox, list[Interval]]]:
         """The box of an expansion, and what is left of it."""
-        level, sharpened = self._level >= _LEVEL, self._sharpened
+        # after so many boxes in a row of which nothing else was left open, a flat condition vanishes everywhere
+        level, sharpened = self._level >= 8, self._sharpened
         cutting = Cutting(
             self._selection.rows, expansion, whole=whole, flat=flat, level=level, sharpened=sharpened
         ).run()

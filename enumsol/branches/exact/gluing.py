@@ -1,4 +1,4 @@
-"""Ends of arcs glued into vertices by the statuses that hold there, never by distance (theory, section 7.6).
+"""Arcs and vertices by exact algebra: ends of arcs are glued by the statuses that hold there (theory, section 7.6).
 
 Two selections share a point at a critical alpha when both hold there; the signs at one of them decide this exactly.
 An isolated point needs only the functions of its own selection; where a selection is singular its polytope of
@@ -8,27 +8,79 @@ solutions is computed in exact arithmetic at that alpha.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property, partial
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from flint import fmpq
 from networkx.utils import UnionFind
 
 from enumsol.arithmetic.algebraic import CriticalAlpha, merge
+from enumsol.arithmetic.rationals import rational, to_fraction
+from enumsol.branches.elements import Arc, ArcValues, Sides, Vertex, degree_of, make_vertex, sides_of, with_exact_zeros
 from enumsol.branches.exact.known_selections import KnownSelections
 from enumsol.branches.unfinished import TOLD_APART, Effort, named
-from enumsol.model.statuses import FINAL, OPEN
+from enumsol.model.statuses import FINAL, OPEN, RowKind, contact_status
+from enumsol.roots.builder import polytope
 from enumsol.roots.components import RootComponent, connected_components
+from enumsol.roots.linearisation import named_statuses, sign_over
+from enumsol.roots.root import Polytope, RootFamily
 from enumsol.search.outcome import Stop, StopReason
-from enumsol.selections.rational_selections import FiberSelections
+from enumsol.selections.functions import SelectionFunctions
+from enumsol.selections.polytopes import dot
+from enumsol.selections.rational_selections import FiberSelections, as_float
 from enumsol.support.deadlines import TimeOverError, look, tell
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
+    from fractions import Fraction
 
+    from enumsol.branches.elements import Pair
     from enumsol.branches.exact.selection_arcs import SelectionArcs, SelectionEvent
     from enumsol.condensation.exact import ExactCondensed
     from enumsol.selections.solution import ActiveSets, SelectionSolution
     from enumsol.support.array_types import Codes
+
+    #: Tail, head and selections of an arc; the selection that represents it (of a sheet: one of its largest polytopes),
+    #: an alpha inside it, its index and its dimension.
+    _About = tuple[int, int, tuple[Codes, ...]]
+    _More = tuple[Codes, fmpq, int | None, int]
+
+
+@dataclass(frozen=True)
+class ExactArcValues(ArcValues):
+    """Values from exact functions, rounded last.
+
+    Attributes
+    ----------
+    exact : ExactCondensed
+    codes : status codes
+    sample : Fraction
+        An alpha inside the arc.
+    """
+
+    exact: ExactCondensed
+    codes: Codes
+    sample: Fraction
+
+    @cached_property
+    def _functions(self) -> SelectionFunctions:
+        return SelectionFunctions(self.exact, self.codes)
+
+    def at(self, alpha: Fraction) -> Pair:
+        """Forces and displacements at an alpha."""
+        point: Any = self._functions.forces_at(rational(alpha))
+        if point is None:  # bounded arcs have no poles, but a rounded end may lie beyond the exact one
+            point = self._functions.forces_at(rational(self.sample)) or ()
+        return _as_floats(self.exact, rational(alpha), point)
+
+
+def _as_floats(exact: ExactCondensed, alpha: fmpq, point: Any) -> Pair:
+    """Contact forces and displacements at a point."""
+    size = 2 * exact.p
+    moves = [as_float(g - dot(row, point)) for g, row in zip(exact.at(alpha)[0][:size], exact.rows, strict=False)]
+    return np.array([as_float(v) for v in point[:size]]), np.array(moves)
 
 
 @dataclass
@@ -61,29 +113,6 @@ class GluedVertex:
 
 
 @dataclass(frozen=True)
-class GluedArc:
-    """A set of solutions over an open interval of alpha: an arc, or a sheet.
-
-    Attributes
-    ----------
-    codes : the selection that represents it (of a sheet: one of its largest polytopes)
-    selections : all selections that coincide on it
-    sample : fmpq inside the interval
-    tail, head : vertices at its lower and upper end
-    index : int or None
-    dimension : 0 for an arc
-    """
-
-    codes: Codes
-    selections: tuple[Codes, ...]
-    sample: Any
-    tail: int
-    head: int
-    index: int | None
-    dimension: int
-
-
-@dataclass(frozen=True)
 class Gluing:
     """Vertices and arcs of the graph over [a, b].
 
@@ -93,7 +122,7 @@ class Gluing:
     a, b : fmpq
     arcs : dict of SelectionArcs by codes, those that hold somewhere
     vertices : list of GluedVertex in the order of alpha
-    edges : list of GluedArc
+    edges : list of Arc
     stopped : Stop or None
         How far it got, if Ctrl-C was pressed while arcs were computed, or the time was over.
     reasons : list of str
@@ -105,7 +134,7 @@ class Gluing:
     b: Any
     arcs: dict[Codes, SelectionArcs]
     vertices: list[GluedVertex]
-    edges: list[GluedArc]
+    edges: list[Arc]
     stopped: Stop | None
     reasons: list[str]
 
@@ -225,7 +254,7 @@ def _join_polytopes(known: KnownSelections, events: Iterable[SelectionEvent], un
 
 
 def _vertices(groups: Sequence[list[SelectionEvent]]) -> list[GluedVertex]:
-    """One vertex a group of events, in the order of alpha."""
+    """Vertices, one for each group of events, in the order of alpha."""
     by_alpha: dict[CriticalAlpha, list[list[SelectionEvent]]] = {}
     for events in groups:
         by_alpha.setdefault(events[0].alpha, []).append(events)
@@ -246,9 +275,9 @@ def _vertices(groups: Sequence[list[SelectionEvent]]) -> list[GluedVertex]:
     return vertices
 
 
-def _edges(known: KnownSelections, vertices: list[GluedVertex]) -> list[GluedArc]:
-    """One arc per cell in which a selection holds; of selections that coincide there, one for all."""
-    found: dict[tuple[int, int, tuple[Codes, ...]], GluedArc] = {}
+def _edges(known: KnownSelections, vertices: list[GluedVertex]) -> list[Arc]:
+    """Arcs, one for each cell in which a selection holds; of selections that coincide there, one for all."""
+    found: dict[_About, _More] = {}
     for number, (codes, arcs) in enumerate(known.arcs.items()):
         tell("selections whose arcs are made", number, len(known.arcs))
         for k, cell in enumerate(arcs.cells):
@@ -273,9 +302,41 @@ def _edges(known: KnownSelections, vertices: list[GluedVertex]) -> list[GluedArc
                 # a search that was cut short may not have found the others
                 first = next(s.codes for s in component.solutions if s.codes in known.arcs)
                 index, dimension = component.index, component.dimension
-            arc = GluedArc(first, selections, cell.sample, tail, head, index, dimension)
-            found.setdefault((tail, head, selections), arc)
-    return sorted(found.values(), key=lambda arc: (arc.tail, arc.head, arc.codes))
+            found.setdefault((tail, head, selections), (first, cell.sample, index, dimension))
+    ordered = sorted(found.items(), key=lambda item: (*item[0][:2], item[1][0]))
+    return [_arc(known, number, vertices, about, more) for number, (about, more) in enumerate(ordered)]
+
+
+def _arc(known: KnownSelections, number: int, vertices: Sequence[GluedVertex], about: _About, more: _More) -> Arc:
+    """An arc between two vertices."""
+    (tail, head, selections), (codes, at, index, dimension) = about, more
+    sample = to_fraction(fmpq(at))
+    begin, end = vertices[tail].alpha, vertices[head].alpha
+    return Arc(
+        number=number,
+        statuses=tuple(map(contact_status, codes, _slips(known.exact, codes, at))),
+        lo=float(begin),
+        hi=float(end),
+        tail=tail,
+        head=head,
+        index=index,
+        dimension=dimension,
+        grazing=known.arcs[codes].grazing,
+        selections=(codes, *(c for c in selections if c != codes)),
+        begin=begin,
+        end=end,
+        sample=sample,
+        _values=ExactArcValues(known.exact, codes, sample),
+    )
+
+
+def _slips(exact: ExactCondensed, codes: Codes, sample: fmpq) -> tuple[int, ...]:
+    """Signs of u_t in the middle of an arc, which name the slip of nodes without friction; zeros if there are none."""
+    if not any(exact.frictionless):
+        return (0,) * exact.p
+    solver = FiberSelections(exact, fmpq(sample))
+    solution = solver.solve(codes)
+    return (0,) * exact.p if solution is None else solver.slip_signs(solution.vertices[0])
 
 
 def _all_known(known: KnownSelections, component: RootComponent) -> bool:
@@ -283,7 +344,7 @@ def _all_known(known: KnownSelections, component: RootComponent) -> bool:
     return component.whole and all(solution.codes in known.arcs for solution in component.solutions)
 
 
-def _component(known: KnownSelections, codes: Codes, sample: Any) -> RootComponent | None:
+def _component(known: KnownSelections, codes: Codes, sample: fmpq) -> RootComponent | None:
     """The connected set of solutions that a degenerate selection belongs to at a point of its cell."""
     look()
     solver = FiberSelections(known.exact, sample)
@@ -295,3 +356,82 @@ def _component(known: KnownSelections, codes: Codes, sample: Any) -> RootCompone
     if component.index is None and not known.exact.reach:
         known.complain(f"the degree of a degenerate arc near alpha = {sample} could not be found; {TOLD_APART}")
     return component
+
+
+# -- vertices in the user's terms (theory, section 7.11) ---------------------------------------------------------------
+
+
+def make_vertices(gluing: Gluing) -> list[Vertex]:
+    """The vertices of a gluing, with their kinds and degrees."""
+    sides = sides_of(gluing.edges, len(gluing.vertices))
+    return [_vertex(gluing, k, glued, sides[k]) for k, glued in enumerate(gluing.vertices)]
+
+
+def _vertex(gluing: Gluing, number: int, glued: GluedVertex, sides: Sides) -> Vertex:
+    border = glued.alpha.is_rational and glued.alpha.lo in (gluing.a, gluing.b)
+    # at the last alpha there are arcs from the left only
+    beside = sides[0 if border and glued.alpha.lo == gluing.b else 1]
+    degree = degree_of(beside) if glued.settled else None
+    return make_vertex(
+        number,
+        glued.alpha,
+        sides,
+        _values(gluing, glued),
+        named_statuses(glued.active, partial(_slip_sign, gluing, glued))[1],
+        glued.members,
+        border=border,
+        settled=glued.settled,
+        bounded=glued.bounded,
+        family=_family(glued, degree, proven=gluing.exact.condensed_exactly),
+    )
+
+
+def _slip_sign(gluing: Gluing, glued: GluedVertex, node: int) -> int:
+    """Sign of u_t of a node at a vertex, exactly; 0 on a continuum over which it changes."""
+    if glued.solver is not None:
+        signs = (glued.solver.slip_signs(v)[node] for s in glued.solutions for v in s.vertices)
+        return sign_over(signs)
+    for codes in glued.members:
+        functions = gluing.arcs[codes].functions
+        if not functions.singular and (det := glued.alpha.sign_of(functions.det)) != 0:
+            slip = functions.row(RowKind.SLIP_FORWARD, node)
+            return 0 if slip.is_zero() else int(det * glued.alpha.sign_of(slip))
+    return 0  # the unloaded body at rest
+
+
+def _values(gluing: Gluing, glued: GluedVertex) -> Pair:
+    """Forces and displacements at a vertex as floats, with exact zeros where the statuses say so."""
+    exact = gluing.exact
+    if glued.solutions and glued.solver is not None:
+        point = glued.solutions[0].vertices[0]
+        return glued.solver.forces(point) + 0.0, glued.solver.displacements(point) + 0.0
+    # an irrational alpha is replaced by a rational one that agrees with it far beyond float precision
+    glued.alpha.narrow(fmpq(1, 2**256))
+    alpha = (glued.alpha.lo + glued.alpha.hi) / 2
+    point = next(
+        (
+            found
+            for c in glued.members
+            if not gluing.arcs[c].functions.singular
+            and (found := gluing.arcs[c].functions.forces_at(alpha)) is not None
+        ),
+        (fmpq(0),) * len(exact.rows),
+    )
+    return with_exact_zeros(_as_floats(exact, alpha, point), glued.active)
+
+
+def _family(glued: GluedVertex, index: int | None, *, proven: bool) -> RootFamily | None:
+    if not glued.dimension or glued.solver is None:
+        return None
+    parts = [polytope(s, s.vertices, glued.solver) for s in glued.solutions if s.dimension > 0]
+    return RootFamily(float(glued.alpha), tuple(_without_repetition(parts)), index, vertices_proven=proven)
+
+
+def _without_repetition(parts: Sequence[Polytope]) -> list[Polytope]:
+    """Polytopes whose vertices are not among those of another (of equal ones the first)."""
+    sets = [set(map(tuple, part.coordinates.tolist())) for part in parts]
+    return [
+        part
+        for k, part in enumerate(parts)
+        if not any(sets[k] < other or (sets[k] == other and j < k) for j, other in enumerate(sets) if j != k)
+    ]

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 MAX_SHEET_BASES = min(2000, MAX_BASES)
 
 
-def sheet_arcs(exact: ExactCondensed, codes: Codes, a: Any, b: Any) -> SelectionArcs:
+def sheet_arcs(exact: ExactCondensed, codes: Codes, a: fmpq, b: fmpq) -> SelectionArcs:
     """Cells and events of a selection that is singular for every alpha, in [a, b].
 
     A vertex of its polytope solves the equations and as many of the inequalities as its kernel has dimensions. All
@@ -64,8 +64,8 @@ def sheet_arcs(exact: ExactCondensed, codes: Codes, a: Any, b: Any) -> Selection
     return arcs
 
 
-def _pattern(exact: ExactCondensed, codes: Codes, alpha: Any) -> Any:
-    """What a polytope looks like: the active sets of its vertices; None when it is empty."""
+def _pattern(exact: ExactCondensed, codes: Codes, alpha: fmpq) -> Any:
+    """Shape of a polytope: the active sets of its vertices; None when it is empty."""
     solver = FiberSelections(exact, alpha)
     solution = solver.solve(codes)
     if solution is None:
@@ -77,7 +77,7 @@ def _critical_polynomials(exact: ExactCondensed, codes: Codes) -> list[Any]:
     """Nonzero integer polynomials whose roots include every alpha at which the polytope changes its shape."""
     size = len(exact.rows)
 
-    def rows_at(alpha: Any) -> tuple[list[list[Any]], list[list[Any]]]:
+    def rows_at(alpha: fmpq) -> tuple[list[list[Any]], list[list[Any]]]:
         equations, inequalities = FiberSelections(exact, alpha).forms(codes)
         return [[*form, c] for form, c in equations], [[*form, c] for form, c in inequalities]
 
@@ -143,7 +143,7 @@ class KnownSelections:
         What stayed undecided or contradicts completeness.
     """
 
-    def __init__(self, exact: ExactCondensed, a: Any, b: Any, *, cut_short: bool) -> None:
+    def __init__(self, exact: ExactCondensed, a: fmpq, b: fmpq, *, cut_short: bool) -> None:
         self.exact, self.a, self.b, self.cut_short = exact, a, b, cut_short
         self.late = False
         self.arcs: dict[Codes, SelectionArcs] = {}

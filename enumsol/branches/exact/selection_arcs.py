@@ -19,6 +19,8 @@ from enumsol.selections.functions import SelectionFunctions
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from flint import fmpq, fmpz_poly
+
     from enumsol.condensation.exact import ExactCondensed
     from enumsol.selections.rational_selections import FiberSelections
     from enumsol.selections.solution import ActiveSets, SelectionSolution
@@ -83,7 +85,7 @@ class Cell:
 
 @dataclass
 class SelectionArcs:
-    """Where one selection holds: events, and the cells between them (one fewer).
+    """Cells in which one selection holds: events, and the cells between them (one fewer).
 
     Attributes
     ----------
@@ -132,7 +134,7 @@ class SelectionArcs:
         return event, True
 
 
-def selection_arcs(exact: ExactCondensed, codes: Codes, a: Any, b: Any) -> SelectionArcs | None:
+def selection_arcs(exact: ExactCondensed, codes: Codes, a: fmpq, b: fmpq) -> SelectionArcs | None:
     """Cells and events of a selection in [a, b]; None when its determinant vanishes identically.
 
     Parameters
@@ -192,7 +194,7 @@ def _required(code: int) -> tuple[RowKind, ...]:
     return (RowKind.NORMAL_FORCE, *inequalities) if code == STICK else inequalities
 
 
-def _critical_points(det: Any, rows: Sequence[Any], a: Any, b: Any) -> dict[CriticalAlpha, int] | None:
+def _critical_points(det: fmpz_poly, rows: Sequence[Any], a: fmpq, b: fmpq) -> dict[CriticalAlpha, int] | None:
     """Roots of the determinant and of the rows, and both ends of the interval, with what vanishes there.
 
     That is the number of a row, _DET or, at an end, _END. None when a row is negative on the whole interval: the

@@ -215,7 +215,7 @@ QUANTITIES = {
 }
 
 
-def quantity_of(name: Any) -> Quantity:
+def quantity_of(name: object) -> Quantity:
     """The quantity of that name.
 
     Raises
@@ -242,7 +242,7 @@ def columns(quantity: Quantity, forces: Floats, moves: Floats, p: int) -> Floats
 
 
 def state_columns(quantity: Quantity, state: Any) -> Floats:
-    """The same of a vertex, or of another state with lambda_n, lambda_t, u_n and u_t."""
+    """Values of a quantity at a vertex, or at another state with lambda_n, lambda_t, u_n and u_t; as `columns`."""
     pairs = (state.lambda_n, state.lambda_t), (state.u_n, state.u_t)
     forces, moves = (np.concatenate([normal, along.ravel(order="F")]) for normal, along in pairs)
     return columns(quantity, forces, moves, len(state.statuses))

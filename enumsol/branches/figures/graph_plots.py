@@ -11,7 +11,6 @@ import numpy as np
 
 from enumsol.branches.figures.curves import (
     Curve,
-    CurvePlace,
     Quantity,
     curves,
     quantity_of,
@@ -20,6 +19,7 @@ from enumsol.branches.figures.curves import (
 )
 from enumsol.branches.figures.marks import GREY, MARKERS, STATUS_STYLES, colour_of, handles, index_style, narrow_changes
 from enumsol.branches.figures.panels import (
+    Panel,
     draw_numbers,
     draw_open_ranges,
     draw_steps,
@@ -31,10 +31,10 @@ from enumsol.branches.roots_at import roots_at
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.arguments import alpha_interval, positive_number, shown
 from enumsol.support.messages import counted
-from enumsol.support.plotting import axes_or_none, checked_units, figure_of, in_units, kept, new_figure
+from enumsol.support.plotting import axes_or_none, checked_units, figure_of, in_units, kept, new_figure, plain_axes
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Sequence
 
     from enumsol.branches.graph_data import GraphData
 
@@ -49,7 +49,7 @@ _BESIDE, _WIDEST = 2.6, 6.0
 
 @dataclass(frozen=True)
 class _Style:
-    """What all panels of a figure share."""
+    """Quantity, units and tolerance of all panels of a figure."""
 
     quantity: Quantity
     units: tuple[str, str] | None
@@ -163,7 +163,7 @@ def _rows(graph: GraphData, quantity: Quantity, nodes: Sequence[Any] | None, *, 
     return sorted(np.argsort(-spread, kind="stable")[:most].tolist())
 
 
-def _windows(graph: GraphData, zoom: Any) -> list[tuple[float, float]]:
+def _windows(graph: GraphData, zoom: bool | tuple[float, float]) -> list[tuple[float, float]]:
     if isinstance(zoom, (bool, np.bool_)):
         return narrow_changes(graph.claims.steps(), graph.interval) if zoom else []
     low, high = (float(end) for end in alpha_interval(zoom, "zoom"))
@@ -173,7 +173,9 @@ def _windows(graph: GraphData, zoom: Any) -> list[tuple[float, float]]:
     return [(max(low, a), min(high, b))]
 
 
-def _grid(rows: int, multiplicity: bool, zooms: int, figsize: Any) -> tuple[Any, list[list[Any]]]:
+def _grid(
+    rows: int, multiplicity: bool, zooms: int, figsize: tuple[float, float] | None
+) -> tuple[Any, list[list[Any]]]:
     """A figure and its axes, column by column; those of the whole interval come first in figure.axes."""
     heights = [3.6 if rows == 1 else 2.7] * rows + [1.1] * int(multiplicity)
     size = figsize or (7.5 + 3.0 * zooms, sum(heights) + 1.0)
@@ -206,8 +208,8 @@ def _drawn(graph: GraphData, style: _Style, window: tuple[float, float] | None) 
 
 def _panel(
     axis: Any, graph: GraphData, style: _Style, row: int, drawn: dict[int, Curve], window: tuple[float, float]
-) -> tuple[Any, dict[int, Curve], dict[int, CurvePlace], Mapping[int, int], int]:
-    """Draw one panel; returns what numbers beside its curves need."""
+) -> Panel:
+    """Draw one panel."""
     from matplotlib.transforms import ScaledTranslation
 
     quantity, height = style.quantity, None if window == graph.interval else _ending(graph, drawn, row, window)
@@ -240,7 +242,7 @@ def _panel(
     _dress(axis, graph, style, row, window)
     if height is not None:
         axis.set_ylim(*height)
-    return axis, drawn, places, graph.branch_of, row
+    return Panel(axis, drawn, places, graph.branch_of, row)
 
 
 def _ending(
@@ -262,9 +264,7 @@ def _dress(axis: Any, graph: GraphData, style: _Style, row: int, window: tuple[f
     name = f"{quantity.name} of node {graph.problem.node_ids[row]}" if quantity.by_node else quantity.words
     axis.set_ylabel(in_units(name, quantity.dimension, style.units))
     axis.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4))
-    axis.grid(visible=True, color="#e4e4e4", linewidth=0.6)
-    axis.set_axisbelow(True)
-    axis.spines[["top", "right"]].set_visible(False)
+    plain_axes(axis)
     axis.margins(y=0.12)
     axis.set_xlim(*window)
 

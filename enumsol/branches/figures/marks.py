@@ -1,4 +1,4 @@
-"""How branches, arcs and vertices look in figures: colours, line styles, markers, and where numbers beside them go."""
+"""Looks of branches, arcs and vertices in figures: colours, line styles, markers, and places for numbers."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ import numpy as np
 
 from enumsol.branches.elements import VertexKind
 from enumsol.model.statuses import ContactStatus
+from enumsol.support.plotting import area_entry, line_entry
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
 
     from enumsol.branches.claims import MultiplicitySteps
     from enumsol.support.array_types import Floats
@@ -54,39 +55,35 @@ def index_style(index: int | None) -> Any:
     return INDEX_STYLES.get(index, INDEX_STYLES[None])
 
 
+#: Entries of a legend for what is no line of a branch and no vertex, by names.
+OTHERS: dict[str, tuple[Callable[..., Any], str, dict[str, Any]]] = {
+    "continuum": (line_entry, "continuum", {"color": GREY, "linewidth": 2.4}),
+    "sheet": (area_entry, "sheet", {"color": GREY, "alpha": 0.25, "linewidth": 0}),
+    "open": (area_entry, "solutions may be missing", OPEN_RANGE),
+    "dots": (line_entry, "number at that alpha alone", {"linestyle": "", "marker": ".", "color": GREY}),
+}
+
+
 def handles(
     kinds: Iterable[VertexKind], statuses: Iterable[ContactStatus], indices: Iterable[int | None], others: set[str]
 ) -> list[Any]:
-    """Entries of a legend for what a figure shows; ``others`` are among "continuum", "sheet", "open", "dots"."""
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
-    shown_kinds, shown = set(kinds), set(statuses)
-    found: list[Any] = [
-        Line2D([], [], color="#666666", linestyle=style, label=status.value)
-        for status, style in STATUS_STYLES.items()
-        if status in shown
-    ]
+    """Entries of a legend for what a figure shows; ``others`` are names in `OTHERS`."""
     known = {index if index in INDEX_STYLES else None for index in indices}
-    found += [
-        Line2D([], [], color="#666666", linestyle=style, label="other index" if k is None else f"index {k:+d}")
-        for k, style in INDEX_STYLES.items()
-        if k in known
+    styles = {status.value: STATUS_STYLES[status] for status in STATUS_STYLES if status in set(statuses)}
+    styles |= {
+        "other index" if index is None else f"index {index:+d}": style
+        for index, style in INDEX_STYLES.items()
+        if index in known
+    }
+    marked = [MARKERS[kind] for kind in MARKERS if kind in set(kinds)]
+    return [
+        *(line_entry(label, color="#666666", linestyle=style) for label, style in styles.items()),
+        *(
+            line_entry(label, linestyle="", marker=marker, color=GREY, markerfacecolor=face, markersize=4.5)
+            for marker, face, label in marked
+        ),
+        *(entry(label, **look) for name, (entry, label, look) in OTHERS.items() if name in others),
     ]
-    found += [
-        Line2D([], [], linestyle="", marker=marker, color=GREY, markerfacecolor=face, markersize=4.5, label=label)
-        for kind, (marker, face, label) in MARKERS.items()
-        if kind in shown_kinds
-    ]
-    if "continuum" in others:
-        found.append(Line2D([], [], color=GREY, linewidth=2.4, label="continuum"))
-    if "sheet" in others:
-        found.append(Patch(color=GREY, alpha=0.25, linewidth=0, label="sheet"))
-    if "open" in others:
-        found.append(Patch(**OPEN_RANGE, label="solutions may be missing"))
-    if "dots" in others:
-        found.append(Line2D([], [], linestyle="", marker=".", color=GREY, label="number at that alpha alone"))
-    return found
 
 
 #: Where along a curve a label may stand, the best place first, and on which sides of it.

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from itertools import groupby
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from enumsol.branches.figures.curves import Curve, CurvePlace, Quantity, columns, state_columns
 from enumsol.branches.figures.marks import GREY, OPEN_RANGE, Label, colour_of, dense, place_labels
+from enumsol.support.plotting import plain_axes
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -20,15 +21,23 @@ if TYPE_CHECKING:
     from enumsol.roots.root_set import RootSet
     from enumsol.support.array_types import Floats
 
-    #: Axes, curves, places, branches of arcs, column.
-    Panel = tuple[Any, dict[int, Curve], dict[int, CurvePlace], Mapping[int, int], int]
+
+class Panel(NamedTuple):
+    """Axes with curves of arcs, by their numbers: their places side by side, branches, and the column drawn."""
+
+    axis: Any
+    drawn: dict[int, Curve]
+    places: dict[int, CurvePlace]
+    branch_of: Mapping[int, int]
+    column: int
+
 
 #: Points of a sheet, and branches that a label names one by one.
 _SHEET, _NAMED = 9, 4
 
 
 def drawn_range(vertices: Iterable[Vertex], quantity: Quantity) -> Floats:
-    """How much a quantity differs between the vertices, by columns."""
+    """The range of a quantity over the vertices, by columns."""
     values = np.array([state_columns(quantity, v) for v in vertices])
     return np.asarray(np.ptp(values, axis=0))
 
@@ -94,9 +103,7 @@ def draw_steps(axis: Any, steps: MultiplicitySteps, window: tuple[float, float])
     axis.set_ylabel("solutions" if steps.exact else "solutions,\nat least")
     axis.set_ylim(0, max([*steps.between, *steps.at], default=1) * 1.1 + 0.4)
     axis.yaxis.get_major_locator().set_params(integer=True, nbins=5)
-    axis.grid(visible=True, color="#e4e4e4", linewidth=0.6)
-    axis.set_axisbelow(True)
-    axis.spines[["top", "right"]].set_visible(False)
+    plain_axes(axis)
     axis.set_xlim(*window)
     return bool(special)
 
@@ -116,7 +123,7 @@ def draw_numbers(figure: Any, panels: Sequence[Panel], alone: Any) -> None:
 
     The note stands below the figure, or below ``alone``, the only panel in a figure of the user's.
     """
-    beside = any(place.among > 1 for _, _, places, _, _ in panels for place in places.values())
+    beside = any(place.among > 1 for panel in panels for place in panel.places.values())
     notes = ["branches that coincide are drawn side by side"] if beside else []
     # the note takes room itself, so that a second pass may find less of it
     for _ in range(2):
@@ -129,10 +136,10 @@ def draw_numbers(figure: Any, panels: Sequence[Panel], alone: Any) -> None:
         figure.draw_without_rendering()
         without: set[int] = set()
         written: set[int] = set()
-        for axis, drawn, places, branch_of, column in panels:
-            for text in [text for text in axis.texts if text.get_gid() == "branch number"]:
+        for panel in panels:
+            for text in [text for text in panel.axis.texts if text.get_gid() == "branch number"]:
                 text.remove()
-            here, missing = _number(axis, drawn, places, branch_of, column)
+            here, missing = _number(panel)
             written |= here
             without |= missing
         without -= written
@@ -141,10 +148,9 @@ def draw_numbers(figure: Any, panels: Sequence[Panel], alone: Any) -> None:
         notes = [*notes[: int(beside)], f"no room for the numbers of branches {ranges(sorted(without))}"]
 
 
-def _number(
-    axis: Any, drawn: dict[int, Curve], places: dict[int, CurvePlace], branch_of: Mapping[int, int], column: int
-) -> tuple[set[int], set[int]]:
+def _number(panel: Panel) -> tuple[set[int], set[int]]:
     """Write the numbers; returns those that are there, and those for which there was no room."""
+    axis, drawn, places, branch_of, column = panel
     members: dict[int, set[int]] = {}
     for arc, place in places.items():
         members.setdefault(place.group, set()).add(branch_of[arc])

@@ -48,10 +48,6 @@ _BESIDE, _ASIDE = 1e-3, 0.1
 _EVEN = 0.125
 #: Where directions at the ends of an edge of the skeleton are taken, relative to the edge: not at a corner itself.
 _INSIDE = 2.0**-10
-#: The shortest step of continuation where it stalls with that of its own.
-_LEAST_STEP = 1e-8
-#: So many links less one, at most, are left out at an end of a curve that run into others of it.
-_TRIMMED = 4
 #: How far a skeleton is prolonged beyond the interval, or beyond the bounds of the rigid displacement, relative to its
 #: last step.
 _BEYOND, _BEYOND_REACH = 0.05, 2.0**-10
@@ -159,7 +155,8 @@ def _path(problem: ContactProblem3D, start: tuple[Any, ...], way: int, span: tup
     """A path that may take shorter steps where it stalls: near a fold of a short interval it has to."""
     path = follow(problem, start, way, span)
     if path.status == PathStatus.STALLED:
-        path = follow(problem, start, way, span, ContinuationOptions(h_min=_LEAST_STEP))
+        # the shortest step of continuation where it stalls with that of its own
+        path = follow(problem, start, way, span, ContinuationOptions(h_min=1e-8))
     return path
 
 
@@ -183,7 +180,8 @@ class ChainBuilder:
     def begun(self) -> CurveChain | None:
         """Part of the chain in the making that is proven so far, without links at its ends that run into others."""
         count = min(len(self._links), len(self._joints) - 1)
-        for off in range(min(_TRIMMED, count)):
+        # so many links less one, at most, are left out at an end of a curve that run into others of it
+        for off in range(min(4, count)):
             for first, last in dict.fromkeys(((0, count - off), (off, count), (off, count - off))):
                 links, joints = self._links[first:last], self._joints[first : last + 1]
                 chain = CurveChain.of(links, joints, self._interval)

@@ -14,9 +14,9 @@ import numpy as np
 
 from enumsol.branches.space.chains import chain_through
 from enumsol.condensation.enclosure import enclosure_of
-from enumsol.proof.proof_file import Proof
+from enumsol.proof.curve_records import CurveBoxRecord
+from enumsol.proof.proof_file import PROOF_VERSION, Proof
 from enumsol.proof.records import UndecidedRecord
-from enumsol.proof.space_records import CurveBoxRecord
 from enumsol.proof.writer import ProofWriter, unit_exponents
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.search.space.known_curves import Curves, joined
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.proof.space_records import CurvePart
+    from enumsol.proof.curve_records import CurvePart
     from enumsol.search.outcome import StopReason
     from enumsol.trusted.space.curve_chains import CurveChain
     from enumsol.trusted.space.curve_parts import Run, Turn
@@ -45,13 +45,9 @@ if TYPE_CHECKING:
 
 #: Nodes of a search at one alpha that is to find curves.
 _SAMPLED = 500
-#: Seconds that it has at least.
-_LEAST_TIME = 1e-3
 #: After so many curves that are not new, or neither whole nor as long as this share of the interval, no further one is
 #: followed.
 _FAILURES, _LONG = 3, 2.0**-6
-#: What the record of an open leaf says.
-_OPEN = "solutions there lie on no curve that is known"
 
 
 @dataclass(eq=False)
@@ -156,7 +152,8 @@ class SpaceCover:
         """Forces of solutions at an alpha, as many as a short search finds, with rigid displacements if any."""
         look()
         seconds = remaining()
-        left = None if seconds is None else max(seconds, _LEAST_TIME)
+        # seconds that it has at least
+        left = None if seconds is None else max(seconds, 1e-3)
         roots = enumerate_roots(self.problem, alpha, max_nodes=_SAMPLED, time_limit=left)
         rigid = [np.zeros(0) if root.rigid_coordinates is None else root.rigid_coordinates for root in roots]
         return [np.concatenate([root.lambda_n, *root.lambda_t.T, q]) for root, q in zip(roots, rigid, strict=True)]
@@ -170,7 +167,7 @@ class SpaceCover:
         writer.write(
             {
                 "format": "enumsol-proof",
-                "version": 1,
+                "version": PROOF_VERSION,
                 "kind": "graph",
                 "problem": self.problem.fingerprint,
                 "interval": [str(end) for end in self.interval],
@@ -200,7 +197,10 @@ class SpaceCover:
         for record in self.records:
             is_open = isinstance(record, OpenLeaf)
             gaps += is_open
-            leaves += is_open or record.kind not in ("a", "b")
-            writer.write((UndecidedRecord(_OPEN) if is_open else record).write())
+            leaves += is_open or record.kind not in ("p", "b")
+            # what the record of an open leaf says
+            writer.write(
+                (UndecidedRecord("solutions there lie on no curve that is known") if is_open else record).write()
+            )
         writer.write({"curves": len(self.chains), "arcs": arcs, "leaves": leaves, "gaps": gaps})
         return writer.close()

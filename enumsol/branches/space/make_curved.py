@@ -97,7 +97,7 @@ def state_of(problem: ContactProblem3D, x: Floats, active: Sequence[Set[int]]) -
 
 @dataclass
 class _Place:
-    """Where a vertex will be."""
+    """A place where a vertex will be."""
 
     alphas: Bounds
     x: Floats

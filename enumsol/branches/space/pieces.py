@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.optimize import brentq
 
-from enumsol.proof.space_records import CurveBoxRecord, CurvePart
+from enumsol.proof.curve_records import CurveBoxRecord, CurvePart
 from enumsol.support.deadlines import look, tell
 from enumsol.trusted.space.curve_events import CurveMotion
 from enumsol.trusted.space.curve_parts import LinkParts, Place, Run, Turn, in_order, put_behind, up_to_bound
@@ -35,18 +35,8 @@ if TYPE_CHECKING:
 #: best, relative to the part, how much of this that place may be off, by what factor farther others are, and how many.
 _HALVINGS = 12
 _BESIDE, _CLOSE, _FARTHER, _TRIALS = 2.0**-44, 0.25, 8.0, 15
-#: The same beside a smooth fold, where alpha is a square of the distance.
-_BESIDE_FOLD = 2.0**-24
 #: Parts are longer than the way between their ends by this, and wider than their ends are known.
 _LONGER, _ROUNDED = 1.05, 16.0
-#: After so many parts of a link that stay open none is halved: along a continuum of solutions all would.
-_MOST_OPEN = 16
-#: A link is cut into so many parts at most: near the limit of sliding alpha hardly changes along a curve.
-_MOST_PARTS = 256
-#: A part along which alpha does not change is left open where its bounds are as close as this.
-_STILL = 2.0**-32
-#: Where a part is cut: at the first of these shares where the solution is regular.
-_CUTS = (0.5, 0.4375, 0.59375)
 
 
 def runs_and_turns(
@@ -55,7 +45,7 @@ def runs_and_turns(
     found: list[Run | Turn] | None = None,
     records: list[CurvePart] | None = None,
 ) -> list[Run | Turn]:
-    """Those of a curve, in its order; see ``in_order``.
+    """Runs and turns of a curve, in its order; see ``in_order``.
 
     ``found`` is filled on the way, so that it has what there is when the time is over, and ``records`` with those of a
     proof.
@@ -110,7 +100,8 @@ class LinkCutter(LinkParts):
     ) -> None:
         super().__init__(problem, link)
         self.nearness, self._open, self._records = nearness, 0, [] if records is None else records
-        self._last = len(self._records) + _MOST_PARTS
+        # a link is cut into so many parts at most: near the limit of sliding alpha hardly changes along a curve
+        self._last = len(self._records) + 256
 
     def parts(self, start: SolutionCurve, end: SolutionCurve) -> list[Run | Turn]:
         """From one joint to another one."""
@@ -150,9 +141,11 @@ class LinkCutter(LinkParts):
         # as where a body slides at one alpha
         still = codes is not None and not start.rises and not end.rises
         own = self._between(start, end) if still and own is None else own
-        done = still and own is not None and own.alphas[1] - own.alphas[0] <= Fraction(_STILL)
+        # a part along which alpha does not change is left open where its bounds are as close as this
+        done = still and own is not None and own.alphas[1] - own.alphas[0] <= Fraction(2.0**-32)
         left = times > 0 or (still and times > -_HALVINGS)
-        left &= not done and self._open < _MOST_OPEN and len(self._records) < self._last
+        # after so many parts of a link that stay open none is halved: along a continuum of solutions all would
+        left &= not done and self._open < 16 and len(self._records) < self._last
         middle = self._middle(start, end) if left else None
         if middle is None:
             self._open += not done
@@ -167,14 +160,15 @@ class LinkCutter(LinkParts):
     def _smooth(
         self, own: SolutionCurve | None, motion: CurveMotion, start: Place, end: Place, codes: Codes
     ) -> list[Run | Turn] | None:
-        """Where the statuses do not change: one run, or two with a fold between them."""
+        """Parts without a change of statuses: one run, or two with a fold between them."""
         run = self.run(motion, start, end, codes)
         if run is not None:
             self._told("s", own)
             return [run]
         if not (start.rises and start.rises == -end.rises and motion.bends(codes)):
             return None
-        sides = self._beside(start, end, lambda point: start.rises * float(point.direction[-1]), _BESIDE_FOLD)
+        # farther away beside a smooth fold, where alpha is a square of the distance
+        sides = self._beside(start, end, lambda point: start.rises * float(point.direction[-1]), 2.0**-24)
         found = None if sides is None else self.fold(motion, start, end, codes, sides)
         if sides is not None and found is not None:
             self._told("f", own, *sides)
@@ -189,7 +183,7 @@ class LinkCutter(LinkParts):
         nodes: Sequence[int],
         times: int,
     ) -> list[Run | Turn] | None:
-        """Where nodes change their statuses, each of them once: the first change, and what follows."""
+        """Parts in which nodes change their statuses, each of them once: the first change, and what follows."""
         one = start.codes
         mine = [one[i] for i in nodes]
         sides = self._beside(start, end, lambda point: status_margin(self.problem, point.z, nodes, mine), _BESIDE)
@@ -220,7 +214,8 @@ class LinkCutter(LinkParts):
         return self.place_at(curve_around(self.problem, near.x, near.direction, self.border, 0.0, roomy=False))
 
     def _middle(self, start: Place, end: Place) -> Place | None:
-        found = (self._at(start, end, share) for share in _CUTS)
+        # where a part is cut: at the first of these shares where the solution is regular
+        found = (self._at(start, end, share) for share in (0.5, 0.4375, 0.59375))
         return next((place for place in found if place is not None and self.is_between(start, place, end)), None)
 
     def _passage(self, start: Place, end: Place, value: Callable[[CurvePoint], float], close: float) -> float | None:
@@ -265,7 +260,7 @@ class LinkCutter(LinkParts):
 
     @staticmethod
     def _tells(one: Place, other: Place) -> bool:
-        """Whether two places are proven to be on different sides."""
+        """True if two places are proven to be on different sides."""
         return one.codes != other.codes or one.rises * other.rises < 0
 
     def _between(self, start: Place, end: Place) -> SolutionCurve | None:

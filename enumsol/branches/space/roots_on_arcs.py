@@ -26,9 +26,6 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Alpha, Codes, Floats
 
 
-#: Levels of the sectors in which a root is looked for, the narrow ones first.
-_LEVELS = (22, 16, 11, 8, 6)
-_CLOSE = "alpha cannot be told from a vertex of the graph"
 _NOT_PROVEN = "the root of an arc could not be proven at this alpha"
 
 
@@ -61,7 +58,12 @@ def roots_on_arcs(
     # every arc has a root of its own
     lost = len(leaves) - len(distinct)
     undecided += [Undecided((None,) * data.problem.p, _NOT_PROVEN, "enumerate_roots there")] * lost
-    undecided += [Undecided(v.statuses, _CLOSE, "another alpha, or enumerate_roots there") for v in near]
+    undecided += [
+        Undecided(
+            v.statuses, "alpha cannot be told from a vertex of the graph", "another alpha, or enumerate_roots there"
+        )
+        for v in near
+    ]
     roots = [enumeration.root(codes, root) for codes, root in distinct]
     roots.sort(key=lambda root: (-float(np.sum(root.lambda_n)), root.lambda_n.tolist(), root.lambda_t.tolist()))
     known = data.claims.knows(Fraction(alpha))
@@ -87,7 +89,8 @@ def root_near(system: EnclosedSpace, codes: Codes, forces: Floats) -> tuple[Code
 
     ``codes`` as in a graph: slip in any direction.
     """
-    for level in _LEVELS:
+    # levels of the sectors in which a root is looked for, the narrow ones first
+    for level in (22, 16, 11, 8, 6):
         for leaf in product(*(_leaves(system, i, code, forces, level) for i, code in enumerate(codes))):
             found = settle(system, leaf)
             if isinstance(found, SpaceRoot):

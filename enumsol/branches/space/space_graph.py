@@ -13,7 +13,7 @@ from enumsol.branches.space.pieces import runs_and_turns
 from enumsol.branches.unfinished import ANOTHER_INTERVAL, MORE_NODES, MORE_TIME, SHORT_INTERVAL
 from enumsol.branches.ways import Made
 from enumsol.condensation.enclosure import NotEnclosedError
-from enumsol.proof.space_records import CutPiece
+from enumsol.proof.curve_records import CutPiece
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.search.space.known_curves import joined
 from enumsol.support.deadlines import TimeOverError, within
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from enumsol.branches.elements import Arc, Vertex
     from enumsol.branches.unfinished import Tick
     from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.proof.space_records import CurvePart
+    from enumsol.proof.curve_records import CurvePart
     from enumsol.support.deadlines import Deadline
     from enumsol.trusted.space.curve_parts import Turn
 

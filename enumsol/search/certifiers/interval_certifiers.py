@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from enumsol.arithmetic.rationals import rational
-from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
+from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError, enclosure_of
 from enumsol.condensation.exact import ExactCondensed, ExactSystem
 from enumsol.model.statuses import RowKind
 from enumsol.relaxation.imposed_rows import with_implied
@@ -38,6 +39,7 @@ class VerifiedIntervalCertifier(IntervalCertifier):
 
     A leaf that the balls cannot exclude is branched on. Only where there are no balls at all (S positive definite
     within rounding) do rationals decide, if S and g were condensed without rounding; there is not a proof file then.
+    Leaves of a body that nothing holds are empty within the bound of its rigid displacement (theory, section 14.8).
 
     Parameters
     ----------
@@ -53,11 +55,11 @@ class VerifiedIntervalCertifier(IntervalCertifier):
         exactly = exact is None or exact.condensed_exactly
         self._enclosure = certified_enclosure(problem, exactly=exactly)
         self._rationals = ExactIntervalCertifier(exact) if exact is not None and exactly else None
-        self._zero = zero if exact is None else exact.zero
+        self._zero, self._held = zero if exact is None else exact.zero, problem.held
         self._piece: tuple[Piece, EnclosedPiece | None, Margin | None] | None = None
         self._form: tuple[Floats, EnclosedPiece] | None = None
         #: Rationals decide where there are no balls; the checker repeats what balls accepted.
-        self.forms, self.rational, self.checkable = True, self._rationals is not None, True
+        self.forms, self.rational, self.checkable = problem.held, self._rationals is not None, True
 
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
         """Whether the dual bounds at both ends of the piece are positive."""
@@ -87,8 +89,12 @@ class VerifiedIntervalCertifier(IntervalCertifier):
     def _on(self, piece: Piece, system: IntervalSystem) -> tuple[EnclosedPiece | None, Margin | None]:
         if self._piece is None or self._piece[0] != piece:
             enclosed = self._make(piece, system)
-            self._piece = (piece, enclosed, None if enclosed is None else energy_margin(enclosed))
+            self._piece = (piece, enclosed, None if enclosed is None else self._margin(enclosed))
         return self._piece[1:]
+
+    def _margin(self, enclosed: EnclosedPiece) -> Margin:
+        # the compiled margins know no rows of a body as a whole
+        return energy_margin(enclosed) if self._held else partial(exclusion_margin, enclosed, errors=2.0)
 
     def _make(self, piece: Piece, system: IntervalSystem) -> EnclosedPiece | None:
         if self._enclosure is None:
@@ -110,7 +116,7 @@ def certified_enclosure(problem: ContactProblem, *, exactly: bool) -> CondensedE
     if not exactly:
         return as_computed(problem)
     try:
-        return problem.enclosure
+        return enclosure_of(problem)
     except NotEnclosedError:
         return None
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from enumsol.condensation.enclosure import EnclosedSystem
+    from enumsol.proof.records import DeclaredForm
     from enumsol.proof.writer import Part, Recorder
     from enumsol.support.array_types import Codes, Floats, Indices
     from enumsol.trusted.quadratic_forms import EnclosedForm
@@ -118,20 +119,23 @@ class Bound(Protocol):
     def form(self) -> Any:
         """The form that ``bound`` is about: an EnclosedForm, in 3D a SlipForm; None for the energy."""
 
-    def multipliers(self) -> tuple[Indices, Floats]:
-        """Rows and their multipliers, which prove ``bound``."""
+    def multipliers(self) -> tuple[Any, Floats]:
+        """Numbers of rows and their multipliers, which prove ``bound``."""
 
 
 @dataclass(frozen=True)
 class RecordedBound:
-    """Multipliers that are said to bound the energy, or a form, from below; in place of a relaxation's."""
+    """Multipliers that are said to bound the energy, or a form, from below; in place of a relaxation's.
 
-    rows: Indices
+    Rows are those of a record: in 3D a list of kind, node and number.
+    """
+
+    rows: Any
     values: Floats
     form: Any = None
     bound: float = np.inf
 
-    def multipliers(self) -> tuple[Indices, Floats]:
+    def multipliers(self) -> tuple[Any, Floats]:
         """Rows and their multipliers."""
         return self.rows, self.values
 
@@ -244,6 +248,8 @@ class RecordingCertifier(Met):
         self.recorder = recorder
         self._verified: dict[Codes, Any] = {}
         self._leaves = 0
+        #: Forms that were declared, by what they are known by, and how many were before each.
+        self._declared: dict[Any, int] = {}
 
     @property
     def certified(self) -> Certified:
@@ -267,10 +273,19 @@ class RecordingCertifier(Met):
         super().add(part)
         self._verified |= part.verified
         self._leaves += part.leaves
+        self._declared.clear()  # it may have declared others
 
     def forget(self) -> None:
         """Forget what was proven."""
         self._verified, self._leaves, self.bounded = {}, 0, False
+        self._declared.clear()
+
+    def _back(self, form: Any, declaration: Callable[[], DeclaredForm]) -> int:
+        """How many forms ago one was declared, 1 for the last; one that was not is declared."""
+        if form not in self._declared:
+            self._declared[form] = len(self._declared)
+            self.recorder.write(declaration().write())
+        return len(self._declared) - self._declared[form]
 
     def _leaf(self, leaf: Record) -> None:
         self._leaves += 1

@@ -6,7 +6,6 @@ problem is small enough, otherwise the selection is left undecided with the reas
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -87,8 +86,6 @@ class VerifiedCertifier(protocol.RecordingCertifier):
         self._exact = exact
         self._node_ids = node_ids
         self._escalations = protocol.Escalations()
-        #: Forms in the order in which they were written.
-        self._forms: dict[EnclosedForm, int] = {}
         self._form_margins: dict[EnclosedForm, protocol.Margin] = {}
         #: A complete selection was not decided by balls.
         self.hard = False
@@ -103,13 +100,13 @@ class VerifiedCertifier(protocol.RecordingCertifier):
         if self._margin is not None:
             if (kept := proven(self._margin, codes, rows, values)) is not None:
                 self._escalations.balls += 1
-                self._leaf(records.Excluded(Terms(rows, kept)))
+                self._leaf(records.Excluded(rows, kept))
                 return True
         elif (certifier := self._exact()) is not None and certifier.excluded(codes, relaxation):
             # no balls for an S that is positive definite only within rounding
             self._escalations.rationals += 1
             # the certifier passes over multipliers that prove nothing, a checker refuses them
-            self._leaf(records.ExcludedInRationals(self._allowed(codes, rows, values)))
+            self._leaf(records.Excluded(*self._allowed(codes, rows, values), records.RATIONAL))
             return True
         self._escalations.refined += 1
         return False
@@ -123,11 +120,10 @@ class VerifiedCertifier(protocol.RecordingCertifier):
         if kept is None:
             self._escalations.refined += 1
             return False
-        if form not in self._forms:
-            self._forms[form] = len(self._forms)
-            self.recorder.write(records.DeclaredForm(form.codes, form.multipliers, form.weight).write())
+        numbers, weight = np.asarray(form.multipliers).ravel(), np.array([form.weight])
+        back = self._back(form, lambda: records.DeclaredForm(form.codes, numbers, weight))
         self._escalations.balls += 1
-        self._leaf(records.ExcludedByForm(len(self._forms) - self._forms[form], Terms(rows, kept)))
+        self._leaf(records.Excluded(rows, kept, back))
         return True
 
     def _allowed(self, codes: Codes, rows: Indices, values: Floats) -> Terms:
@@ -178,7 +174,7 @@ class VerifiedCertifier(protocol.RecordingCertifier):
             return self._undecided(codes, solution.reason, solution.hint)
         self._escalations.rationals += 1
         if solution is None:
-            self._leaf(records.NoRootInRationals())
+            self._leaf(records.NoRoot(records.RATIONAL))
         else:
             points = [[_fraction(v) for v in vertex] for vertex in solution.vertices]
             self._leaf(records.RootSetRecord(points, solution.dimension))
@@ -202,7 +198,7 @@ class VerifiedCertifier(protocol.RecordingCertifier):
             closing, solutions = exact
             self._known += [solution.codes for solution in solutions]
             self._escalations.rationals += 1
-            self._leaf(records.ClosedInRationals(closing.selection, closing.numbers, len(solutions)))
+            self._leaf(records.Closed(closing.selection, closing.free, closing.numbers, len(solutions)))
             return solutions
         found = None if proposal is None or ball is None or ball.is_wide else self._closed_by(proposal, ball)
         if found and proposal is not None and certifier is not None:
@@ -222,7 +218,8 @@ class VerifiedCertifier(protocol.RecordingCertifier):
         if root is None:
             return None
         self._escalations.balls += 1
-        return [self._regular(proposal.selection, root, partial(records.Alone, *given, terms))]
+        chosen, weights, strengths = given
+        return [self._regular(chosen, root, lambda ball: records.Alone(chosen, weights, ball, strengths, terms))]
 
     def _take_note(self, force: Floats, w: Floats) -> None:
         """Take note of nodes that slide without load at a solution."""
@@ -293,7 +290,6 @@ class VerifiedCertifier(protocol.RecordingCertifier):
         """Forget what was proven."""
         super().forget()
         self._escalations = protocol.Escalations()
-        self._forms.clear()
         self._known.clear()
 
     def _regular(

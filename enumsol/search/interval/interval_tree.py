@@ -312,7 +312,7 @@ class SubintervalTree:
         return found
 
     def _empty(self, item: _Item, over: Relaxation) -> bool:
-        """Whether the relaxation proves the node empty, or all roots below it; roots that it does are taken out."""
+        """True if the relaxation proves the node empty, or all roots below it; roots that it does are taken out."""
         rows, values = over.multipliers()
         waiting = []
         for root in item.roots if item.above else [item]:

@@ -2,12 +2,14 @@
 
 A piece is a subinterval. It is searched by trees whose leaves cover all selections: a leaf is proven empty on the whole
 piece, or it is a complete selection that survives, or it is left to both halves of the piece. What was proven for the
-whole piece is proven for its halves, too. Bodies that nothing holds have their own certifier (theory, section 14.8).
+whole piece is proven for its halves, too.
 """
 
 from __future__ import annotations
 
 import itertools
+import pickle
+import threading
 import time
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
@@ -17,21 +19,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.condensation.enclosure import NotEnclosedError, enclosure_of
 from enumsol.model.statuses import UNDECIDED
 from enumsol.relaxation.interval_relaxation import IntervalSystem
 from enumsol.search.floating_solvers import WEAK
 from enumsol.search.interval.interval_tree import LARGEST_TREE, EmptyLeaf, SubintervalTree, Subtree, TreeResult
 from enumsol.search.outcome import Stop, StopReason
-from enumsol.trusted.exclusion import exclusion_margin
-from enumsol.trusted.over_interval import EnclosedPiece, PieceNumbers
+from enumsol.support.workers import Crew, Job
+from enumsol.trusted.over_interval import PieceNumbers
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
+    from concurrent.futures import Executor
 
     from enumsol.condensation.condensed import CondensedProblem
     from enumsol.model.problem import ContactProblem
-    from enumsol.search.certifiers.protocol import Margin
     from enumsol.support.array_types import Codes, Floats
 
 
@@ -40,8 +41,6 @@ SMALLEST_PIECE = 2.0**-40
 #: Trees are given up over pieces longer than this part of the interval, which only have to be cut, where friction
 #: varies: a block with p = 64 takes a quarter of the nodes then, and under a varying load 1.6 times as many.
 LONG_PIECE = 2.0**-9
-#: Into how many trees what a tree of the largest size left is divided.
-FURTHER_TREES = 8
 
 
 @dataclass(frozen=True)
@@ -99,10 +98,10 @@ class IntervalCertifier(ABC):
 
     @abstractmethod
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
-        """Whether the dual bounds at both ends of the piece are positive."""
+        """True if the dual bounds at both ends of the piece are positive."""
 
     def convex(self, piece: Piece, system: IntervalSystem, form: Floats) -> bool:
-        """Whether the form of these multipliers is proven convex on the piece."""
+        """True if the form of these multipliers is proven convex on the piece."""
         return False
 
 
@@ -129,7 +128,8 @@ class Task:
 
     def further(self, result: TreeResult) -> list[Task]:
         """The trees over the same piece for what this one did not examine."""
-        size = -(-len(result.rest) // FURTHER_TREES) or 1
+        # eight trees, which workers share
+        size = -(-len(result.rest) // 8) or 1
         return [Task(self.piece, tuple(result.rest[k : k + size])) for k in range(0, len(result.rest), size)]
 
     @staticmethod
@@ -336,49 +336,126 @@ class IntervalSearch:
         return None if self.stopped is not None else self.worker.run(task, rest, self.deadline)
 
 
-#: As of other intervals.
-_MARGIN = 1e-12
+def run_parallel(executor: Executor, search: IntervalSearch) -> None:
+    """Run a search with the help of an executor: the same result, whatever their number and timing.
+
+    Raises
+    ------
+    KeyboardInterrupt, MemoryError
+        The search then holds what was found by then.
+    """
+    ahead = _Ahead(executor, search)
+    try:
+        ahead.run()
+    except (KeyboardInterrupt, MemoryError) as error:
+        search.stopped = Stop(StopReason.of(type(error)), ahead.nodes)
+        search.run(ahead.known)
+        raise
+    finally:
+        ahead.cancel()
+    search.run(ahead.known)
+
+
+class _Ahead:
+    """The trees that are searched ahead.
+
+    Attributes
+    ----------
+    known : dict
+        Results of tasks.
+    nodes : int
+        Of all these.
+    """
+
+    def __init__(self, executor: Executor, search: IntervalSearch) -> None:
+        self.known: dict[Task, TreeResult] = {}
+        self.nodes = 0
+        self._crew, self._search = Crew(executor), search
+        self._worker = pickle.dumps(search.worker)
+        self._tasks: dict[Job, Task] = {}
+        #: of every piece its first tree, and the number of its trees that are not finished
+        self._first: dict[Piece, Task] = {}
+        self._waiting: dict[Piece, int] = {}
+        self._share = Fraction(0)
+
+    def run(self) -> None:
+        """Search all trees, until a limit is reached."""
+        search = self._search
+        a, b = search.interval
+        self._share = sum((piece.b - piece.a for piece in search.closed), Fraction(0)) / (b - a)
+        for task in search.trees():
+            self._begin(task)
+        while self._tasks:
+            job = self._crew.next(self._seconds())
+            if job is None or not job.result.nodes:
+                # there is no time left, here or for the worker
+                search.stopped = Stop(StopReason.TIME_LIMIT)
+                return
+            self._take(self._tasks.pop(job), job.result)
+            if search.max_nodes is not None and self.nodes >= search.max_nodes:
+                return
+
+    def _seconds(self) -> float | None:
+        """Until the deadline."""
+        deadline = self._search.deadline
+        return None if deadline is None else max(deadline - time.perf_counter(), 0.0)
+
+    def _begin(self, task: Task) -> None:
+        """Hand out the first tree over a piece."""
+        self._first[task.piece], self._waiting[task.piece] = task, 1
+        self._hand_out(task)
+
+    def _hand_out(self, task: Task) -> None:
+        self._tasks[self._crew.submit(_search_tree, self._worker, task, self._seconds())] = task
+
+    def _take(self, task: Task, result: TreeResult) -> None:
+        """Keep a result, and hand out the trees that follow from it."""
+        piece, further = task.piece, task.further(result)
+        self.known[task] = result
+        self.nodes += result.nodes
+        self._waiting[piece] += len(further) - 1
+        for another in further:
+            self._hand_out(another)
+        if self._waiting[piece]:
+            return
+        halves = Task.halves(piece, self._cut(piece))
+        for half in halves:
+            self._begin(half)
+        if not halves and self._search.progress is not None:
+            a, b = self._search.interval
+            self._share += (piece.b - piece.a) / (b - a)
+            self._search.progress(float(self._share))
+
+    def _cut(self, piece: Piece) -> list[Subtree]:
+        """Subtrees that a piece leaves to its halves, in the order in which a search without workers finds them."""
+        cut: list[Subtree] = []
+        waiting = [self._first[piece]]
+        while waiting:
+            task = waiting.pop()
+            cut += self.known[task].cut
+            waiting += task.further(self.known[task])[::-1]
+        return cut
+
+    def cancel(self) -> None:
+        """Cancel what has not begun."""
+        self._crew.cancel()
+
+
+_local = threading.local()
+
+
+def _search_tree(packed: bytes, task: Task, seconds: float | None) -> TreeResult:
+    """Search one tree, in a worker; every thread has a searcher of its own, and keeps it for the next tree."""
+    if getattr(_local, "packed", None) != packed:
+        _local.worker, _local.packed = pickle.loads(packed), packed
+    worker: Worker = _local.worker
+    return worker.run(task, deadline=None if seconds is None else time.perf_counter() + seconds)
 
 
 def on_weak_springs(problem: ContactProblem) -> CondensedProblem:
-    """What the relaxations are about: the body on weak springs at the degrees of freedom where springs hold it."""
+    """The body on weak springs at the degrees of freedom where springs hold it, which relaxations are about."""
     modes = problem.modes
     if modes.r == 0:
         raise AssertionError("the body is held")
     condensed: CondensedProblem = problem.on_springs.replace(A=problem.A + WEAK * modes.springs()).condensed
     return condensed
-
-
-class FloatingIntervalCertifier(IntervalCertifier):
-    """Accepts a leaf when the bounds of its multipliers prove it empty on the whole piece, within the bound or without.
-
-    What balls cannot exclude is branched on: complete selections are followed by algebra.
-
-    Parameters
-    ----------
-    problem : ContactProblem
-    checkable : bool
-        A proof is wanted.
-    """
-
-    def __init__(self, problem: ContactProblem, *, checkable: bool) -> None:
-        self._problem, self.checkable = problem, checkable
-        self._piece: tuple[Piece, Margin | None] | None = None
-
-    def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
-        """Whether the bounds at both ends of the piece are positive."""
-        if self._piece is None or self._piece[0] != piece:
-            self._piece = piece, self._on(piece, system)
-        margin = self._piece[1]
-        return margin is not None and margin(leaf.codes, leaf.rows, leaf.values) > _MARGIN
-
-    def _on(self, piece: Piece, system: IntervalSystem) -> Margin | None:
-        units = system.scaled
-        try:
-            enclosure = enclosure_of(self._problem)
-            within = EnclosedPiece.from_enclosure(enclosure, piece.a, piece.b, units.force, units.length, None)
-        except NotEnclosedError:
-            return None
-        if not all(end.smallest_eigenvalue > 0 for end in within.ends):
-            return None
-        return partial(exclusion_margin, within, errors=2.0)

@@ -19,10 +19,6 @@ if TYPE_CHECKING:
 
 #: What a writer of proofs asks for (see ``solution_in_box``).
 _ERRORS = 2.0
-#: Forces known no better than this, relative to the largest, tell no solution near which to look.
-_ROUGH = 0.1
-#: Solutions that are as near to each other, relative to the largest force, are the same.
-_SAME = 1e-6
 
 
 class KnownBoxes:
@@ -55,7 +51,8 @@ class KnownBoxes:
             if is_inside(y, w, known.box, _ERRORS):
                 return known
         if halved:
-            if not np.max(y.rad) <= _ROUGH * np.max(np.abs(y.mid) + y.rad):
+            # forces known no better than this, relative to the largest, tell no solution near which to look
+            if not np.max(y.rad) <= 0.1 * np.max(np.abs(y.mid) + y.rad):
                 return None
             if self._wait > 0:
                 self._wait -= 1
@@ -71,7 +68,8 @@ class KnownBoxes:
             near = self._problem.near(y, self._system)
             if near is None:
                 return None
-            size = _SAME * float(np.max(np.abs(near)))
+            # nearer ones are the same solution
+            size = 1e-6 * float(np.max(np.abs(near)))
             if any(np.max(np.abs(near - other)) <= size for other in self._passed):
                 return None
             point = Point.of(self._system, self._problem, self._problem.by_node(near, self._system))

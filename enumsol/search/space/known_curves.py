@@ -25,10 +25,6 @@ if TYPE_CHECKING:
     from enumsol.trusted.space.pieces import AlphaPiece
     from enumsol.trusted.space.solution_curve import SolutionCurve
 
-#: Boxes of a curve in a row in which a leaf may lie, and how many such rows are tried.
-_LONGEST, _RUNS = 64, 4
-#: From the ends of curves inside the interval so far, as a share of it, nothing is searched.
-_AROUND_ENDS = 2.0**-14
 #: Pieces of undecided statuses at most at which a first curve is sought; where solutions are sampled, as shares of the
 #: interval, if more than one curve may be needed.
 _SOUGHT, _SAMPLED = 8, (Fraction(15, 16), Fraction(1, 2), Fraction(1, 16))
@@ -101,7 +97,8 @@ class Curves:
         )
         self._b = np.array([curve.reach for curve in self._boxes])
         self._h = np.array([box.half for box in boxes])
-        room = Fraction(_AROUND_ENDS) * (self._interval[1] - self._interval[0])
+        # so near to the ends of curves nothing is searched
+        room = Fraction(2.0**-14) * (self._interval[1] - self._interval[0])
         ends = [end for curve in self.known for end in curve.chain.gaps]
         whole = joined((low - room, high + room) for low, high in ends)
         self.ends = [(simplest(low, low + room / 2), simplest(high - room / 2, high)) for low, high in whole]
@@ -155,8 +152,9 @@ class Curves:
         for ends in piece.places(found, self._given) if self._boxes else ():
             sides = [np.flatnonzero(self._around(end.mid, end.rad)).tolist() for end in ends]
             runs = {(min(pair), max(pair)) for pair in product(sides[0], sides[-1])}
-            for first, last in sorted(runs, key=lambda run: run[1] - run[0])[:_RUNS]:
-                near = last - first < _LONGEST and self._owner[first] == self._owner[last]
+            # a few rows of boxes of one curve, the shortest first, and no longer ones
+            for first, last in sorted(runs, key=lambda run: run[1] - run[0])[:4]:
+                near = last - first < 64 and self._owner[first] == self._owner[last]
                 if near and lie_along(ends, self._boxes[first : last + 1], 2.0):
                     return first, last
         return None

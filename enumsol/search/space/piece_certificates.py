@@ -33,12 +33,6 @@ if TYPE_CHECKING:
 
 #: Smallest eigenvalue relative to S from which a form counts as definite, nodes from which better ones are sought.
 _DEFINITE, _MANY = 1e-9, 8
-#: Weight of the equations of an assignment, by the largest entry of S; what of a gap may serve for its slip.
-_WEIGHT, _SHARED = 1024.0, 0.5
-#: How often large distances get more weight in the fit of psi, and by how little the least ones count.
-_ROUNDS, _LEAST = 4, 1e-3
-#: At these shares of a piece it is asked how often a curve passes it.
-_PASSED = (2.0 * np.arange(4) + 1.0) / 8
 #: By how much more a writer of proofs has theta vary.
 ERRORS = 1.0 + 2.0**-6
 
@@ -75,7 +69,7 @@ class PieceProposals:
         self._system = SpaceSystem.in_middle(self._middle, piece.space.units)
 
     def numbers(self, codes: Codes, parts: CurveParts) -> Array | None:
-        """Those of a form that seems to serve all over the piece, or None."""
+        """Numbers of a form that seems to serve all over the piece, or None."""
         p, places, whole = self._system.p, self._system.tau >= 0, self._piece.whole
         with np.errstate(all="ignore"):
             thetas, apart = self._thetas(parts)
@@ -92,7 +86,7 @@ class PieceProposals:
         return np.concatenate([mu, kappa, nu[places], *(theta[places] for theta in thetas)])
 
     def is_hopeful(self, codes: Codes, parts: CurveParts) -> bool:
-        """Whether a shorter piece may have such a form: the middle has one, by the parts of the curve there."""
+        """True if a shorter piece may have such a form: the middle has one, by the parts of the curve there."""
         with np.errstate(all="ignore"):
             apart, discs = self._apart(parts), self._middle.discs.mid
             turn, off = self._turn(parts, apart)
@@ -102,7 +96,8 @@ class PieceProposals:
 
     def _rows(self, codes: Codes) -> Array | None:
         """Rows that are zero for the difference of two solutions with these statuses."""
-        return None if all(code == UNDECIDED for code in codes) else equations(self._middle, codes, _WEIGHT).mid
+        # weighed so by the largest entry of S, equations leave little of what does not satisfy them
+        return None if all(code == UNDECIDED for code in codes) else equations(self._middle, codes, 1024.0).mid
 
     def _turn(self, parts: CurveParts, apart: Flags) -> tuple[Array, Array]:
         """theta of the curve at the middle of the piece, (p, 2), and how far it is from one that serves there, (p,)."""
@@ -118,7 +113,8 @@ class PieceProposals:
         (theta, far), normal, slip = parts.thetas, *(part.mid for part in parts.slips)
         r = np.maximum(parts.F.mid, 0.0) / self._piece.whole.references
         pushed = self._piece.whole.references * r * np.linalg.norm(slip, axis=2)
-        shorter = np.maximum(1.0 - _SHARED * np.maximum(-normal, 0.0) / np.maximum(pushed, 1e-300), 0.0)
+        # half of a gap serves for the slip
+        shorter = np.maximum(1.0 - 0.5 * np.maximum(-normal, 0.0) / np.maximum(pushed, 1e-300), 0.0)
         apart = self._apart(parts)
         return np.where(apart[:, None], shorter[:, :, None] * theta, theta), np.isfinite(far) | apart
 
@@ -128,7 +124,7 @@ class PieceProposals:
         return np.asarray(np.all(parts.open & (parts.slips[0].mid < 0), axis=0))
 
     def _thetas(self, parts: CurveParts) -> tuple[Sequence[Array], Flags]:
-        """Those at both ends whose psi is near to that of the curve all over the piece, (p, 2) each, and open nodes."""
+        """Thetas at both ends, (p, 2) each, whose psi is near the curve's all over the piece, and open nodes."""
         low, high, reference = float(self._piece.low), float(self._piece.high), self._piece.whole.references
         share = np.clip((parts.alpha.mid - low) / (high - low), 0.0, 1.0)
         r = np.maximum(parts.F.mid, 0.0) / reference
@@ -138,14 +134,15 @@ class PieceProposals:
         basis = (1.0 - share)[:, None] * ends[0], share[:, None] * ends[1]
         weight = np.ones_like(r)
         fitted = [np.zeros_like(theta[0]), np.zeros_like(theta[0])]
-        for _ in range(_ROUNDS):
+        # large distances get more weight each time, the least ones a little
+        for _ in range(4):
             a, b, c = (np.sum(weight * x * y, axis=0) for x, y in combinations_with_replacement(basis, 2))
             a, c = a + 1e-12 * (a + c) + 1e-300, c + 1e-12 * (a + c) + 1e-300
             one, other = (np.sum((weight * x)[:, :, None] * psi, axis=0) for x in basis)
             det = (a * c - b * b)[:, None]
             fitted = [(c[:, None] * one - b[:, None] * other) / det, (a[:, None] * other - b[:, None] * one) / det]
             missed = np.linalg.norm(psi - sum(x[:, :, None] * y for x, y in zip(basis, fitted, strict=True)), axis=2)
-            weight *= missed / np.maximum(np.max(missed, axis=0), 1e-300) + _LEAST
+            weight *= missed / np.maximum(np.max(missed, axis=0), 1e-300) + 1e-3
         size = [np.linalg.norm(theta, axis=1) for theta in fitted]
         shrunk = [np.where(apart & (x > 1.0), (1.0 - 4e-16) / np.maximum(x, 1.0), 1.0) for x in size]
         places = self._system.tau >= 0
@@ -155,7 +152,8 @@ class PieceProposals:
 def _only_turns(alpha: Array, piece: AlphaPiece) -> bool:
     """True if a run along a curve, given by alphas, passes some alphas of a piece twice, but none just once."""
     low, high = float(piece.low), float(piece.high)
-    beyond = alpha > (low + (high - low) * _PASSED)[:, None]
+    # at four alphas of the piece
+    beyond = alpha > (low + (high - low) * (2.0 * np.arange(4) + 1.0) / 8)[:, None]
     passed = np.sum(beyond[:, 1:] != beyond[:, :-1], axis=1)
     return bool(np.any(passed > 1) and not np.any(passed == 1))
 

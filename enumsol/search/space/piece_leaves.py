@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of, parts_around, places, span, width_of
+from enumsol.proof.curve_records import OnCurve, ThroughCurveBox
 from enumsol.proof.records import NoRoot
-from enumsol.proof.space_records import InCurveBoxes, ThroughCurveBox
 from enumsol.search.space.piece_multipliers import unbalanced
 from enumsol.search.space.space_fathoming import without_sectors
 from enumsol.trusted.space.solution_curve import curve_point
@@ -33,12 +33,6 @@ if TYPE_CHECKING:
     from enumsol.trusted.space.pieces import AlphaPiece
     from enumsol.trusted.space.solution_curve import AlphaProblem
 
-#: Where points are taken, as shares of a curve's parts in a leaf, and the level of the sectors around them.
-_PLACES, _POINTED = (0.5, 0.25, 0.75), 12
-#: By so many times their lengths pieces are made longer on both sides for arcs.
-_FACTORS = 0, 1
-#: Arcs are sought where a known curve has directions in a leaf, or beside it by this factor.
-_BESIDE = 1.5
 #: Around the directions of known curves sectors get more room by this share of what these turn by, and are no narrower
 #: than those of a level; a sector is cut so if no more than this share of it is left.
 _ROOM, _NARROWEST, _LEFT = 0.5, 9, 0.5
@@ -49,12 +43,12 @@ def _turning(codes: Codes) -> list[int]:
 
 
 def slides(parts: CurveParts, codes: Codes) -> Mask:
-    """In which parts of a curve the statuses of a leaf hold, and those in sectors do not stick all the time, (N,)."""
+    """Mask of the parts of a curve where a leaf's statuses hold and those in sectors do not always stick, (N,)."""
     return np.asarray(parts.held(without_sectors(codes)) & ~np.any(parts.sticking[:, _turning(codes)], axis=1))
 
 
 def beside(parts: CurveParts, codes: Codes, centre: Floats, angle: Floats | float, radius: Floats) -> NDArray[np.intp]:
-    """Which parts of a curve have the statuses of a leaf, and directions within angles from those at its middle."""
+    """Parts of a curve that have the statuses of a leaf, and directions within angles from those at its middle."""
     there = np.flatnonzero(slides(parts, codes))
     if not len(there):
         return there
@@ -66,7 +60,8 @@ def beside(parts: CurveParts, codes: Codes, centre: Floats, angle: Floats | floa
 def points_on(arc: LeafArc, known: KnownCurve, parts: CurveParts, codes: Codes) -> list[tuple[Fraction, Codes]]:
     """Points of a curve that seem to be on the arc of a leaf, as alphas and leaves of narrow sectors."""
     chosen, found = beside(parts, codes, arc.centre, arc.angle, arc.radius), []
-    for k in [chosen[int(share * (len(chosen) - 1))] for share in _PLACES] if len(chosen) else []:
+    # in the middle of the parts, then at a quarter from their ends
+    for k in [chosen[int(share * (len(chosen) - 1))] for share in (0.5, 0.25, 0.75)] if len(chosen) else []:
         box = known.chain.links[parts.links[k]].curve.box
         near = curve_point(known.problem, box.centre + parts.t.mid[k] * box.direction, box.border)
         if near is not None:
@@ -79,7 +74,8 @@ def _narrow(problem: AlphaProblem, x: Floats, codes: Codes, nodes: Sequence[int]
     leaf, p = list(codes), len(codes)
     y = (problem.unplaced(x)[:-1] / problem.ratio.mid)[p : 3 * p].reshape(2, p)
     for i in nodes:
-        up = DEEPEST + 2 - max(_POINTED, level_of(codes[i] - SECTORS))
+        # sectors of this level around the point, or narrower ones
+        up = DEEPEST + 2 - max(12, level_of(codes[i] - SECTORS))
         leaf[i] = SECTORS + (1 << (DEEPEST + 2 - up)) + (int(places(y[:, i])) >> up)
     return tuple(leaf)
 
@@ -125,7 +121,7 @@ class PieceLeaves:
         if (without := unbalanced(at.piece, codes)) is not None:
             return without
         run = self._curves.run(piece, found)
-        return self._on_arc(at, codes, piece, found) if run is None else InCurveBoxes(*run)
+        return self._on_arc(at, codes, piece, found) if run is None else OnCurve(*run)
 
     def through(
         self,
@@ -148,10 +144,12 @@ class PieceLeaves:
     def _on_arc(self, at: ExaminedPiece, codes: Codes, piece: AlphaPiece, held: SpaceRoot | Open) -> Record | None:
         """The record of a leaf whose roots lie on an arc that has a point of a known curve."""
         half = np.abs(held.angle) + held.angle_rad
-        for factor in _FACTORS:
+        # as long as it is, then by its length longer on both sides
+        for factor in 0, 1:
             whole = piece.wider(factor, self._interval)
             runs = at.along(self._curves.known, whole)
-            if not any(len(beside(parts, codes, held.centre, 0.0, _BESIDE * half)) for _, parts in runs):
+            # directions of a known curve in the leaf, or somewhat beside it
+            if not any(len(beside(parts, codes, held.centre, 0.0, 1.5 * half)) for _, parts in runs):
                 continue
             found = whole.held(codes) if factor else held
             arc = None if found is None else whole.arc(codes, 2.0, found)

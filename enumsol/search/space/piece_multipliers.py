@@ -14,8 +14,7 @@ from scipy.linalg import solve_triangular
 from scipy.optimize import nnls
 
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
-from enumsol.proof.records import Unbalanced
-from enumsol.proof.space_records import ExcludedOverPiece
+from enumsol.proof.records import Excluded, Unbalanced
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.floating_solvers import weakly_held
 from enumsol.search.space.space_newton import Isotropic
@@ -35,14 +34,8 @@ if TYPE_CHECKING:
     from enumsol.trusted.space.pieces import AlphaPiece
 
 
-#: The weight of the squares of multipliers, each by the length of its row, which keeps them bounded.
-_RIDGE = 1e-12
 #: How often a writer of proofs counts errors.
 COUNTED = 2.0
-#: How often weights of the bounds are tried.
-_WEIGHTS = 6
-#: Rows of a program at one alpha.
-_ROWS = 4096
 
 
 class AlphaPoint:
@@ -57,7 +50,8 @@ class AlphaPoint:
     def __init__(self, space: AlphaSpace, alpha: Fraction) -> None:
         self.alpha = alpha
         self.system, self._floats = _relaxed(space, alpha), not space.fixed.held
-        self.engine = SpaceEngine(self.system, _ROWS)
+        # the rows of a program at one alpha
+        self.engine = SpaceEngine(self.system, 4096)
         self.splitting = SpaceSplitting(self.engine)
         self.rows = ImposedRows(self.splitting, self.system.p)
         self._discs = space.discs(alpha).mid
@@ -67,7 +61,7 @@ class AlphaPoint:
         return self.engine.root(*self.rows.over(codes, range(self.system.p)))
 
     def multipliers(self, relaxation: SpaceRelaxation) -> tuple[list[Row], Floats]:
-        """Those of a relaxation, in the variables of a space: tau is less there by the discs' radii, v is more."""
+        """Multipliers of a relaxation in the variables of a space: tau is less there by the discs' radii, v is more."""
         numbers, values = relaxation.multipliers()
         rows = [self.engine.rows[number] for number in numbers.tolist()]
         return rows, values * np.array([self._factor(row) for row in rows])
@@ -154,8 +148,9 @@ class PieceBounds:
         size = np.sqrt(np.sum(self._B * self._B, axis=(0, 1))) + 1e-300
         B, q = self._B / size, self._q / size
         B, q = np.concatenate([B, -B[:, :, self._free]], axis=2), np.concatenate([q, -q[:, self._free]], axis=1)
-        weight, ridge = np.full(3, 1 / 3), np.sqrt(_RIDGE)
-        for _ in range(_WEIGHTS):
+        # squares of multipliers, by the lengths of their rows, keep these bounded
+        weight, ridge = np.full(3, 1 / 3), np.sqrt(1e-12)
+        for _ in range(6):
             root = np.sqrt(weight)[:, None]
             matrix = np.vstack([*(root[:, :, None] * B), ridge * np.eye(B.shape[2])])
             target = np.concatenate([*(root * self._v), -2.0 / ridge * (weight @ q)])
@@ -177,7 +172,7 @@ class PieceBounds:
         return None
 
 
-def exclusion(piece: AlphaPiece, codes: Sequence[int], rows: Sequence[Row]) -> ExcludedOverPiece | None:
+def exclusion(piece: AlphaPiece, codes: Sequence[int], rows: Sequence[Row]) -> Excluded | None:
     """The proof by multipliers of rows that a piece holds no solution; None if none are found."""
     with np.errstate(over="ignore", invalid="ignore"):
         try:
@@ -190,11 +185,11 @@ def exclusion(piece: AlphaPiece, codes: Sequence[int], rows: Sequence[Row]) -> E
     if not piece.margin(codes, rows, (low, high), COUNTED) > 0:
         return None
     used = np.flatnonzero((low != 0) | (high != 0))
-    return ExcludedOverPiece([rows[k] for k in used.tolist()], low[used], high[used])
+    return Excluded([rows[k] for k in used.tolist()], np.stack([low[used], high[used]]))
 
 
 def _columns(system: EnclosedSpace, rows: Sequence[Row]) -> tuple[Floats, Floats, Floats]:
-    """What each row adds to the load but for discs, by these, and it as a row on w, (m, n) each."""
+    """Parts of the load that rows add: but for discs, by these, and the rows on w, (m, n) each."""
     size, units = len(system.g), system.row_unit
     columns, normals = np.zeros((2 * size, len(rows))), np.zeros((size, len(rows)))
     for k, row in enumerate(rows):

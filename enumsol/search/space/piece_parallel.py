@@ -136,7 +136,7 @@ class SpreadPieces(Spread):
 
     @property
     def _state(self) -> tuple[Any, ...]:
-        """What workers are to know of the curves, and changes during a search."""
+        """Facts about the curves that workers are to know, and that change during a search."""
         curves = self._pieces.curves
         return len(curves.known), curves.sampled, curves.sought_enough, curves.more is None
 

@@ -14,8 +14,8 @@ from enumsol.arithmetic.rationals import simplest
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of, width_level
 from enumsol.model.statuses import CONTACT, UNDECIDED
-from enumsol.proof.records import Branching
-from enumsol.proof.space_records import CutPiece, ExcludedOverPiece, OnlyOnCurve
+from enumsol.proof.curve_records import CutPiece, OnCurve
+from enumsol.proof.records import Branching, Excluded
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.outcome import StopReason
 from enumsol.search.space.known_curves import Curves, middle_of
@@ -52,13 +52,8 @@ _ALONE = 2.0**-5
 _CUTS = 2
 #: Longer pieces are cut where statuses occur along one curve over a part of them.
 _SHORT = 2.0**-6
-#: Leaves are tested from this level of their sectors on; where more than two nodes slip, from the second one on.
-_TRIED = 3, 5
 #: Nodes that are examined before others than this process help.
 FIRST = 16
-#: Sectors above this level are halved, rather than alpha, where a leaf is settled in the middle only; by how many
-#: levels fewer sectors are halved than pieces.
-_WIDE, _NARROW = 6, 8
 
 
 @dataclass(frozen=True)
@@ -281,14 +276,15 @@ class PieceTree:
         """True if a leaf is to be tested: where sectors are wide that is of no use."""
         levels = [width_level(code - SECTORS) for code in codes if code > SECTORS]
         final = not {CONTACT, UNDECIDED} & set(codes)
-        return final and (not levels or min(levels) >= _TRIED[len(levels) > 2])
+        # of wide sectors a test is of no use, the more so where more than two nodes slip
+        return final and (not levels or min(levels) >= (5 if len(levels) > 2 else 3))
 
     def _excluded(self, at: ExaminedPiece, codes: Codes, parent: tuple[AlphaPoint, SpaceRelaxation], cuts: int) -> Done:
         """An assignment that one alpha excludes: over all of the piece, if possible, or it is cut or branched."""
         point, relaxation = parent
         rows, values = point.multipliers(relaxation)
         if at.piece.margin(codes, rows, (values, values), COUNTED) > 0:
-            return ExcludedOverPiece(rows, values, values), []
+            return Excluded(rows, np.stack([values, values])), []
         if (without := unbalanced(at.piece, codes)) is not None:
             return without, []
         ends = self._ends(at, codes)
@@ -331,7 +327,8 @@ class PieceTree:
     def _is_wide(self, piece: AlphaPiece, codes: Codes) -> bool:
         """True if a sector is to be halved rather than the piece: those of short pieces may be narrow."""
         share = float((piece.high - piece.low) / (self.interval[1] - self.interval[0]))
-        level = max(_WIDE, -np.log2(share) - _NARROW)
+        # wider sectors are halved rather than alpha; those of short pieces may be narrower, by so many levels less
+        level = max(6, -np.log2(share) - 8)
         return any(code > SECTORS and width_level(code - SECTORS) < min(level, DEEPEST) for code in codes)
 
     def _branched(
@@ -366,7 +363,7 @@ class PieceTree:
         return CutPiece(str(alpha)), [PieceNode(*both, codes, cuts=cuts) for both in pairwise(ends)]
 
     def _beside_ends(self, at: ExaminedPiece, codes: Codes) -> Done | None:
-        """Where curves end, what stays open is cut off from what has to be searched."""
+        """A cut between places where curves end, which stay open, and what has to be searched; or None."""
         low, high = at.piece.low, at.piece.high
         for begin, end in self.curves.ends:
             if begin <= low and high <= end:
@@ -381,7 +378,7 @@ class PieceTree:
         return OpenLeaf(at.piece.low, at.piece.high, codes, forces)
 
     def _certified(self, at: ExaminedPiece, codes: Codes) -> Done | None:
-        """One certificate for all that is below an assignment, or the piece is cut since it is too long for that.
+        """A certificate for all that is below an assignment, or a cut of a piece that is too long for one; or None.
 
         None of a body that nothing holds: the form says nothing about its rigid displacement.
         """
@@ -400,7 +397,7 @@ class PieceTree:
         numbers = at.proposals.numbers(statuses, passage.parts)
         if numbers is not None and piece.lies_on(known, run, statuses, numbers, ERRORS):
             before = sum(len(other.chain.links) for other in self.curves.known[: passage.curve])
-            return OnlyOnCurve(numbers, before + run.first, before + run.last), []
+            return OnCurve(before + run.first, before + run.last, numbers), []
         longer = self._is_longer(piece, _ALONE)
         if longer and at.proposals.is_hopeful(statuses, known.over(run, piece.middle, piece.middle)):
             # a leaf may be decided over a longer piece

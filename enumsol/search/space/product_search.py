@@ -27,12 +27,6 @@ if TYPE_CHECKING:
 
 #: What a writer of proofs asks for (see ``Ellipsoid.of``).
 _ERRORS = 2.0
-#: Size of the ellipsoid that is expected at first, and powers of 1/2 of a sector that are cut off its ends.
-_WIDEST, _SLICES = 1.0, (1, 2, 3)
-#: Log2 of what an ellipsoid has to take off the widths of all sectors, or else one is halved.
-_GAIN = 1.0
-#: The mean curvature of a form is at most so many times the least one.
-_STEEPEST = 1e3
 #: The radius of the ellipsoid that a program is scaled for should be within this of the one that it finds.
 _SCALED, _RESCALINGS = 30.0, 2
 #: Rank of the forms up to which a program is begun: beyond, its preparation alone takes more than a second, in which
@@ -92,7 +86,7 @@ class ProductSearch:
             return None
         last = self.programs + programs
         tree: list[Branched | Missed | Enclosed] = []
-        stack: list[tuple[Codes, Ellipsoid | None, float]] = [(codes, None, _WIDEST)]
+        stack: list[tuple[Codes, Ellipsoid | None, float]] = [(codes, None, 1.0)]
         while stack:
             codes, above, size = stack.pop()
             if above is not None and above.misses(codes):
@@ -140,7 +134,7 @@ class ProductSearch:
         return None
 
     def _narrowed(self, ellipsoid: Ellipsoid, tree: list[Branched | Missed | Enclosed]) -> Codes | None:
-        """What an ellipsoid leaves of an assignment, if that is much less; what it cuts off is put into the tree."""
+        """The rest that an ellipsoid leaves of an assignment, if that is much less; the tree gets the parts cut off."""
         codes, gain, cuts = list(ellipsoid.codes), 0.0, []
         for i, code in enumerate(codes):
             parts: list[int] = []
@@ -153,7 +147,8 @@ class ProductSearch:
                 (rest,) = set(children) - set(parts)
             elif code > SECTORS:
                 for end in (0, 1):
-                    for halvings in _SLICES:
+                    # half of it, a quarter, an eighth
+                    for halvings in (1, 2, 3):
                         part, left = cut(rest - SECTORS, end, halvings)
                         if level_of(left) <= DEEPEST and ellipsoid.node_misses(i, SECTORS + part):
                             parts.append(SECTORS + part)
@@ -162,7 +157,8 @@ class ProductSearch:
             if parts:
                 gain += 2.0 if code == CONTACT else float(np.log2(width_of(code - SECTORS) / width_of(rest - SECTORS)))
                 cuts.append((i, parts, rest))
-        if gain < _GAIN:
+        # an ellipsoid has to take a factor of two off the widths of all sectors, or else one is halved
+        if gain < 1.0:
             return None
         for i, parts, rest in cuts:
             tree.append(Branched(i, (*parts, rest)))
@@ -234,11 +230,12 @@ def _solved(matrices: Floats, kinds: list[int], size: float) -> tuple[Floats, Fl
     reduced = reduced / norm[:, None, None]
     inner, corner = reduced[:, :rank, :rank], np.zeros((rank + 1, rank + 1))
     corner[rank, rank] = 1.0
-    # unknowns: the multipliers, and the minimum; whose signs, mean curvature and cones, and what is to be definite
+    # unknowns: the multipliers, and the minimum; whose signs, mean curvature and cones, and what is to be definite;
+    # the mean curvature is at most a thousand times the least one
     chosen = -np.eye(count, count + 1)
     flat = np.append(np.trace(inner, axis1=1, axis2=2), 0.0)
     blocks = [
-        (np.vstack([chosen[signed], flat]), np.append(np.zeros(len(signed)), _STEEPEST * rank)),
+        (np.vstack([chosen[signed], flat]), np.append(np.zeros(len(signed)), 1e3 * rank)),
         (chosen[triples], np.zeros(len(triples))),
         (-np.column_stack([_packed(reduced).T, _packed(-corner)]), np.zeros(len(_packed(corner)))),
         (-np.column_stack([_packed(inner).T, 0.0 * _packed(np.eye(rank))]), -_packed(np.eye(rank))),

@@ -44,8 +44,6 @@ _DEFINITE, _GOOD, _HOPELESS = 1e-9, 1e-2, -4.0
 _CLEAR = 1e-6
 #: Contact nodes from which better numbers than the plain ones are sought; evaluations for that, in rounds of so many.
 _MANY, _EVALUATIONS, _ROUND = 8, 60, 20
-#: How sharply the smallest eigenvalue counts in each round.
-_HARDNESS = 10.0, 20.0, 40.0
 #: Of the gap of an open node, what may serve for its slip.
 _SHARED = 0.5
 #: Weight of the equations of an assignment, by the largest entry of S.
@@ -138,7 +136,7 @@ class SpaceCloser(TreeCloser):
         return ProductSearch(self._certifier.enclosed)
 
     def _by_products(self, codes: Codes) -> list[Any] | None:
-        """What forms of products leave of an assignment, if that is a few boxes with a solution each."""
+        """Solutions that forms of products leave of an assignment, if these are in a few boxes with one each."""
         tree = None if self._regular else self._products.closed(codes, _PROGRAMS)
         return None if tree is None else self._certifier.fathom(codes, tree)
 
@@ -222,7 +220,7 @@ class Point:
 
     @classmethod
     def of(cls, system: SpaceSystem, problem: Isotropic, y: Floats) -> Point:
-        """Of forces y, (p, 3), which solve the problem up to rounding."""
+        """The solution of forces y, (p, 3), which solve the problem up to rounding."""
         w = problem.displacements(y)
         n, gap, tau, v = np.maximum(y[:, 0], 0.0), np.maximum(-w[:, 0], 0.0), y[:, 1:], w[:, 1:]
         rubs, size, length = np.any(system.tau >= 0, axis=1), np.linalg.norm(v, axis=1), np.linalg.norm(tau, axis=1)
@@ -357,14 +355,9 @@ class DefiniteForm:
         """The smallest eigenvalue of Q relative to S."""
         numbers = self._numbers(logs, shares)
         try:
-            return min(
-                float(
-                    scipy.linalg.eigh(self._matrix(turn, *numbers), self._S, eigvals_only=True, subset_by_index=[0, 0])[
-                        0
-                    ]
-                )
-                for turn in self._turns
-            )
+            forms = (self._matrix(turn, *numbers) for turn in self._turns)
+            first = {"eigvals_only": True, "subset_by_index": [0, 0]}
+            return min(float(scipy.linalg.eigh(form, self._S, **first)[0]) for form in forms)
         except (np.linalg.LinAlgError, ValueError):
             return -np.inf
 
@@ -378,7 +371,8 @@ class DefiniteForm:
         bounds = Bounds(least_x, np.inf)
         # columns in which S is the unit matrix
         columns = np.linalg.inv(np.linalg.cholesky(self._S)).T
-        for hardness in _HARDNESS:
+        # the smallest eigenvalue counts more sharply in each round
+        for hardness in 10.0, 20.0, 40.0:
             if left <= 0 or least > _GOOD:
                 break
             options = {"maxfun": min(_ROUND, left), "maxiter": _ROUND}

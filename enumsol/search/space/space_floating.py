@@ -13,18 +13,11 @@ import numpy as np
 
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.statuses import CONTACT, UNDECIDED
-from enumsol.proof.records import Exclusion, NoRoot, Unbalanced
-from enumsol.proof.space_records import (
-    FLOATING_LEAVES,
-    DeclaredSpaceReference,
-    ExcludedInSpace,
-    OnlySpaceReference,
-)
+from enumsol.proof.records import DeclaredForm, Excluded, NoRoot, OnlyReference, Unbalanced
 from enumsol.relaxation.engine import PRUNE_MARGIN
-from enumsol.search.certifiers.protocol import Bound, Certified, Certifier, Refine, UndecidedPart, Unrecorded
+from enumsol.search.certifiers.protocol import Bound, Certifier, Refine, UndecidedPart, Unrecorded
 from enumsol.search.closing import TreeCloser
-from enumsol.search.floating_solvers import WEAK, FloatingReader, weakly_held
-from enumsol.search.setup import HeldByNothing
+from enumsol.search.floating_solvers import WEAK, weakly_held
 from enumsol.search.space.space_references import reference_numbers, space_closer
 from enumsol.search.space.space_search import SpaceCertifier
 from enumsol.search.space.space_setup import SpaceSolvers
@@ -44,10 +37,8 @@ if TYPE_CHECKING:
     from enumsol.trusted.space.sector_rows import Row
 
 
-class FloatingSpaceSolvers(HeldByNothing, SpaceSolvers):
+class FloatingSpaceSolvers(SpaceSolvers):
     """Solvers and certifier for a body in 3D that nothing holds, at one alpha; parameters as of SpaceSolvers."""
-
-    offered = '"verified"'
 
     @cached_property
     def relaxed(self) -> SpaceSystem:
@@ -72,11 +63,6 @@ class FloatingSpaceSolvers(HeldByNothing, SpaceSolvers):
     def _closer(self, certifier: Certifier) -> TreeCloser | None:
         return None if self.exclusions is None else space_closer(certifier, self._engine, lambda: self.known_root)
 
-    def reader(self) -> FloatingReader:
-        """Understands the records of an earlier proof."""
-        modes = self.problem.modes.r
-        return FloatingReader(super().reader(), FLOATING_LEAVES, modes)
-
 
 class SpaceExclusions:
     """What excludes assignments of a body that nothing holds, if possible without a bound of the rigid displacement.
@@ -95,7 +81,7 @@ class SpaceExclusions:
         self.system, self.free = enclosed, unbounded(enclosed)
         self._references: dict[Codes, SpaceReference | None] = {}
         #: How the forms of roots are declared, but for enclosures, by their leaves.
-        self.numbers: dict[Codes, tuple[Floats, float, float]] = {}
+        self.numbers: dict[Codes, tuple[Floats, Floats]] = {}
 
     def reference(self, system: SpaceSystem, leaf: Codes) -> SpaceReference | None:
         """The form of the root of a leaf, if one is proven definite."""
@@ -103,30 +89,30 @@ class SpaceExclusions:
             self._references[leaf], root = None, settle(self.system, leaf)
             with np.errstate(all="ignore"):
                 tried = reference_numbers(system, self.system, root, leaf) if isinstance(root, SpaceRoot) else ()
-                for numbers in tried:
-                    found = SpaceReference.of(self.system, leaf, *numbers)
+                for numbers, *more in tried:
+                    found = SpaceReference.of(self.system, leaf, numbers, *more)
                     if found is not None:
-                        self.numbers[leaf], self._references[leaf] = numbers, found
+                        self.numbers[leaf], self._references[leaf] = (numbers, np.array(more)), found
                         break
         return self._references[leaf]
 
     def record(
         self, codes: Codes, rows: Sequence[Row], values: Floats, *, within: bool
-    ) -> tuple[Exclusion | NoRoot, bool] | None:
+    ) -> tuple[Excluded | Unbalanced | NoRoot, bool] | None:
         """A record that excludes a partial assignment, and whether it needs the bound; or None.
 
         ``within``: the bound is known to be needed. Otherwise it is used only where all statuses are determined
         (theory, section 14.4).
         """
         if len(rows) and floating_margin(self.free, codes, rows, values, errors=2.0) > 0:
-            return ExcludedInSpace(list(rows), values), False
+            return Excluded(list(rows), values), False
         if (unbalanced := self.unbalanced(codes)) is not None:
             return unbalanced, False
         told = not any(code in (UNDECIDED, CONTACT) for code in codes)
         if (within or told) and len(rows) and floating_margin(self.system, codes, rows, values, errors=2.0) > 0:
             if told and settle(self.free, codes) is None:
                 return NoRoot(), False
-            return ExcludedInSpace(list(rows), values), True
+            return Excluded(list(rows), values), True
         return None
 
     def unbalanced(self, codes: Codes) -> Unbalanced | None:
@@ -150,8 +136,6 @@ class FloatingSpaceCertifier(SpaceCertifier):
     ) -> None:
         super().__init__(engine, enclosed, recorder)
         self._exclusions = exclusions
-        #: The root that was declared last.
-        self._declared: SpaceReference | None = None
 
     def reference(self, leaf: Codes) -> SpaceReference | None:
         """The form of the root of a leaf, if one is proven definite."""
@@ -166,32 +150,19 @@ class FloatingSpaceCertifier(SpaceCertifier):
             if not reference.is_only_root(codes, *proposal, exclusions.system.reach):
                 return None
             self.bounded = True
-        if self._declared is not reference:
-            self._declared = reference
+        if leaf not in self._declared:
             self.bounded |= not isinstance(settle(exclusions.free, leaf), SpaceRoot)
-            enclosure = self._ball(reference.root)
-            self.recorder.write(DeclaredSpaceReference(leaf, *exclusions.numbers[leaf], enclosure).write())
             found = [self._placed(leaf, reference.root)]
             self._verified[leaf] = found[0]
-        self._leaf(OnlySpaceReference(*proposal))
+        declared = DeclaredForm(leaf, *exclusions.numbers[leaf], self._ball(reference.root))
+        self._leaf(OnlyReference(self._back(leaf, lambda: declared), *proposal))
         return found
-
-    def add(self, part: Certified) -> None:
-        """Take over what the certifier of a subtree has proven, which may have declared a root."""
-        super().add(part)
-        self._declared = None
-
-    def forget(self) -> None:
-        """Forget what was proven, and what was declared."""
-        super().forget()
-        self._declared = None
 
     def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """True if the relaxation's multipliers, or balance alone, are proven to exclude the partial assignment."""
         if self._exclusions is None or not relaxation.bound > PRUNE_MARGIN:
             return False
-        numbers, values = relaxation.multipliers()
-        rows = [self._engine.rows[number] for number in numbers.tolist()]
+        rows, values = self._multipliers(relaxation)
         found = self._exclusions.record(codes, rows, values, within=self.bounded)
         if found is None:
             return False

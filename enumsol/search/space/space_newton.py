@@ -43,7 +43,7 @@ class Isotropic:
 
     @classmethod
     def of(cls, system: SpaceSystem) -> Isotropic:
-        """Of a scaled system."""
+        """The problem of a scaled system."""
         p, tau = system.p, system.tau
         places = np.column_stack([np.arange(p), tau]).ravel()
         occurs = places >= 0

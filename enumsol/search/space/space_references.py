@@ -27,24 +27,16 @@ if TYPE_CHECKING:
     from enumsol.trusted.space.sector_rows import Row
     from enumsol.trusted.space.space_reference import SpaceProduct, SpaceReference
 
-#: Weights of |G d|^2 that are tried, by the largest entry of S.
-_BALANCE = 1.0, 1024.0
-#: Smallest eigenvalue relative to S from which a form counts as definite; the share of a gap that serves for a slip.
-_DEFINITE, _SHARED = 1e-9, 0.5
 #: Eigenvalues of the small matrix, relative to its largest one, that count as none; what of rows counts as none.
 _NONE, _NOTHING = 1e-9, 1e-8
 #: Factors of products that are tried, relative to the compliance.
 _FACTORS = np.geomspace(2.0**-8, 2.0**8, 9)
-#: Assignments that are tried in vain for one more that passes before the next try, and how many pass at most.
-_PATIENCE, _LONGEST = 16, 7
-#: Of rows of size one, what keeps their squares regular.
-_LITTLE = 1e-3
 #: Contact nodes from which a root is sought before the tree; of fewer, assignments that are met before that.
 _MANY, _EASY = 8, 32
 
 
 def space_closer(certifier: Any, engine: SpaceEngine, root: Callable[[], Codes | None]) -> ReferenceCloser:
-    """What ends the tree where only a root is left, unless not even its own statuses leave it alone.
+    """A closer that ends the tree where only a root is left; none if not even its own statuses leave it alone.
 
     Parameters
     ----------
@@ -61,7 +53,8 @@ def space_closer(certifier: Any, engine: SpaceEngine, root: Callable[[], Codes |
         return True
 
     def pause(vain: int) -> int:
-        return min(vain // _PATIENCE, _LONGEST)
+        # one more assignment passes for so many tries in vain, and no more than so many
+        return min(vain // 16, 7)
 
     easy = 0 if engine.system.p >= _MANY else _EASY
     return ReferenceCloser(certifier, root, proposed, worth=worth, pause=pause, easy=easy)
@@ -71,7 +64,8 @@ def _far_apart(reference: SpaceReference) -> list[int]:
     """Contact nodes, one more than it takes to hold the body against the foundation, far from each other."""
     normals = reference.system.rows.G.mid[:, : len(reference.leaf)].T
     pressed, found = [i for i, code in enumerate(reference.leaf) if code != OPEN], list[int]()
-    M = _LITTLE * np.eye(normals.shape[1])
+    # their squares would be singular otherwise
+    M = 1e-3 * np.eye(normals.shape[1])
     for _ in range(min(int(np.linalg.matrix_rank(normals[pressed])) + 1, len(pressed))):
         left = [i for i in pressed if i not in found]
         gain = np.einsum("ij,ij->i", normals[left], np.linalg.solve(M, normals[left].T).T)
@@ -150,19 +144,20 @@ def reference_numbers(
     y, w, code = root.y.mid, root.w.mid, np.array(leaf)
     force, slip = (np.where(tau >= 0, part, 0.0) for part in (y[tau] * unit[tau], w[tau] / unit[tau]))
     apart, size = code == OPEN, np.linalg.norm(slip, axis=1)
-    # of open nodes as much of the slip as their gap does not serve for
-    need = np.maximum(1.0 + _SHARED * w[:p] / np.where(size > 0, size, np.inf), 0.0)
+    # of open nodes as much of the slip as half of their gap does not serve for
+    need = np.maximum(1.0 + 0.5 * w[:p] / np.where(size > 0, size, np.inf), 0.0)
     length = np.where(code == STICK, y[:p], np.linalg.norm(force, axis=1))
     divisor = np.where(length > 0, length, np.inf)
     theta = np.where(
         apart[:, None], slip * (need / np.where(size > 0, size, np.inf))[:, None], force / divisor[:, None]
     )
     scale, found = float(np.max(np.abs(enclosed.S))), None
-    for balance in (scale * factor for factor in _BALANCE):
+    # weights of |G d|^2
+    for balance in (scale, 1024.0 * scale):
         held = np.sqrt(balance) * enclosed.rows.G.mid
         form = DefiniteForm(replace(system, S=enclosed.S, g=enclosed.g), [theta], apart, np.zeros(p), held=held)
         for better in (False, True):
-            found = form.best(_DEFINITE, better=better)
+            found = form.best(1e-9, better=better)
             if found is not None:
                 mu, kappa, nu = found
                 numbers = np.concatenate([mu, kappa, np.zeros(p), nu[tau >= 0], theta[tau >= 0]])

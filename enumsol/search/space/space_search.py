@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,15 +21,21 @@ from enumsol.model.sectors import (
     span,
 )
 from enumsol.model.statuses import CONTACT, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
-from enumsol.proof import space_records
-from enumsol.proof.records import EnclosureRecord, Limits, NoRoot, RegularRoot, UndecidedRecord
+from enumsol.proof.records import (
+    Alone,
+    BoxedRoot,
+    DeclaredForm,
+    EnclosureRecord,
+    Excluded,
+    NoRoot,
+    RegularRoot,
+    UndecidedRecord,
+)
 from enumsol.relaxation.engine import PRUNE_MARGIN, Relaxation
 from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
 from enumsol.search.certifiers.protocol import (
     WIDEN,
     Bound,
-    Certified,
-    RecordedBound,
     RecordingCertifier,
     Refine,
     UndecidedPart,
@@ -40,8 +46,7 @@ from enumsol.search.space.open_leaves import Cause, obstacle, sector_to_halve
 from enumsol.search.space.product_search import Branched, Enclosed, Missed
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
 from enumsol.trusted.space.product_forms import Ellipsoid, refines
-from enumsol.trusted.space.sector_rows import is_sector_covering, sector_margin, sector_row_terms
-from enumsol.trusted.space.slip_forms import SlipForm
+from enumsol.trusted.space.sector_rows import is_sector_covering, sector_margin
 from enumsol.trusted.space.space_uniqueness import OnlySolution, lone_root, only_root, only_solution_in_space
 from enumsol.trusted.space.turning import turned_by
 
@@ -50,9 +55,9 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.space_condensed import EnclosedSpace
     from enumsol.proof.writer import Recorder
-    from enumsol.search.fathoming_in_contact import LoneProposal
     from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.space.boxed_solution import BoxedSolution
+    from enumsol.trusted.space.sector_rows import Row
     from enumsol.trusted.space.space_uniqueness import LooseSolution
 
 
@@ -118,71 +123,6 @@ class SpaceSplitting:
         return CONTACT if code > SECTORS or code in (STICK, SLIP_PLUS, SLIP_MINUS) else UNDECIDED
 
 
-class SpaceReader:
-    """Understands the records of a proof in 3D (see ``search.resume``).
-
-    Parameters
-    ----------
-    engine : SpaceEngine
-    enclosed : EnclosedSpace
-        Balls for its system, by which forms are proven.
-    """
-
-    kinds = space_records.LEAVES
-
-    def __init__(self, engine: SpaceEngine, enclosed: EnclosedSpace) -> None:
-        self._engine, self._enclosed = engine, enclosed
-        #: The form that was declared last, and the ellipsoid of the last form of products.
-        self._form: SlipForm | None = None
-        self._ellipsoid: Ellipsoid | None = None
-
-    def declare(self, record: list[Any]) -> None:
-        """Take note of a form; ValueError where the record makes no sense."""
-        system = self._engine.system
-        limits = Limits((UNDECIDED,) * system.p, components=len(system.g))
-        if len(record) in space_records.DeclaredProductForm.sizes:
-            said = space_records.DeclaredProductForm.read(record, limits)
-            self._ellipsoid = Ellipsoid.of(self._enclosed, said.codes, said.centre / system.unit, said.numbers)
-            return
-        numbers = space_records.DeclaredSlipForm.read(record, limits).numbers
-        # parts of one search declare the same form
-        if self._form is None or not np.array_equal(self._form.numbers, numbers):
-            self._form = SlipForm.of(self._enclosed, numbers)
-
-    def form_over(self, codes: Codes) -> SlipForm | None:
-        """The form that was declared last, which holds over all partial assignments."""
-        del codes
-        return self._form
-
-    def lone(self, codes: Codes, record: list[Any]) -> tuple[LoneProposal, Bound]:
-        """No root is proven to be alone so in 3D."""
-        del codes, record
-        raise ValueError("a lone root in a proof in 3D")
-
-    def bound(self, codes: Codes, record: list[Any]) -> Bound:
-        """What is said to exclude a partial assignment; ValueError where the record makes no sense."""
-        engine, p = self._engine, len(codes)
-        if record[0] == space_records.MissedByProducts.kind:
-            space_records.MissedByProducts.read(record, Limits(codes))
-            if self._ellipsoid is None:
-                raise ValueError("there is no ellipsoid")
-            return RecordedBound(np.zeros(0, dtype=np.intp), np.zeros(0), self._ellipsoid)
-        by_form = record[0] == space_records.ExcludedBySlipForm.kind
-        if by_form and self._form is None:
-            raise ValueError("its form was not declared")
-        said = (space_records.ExcludedBySlipForm if by_form else space_records.ExcludedInSpace).read(
-            record, Limits(codes)
-        )
-        rows = said.rows
-        for row in rows:
-            sector_row_terms(row, engine.system.tau, len(engine.system.g))  # there is such a row
-        slots = [engine.slot(row) for row in rows]
-        numbers = [slot * p + row[1] for slot, row in zip(slots, rows, strict=True) if slot is not None]
-        if len(numbers) < len(rows):
-            raise ValueError("no room for its rows")
-        return RecordedBound(np.array(numbers, dtype=np.intp), said.values, self._form if by_form else None)
-
-
 def _towards(code: int, vector: np.ndarray) -> float:
     """How much a vector points into the middle of a sector."""
     number = code - SECTORS
@@ -205,9 +145,6 @@ class SpaceCertifier(RecordingCertifier):
         super().__init__(recorder)
         self._engine, self.enclosed = engine, enclosed
         self._boxes = KnownBoxes(engine.system, enclosed)
-        #: The form that was written last, and the ellipsoid of the last form of products.
-        self._form: SlipForm | None = None
-        self._ellipsoid: Ellipsoid | None = None
 
     def excluded(self, codes: Codes, relaxation: Bound) -> bool:
         """True if the relaxation's multipliers are proven to exclude the partial assignment."""
@@ -215,26 +152,24 @@ class SpaceCertifier(RecordingCertifier):
             return False
         if isinstance(relaxation.form, Ellipsoid):
             return self._missed(codes, relaxation.form)
-        numbers, values = relaxation.multipliers()
-        rows = [self._engine.rows[number] for number in numbers.tolist()]
+        rows, values = self._multipliers(relaxation)
         form = relaxation.form
         if not sector_margin(self.enclosed, codes, rows, values, 2.0, form) > 0:
             return False
-        if form is not None and form is not self._form:
-            self._form = form
-            self.recorder.write(space_records.DeclaredSlipForm(form.numbers).write())
-        self._leaf((space_records.ExcludedInSpace if form is None else space_records.ExcludedBySlipForm)(rows, values))
+        by = None if form is None else self._back(form, lambda: DeclaredForm(self._whole, form.numbers, np.zeros(0)))
+        self._leaf(Excluded(rows, values, by))
         return True
 
-    def add(self, part: Certified) -> None:
-        """Take over what the certifier of a subtree has proven, which may have declared another form."""
-        super().add(part)
-        self._form = self._ellipsoid = None
+    def _multipliers(self, bound: Bound) -> tuple[list[Row], Floats]:
+        """Rows, which the engine numbers, and their multipliers."""
+        numbers, values = bound.multipliers()
+        if isinstance(numbers, list):
+            return numbers, values
+        return [self._engine.rows[number] for number in numbers.tolist()], values
 
-    def forget(self) -> None:
-        """Forget what was proven, and what was declared."""
-        super().forget()
-        self._form = self._ellipsoid = None
+    @property
+    def _whole(self) -> Codes:
+        return (UNDECIDED,) * self._engine.system.p
 
     def selection(self, codes: Codes) -> SpaceRoot | BoxedSolution | UndecidedPart | Refine | None:
         """The root of a leaf, a sector to halve, or why the leaf stays open."""
@@ -244,7 +179,7 @@ class SpaceCertifier(RecordingCertifier):
         elif isinstance(answer, Open):
             node = sector_to_halve(answer)
             if (boxed := self._boxed(answer, halved=node is not None)) is not None:
-                return self._in_box(codes, boxed, space_records.BoxedRoot)
+                return self._in_box(codes, boxed)
             if node is not None and level_of(codes[node] - SECTORS) < DEEPEST:
                 return Refine(node)
             cause, mode = obstacle(answer)
@@ -257,27 +192,24 @@ class SpaceCertifier(RecordingCertifier):
             answer = self._verified[codes] = self._placed(codes, answer)
         return answer
 
-    def _in_box(self, codes: Codes, found: BoxedSolution, kind: type[space_records.BoxedRoot]) -> BoxedSolution:
+    def _in_box(self, codes: Codes, found: BoxedSolution, by: int | None = None) -> BoxedSolution:
         """The solution of a box, and its leaf written."""
         self._verified[codes], unit = found, self.enclosed.unit
         centre, radius, rho = found.box.numbers
-        self._leaf(kind(centre * unit, radius * unit, rho * unit**2, self._ball(found, wider=_WIDER)))
+        self._leaf(BoxedRoot(centre * unit, radius * unit, rho * unit**2, self._ball(found, wider=_WIDER), by))
         return found
 
     def _missed(self, codes: Codes, ellipsoid: Ellipsoid) -> bool:
         """True if an ellipsoid leaves no solution of an assignment, which is then written."""
         if not refines(codes, ellipsoid.codes) or not ellipsoid.misses(codes):
             return False
-        self._declare(ellipsoid)
-        self._leaf(space_records.MissedByProducts())
+        self._leaf(Excluded([], np.zeros(0), self._about(ellipsoid)))
         return True
 
-    def _declare(self, ellipsoid: Ellipsoid) -> None:
-        """Write a form of products, unless it is the last one."""
-        if ellipsoid is not self._ellipsoid:
-            self._ellipsoid = ellipsoid
-            centre = ellipsoid.frame.centre * self.enclosed.unit
-            self.recorder.write(space_records.DeclaredProductForm(ellipsoid.codes, centre, ellipsoid.numbers).write())
+    def _about(self, ellipsoid: Ellipsoid) -> int:
+        """How many forms ago that of an ellipsoid was declared."""
+        centre = ellipsoid.frame.centre * self.enclosed.unit
+        return self._back(ellipsoid, lambda: DeclaredForm(ellipsoid.codes, ellipsoid.numbers, centre))
 
     def fathom(self, codes: Codes, tree: Sequence[Branched | Missed | Enclosed]) -> list[BoxedSolution]:
         """The solutions of boxes in a tree below an assignment that is proven already, which is written.
@@ -296,11 +228,11 @@ class SpaceCertifier(RecordingCertifier):
                 after = codes[node.node + 1 :]
                 stack += [(*codes[: node.node], child, *after) for child in reversed(node.children)]
                 continue
-            self._declare(node.ellipsoid)
+            by = self._about(node.ellipsoid)
             if isinstance(node, Enclosed):
-                found.append(self._in_box(codes, node.found, space_records.EnclosedByProducts))
+                found.append(self._in_box(codes, node.found, by))
             else:
-                self._leaf(space_records.MissedByProducts())
+                self._leaf(Excluded([], np.zeros(0), by))
         return found
 
     def _boxed(self, leaf: Open, *, halved: bool) -> BoxedSolution | None:
@@ -340,8 +272,7 @@ class SpaceCertifier(RecordingCertifier):
         if found is None or not np.max(found.y.rad) <= _PLACED * np.max(np.abs(found.y.mid), initial=_SMALL_FORCE):
             return None
         self._verified[codes or (UNDECIDED,) * len(normal)] = found
-        ball = self._ball(found)
-        self._leaf(space_records.OnlyRoot(numbers, codes or (), ball.mid, ball))
+        self._leaf(Alone(codes or (), numbers, self._ball(found)))
         return [found]
 
     def alone(self, codes: Codes, numbers: Floats, leaf: Codes) -> list[SpaceRoot] | None:
@@ -356,8 +287,7 @@ class SpaceCertifier(RecordingCertifier):
         found = lone_root(self.enclosed, codes, numbers, leaf, errors=2.0)
         if found is None:
             return None
-        ball = self._ball(found)
-        self._leaf(space_records.OnlyRoot(numbers, leaf, ball.mid, ball))
+        self._leaf(Alone(leaf, numbers, self._ball(found)))
         found = self._verified[leaf] = self._placed(leaf, found)
         return [found]
 

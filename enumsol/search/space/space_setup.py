@@ -5,32 +5,33 @@ from __future__ import annotations
 import copy
 from fractions import Fraction
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from enumsol.condensation.enclosure import NotEnclosedError, enclosure_of
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
-from enumsol.proof.writer import Recorder, point_header, unit_exponents
-from enumsol.relaxation.space_convex_forms import SpaceFormAscent
+from enumsol.model.statuses import UNDECIDED
+from enumsol.proof.declared_forms import space_form
+from enumsol.proof.records import Limits, Tree
+from enumsol.proof.writer import Recorder
+from enumsol.relaxation.convex_forms import SlipFormAscent
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.certifiers.protocol import Certifier, Unrecorded
 from enumsol.search.closing import TreeCloser
 from enumsol.search.form_policy import Forms
+from enumsol.search.resume import Reader
 from enumsol.search.setup import SearchSetup
 from enumsol.search.space.space_fathoming import SpaceCloser, SpaceClosing, solved
-from enumsol.search.space.space_search import SpaceCertifier, SpaceReader, SpaceSplitting
+from enumsol.search.space.space_search import SpaceCertifier, SpaceSplitting
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.search.resume import Reader
     from enumsol.support.array_types import Alpha, Codes, Floats
     from enumsol.trusted.space.slip_forms import SlipForm
 
-#: Level of the sectors in which a root that floats suggest is sought: they are three degrees wide.
-_WIDE = 7
 #: Nodes examined with the energy before a form that knows where the body slides is tried (theory, section 12.2).
 NODES = 256
 #: It is used where it leaves no more than this share of the gap to the pruning bound at the root of the tree.
@@ -52,21 +53,18 @@ class SpaceSolvers(SearchSetup):
         Of ``problem.friction_at`` and of the condensation.
     """
 
+    _offered, _kind = '"verified"', {"kind": "space"}
+
     def __init__(self, problem: ContactProblem3D, alpha: Alpha, arithmetic: str) -> None:
-        self.problem, self.alpha, self.arithmetic = problem, alpha, arithmetic
+        super().__init__(problem, alpha, arithmetic)
         friction = problem.friction_at(alpha)  # refuses what cannot be enumerated before anything is computed
         condensed = problem.on_springs.condensed
-        self.system = SpaceSystem.scaled(condensed.S, condensed.free_displacements(alpha), friction)
+        self.system = self.scaled = SpaceSystem.scaled(condensed.S, condensed.free_displacements(alpha), friction)
 
     @cached_property
     def _engine(self) -> SpaceEngine:
         """Its rows are numbered in the order in which certifier, splitting and relaxations ask for them."""
         return SpaceEngine(self.relaxed)
-
-    @property
-    def relaxed(self) -> SpaceSystem:
-        """System that the relaxations are about."""
-        return self.system
 
     @cached_property
     def _enclosed(self) -> tuple[EnclosedSpace, str | None]:
@@ -104,7 +102,8 @@ class SpaceSolvers(SearchSetup):
         with np.errstate(all="ignore"):
             found = solved(system, near)
         # a body on springs has slightly different directions
-        return None if found is None else ([found[0].leaf(_WIDE), found[0].codes], found[1])
+        # from sectors of three degrees on
+        return None if found is None else ([found[0].leaf(7), found[0].codes], found[1])
 
     def _splitting(self, certifier: Certifier) -> SpaceSplitting:
         return SpaceSplitting(self._engine)
@@ -112,6 +111,7 @@ class SpaceSolvers(SearchSetup):
     def _closer(self, certifier: Certifier) -> TreeCloser | None:
         return SpaceCloser(self.system, cast("SpaceClosing", certifier), regular=self.arithmetic == "fast")
 
+    @property
     def _forms(self) -> Forms | None:
         """Forms with which a long search may bound in place of the energy."""
         return Forms(self._better, SpaceEngine.bounding, NODES)
@@ -121,7 +121,7 @@ class SpaceSolvers(SearchSetup):
         plain = engine.root(*rows)
         if plain.stalled or plain.pruned:
             return None
-        found = SpaceFormAscent(engine, self.enclosed).ascended(rows)
+        found = SlipFormAscent(engine, self.enclosed, rows).ascended()
         return None if found is None or not found[1].bound > _SHARE * plain.bound else found[0]
 
     def remake(self) -> Callable[[], SpaceSolvers]:
@@ -134,21 +134,9 @@ class SpaceSolvers(SearchSetup):
         other.__dict__.pop("_engine", None)
         return other
 
-    def unloaded(self) -> bool:
-        """True if g = 0 for the data as given, so that only lambda = 0 solves."""
-        return bool(self.problem.is_unloaded(self.alpha))
-
     def reader(self) -> Reader:
         """Understands the records of an earlier proof."""
-        return SpaceReader(self._engine, self.enclosed)
-
-    def proof_header(self) -> dict[str, Any]:
-        """First record of a proof (see enumsol.proof.proof_file).
-
-        Raises
-        ------
-        InvalidArgumentError
-            alpha is a fraction of more digits than a proof may hold.
-        """
-        units = unit_exponents(self.system.force, self.system.length)
-        return point_header(self.problem, self.alpha, "problem", units, kind="space")
+        system, tree = self.system, Tree.SPACE if self.problem.held else Tree.FLOATING_SPACE
+        codes, modes = (UNDECIDED,) * system.p, self.problem.modes.r
+        limits = Limits(codes, tree, components=len(system.g), modes=modes)
+        return Reader(limits, partial(space_form, self.enclosed))

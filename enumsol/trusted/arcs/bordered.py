@@ -89,7 +89,7 @@ class BorderedLines(AlphaFunctions):
         return value[k, 0], slope[k, 0]
 
     def _parts(self, a: arb, X: arb_mat, X1: arb_mat) -> tuple[Any, Any, Any]:
-        """Of c + C y and of C v, mu and rho, their values and slopes, from those of both columns."""
+        """Values and slopes of c + C y, of C v, and of mu and rho, from those of both columns."""
         C, last = self.C[0] + self.C[1] * a, X.nrows() - 1
         (v, y), (v1, y1) = ([column([part[i, j] for i in range(last + 1)]) for j in (0, 1)] for part in (X, X1))
         return (

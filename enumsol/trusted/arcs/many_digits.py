@@ -112,15 +112,12 @@ _SOLUTION_BITS = 208
 _STEPS, _LEAST_GAIN = 40, 4
 #: Rows of A that are multiplied together.
 _ROWS = 128
-#: Bits of a residual that floats are given.
-_FLOAT_BITS = 60
-#: Most products of an entry of A with one of a solution in a step: some ten seconds for all steps.
-_MOST_PRODUCTS = 2**24
 
 
 def affordable(problem: ContactProblem) -> bool:
-    """Whether a problem is small enough for balls of many digits: by the entries of A and the number of rows."""
-    return bool(problem.A.nnz * (problem.contact_rows.shape[0] + 2) <= _MOST_PRODUCTS)
+    """True if a problem is small enough for balls of many digits: by the entries of A and the number of rows."""
+    # most products of an entry of A with one of a solution in a step: some ten seconds for all steps
+    return bool(problem.A.nnz * (problem.contact_rows.shape[0] + 2) <= 2**24)
 
 
 def refined_table(problem: ContactProblem) -> list[list[Any]] | None:
@@ -222,7 +219,8 @@ def _refined(
             break
         before = largest
         tell("bits of A^-1 B'", max(-largest, 0), _RESIDUAL_BITS)
-        drop = np.maximum(sizes - _FLOAT_BITS, 0)
+        # bits of a residual that floats are given
+        drop = np.maximum(sizes - 60, 0)
         floats = (E >> drop.astype(object)).astype(float)
         step = np.asarray(problem.factorization.solve(floats / scale[:, None], refined=False) / scale[:, None])
         if not np.all(np.isfinite(step)):

@@ -30,7 +30,7 @@ _HALVINGS, _TOGETHER = 8, 8
 
 
 def only_roots(asked: Sequence[Span], numbers: PieceNumbers, errors: float = 1.0, margin: float = 0.0) -> list[bool]:
-    """Of every selection whether there is no other solution at any alpha at which it has a root.
+    """List of whether, for every selection, there is no other solution at any alpha at which it has a root.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ class _Along:
         self.hopeless = False
 
     def alone(self, margin: float) -> bool:
-        """Whether the form is definite at every alpha, with theta that serves the solution there."""
+        """True if the form is definite at every alpha, with theta that serves the solution there."""
         numbers, p = self._numbers, self._system.p
         if not self.sign:
             return False
@@ -199,7 +199,7 @@ def _values(coefficients: Floats, tau: float) -> Floats:
 
 
 def _longer(polynomials: Ball) -> Ball:
-    """The same with one coefficient more."""
+    """Polynomials with one coefficient more."""
     return Ball.beside(polynomials, Ball.exact(np.zeros((len(polynomials.mid), 1))))
 
 

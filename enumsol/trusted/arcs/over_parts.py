@@ -37,7 +37,7 @@ _APART, _MARGIN, _WIDENINGS, _STEPS = 1e-5, 4.0, 60, 4
 
 @dataclass(frozen=True)
 class OverInterval:
-    """What is known of a selection over an interval of alpha.
+    """Knowledge of a selection over an interval of alpha.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class OverInterval:
 
     @property
     def holds(self) -> bool:
-        """Whether the selection has exactly one root at every alpha, with all conditions strict."""
+        """True if the selection has exactly one root at every alpha, with all conditions strict."""
         return self.regular and bool(np.all(self.conditions > 0))
 
     @property
@@ -121,11 +121,11 @@ class Expansion:
 
     @property
     def rough(self) -> bool:
-        """Whether the series was truncated too early for bounds near those of rounding: the interval is long."""
+        """True if the series was truncated too early for bounds near those of rounding: the interval is long."""
         return self.series.truncated and bool(np.median(self.series.error / (self._size + TINY)) > _ROUGH)
 
     def over(self, low: float, high: float) -> OverInterval:
-        """What is known over a part of the interval."""
+        """Knowledge of a part of the interval."""
         return over_parts([(self, low, high)])[0]
 
     def zeros(self, condition: int) -> list[float]:
@@ -144,7 +144,7 @@ class Expansion:
         return [alpha for alpha in found if self.low < alpha < self.high]
 
     def flat(self, condition: int) -> bool:
-        """Whether a condition is nowhere larger than the bound of its error allows to tell."""
+        """True if a condition is nowhere larger than the bound of its error allows to tell."""
         return bool(self._size[condition] <= _FLAT * self.rounded[condition])
 
     def zero_bounds(self, condition: int, slope: int, low: float, high: float) -> tuple[float, float]:
@@ -171,7 +171,7 @@ class Expansion:
         """Cuts are made around zeros; see ``taylor.ShortExpansion``."""
 
     def near(self, condition: int, low: float, high: float) -> tuple[float, float]:
-        """What should be bounds of the only zero of a condition in a part; no claim rests on them."""
+        """Presumed bounds of the only zero of a condition in a part; no claim rests on them."""
         value, slope = self.series.coefficients[condition].tolist(), self.slope[condition].tolist()
         first, last = self.tau(low, high)
         tau, rise = 0.5 * (first + last), 0.0
@@ -191,7 +191,7 @@ class Expansion:
         return _horner(self.slope[condition].tolist(), tau) / t / self.series.radius if t else np.inf
 
     def slack(self) -> float:
-        """How much tau of an alpha may be off."""
+        """Bound of the error of tau of an alpha."""
         return 8.0 * UNIT * (1.0 + max(abs(self.low), abs(self.high)) / self.series.radius)
 
     def tau(self, low: float, high: float) -> tuple[float, float]:
@@ -239,7 +239,7 @@ def expansions(
 
 
 def over_parts(asked: Sequence[tuple[Expansion | Nowhere, float, float]]) -> list[OverInterval]:
-    """What is known of expansions over parts of their intervals."""
+    """Knowledge of expansions over parts of their intervals."""
     found = [one.known if isinstance(one, Nowhere) else None for one, _, _ in asked]
     groups: dict[int, list[tuple[int, tuple[Expansion, float, float]]]] = {}
     for k, (one, *part) in enumerate(asked):

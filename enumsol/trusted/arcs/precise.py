@@ -43,9 +43,6 @@ if TYPE_CHECKING:
     Signs = NDArray[np.int8]
     Number = float | Fraction
 
-#: Where a matrix changes by no more than this over an interval, no zero of its determinant is near.
-_LITTLE = 2.0**-4
-
 
 @dataclass(frozen=True, eq=False)
 class PreciseSystem:
@@ -122,7 +119,7 @@ class PreciseSystem:
 
 
 class PreciseSelection(AlphaFunctions):
-    """One selection as a function of alpha.
+    """A selection as a function of alpha, in balls of many digits.
 
     Parameters
     ----------
@@ -212,7 +209,8 @@ class PreciseSelection(AlphaFunctions):
                 near = constant + slope * middle
                 return self._short((first, last), values, slope * radius, self._constant_index, near)
             found = self._expansion(first, last, middle, radius)
-            if found is not None and found.shift <= _LITTLE:
+            # where a matrix changes by no more than this over an interval, no zero of its determinant is near
+            if found is not None and found.shift <= 2.0**-4:
                 return found
             # a zero of det M is near, or lies between them
             off = middle + radius / 16 if found is None else middle

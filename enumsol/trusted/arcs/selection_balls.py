@@ -16,9 +16,6 @@ from enumsol.trusted.confinement import motion_against
 from enumsol.trusted.floating_bounds import is_unbalanced
 from enumsol.trusted.selection import Selection
 
-#: Smallest quotient of units, far above underflow.
-_LEAST_PAIR = 2.0**-1000
-
 
 @dataclass(frozen=True)
 class ArcSystem:
@@ -66,7 +63,8 @@ class ArcSystem:
     @classmethod
     def _of(cls, enclosure: CondensedEnclosure, force: Floats, length: Floats, side: float) -> ArcSystem:
         pair = force[:, None] / length[None, :]
-        if not np.all(pair >= _LEAST_PAIR):
+        # smallest quotient of units, far above underflow
+        if not np.all(pair >= 2.0**-1000):
             raise NotEnclosedError("the units of the arcs underflow float64; expected data in other units")
         F0, F1 = (np.asarray(part, dtype=np.float64) for part in enclosure.problem.affine_friction)
 
@@ -87,7 +85,7 @@ class ArcSystem:
 
 
 class ArcSelection:
-    """One selection as a function of alpha.
+    """A selection as a function of alpha, in balls of double arithmetic.
 
     Parameters
     ----------

@@ -35,10 +35,6 @@ _SHARE = 1e-3
 #: Sizes are rounded up to multiples of this one; most entries of a stack.
 _STEP, _MOST_ENTRIES = 4, 2**20
 
-#: Where a constant M is so far from singular, t = 1 is as good as any other last row: search and checker, which may
-#: choose differently close to this, both find good series there.
-_PLAINLY = 2.0**-10
-
 
 @dataclass(frozen=True)
 class Series:
@@ -188,7 +184,7 @@ class _Stack:
         ]
 
     def _one(self, b: int, sums: Floats, values: Floats, slopes: Floats, *, truncated: bool) -> Series | None:
-        """One of them, without what was filled up."""
+        """A series, without what was filled up."""
         size, m = self._sizes[b]
         rows, kept = [*range(m), -1], [*range(size), self._k - 1]
         if not np.max(np.abs(sums)) < _LARGEST:
@@ -238,7 +234,9 @@ class _Stack:
             bound = bound * (1.0 + norm) * SAFE
             off = (gamma(self._k + 4) * size * size + 2.0 * size * off + off * off) * SAFE + TINY
         share = wrong * found * SAFE
-        most = _PLAINLY if self._plain else 0.5 / self._errors
+        # where a constant M is so far from singular, t = 1 is as good as any other last row: search and checker, which
+        # may choose differently close to this, both find good series there
+        most = 2.0**-10 if self._plain else 0.5 / self._errors
         found = np.where(share < most, found / (1.0 - share) * SAFE, np.nan)
         return np.asarray(np.where(found * self._errors < _LARGEST_GROWTH, found, np.nan))
 

@@ -41,16 +41,8 @@ _TERMS = 12
 #: Bound of how much M may change over an interval; of this the norm is chosen where that is small enough; and steps
 #: to such a norm.
 _LARGEST_SHIFT, _SMALL_SHIFT, _STEPS = 0.5, 0.25, 20
-#: Rises that count as none where norms are chosen.
-_NO_RISE = 1e-250
-#: Covers underflow of some products.
-_SUBNORMAL = 2.0**-1070
 #: Steps of Newton's method to a zero, and enlargements of its bounds.
 _NEWTON_STEPS, _WIDENINGS = 10, 6
-#: Intervals shorter than this share of alpha are narrow beside the distances at which conditions bend.
-_NEAR = Fraction(1, 2**30)
-#: Zeros are farther apart (tau), or the rounding of floats hides it.
-_LEAST_SPLIT = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +82,8 @@ class Smooth:
         norm = float(np.max(uppers(rest)[:, 0] / u)) * SAFE
         # ||P^m d|| times bounds of (I + tau P)^-1, and of the slope of tau^(m + 1) (I + tau P)^-1
         growths = 1.0 / (1.0 - k), (_TERMS + 1) / (1.0 - k) + k / (1.0 - k) ** 2
-        errors = [u * (norm * growth * (1.0 + 16 * UNIT) * SAFE) + _SUBNORMAL for growth in growths]
+        # covers underflow of some products
+        errors = [u * (norm * growth * (1.0 + 16 * UNIT) * SAFE) + 2.0**-1070 for growth in growths]
         left, left_slope = (column([arb(0, float(e)) for e in error]) for error in errors)
         return cls(terms, left, left_slope, k)
 
@@ -106,7 +99,7 @@ class Smooth:
         return Smooth(terms, turned * self.left, C1 * self.left + turned * self.left_slope, self.shift)
 
     def entry(self, i: int) -> Smooth:
-        """One of them."""
+        """A single function among them."""
         return Smooth(
             [column([x[i, 0]]) for x in self.terms], *(column([x[i, 0]]) for x in (self.left, self.left_slope))
         )
@@ -157,7 +150,8 @@ def _norm(sizes: Floats, P: Floats) -> tuple[Floats, float] | None:
     u has the proportions of ``sizes``, unless k is smaller with some parts of it larger.
     """
     largest = float(np.max(sizes))
-    least = u = sizes / largest + 1e-3 if largest > _NO_RISE else np.ones(len(sizes))
+    # rises that count as none where norms are chosen
+    least = u = sizes / largest + 1e-3 if largest > 1e-250 else np.ones(len(sizes))
     with np.errstate(over="ignore", invalid="ignore"):
         for _ in range(_STEPS):
             grown = upper_sum(P * u, axis=1)
@@ -216,7 +210,7 @@ class AlphaFunctions:
     def newton(
         self, k: int, low: Fraction, high: Fraction, width: Fraction, steps: int = _NEWTON_STEPS
     ) -> Fraction | None:
-        """Where a function seems to vanish between two alphas, to a part of ``width``; no claim rests on it."""
+        """Alpha between two at which a function seems to vanish, to a part of ``width``; no claim rests on it."""
         with precision():
             alpha, unit = (low + high) / 2, width / 2**8
             for _ in range(steps):
@@ -240,7 +234,8 @@ class AlphaFunctions:
         """
         width = Fraction(1, 2**ZERO_BITS) * (high - low) if width is None else width
         # bounds that are narrow already are so near that one step is enough
-        near = high - low <= _NEAR * max(abs(low), abs(high))
+        # intervals shorter than this share of alpha are narrow beside the distances at which conditions bend
+        near = high - low <= Fraction(1, 2**30) * max(abs(low), abs(high))
         for steps, widenings in ((1, 1), (_NEWTON_STEPS, _WIDENINGS))[not near :]:
             alpha = self.newton(k, low, high, width, steps)
             if alpha is None:
@@ -312,13 +307,14 @@ class ShortExpansion:
         No claim rests on it.
         """
         rising, falling = ([tau for rise, tau in self._crossings if rise == sign] for sign in (1, -1))
-        if not rising or not falling or max(rising) - min(falling) < _LEAST_SPLIT:
+        # zeros are farther apart (tau), or the rounding of floats hides it
+        if not rising or not falling or max(rising) - min(falling) < 1e-12:
             return None
         tau = 0.5 * (max(rising) + min(falling))
         return self.low + Fraction(1 + tau) * (self.high - self.low) / 2 if abs(tau) < 1.0 else None
 
     def over(self, low: Number, high: Number) -> OverInterval:
-        """What is known over a part of the interval."""
+        """Knowledge of a part of the interval."""
         signs, unknown = self._whole.copy(), np.zeros_like(self._whole)
         found = [self._functions.signs_at(Fraction(alpha)) for alpha in (low, high)]
         first, last = (unknown if end is None else end for end in found)
@@ -333,7 +329,7 @@ class ShortExpansion:
         return OverInterval(signs, bool(index), none, index, (first, last), rises * abs(sign))
 
     def near(self, condition: int, low: Number, high: Number) -> tuple[Number, Number]:
-        """As in ``over_parts.Expansion``; bounds are found at once, by ``zero_bounds``."""
+        """Nothing yet: bounds are found at once, by ``zero_bounds``; see ``over_parts.Expansion``."""
         return low, low
 
     def zeros(self, condition: int) -> list[Fraction]:
@@ -344,7 +340,7 @@ class ShortExpansion:
         return [] if found is None or not self.low < found < self.high else [found]
 
     def flat(self, condition: int) -> bool:
-        """Whether a condition, or last det M, cannot be distinguished from zero."""
+        """True if a condition, or last det M, cannot be distinguished from zero."""
         return self._small[condition]
 
     def zero_bounds(self, condition: int, slope: int, low: Number, high: Number) -> Bounds:

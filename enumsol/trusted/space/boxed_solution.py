@@ -142,7 +142,7 @@ def apart_in_boxes(regular: Sequence[_AnyLeaf], boxed: Iterable[_AnyLeaf]) -> Ap
 
 
 def _same(one: SpaceRoot | BoxedSolution, other: SpaceRoot | BoxedSolution) -> bool | None:
-    """Whether two solutions are the same; None where that is open."""
+    """True if two solutions are the same; None where that is open."""
     if np.any(np.abs(one.y.mid - other.y.mid) > (one.y.rad + other.y.rad) * SAFE):
         return False
     pairs = ((one, other), (other, one))

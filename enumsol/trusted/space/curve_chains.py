@@ -90,7 +90,7 @@ def _hull(low: Ball, high: Ball) -> Ball:
 
 
 def goes_on(before: CurveLink, after: CurveLink, joint: SolutionCurve) -> bool:
-    """Whether two links with a point in common run through it in the same direction.
+    """True if two links with a point in common run through it in the same direction.
 
     Where all statuses hold strictly the curve is smooth, and the slope of the point is its direction.
     """
@@ -126,7 +126,7 @@ class CurveChain:
 
     @classmethod
     def of(cls, links: Sequence[CurveLink], joints: Sequence[SolutionCurve], interval: Range) -> CurveChain | None:
-        """That of links and joints; None where they do not run on from each other, or do so more than once round."""
+        """Chain of links and joints; None where they do not run on from each other, or do so more than once round."""
         if not links or not all(map(goes_on, links[:-1], links[1:], joints[1:-1])):
             return None
         if any(link.leaves > 0 for link in links[:-1]) or any(link.leaves < 0 for link in links[1:]):
@@ -153,7 +153,7 @@ class CurveChain:
         return [end for end in self.ends if end is not None]
 
     def runs_through(self, low: Fraction, high: Fraction) -> bool:
-        """Whether solutions over [low, high] that are connected with a point in one of its boxes are all on it."""
+        """True if solutions over [low, high] that are connected with a point in one of its boxes are all on it."""
         return all(end < low or begin > high for begin, end in self.gaps)
 
 
@@ -222,7 +222,7 @@ def _beyond_in(curve: SolutionCurve, end: SolutionCurve, side: int) -> Range:
 
 
 def apart(one: CurveChain, other: CurveChain) -> bool:
-    """Whether two curves have no point in common.
+    """True if two curves have no point in common.
 
     From a point in common they run on together until one of them ends, or, if both are closed, all the way round. So
     the ends of neither lie in a box of the other one, of a closed curve any of its points.
@@ -236,14 +236,14 @@ def _ends_outside(one: CurveChain, other: CurveChain) -> bool:
 
 
 def _not_on(link: CurveLink, x: Ball) -> bool:
-    """Whether a link has no point in a ball between its two joints."""
+    """True if a link has no point in a ball between its two joints."""
     t = parameter_in(link.curve.box, x)
     before, after = t - link.start, t - link.end
     return bool(before.mid < -before.rad * SAFE or after.mid > after.rad * SAFE) or _outside(link.curve, x)
 
 
 def _outside(curve: SolutionCurve, x: Ball) -> bool:
-    """Whether a curve has no point in a ball: it may bend beyond its box where a node changes its status."""
+    """True if a curve has no point in a ball: it may bend beyond its box where a node changes its status."""
     t = parameter_in(curve.box, x)
     if abs(t.mid) - t.rad * SAFE > curve.box.half:
         return True
@@ -252,6 +252,6 @@ def _outside(curve: SolutionCurve, x: Ball) -> bool:
 
 
 def _same(one: CurveBox, other: CurveBox) -> bool:
-    """Whether two boxes are given by the same numbers, so that they hold the same solution."""
+    """True if two boxes are given by the same numbers, so that they hold the same solution."""
     parts = ("centre", "direction", "border", "radius", "rho")
     return all(np.array_equal(getattr(one, part), getattr(other, part)) for part in parts)

@@ -107,7 +107,7 @@ class CurveMotion:
         return None if D is None else Ball.joined(self.problem.part - D @ self._Z, Ball.exact(self._border[None]))
 
     def _derivative(self, codes: Sequence[int]) -> Ball | None:
-        """That of the projection P with respect to (z, alpha), by (12.17)."""
+        """Derivative of the projection P with respect to (z, alpha), by (12.17)."""
         m = self.problem.m
         D = Ball(np.zeros((m, m + 1)), np.zeros((m, m + 1)))
         kept = np.arange(3 * self.problem.p, m)
@@ -142,7 +142,7 @@ class CurveMotion:
 
     @cached_property
     def _directions(self) -> Directions:
-        """Of z_t of all nodes; they serve where it has two components and does not vanish."""
+        """Directions of z_t of all nodes; they serve where it has two components and does not vanish."""
         places = self.problem.places
         x = Ball(np.where(places >= 0, self.z.mid[places], 0.0), np.where(places >= 0, self.z.rad[places], 0.0))
         with np.errstate(all="ignore"):

@@ -301,7 +301,7 @@ class LinkParts:
         return (None, nodes) if nodes else (here, [])
 
     def run(self, motion: CurveMotion, start: Place, end: Place, codes: Codes) -> Run | None:
-        """Where statuses hold all along: the run, if alpha goes one way."""
+        """Run of a part where statuses hold all along, if alpha goes one way."""
         rises = motion.rises(codes)
         if not rises and start.rises == end.rises and motion.bends(codes):
             # the derivative of alpha is monotone
@@ -311,7 +311,7 @@ class LinkParts:
     def fold(
         self, motion: CurveMotion, start: Place, end: Place, codes: Codes, sides: tuple[Place, Place]
     ) -> list[Run | Turn] | None:
-        """Where statuses hold all along: two runs and the fold between them, if alpha turns back once."""
+        """Two runs and the fold between them, where statuses hold all along and alpha turns back once."""
         before, after = sides
         if not start.rises or start.rises != -end.rises or not motion.bends(codes):
             return None
@@ -323,7 +323,7 @@ class LinkParts:
         return [self._run(start, before, codes, start.rises), turn, self._run(after, end, codes, end.rises)]
 
     def corner(self, motion: CurveMotion, start: Place, end: Place, sides: tuple[Place, Place]) -> Turn | None:
-        """Where nodes change their statuses, each of them once: the first change, between places.
+        """First change, between places, where nodes change their statuses, each of them once.
 
         ``motion`` is that of a curve that has both. It is not settled where alpha hardly changes beside it, as where a
         body begins to slide.
@@ -353,7 +353,7 @@ class LinkParts:
         return Turn(alphas, 0.5 * (before.x + after.x), (one, other), settled)
 
     def behind(self, after: Place, end: Place) -> tuple[SolutionCurve | None, Place, Place, Codes | None]:
-        """What follows a corner, as a part: the link's curve and the statuses, where these do not change again."""
+        """Part that follows a corner: the link's curve and the statuses, where these do not change again."""
         known = after.codes == end.codes
         return (self.curve if known else None), after, end, (end.codes if known else None)
 

@@ -68,19 +68,19 @@ class CurveParts:
 
     @cached_property
     def open(self) -> Flags:
-        """Where a node is open all along a part, (N, p): z_n <= 0, so that no force acts."""
+        """Mask of nodes open all along a part, (N, p): z_n <= 0, so that no force acts."""
         p = len(self.rubs)
         return self.z.mid[:, :p] + self.z.rad[:, :p] * SAFE <= 0
 
     @cached_property
     def touching(self) -> Flags:
-        """Where a node touches all along a part, (N, p): z_n >= 0, so that w_n = 0."""
+        """Mask of nodes that touch all along a part, (N, p): z_n >= 0, so that w_n = 0."""
         p = len(self.rubs)
         return self.z.mid[:, :p] - self.z.rad[:, :p] * SAFE >= 0
 
     @cached_property
     def sticking(self) -> Flags:
-        """Where a node sticks all along a part, (N, p): |z_t| <= F z_n, so that w = 0."""
+        """Mask of nodes that stick all along a part, (N, p): |z_t| <= F z_n, so that w = 0."""
         p = len(self.rubs)
         most = upper_norm(self.tangents.size, axis=2)
         normal = (self.z.mid[:, :p] - self.z.rad[:, :p] * SAFE) / SAFE
@@ -124,7 +124,7 @@ class CurveParts:
         return theta, np.where(known, far, np.inf)
 
     def held(self, codes: Sequence[int]) -> Flags:
-        """In which parts all solutions have the statuses of an assignment, (N,); a sector counts as contact."""
+        """Mask of parts in which all solutions have the statuses of an assignment, (N,); a sector counts as contact."""
         held = np.ones(len(self.alpha.mid), dtype=bool)
         for i, code in enumerate(codes):
             if code != UNDECIDED:
@@ -133,7 +133,7 @@ class CurveParts:
         return held
 
     def allowed(self, codes: Sequence[int]) -> bool:
-        """Whether they have them in all parts."""
+        """True if they have them in all parts."""
         return bool(np.all(self.held(codes)))
 
 
@@ -174,7 +174,7 @@ class KnownCurve:
         return np.arange(first, last + 1 + (count if last < first else 0)) % count
 
     def passes(self, run: Run, low: Fraction, high: Fraction) -> bool:
-        """Whether a run passes every alpha of a piece: its ends lie on either side of it, or at its ends."""
+        """True if a run passes every alpha of a piece: its ends lie on either side of it, or at its ends."""
         if self.places(run) is None:
             return False
         start, end = self.chain.joints[run.first].alphas, self.chain.joints[run.last + 1].alphas

@@ -51,7 +51,7 @@ class LeafArc:
     radius: Floats
 
     def has(self, root: SpaceRoot, codes: Codes) -> bool:
-        """Whether the root of a leaf, at an alpha of the piece, is on the arc."""
+        """True if the root of a leaf, at an alpha of the piece, is on the arc."""
         if patterns(codes) != self.statuses:
             return False
         shift = turned(self.centre, root.centre)

@@ -13,7 +13,7 @@ from scipy.linalg import qr
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, smaller, solution, upper_sum
 from enumsol.model.sectors import SECTORS, direction, end_number
 from enumsol.trusted.space.sector_rows import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
-from enumsol.trusted.space.turning import LIBRARY, Box, Combined, Turning, turned_by
+from enumsol.trusted.space.turning import LIBRARY, AngleBox, Combined, Turning, turned_by
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,7 +38,7 @@ class State(NamedTuple):
     w: Ball
     G: Ball
     J: Ball
-    box: Box
+    box: AngleBox
     #: Derivatives of G along a piece of alpha.
     G_turn: Ball | None = None
 

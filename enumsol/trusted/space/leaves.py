@@ -147,7 +147,7 @@ def unsettled(system: EnclosedSpace, codes: Sequence[int]) -> Open:
 
 
 def contents(leaf: Leaf) -> SpaceRoot | Open | None:
-    """What ``settle`` says of a leaf, with the normal forces left free that are.
+    """Contents of a leaf as ``settle`` has them, with the normal forces left free that are.
 
     Angles in what follows are the values of the free unknowns, too, after those of the directions.
     """
@@ -239,7 +239,7 @@ def _refined(leaf: Leaf, angle: Floats, radius: Floats, reach: Floats) -> SpaceR
 
 
 def _left_open(leaf: Leaf, angle: Floats, radius: Floats, state: State | None) -> Open | None:
-    """What is known of a leaf that is not settled; None if there is nothing."""
+    """Bounds of a leaf that is not settled; None if nothing is known of it."""
     m, q, last = len(leaf.system.g), len(leaf.turning), LastBox(leaf, angle, radius, state)
     y, w = (None, None) if state is None else (state.y[:m], state.w[:m])
     rigid = None if state is None or not len(leaf.system.reach) else -state.y[m:]
@@ -273,7 +273,7 @@ def _root(leaf: Leaf, state: State, angle: Floats, radius: Floats, reach: Floats
 
 
 def same_root(one: SpaceRoot, other: SpaceRoot) -> bool | None:
-    """Whether two roots of leaves with the same statuses up to sectors are one; None where that is open.
+    """True if two roots of leaves with the same statuses up to sectors are one; None where that is open.
 
     The leaves have the same nodes open, sticking and slipping. They are one if one root's directions lie in the box in
     which the other is the only root; they are two if their forces differ.

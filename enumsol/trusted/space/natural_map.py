@@ -108,7 +108,7 @@ class Turns:
         return np.asarray(upper_sum(most[:, :, None, None] * np.abs(self.matrices), axis=1))
 
     def bounds(self, Y: Floats, Z: Floats, d: Floats | None = None) -> tuple[Floats, Floats]:
-        """Of |Y D Z| and |Y D Z d| for all these D, up to rounding, for which ``size`` times gamma serves."""
+        """Bounds of |Y D Z| and |Y D Z d| for all these D, up to rounding, for which ``size`` times gamma serves."""
         m, n = len(Y), Z.shape[1]
         before = np.hstack([Y, np.zeros((m, 1))])[:, self.rows]
         after = np.vstack([Z, np.zeros((1, n))])[self.columns]
@@ -394,7 +394,7 @@ class _Blocks:
 
     @classmethod
     def of(cls, slips_of: _Slips) -> Self | None:
-        """Of all points of a set; None where there is no bound."""
+        """Derivatives at all points of a set; None where there is no bound."""
         z, F, at, change = slips_of.z, slips_of.discs.F, slips_of.at, np.abs(slips_of.change)
         p, tau = len(F.mid), slips_of.discs.tau
         low, high = _outwards(z.mid[:p], z.rad[:p])
@@ -516,7 +516,7 @@ class Directions:
 
     @classmethod
     def of(cls, x: Ball, away: Floats | None = None) -> Directions:
-        """Of points in balls of shape (p, 2); where a component is 0 without radius, e has one component.
+        """Directions of points in balls of shape (p, 2); where a component is 0 without radius, e has one component.
 
         ``away``: bounds, (p, 2), of how far they are from the middle along its direction and beside it, if known.
         """

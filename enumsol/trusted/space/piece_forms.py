@@ -76,7 +76,7 @@ def only_on_curve(
     parts: CurveParts,
     errors: float = 1.0,
 ) -> bool:
-    """Whether all solutions over a piece with the statuses of an assignment are those of a curve.
+    """True if all solutions over a piece with the statuses of an assignment are those of a curve.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def _times(theta: Array, discs: Ball) -> Ball:
 
 
 def _shares(piece: tuple[Fraction, Fraction], alpha: Ball) -> Ball:
-    """Where alphas are in a piece, from -1 to 1."""
+    """Places of alphas in a piece, from -1 to 1."""
     middle, half = (piece[0] + piece[1]) / 2, (piece[1] - piece[0]) / 2
     near, inverse = float(middle), 1.0 / float(half)
     # rounded to nearest
@@ -131,7 +131,7 @@ def _shares(piece: tuple[Fraction, Fraction], alpha: Ball) -> Ball:
 def how_far_off(
     system: PieceSpace, piece: tuple[Fraction, Fraction], weights: PieceWeights, psi: Sequence[Ball], parts: CurveParts
 ) -> Array:
-    """How far psi is at most from r theta with a theta that serves the curve's solution, (p,), at all alphas.
+    """Bound of the distance of psi from r theta with a theta that serves the curve's solution, (p,), at all alphas.
 
     Where nothing better is known |theta| <= 1.
     """
@@ -151,7 +151,7 @@ def how_far_off(
 
 
 def _gap_serves(weights: PieceWeights, reference: Array, psi: Ball, r: Ball, parts: CurveParts) -> Flags:
-    """Where psi itself serves by the gap of an open node, (N, p): (mu - r |nu|) |w_n| >= kappa (r |v| - psi . v)."""
+    """Mask of nodes whose gap lets psi itself serve, (N, p): (mu - r |nu|) |w_n| >= kappa (r |v| - psi . v)."""
     inside = np.all([upper_norm(theta, axis=1) <= 1.0 for theta in weights.thetas], axis=0)
     normal, slip = parts.slips
     gap = np.where(parts.open, -(normal.mid + normal.rad * SAFE), 0.0) / SAFE

@@ -56,7 +56,7 @@ class AlphaPiece:
 
     @property
     def middle(self) -> Fraction:
-        """Of the piece."""
+        """Middle of the piece."""
         return (self.low + self.high) / 2
 
     @cached_property
@@ -131,7 +131,7 @@ class AlphaPiece:
         return Ball(np.array(middle), np.array(float(off) * (1.0 + 4 * UNIT) + TINY))
 
     def held(self, codes: Sequence[int]) -> SpaceRoot | Open | None:
-        """What a leaf holds at every alpha of the piece: exactly one root, none (None), or it is not settled."""
+        """Answer for a leaf at every alpha of the piece: exactly one root, none (None), or it is not settled."""
         return settle(self.whole, codes)
 
     def narrowed(self, codes: Sequence[int]) -> tuple[AlphaPiece, SpaceRoot | Open | None]:
@@ -154,7 +154,7 @@ class AlphaPiece:
         return piece, found
 
     def lies_on(self, known: KnownCurve, run: Run, codes: Sequence[int], numbers: Array, errors: float = 1.0) -> bool:
-        """Whether all solutions with the statuses of an assignment, at every alpha of the piece, are those of a run.
+        """True if all solutions with the statuses of an assignment, at every alpha of the piece, are those of a run.
 
         Parameters
         ----------
@@ -180,7 +180,7 @@ class AlphaPiece:
         return AlphaPiece(self.space, low, high) if factor else self
 
     def point_at(self, alpha: Fraction) -> AlphaPiece:
-        """One alpha alone."""
+        """Piece of one alpha alone."""
         return AlphaPiece(self.space, alpha, alpha)
 
     def arc(self, codes: Sequence[int], errors: float = 1.0, found: SpaceRoot | Open | None = None) -> LeafArc | None:
@@ -198,7 +198,7 @@ class AlphaPiece:
         given: AlphaProblem,
         curve: SolutionCurve,
     ) -> bool:
-        """Whether the only root of a leaf at some alpha of the piece is on an arc, and in the box of a curve."""
+        """True if the only root of a leaf at some alpha of the piece is on an arc, and in the box of a curve."""
         at, root = self.root_at(*point)
         return root is not None and arc.has(root, point[1]) and lies_in(at.place(root, given), curve)
 
@@ -213,7 +213,7 @@ class AlphaPiece:
     def holds_all(
         self, codes: Sequence[int], given: AlphaProblem, curves: Sequence[SolutionCurve], errors: float = 1.0
     ) -> bool:
-        """Whether all roots of a leaf are on the curve of some boxes, at every alpha of the piece."""
+        """True if all roots of a leaf are on the curve of some boxes, at every alpha of the piece."""
         piece, found = self.narrowed(codes)
         return found is None or any(lie_along(ends, curves, errors) for ends in piece.places(found, given))
 
@@ -258,7 +258,7 @@ class AlphaPiece:
 
 
 def lies_in(place: Ball | None, curve: SolutionCurve, errors: float = 1.0) -> bool:
-    """Whether all solutions within bounds are on the curve of a box: they lie where it has the only ones.
+    """True if all solutions within bounds are on the curve of a box: they lie where it has the only ones.
 
     ``errors``: 1 proves, a writer of proofs takes more.
     """
@@ -266,7 +266,7 @@ def lies_in(place: Ball | None, curve: SolutionCurve, errors: float = 1.0) -> bo
 
 
 def lie_along(ends: Sequence[Ball], curves: Sequence[SolutionCurve], errors: float = 1.0) -> bool:
-    """Whether all between two bounds, or within one, is on the curve of some boxes, in one box after the other.
+    """True if all between two bounds, or within one, is on the curve of some boxes, in one box after the other.
 
     The sets in which curves are the only solutions are convex: what is between two bounds that lie in one does so, too.
     """

@@ -192,14 +192,14 @@ class Ellipsoid:
 
     @property
     def codes(self) -> tuple[int, ...]:
-        """Of the assignment."""
+        """Codes of the assignment."""
         return self.frame.codes
 
     @classmethod
     def of(
         cls, system: EnclosedSpace, codes: Sequence[int], centre: Floats, numbers: Floats, errors: float = 1.0
     ) -> Ellipsoid | None:
-        """That of the form with these multipliers; None where the form is not proven convex.
+        """Ellipsoid of the form with these multipliers; None where the form is not proven convex.
 
         Parameters
         ----------
@@ -251,7 +251,7 @@ class Ellipsoid:
 
     @property
     def empty(self) -> bool:
-        """Whether the assignment has no solution."""
+        """True if the assignment has no solution."""
         return self.reach < 0
 
     def _bounds(self, rows: Ball, value: Ball) -> tuple[Floats, Floats]:
@@ -262,14 +262,14 @@ class Ellipsoid:
         return value.mid - away, value.mid + away
 
     def misses(self, codes: Sequence[int]) -> bool:
-        """Whether no solution of the assignment has the statuses of another one, which refines it."""
+        """True if no solution of the assignment has the statuses of another one, which refines it."""
         if self.empty:
             return True
         pairs = enumerate(zip(self.codes, codes, strict=True))
         return any(one != other and self.node_misses(i, other) for i, (one, other) in pairs)
 
     def node_misses(self, i: int, code: int) -> bool:
-        """Whether node i has this status at no solution of the assignment."""
+        """True if node i has this status at no solution of the assignment."""
         if code == STICK:
             low, high = self._bounds(self.frame.parts[i, _V], self.frame.values[i, _V])
             return bool(np.any((low > 0) | (high < 0)))
@@ -285,7 +285,7 @@ class Ellipsoid:
         return False
 
     def is_in(self, box: Box, errors: float = 1.0) -> bool:
-        """Whether all solutions of the assignment lie in a box (``errors`` as above)."""
+        """True if all solutions of the assignment lie in a box (``errors`` as above)."""
         if self.empty:
             return True
         with np.errstate(all="ignore"):
@@ -307,7 +307,7 @@ class Ellipsoid:
 
 
 def refines(codes: Sequence[int], over: Sequence[int]) -> bool:
-    """Whether every node has a status in one assignment that its status in another one allows."""
+    """True if every node has a status in one assignment that its status in another one allows."""
     return len(codes) == len(over) and all(map(_within, codes, over))
 
 

@@ -143,7 +143,7 @@ def _finite(bounds: Floats) -> float:
 
 
 def is_unbalanced_in_space(system: EnclosedSpace | PieceSpace, codes: Sequence[int], z: Floats) -> bool:
-    """Whether no forces below a partial assignment are in balance with the load, by z (r,); see theory, (14.7).
+    """True if no forces below a partial assignment are in balance with the load, by z (r,); see theory, (14.7).
 
     z'h > 0, and z'G y <= 0 for all y of every node: (1, tau) with tau in the disc, or on the arc of its sector. Proven
     at both ends of a piece of alpha, it is so in between (theory, section 14.14).
@@ -176,7 +176,7 @@ def is_unbalanced_in_space(system: EnclosedSpace | PieceSpace, codes: Sequence[i
 
 
 def _most_friction(code: int, across: Floats, length: float, spread: float) -> float:
-    """What across . tau is at most for the tau of a node of this code, |tau| <= 1."""
+    """Maximum of across . tau for the tau of a node of this code, |tau| <= 1."""
     if code == FRICTIONLESS:
         return 0.0
     if code in (SLIP_PLUS, SLIP_MINUS):  # one component only: the other one is zero

@@ -465,7 +465,7 @@ class SolutionCurve:
 
     @property
     def stretch(self) -> float:
-        """How much longer a box there may about be that is found as this one was; no claim."""
+        """Factor by which a box that is found as this one was may about be longer; no claim."""
         found = self.found
         if not found.near.half:
             return 1.0
@@ -703,7 +703,7 @@ class _Proven:
 
     @cached_property
     def slope(self) -> Array:
-        """How far differences over t are from d at most; infinite where that is not known."""
+        """Bound of the distance of differences over t from d; infinite where none is known."""
         with np.errstate(all="ignore"):
             step = self.spread[2]
             radius = step.balanced(1.0, 0.0, 1.1)
@@ -737,7 +737,7 @@ class _CurveMap:
     # -- boxes -----------------------------------------------------------------------------------------------------
 
     def turned(self) -> float:
-        """How far corners are from being too wide for the test: less than 1 where they are not."""
+        """Width of corners relative to what the test bears: less than 1 where it bears them."""
         step = self.step(self.extent())
         if step is None or not np.all(np.isfinite(step.slopes)):
             return np.inf

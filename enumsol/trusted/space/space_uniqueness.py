@@ -374,7 +374,7 @@ class _Form:
         return g - (S @ Ball(y.mid[:, None], y.rad[:, None]))[:, 0]
 
     def _change(self, n: Floats, w: Ball) -> Floats:
-        """How much the load has to change at most, row by row, that a point with these lambda_n is a solution."""
+        """Bound of the change of the load, row by row, that makes a point with these lambda_n a solution."""
         system, numbers, p = self.system, self.numbers, len(n)
         change = w.size.copy()
         apart = n == 0

@@ -31,7 +31,7 @@ def turned_by(centre: Floats, angle: Floats) -> tuple[Floats, Floats]:
 
 
 @dataclass(frozen=True)
-class Box:
+class AngleBox:
     """Values over a box of angles, and their derivatives with respect to these.
 
     Attributes
@@ -88,7 +88,7 @@ class Box:
         """Derivatives of w with respect to the free unknowns."""
         return self.lone[len(self.w.mid) :]
 
-    def combined(self, rows: Ball, point: Box, radius: Floats) -> Combined:
+    def combined(self, rows: Ball, point: AngleBox, radius: Floats) -> Combined:
         """Rows times w over the box, with what is known in its middle.
 
         Combined first and bounded then, so that what cancels in the middle does so over the box, too.
@@ -120,9 +120,9 @@ class Box:
 
 
 class Combined(NamedTuple):
-    """Combinations of w over a box, k of them: ``across`` and ``along``, (k, q), are as those of w (see Box)."""
+    """Combinations of w over a box, k of them: ``across`` and ``along``, (k, q), are as those of w (see AngleBox)."""
 
-    box: Box
+    box: AngleBox
     across: Ball
     along: Ball
 
@@ -281,11 +281,11 @@ class Turning:
 
     @property
     def sign(self) -> int:
-        """That of det P S E over every box in which the equations are regular; 0 where it is not proven."""
+        """Sign of det P S E over every box in which the equations are regular; 0 where it is not proven."""
         return determinant_sign(self.matrix)
 
-    def over(self, radius: Floats, free: Ball) -> Box | None:
-        """What holds over all angles up to ``radius``, (q,), from the middle; None if they are not proven regular.
+    def over(self, radius: Floats, free: Ball) -> AngleBox | None:
+        """Bounds over all angles up to ``radius``, (q,), from the middle; None if they are not proven regular.
 
         ``free`` are the values of the free unknowns, (k,). In the middle directions are known but for rounding.
         """
@@ -298,8 +298,8 @@ class Turning:
         return self._over(radius, free, point)
 
     @cached_property
-    def _points(self) -> dict[bytes, Box | None]:
-        """What holds in the middle, by values of the free unknowns."""
+    def _points(self) -> dict[bytes, AngleBox | None]:
+        """Bounds in the middle, by values of the free unknowns."""
         return {}
 
     def coupling(self, radius: Floats) -> Floats:
@@ -332,7 +332,7 @@ class Turning:
         swept[:, -1] = part[:, -1] + grown
         return swept
 
-    def _over(self, radius: Floats, free: Ball, point: Box | None) -> Box | None:
+    def _over(self, radius: Floats, free: Ball, point: AngleBox | None) -> AngleBox | None:
         q, m = len(radius), len(self.start.mid) // 2
         lone, start, base = self.change[:, 2 * q :], self.start, self.x
         if len(free.mid):
@@ -371,7 +371,7 @@ class Turning:
             value = smaller(value, Ball.joined(point.y, point.w) + moves[:, 0])
         w = value[m:]
         w.mid[self.rows], w.rad[self.rows] = 0.0, 0.0
-        return Box(value[:m], w, slope, lone, x, pushed, led, lag, self.share)
+        return AngleBox(value[:m], w, slope, lone, x, pushed, led, lag, self.share)
 
 
 def held_by(matrix: Ball, SE: Ball, load: Ball, rows: Sequence[int]) -> tuple[Ball, Ball] | None:

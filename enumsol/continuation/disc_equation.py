@@ -12,22 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
 from enumsol.continuation.scaled_equation import STATUS_TOLERANCE, ScaledEquation
 from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP, STICK, ContactStatus
-from enumsol.roots.local_branch import LocalBranchTest, coherent_orientation
-from enumsol.roots.slips import NodeSlips
 from enumsol.support.array_types import Codes, Floats, Mask
 
-#: The statuses on the other side of the conditions of a status, in their order.
-_ACROSS = {
-    OPEN: ((SLIP, FRICTIONLESS),),
-    STICK: ((SLIP,),),
-    SLIP: ((OPEN,), (STICK,)),
-    FRICTIONLESS: ((OPEN,),),
-}
 _NAMES = {OPEN: ContactStatus.OPEN, STICK: ContactStatus.STICK, SLIP: ContactStatus.SLIP}
 
 
@@ -50,13 +42,16 @@ class _Trial:
     force: Floats
 
 
-class SpaceEquation(ScaledEquation):
+class DiscEquation(ScaledEquation):
     """H in 3D: selections are named by rows (p, 2), whether a node is in contact and whether it slips.
 
     Parameters are those of ScaledEquation.
     """
 
     single_valued = False
+    neighbours = MappingProxyType(
+        {OPEN: ((SLIP, FRICTIONLESS),), STICK: ((SLIP,),), SLIP: ((OPEN,), (STICK,)), FRICTIONLESS: ((OPEN,),)}
+    )
 
     # -- friction ----------------------------------------------------------------------------------------------------
 
@@ -83,14 +78,6 @@ class SpaceEquation(ScaledEquation):
         return _Trial(length, zeta / np.where(length > 0, length, 1.0)[:, None], force)
 
     # -- H and its selections ----------------------------------------------------------------------------------------
-
-    def residual(self, x: Floats) -> Floats:
-        """H(x) for each node's own r, shape (3p + r,)."""
-        return self._projected(x, np.ones(3 * self.p))
-
-    def merit(self, x: Floats) -> float:
-        """Norm of H(x) for the given r, which its Newton directions lower."""
-        return float(np.linalg.norm(self._projected(x, self.r)))
 
     def _projected(self, x: Floats, r: Floats) -> Floats:
         """lambda - P(lambda + r w), P into lambda_n >= 0 and the disc of that lambda_n, in units of q."""
@@ -129,9 +116,8 @@ class SpaceEquation(ScaledEquation):
         """Gradient of the named selection function (see selection_residual), shape (3p + r, 3p + r + 1)."""
         p, values, cone = self.p, self.at(x), self._cone(x)
         closed, slips = rows[:, 0], (rows[:, 0] & rows[:, 1])[:, None, None]
-        dw_n, dw_t = self._slopes(x)
-        force, node = np.eye(3 * p, len(x)), np.arange(p)
-        dn, dt = force[:p], np.stack([force[p : 2 * p], force[2 * p :]], axis=1)
+        dw_n, dw_t = _parted(self._slopes(x))
+        (dn, dt), node = _parted(np.eye(3 * p, len(x))), np.arange(p)
         direction, turned = self._turning(x, cone, dw_t, dt)
         slip = dt - (x[:p, None] * values.F)[:, :, None] * turned
         slip[node, :, node] -= values.F * direction
@@ -141,12 +127,6 @@ class SpaceEquation(ScaledEquation):
         tangential = np.where(free[:, :, None], dt, held)
         rest = np.column_stack([self.bordered[self.m :], -values.dg[self.m :]])
         return np.concatenate([np.where(closed[:, None], -dw_n, dn), tangential[:, 0], tangential[:, 1], rest])
-
-    def _slopes(self, x: Floats) -> tuple[Floats, Floats]:
-        """Gradients of w_n and w_t with respect to x, (p, 3p + r + 1) and (p, 2, 3p + r + 1)."""
-        p = self.p
-        slope = np.column_stack([-self.bordered, self.at(x).dg])[: self.m]
-        return slope[:p], np.stack([slope[p : 2 * p], slope[2 * p :]], axis=1)
 
     def _turning(self, x: Floats, cone: _Cone, dw_t: Floats, dt: Floats) -> tuple[Floats, Floats]:
         """Directions of slip, (p, 2), and their gradients, (p, 2, 3p + r + 1)."""
@@ -168,20 +148,19 @@ class SpaceEquation(ScaledEquation):
         return (cone.c * x[: self.p] - size) / (1.0 + cone.c), force / np.where(size > 0, size, 1.0)[:, None]
 
     def slacks(self, codes: Codes, x: Floats) -> Floats:
-        """What must be >= 0 for the statuses to hold at a root, shape (p, 2); infinite where there is one condition."""
+        """Values that are >= 0 where the statuses hold, shape (p, 2); infinite where there is one condition."""
         named, cone, (w_n, w_t) = np.array(codes), self._cone(x), self.split(self.w(x))
         along = np.sum(self._trial(x, self.r, cone).direction * cone.q * w_t, axis=1)
         first = np.select([named == OPEN, named == STICK], [-w_n, self._room(x, cone)[0]], x[: self.p])
         return np.column_stack([first, np.where(named == SLIP, along, np.inf)])
 
-    def _slack_gradients(self, codes: Codes, x: Floats) -> Floats:
+    def slack_gradients(self, codes: Codes, x: Floats) -> Floats:
         """Gradients of all slacks, shape (p, 2, 3p + r + 1), 0 where there is one condition."""
         p, named, cone = self.p, np.array(codes), self._cone(x)
-        dw_n, dw_t = self._slopes(x)
-        force, node = np.eye(3 * p, len(x)), np.arange(p)
-        dt = np.stack([force[p : 2 * p], force[2 * p :]], axis=1)
+        dw_n, dw_t = _parted(self._slopes(x))
+        (dn, dt), node = _parted(np.eye(3 * p, len(x))), np.arange(p)
         found = np.zeros((p, 2, len(x)))
-        found[:, 0] = np.where((named == OPEN)[:, None], -dw_n, force[:p])
+        found[:, 0] = np.where((named == OPEN)[:, None], -dw_n, dn)
         room, towards = self._room(x, cone)
         inverse, tangential = self._inverse(cone), self.split(x[:-1])[1]
         stick = -np.einsum("ik,ikj->ij", towards * inverse, dt)
@@ -195,25 +174,8 @@ class SpaceEquation(ScaledEquation):
         found[:, 1] = np.where((named == SLIP)[:, None], along, 0.0)
         return found
 
-    def slack_gradient(self, codes: Codes, x: Floats, which: tuple[int, int]) -> Floats:
-        """Gradient of one slack with respect to x, shape (3p + r + 1,)."""
-        return np.asarray(self._slack_gradients(codes, x)[which])
-
-    def slack_rates(self, codes: Codes, x: Floats, tangent: Floats) -> Floats:
-        """Derivatives of the slacks along a tangent, shape (p, 2); zero where there is one condition."""
-        return np.asarray(self._slack_gradients(codes, x) @ tangent)
-
-    def across(self, code: int, k: int) -> Sequence[int]:
-        """The statuses on the other side of the k-th condition of a status."""
-        return _ACROSS[code][k] if k < len(_ACROSS[code]) else ()
-
-    def flip(self, codes: Codes, x: Floats, which: tuple[int, int]) -> Codes:
-        """Statuses after one slack vanished: a node that comes into contact slips at once."""
-        i, k = which
-        new = _ACROSS[codes[i]][k][0]
-        if codes[i] == OPEN and self.frictionless[i]:
-            new = FRICTIONLESS
-        return (*codes[:i], new, *codes[i + 1 :])
+    def _touching(self, i: int, x: Floats) -> int:
+        return SLIP
 
     def active(self, x: Floats, tolerance: float = STATUS_TOLERANCE) -> tuple[frozenset[int], ...]:
         """Per node the status codes whose equations and conditions hold within the tolerance."""
@@ -230,17 +192,12 @@ class SpaceEquation(ScaledEquation):
                 found[i].add(code)
         return tuple(map(frozenset, found))
 
-    def codes(self, x: Floats, prefer: Codes | None = None, tolerance: float = STATUS_TOLERANCE) -> Codes:
-        """Statuses at a solution; ``prefer`` is kept where it holds too."""
+    def _codes(self, x: Floats) -> Codes:
         ones, cone = np.ones(3 * self.p), self._cone(x)
         normal = x[: self.p] + self.w(x)[: self.p]
         slips = self._trial(x, ones, cone).length >= cone.c * np.maximum(normal, 0.0)
         touching = np.where(self.frictionless, FRICTIONLESS, np.where(slips, SLIP, STICK))
-        found = np.where(normal > 0, touching, OPEN).tolist()
-        if prefer is not None:
-            active = self.active(x, tolerance)
-            found = [old if old in held else new for old, new, held in zip(prefer, found, active, strict=True)]
-        return tuple(found)
+        return tuple(np.where(normal > 0, touching, OPEN).tolist())
 
     def statuses(self, codes: Sequence[int], slip: Floats) -> tuple[ContactStatus, ...]:
         """Names of the statuses; a frictionless node in contact slips wherever its u_t is not 0."""
@@ -248,13 +205,13 @@ class SpaceEquation(ScaledEquation):
         without = (ContactStatus.STICK, ContactStatus.SLIP)
         return tuple(_NAMES.get(code, without[bool(move)]) for code, move in zip(codes, moves, strict=True))
 
-    def local_test(self, x: Floats) -> LocalBranchTest:
-        """The local branch test at a point of a path; see ScaledEquation."""
-        F, (slip, force) = self.at(x).F, (self.split(part)[1] for part in (self.w(x), x[:-1]))
-        slips = NodeSlips.of(F, force, slip)
-        return coherent_orientation(self.bordered, F, self.active(x), slip, self.alpha(x), slips=slips)
-
 
 def _flat(normal: Floats, tangential: Floats) -> Floats:
-    """Of (p,) and (p, 2) one array (3p,), all normals first."""
+    """Normal and tangential parts, (p,) and (p, 2), as one array (3p,), all normals first."""
     return np.concatenate([normal, tangential[:, 0], tangential[:, 1]])
+
+
+def _parted(rows: Floats) -> tuple[Floats, Floats]:
+    """Rows (3p, k) as those of normals, (p, k), and of both tangents, (p, 2, k)."""
+    normal, first, second = rows.reshape(3, -1, rows.shape[1])
+    return normal, np.stack([first, second], axis=1)

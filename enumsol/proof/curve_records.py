@@ -1,0 +1,213 @@
+"""Records of graphs in 3D: boxes of curves, parts of curves, and what stands in trees over pieces of alpha only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from enumsol.proof.reading import numbers_from, quoted, rational_from
+from enumsol.proof.records import ClosingRecord, Limits, Record, RecordError, Tree, check_complete, is_code_of_leaf
+from enumsol.trusted.space.solution_curve import CurveBox
+
+if TYPE_CHECKING:
+    from fractions import Fraction
+
+    from enumsol.support.array_types import Floats
+
+
+@dataclass(frozen=True, eq=False)
+class CurveBoxRecord(Record):
+    """A box around a curve of solutions over alpha, or around a point of one.
+
+    Attributes
+    ----------
+    centre, direction, border, radius : (m + 1,) arrays, m = 3p, with rigid modes 3p + r
+    rho : (m,) array
+    half : float
+    """
+
+    kind, sizes = "w", (7,)
+
+    centre: Floats
+    direction: Floats
+    border: Floats
+    radius: Floats
+    rho: Floats
+    half: float
+
+    @classmethod
+    def of(cls, entries: list[Any], limits: Limits) -> CurveBoxRecord:
+        """The numbers; RecordError where there are not as many as there must be."""
+        try:
+            m = 3 * limits.p + limits.modes
+            c, d, e, radius = (numbers_from(part, m + 1) for part in entries[:4])
+            rho = numbers_from(entries[4], m)
+            (half,) = numbers_from([entries[5]], 1)
+        except ValueError as error:
+            raise RecordError(f"a box around a curve cannot be read: {error}") from None
+        return cls(c, d, e, radius, rho, float(half))
+
+    @classmethod
+    def around(cls, box: CurveBox) -> CurveBoxRecord:
+        """That of a box."""
+        return cls(box.centre, box.direction, box.border, box.radius, box.rho, box.half)
+
+    @property
+    def box(self) -> CurveBox:
+        """What it stands for."""
+        return CurveBox(self.centre, self.direction, self.border, self.half, self.radius, self.rho)
+
+
+#: Boxes of the kinds of parts: of the part itself, then of places and of what lies between them.
+PARTS = {"s": 1, "f": 3, "c": 4, "h": 2, "u": 1}
+
+
+@dataclass(frozen=True, eq=False)
+class CurvePart:
+    """What the curve of a link does between two places, or how that part is cut (theory, section 12.10).
+
+    Attributes
+    ----------
+    kind : of PARTS
+        A run, a fold between two places, a change of statuses between two places, a middle place, or nothing is known.
+    boxes : of CurveBoxRecord, or None
+        The part's own box first, None where one is known that holds it, or none is needed.
+    """
+
+    kind: str
+    boxes: tuple[CurveBoxRecord | None, ...]
+
+    @classmethod
+    def read(cls, record: Any, limits: Limits) -> CurvePart:
+        """A part; RecordError where it is none."""
+        kind = record[0] if isinstance(record, list) and record and isinstance(record[0], str) else None
+        if kind not in PARTS or len(record) != 1 + PARTS[kind]:
+            raise RecordError(f"{quoted(record)} is no part of a curve")
+        boxes = [None if box is None else box_from(box, limits) for box in record[1:]]
+        places = boxes[1:3] if kind in ("f", "c") else boxes[1:]
+        if None in places:
+            raise RecordError("a place on a curve is missing")
+        return cls(kind, tuple(boxes))
+
+    def write(self) -> list[Any]:
+        """As ``read`` takes it."""
+        return [self.kind, *(None if box is None else box.write() for box in self.boxes)]
+
+
+def box_from(record: Any, limits: Limits) -> CurveBoxRecord:
+    """A box; RecordError where it is none."""
+    if not isinstance(record, list) or record[:1] != [CurveBoxRecord.kind]:
+        raise RecordError(f"{quoted(record)} is no box")
+    found: CurveBoxRecord = CurveBoxRecord.read(record, limits)
+    return found
+
+
+@dataclass(frozen=True)
+class CutPiece(Record):
+    """The piece of alpha is cut here; the subtrees of both parts follow, the lower one first."""
+
+    kind, sizes = "p", (2,)
+
+    alpha: str
+
+    def between(self, low: Fraction, high: Fraction) -> Fraction:
+        """Where it is cut; RecordError where that is not within the piece."""
+        try:
+            alpha = rational_from(self.alpha)
+        except ValueError as error:
+            raise RecordError(f"a piece is cut nowhere: {error}") from None
+        if not low < alpha < high:
+            raise RecordError("a piece is not cut within")
+        return alpha
+
+
+@dataclass(frozen=True, eq=False)
+class OnCurve(ClosingRecord):
+    """All solutions over the piece lie on a curve, in these of its boxes, one after the other.
+
+    Attributes
+    ----------
+    first, last : int
+        Boxes of the curve.
+    numbers : array or None
+        Of a form, as ``trusted.space.piece_forms.PieceWeights.of`` takes them, by which a run of the curve from the
+        first to the last box has all solutions with the statuses of the assignment. Without it the assignment is
+        complete, and its solutions lie in the boxes.
+    """
+
+    kind, sizes, trees = "k", (3, 4), Tree.PIECES
+
+    first: int
+    last: int
+    numbers: Floats | None = None
+
+    @classmethod
+    def of(cls, entries: list[Any], limits: Limits) -> OnCurve:
+        """The numbers; RecordError where there are not as many as there must be, or no such boxes."""
+        first, last, *form = entries
+        _boxes([first, last], limits)
+        if not form:
+            check_complete(limits.codes)
+            return cls(first, last)
+        if not limits.held:
+            raise RecordError("its form is that of a body that is held")
+        try:
+            return cls(first, last, numbers_from(form[0], 3 * limits.components - limits.p))
+        except ValueError as error:
+            raise RecordError(f"a form over a piece cannot be read: {error}") from None
+
+
+@dataclass(frozen=True)
+class ThroughCurveBox(ClosingRecord):
+    """All roots over the piece lie on one arc, and one of its points in this box.
+
+    Attributes
+    ----------
+    box : int
+    low, high : str
+        The arc is one over this piece, which has all alpha of the roots.
+    alpha : str
+    leaf : codes of a leaf whose root at that alpha is the point
+    """
+
+    kind, sizes, trees = "t", (6,), Tree.PIECES
+
+    box: int
+    low: str
+    high: str
+    alpha: str
+    leaf: tuple[int, ...]
+
+    @classmethod
+    def of(cls, entries: list[Any], limits: Limits) -> ThroughCurveBox:
+        """The entries; RecordError where there is no such box, or they are no numbers or no leaf."""
+        box, low, high, alpha, leaf = entries
+        _boxes([box], limits)
+        check_complete(limits.codes)
+        if not isinstance(leaf, list) or len(leaf) != limits.p or not all(map(is_code_of_leaf, leaf)):
+            raise RecordError("the leaf of a point of an arc is none")
+        try:
+            inside = rational_from(low) <= rational_from(alpha) <= rational_from(high)
+        except ValueError as error:
+            raise RecordError(f"an arc is over no piece: {error}") from None
+        if not inside:
+            raise RecordError("a point of an arc is not over its piece")
+        return cls(box, low, high, alpha, tuple(leaf))
+
+    @property
+    def piece(self) -> tuple[Fraction, Fraction]:
+        """Of the arc."""
+        return rational_from(self.low), rational_from(self.high)
+
+    @property
+    def point(self) -> tuple[Fraction, tuple[int, ...]]:
+        """Alpha and the leaf."""
+        return rational_from(self.alpha), self.leaf
+
+
+def _boxes(entries: list[Any], limits: Limits) -> list[int]:
+    """Numbers of boxes around curves."""
+    for box in entries:
+        if type(box) is not int or not 0 <= box < limits.boxes:
+            raise RecordError(f"there is no box {quoted(box)}")
+    return entries
