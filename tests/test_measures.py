@@ -11,10 +11,10 @@ from documents import ROOT
 
 #: A change that lowers a measure lowers its bound; one that has to raise it says why in its commit.
 BOUNDS = {
-    "code lines": 46_562,
-    "classes": 602,
+    "code lines": 46_532,
+    "classes": 600,
     "kinds of records": 20,
-    "parameters annotated Any": 331,
+    "parameters annotated Any": 330,
     "files": 332,
     "docstrings that begin with a pronoun": 68,
     "class names used twice or more": 10,

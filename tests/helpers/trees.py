@@ -9,7 +9,7 @@ from enumsol.search import fathoming as closing
 from enumsol.search.fathoming import Closer
 from enumsol.search.reduction import WeightSource
 from enumsol.search.space import space_fathoming, space_setup
-from enumsol.search.space.known_boxes import KnownBoxes
+from enumsol.search.space.open_leaves import KnownBoxes
 from enumsol.search.space.space_fathoming import SpaceCloser
 
 

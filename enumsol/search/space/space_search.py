@@ -41,8 +41,7 @@ from enumsol.search.certifiers.protocol import (
     UndecidedPart,
 )
 from enumsol.search.outcome import HOLD
-from enumsol.search.space.known_boxes import KnownBoxes
-from enumsol.search.space.open_leaves import Cause, obstacle, sector_to_halve
+from enumsol.search.space.open_leaves import Cause, KnownBoxes, obstacle, sector_to_halve
 from enumsol.search.space.product_search import Branched, Enclosed, Missed
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
 from enumsol.trusted.space.product_forms import Ellipsoid, refines
