@@ -22,6 +22,7 @@ from unittest.mock import patch
 
 import enumsol
 from contact_alone.bodies import brake_shoe, clip, half_plate, pin, stack, telescope, wedge
+from enumsol.search.closing import TreeCloser
 from shared.clock import timed
 from shared.results import yes
 
@@ -65,7 +66,7 @@ def row(name: str, most: int) -> dict[str, Any]:
     search = partial(enumsol.enumerate_roots, problem, 0, max_nodes=most)
     roots, seconds = timed(search)
     checked, verified = timed(enumsol.verify, problem, roots.proof)
-    with patch("enumsol.search.floating_solvers.ReferenceCloser", lambda *_: None):
+    with patch("enumsol.search.floating_solvers.LeadingCloser", lambda *_: TreeCloser()):
         alone, without = timed(search)
     assert checked
     assert not (roots.complete and alone.complete) or len(roots) == len(alone)

@@ -196,9 +196,7 @@ def test_changed_forms_prove_nothing_false(eager, seed):
         elif how == 2:
             changed[k][6] *= float(rng.choice((0.0, 1e-3, 1e3, -1.0)))
         elif how == 3:
-            digits = list(changed[k][1])
-            digits[node] = str(rng.integers(7))
-            changed[k][1] = "".join(digits)
+            changed[k][1][node] = int(rng.integers(7))
         elif how == 4:
             del changed[k]
         else:
