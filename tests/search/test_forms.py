@@ -187,14 +187,14 @@ def test_changed_forms_prove_nothing_false(eager, seed):
     for _ in range(60):
         changed = copied(records)
         k = int(rng.choice(places))
-        part, node = int(rng.integers(2, 6)), int(rng.integers(problem.p))
+        number, node = int(rng.integers(4 * problem.p)), int(rng.integers(problem.p))
         how = int(rng.integers(6))
         if how == 0:
-            changed[k][part][node] *= float(rng.choice((-1.0, 0.0, 0.5, 2.0, 1e3)))
+            changed[k][2][number] *= float(rng.choice((-1.0, 0.0, 0.5, 2.0, 1e3)))
         elif how == 1:
-            changed[k][part][node] += float(rng.normal())
+            changed[k][2][number] += float(rng.normal())
         elif how == 2:
-            changed[k][6] *= float(rng.choice((0.0, 1e-3, 1e3, -1.0)))
+            changed[k][3][0] *= float(rng.choice((0.0, 1e-3, 1e3, -1.0)))
         elif how == 3:
             changed[k][1][node] = int(rng.integers(7))
         elif how == 4:
