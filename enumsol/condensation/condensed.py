@@ -269,7 +269,9 @@ class Condensation(Sealed):
 
     @cached_property
     def bordered(self) -> Floats:
-        """The matrix of theory, (14.9), shape (m + r, m + r); raises as ``mixing``."""
+        """The matrix of theory, (14.9), shape (m + r, m + r), of a held body ``balanced``; raises as ``mixing``."""
+        if self.problem.held:
+            return self.balanced
         G = self.moves
         return sealed(np.block([[self.balanced, -G.T], [G, np.zeros((len(G), len(G)))]]))
 

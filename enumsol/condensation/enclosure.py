@@ -373,8 +373,7 @@ class RigidRows:
         finite = rows.finite and all(load.finite for load in loads) and np.all(np.isfinite(reach))
         if not (finite and np.all(reach * unit == most)):
             raise NotEnclosedError(_RIGID_OVERFLOW)
-        slope = loads[1] if len(loads) > 1 else Ball.exact(np.zeros(len(unit)))
-        return cls(rows, loads[0], slope, unit, reach)
+        return cls(rows, loads[0], loads[1] if len(loads) > 1 else Ball.exact(np.zeros(len(unit))), unit, reach)
 
 
 #: Stands for those of a body that is held, of any number of contact forces.
@@ -420,12 +419,13 @@ class EnclosedSystem:
     @cached_property
     def balls(self) -> tuple[Ball, Ball, Ball]:
         """S and g, bordered by G and h, and F."""
-        G, h = self.rows.G, self.rows.h
-        corner = np.zeros((len(G.mid),) * 2)
+        if self.held:
+            return Ball(self.S, self.S_rad), Ball(self.g, self.g_rad), Ball(self.F, self.F_rad)  # no copy of a large S
         mid, rad = (
-            np.block([[own, border.T], [border, corner]]) for own, border in ((self.S, G.mid), (self.S_rad, G.rad))
+            np.block([[own, border.T], [border, np.zeros((len(border),) * 2)]])
+            for own, border in ((self.S, self.rows.G.mid), (self.S_rad, self.rows.G.rad))
         )
-        return Ball(mid, rad), Ball.joined(Ball(self.g, self.g_rad), h), Ball(self.F, self.F_rad)
+        return Ball(mid, rad), Ball.joined(Ball(self.g, self.g_rad), self.rows.h), Ball(self.F, self.F_rad)
 
     @cached_property
     def smallest_eigenvalue(self) -> float:

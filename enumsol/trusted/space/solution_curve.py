@@ -156,10 +156,8 @@ class AlphaProblem:
                 Ball(enclosure.g1 / length, enclosure.g1_rad / length + TINY),
             ]
             rows, work = RigidRows.of(problem, Fraction(0), force, length), float(force[0] * length[0])
-            data, ratio = (
-                _bordered(data, rows),
-                Ball.joined(_ratios(problem, occurs), Ball.exact(np.ones(len(rows.unit)))),
-            )
+            data = _bordered(data, rows)
+            ratio = Ball.joined(_ratios(problem, occurs), Ball.exact(np.ones(len(rows.unit))))
             force, length = np.append(force, rows.unit), np.append(length, work / rows.unit)
             S, g0, g1 = (part * ratio if part.mid.ndim == 1 else ratio[:, None] * part for part in data)
             inverse = Ball(1.0 / ratio.mid, (2.0 * ratio.rad / ratio.mid + 2 * UNIT) / ratio.mid * SAFE)
