@@ -1,0 +1,202 @@
+"""The dynamic stiffness of contact rows: K(mu) = (B (A + mu M)^-1 B')^-1, in balls (theory, section 15.2).
+
+K(mu) is the stiffness with which contact rows resist motions that grow like exp(rho t), mu = rho^2. It increases with
+mu and is concave (theory, 15.3), so that its values at a few mu bound it everywhere.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, Inverse
+from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
+from enumsol.condensation.factorization import Factorization
+from enumsol.condensation.products import Products
+from enumsol.errors import InvalidProblemError
+
+if TYPE_CHECKING:
+    from fractions import Fraction
+
+    from enumsol.support.array_types import AlphaLike, Floats
+
+
+class Pencil:
+    """A + mu M at one mu, with rows B, as what condensing asks of a problem without any load.
+
+    Parameters
+    ----------
+    A : (n, n) sparse matrix, symmetric
+    rows : (m, n) sparse matrix
+    """
+
+    load_slope: Floats | None = None
+    offset_radius: Floats | None = None
+    exact_offset: tuple[Fraction, ...] | None = None
+    held, modes, rigid_reach = True, None, 0.0
+
+    def __init__(self, A: sp.csc_array, rows: sp.csr_array) -> None:
+        self.A, self.contact_rows, self.n = A, rows, A.shape[0]
+        self.f, self.gap, self.slip_offset = np.zeros(self.n), np.zeros(rows.shape[0]), np.zeros(0)
+
+    @property
+    def on_springs(self) -> Pencil:
+        """Itself: it is held."""
+        return self
+
+    def load_at(self, alpha: AlphaLike) -> Floats:
+        """No load, (n,)."""
+        del alpha
+        return self.f
+
+    @cached_property
+    def factorization(self) -> Factorization:
+        """Factors of A + mu M."""
+        return Factorization(self.A)
+
+    def compliance(self, rounding: Floats | None = None) -> Ball:
+        """B (A + E)^-1 B' for all symmetric E with |E| x <= ``rounding`` for x = 1, entry by entry.
+
+        Parameters
+        ----------
+        rounding : (n, n) sparse matrix, optional
+            Bounds of the entries of E.
+
+        Raises
+        ------
+        NotEnclosedError
+            A is not proven positive definite.
+        """
+        try:
+            products = Products.of(self)
+            enclosed = CondensedEnclosure.from_problem(self, products)
+        except InvalidProblemError as error:
+            raise NotEnclosedError(str(error)) from None
+        S, m = Ball(enclosed.S, enclosed.S_rad), len(enclosed.S)
+        if rounding is None:
+            return S
+        # b'(A + E)^-1 c - b'A^-1 c = -b'A^-1 E (A + E)^-1 c, in units in which A has a diagonal near one
+        scale, bound = products.scale, enclosed.stiffness_bound
+        off = float(np.max(scale * (rounding @ scale))) * (1 + self.n * UNIT) * SAFE
+        if not off < 0.5 * bound:
+            raise NotEnclosedError("the rounding of A + mu M is as large as its smallest eigenvalue")
+        lengths = (products.lengths[:m] + products.left[:m] / bound) * SAFE
+        more = np.outer(lengths, lengths) * (off / (1 - off / bound))
+        return Ball(S.mid, (S.rad + more * SAFE) * SAFE + TINY)
+
+
+class DynamicStiffness:
+    """K(mu) of some contact rows of a body.
+
+    Parameters
+    ----------
+    A, M : (n, n) sparse matrices, symmetric
+        Stiffness and mass; A + mu M is positive definite for mu > 0.
+    rows : (m, n) sparse matrix
+        B, of full rank.
+    modes : (n, r) array, optional
+        Rigid modes N, A N = 0, of a body that nothing holds.
+    springs : (n, n) sparse matrix, optional
+        With them A is positive definite.
+    """
+
+    def __init__(
+        self, A: sp.csc_array, M: sp.csc_array, rows: sp.csr_array, modes: Floats | None = None, springs: Any = None
+    ) -> None:
+        self.A, self.M, self.rows, self._modes, self.springs = A, M, rows, modes, springs
+        self._known: dict[float, Ball | None] = {}
+
+    def at(self, mu: float) -> Ball | None:
+        """K(mu), (m, m) [force / length]; None where it is not enclosed."""
+        if mu not in self._known:
+            try:
+                self._known[mu] = self._inverse(self._compliance(mu)) if mu or self.held else self._slow()
+            except NotEnclosedError:
+                self._known[mu] = None
+        return self._known[mu]
+
+    @property
+    def held(self) -> bool:
+        """True if A is positive definite: K(mu) is there for some mu < 0, too."""
+        return self._modes is None or not self._modes.shape[1]
+
+    @property
+    def known(self) -> list[float]:
+        """All mu at which K(mu) has been enclosed, in order."""
+        return sorted(mu for mu, K in self._known.items() if K is not None)
+
+    @cached_property
+    def steepest(self) -> Ball | None:
+        """The limit of K(mu) / mu for large mu, (B M^-1 B')^-1; None where it is not enclosed or not there.
+
+        Degrees of freedom without mass that contact rows do not touch are left out: they follow the others.
+        """
+        massive = self.M.diagonal() > 0
+        rows = self.rows[:, massive]
+        if not self.increases or not np.any(massive) or self.rows[:, ~massive].nnz:
+            return None
+        return self._limit(self.M, rows, massive)
+
+    @cached_property
+    def stiffest(self) -> Ball | None:
+        """The limit of K(mu) where all contact rows act on degrees of freedom without mass; others stand still."""
+        massless = self.M.diagonal() == 0
+        rows = self.rows[:, massless]
+        if not self.increases or np.any(np.diff(rows.indptr) == 0):
+            return None
+        return self._limit(self.A, rows, massless)
+
+    @cached_property
+    def increases(self) -> bool:
+        """True if M is proven positive definite where it is not zero: K(mu) then increases with mu."""
+        massive = self.M.diagonal() > 0
+        if not np.any(massive) or sp.csr_array(self.M)[~massive].nnz:
+            return False
+        try:
+            part = sp.csc_array(sp.csr_array(self.M)[massive][:, massive])
+            Pencil(part, sp.csr_array(self.rows[:1][:, massive])).compliance()
+        except NotEnclosedError:
+            return False
+        return True
+
+    def _limit(self, matrix: sp.csc_array, rows: sp.csr_array, chosen: Any) -> Ball | None:
+        """The inverse of B X^-1 B' for a part X of a matrix."""
+        part = sp.csc_array(sp.csr_array(matrix)[chosen][:, chosen])
+        try:
+            return self._inverse(Pencil(part, sp.csr_array(rows)).compliance())
+        except NotEnclosedError:
+            return None
+
+    def _compliance(self, mu: float) -> Ball:
+        if mu == 0:
+            return Pencil(self.A, self.rows).compliance()
+        added = mu * self.M
+        rounding = (abs(self.A) + 2.0 * abs(added)) * (2.0 * UNIT)
+        return Pencil(sp.csc_array(self.A + added), self.rows).compliance(rounding)
+
+    def _slow(self) -> Ball:
+        """K(0) of a body that nothing holds: stiffness against all but the rigid motions (theory, (15.5))."""
+        springs = abs(self.springs)
+        held = Pencil(sp.csc_array(self.A + self.springs), self.rows)
+        K = self._inverse(held.compliance((abs(self.A) + springs) * (2.0 * UNIT)))
+        assert self._modes is not None
+        moved = self.rows @ self._modes
+        size = abs(self.rows) @ np.abs(self._modes)
+        G = Ball(moved, size * (self.A.shape[0] + 2) * 2 * UNIT * SAFE + TINY)
+        KG = K @ G
+        inverse = Inverse.of(Ball(G.mid.T, G.rad.T) @ KG)
+        if inverse is None:
+            raise NotEnclosedError("some rigid displacement moves no node in contact")
+        return (K - KG @ inverse.solve(Ball(KG.mid.T, KG.rad.T))).symmetric
+
+    @staticmethod
+    def _inverse(S: Ball) -> Ball:
+        if not len(S.mid):
+            return S
+        inverse = Inverse.of(S)
+        if inverse is None:
+            raise NotEnclosedError("S(mu) is not proven regular")
+        return inverse.solve(Ball.exact(np.eye(len(S.mid)))).symmetric

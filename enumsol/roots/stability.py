@@ -1,0 +1,299 @@
+"""Which equilibria run away: directional stability of roots (theory, section 15)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
+from enumsol.condensation.data import exactly_at
+from enumsol.condensation.dynamic import DynamicStiffness
+from enumsol.condensation.enclosure import nearest_floats
+from enumsol.model.statuses import ContactStatus
+from enumsol.search.stability import Proven, StabilitySearch
+from enumsol.support.immutable import Sealed
+from enumsol.support.messages import counted
+from enumsol.trusted.running_away import Motions, Touching
+
+if TYPE_CHECKING:
+    from enumsol.roots.root import Root
+    from enumsol.support.array_types import Floats
+
+Verdict = Literal["runs away", "does not run away", "undecided"]
+_OPEN, _STICK, _PLUS, _MINUS, _SLIP = (
+    ContactStatus.OPEN,
+    ContactStatus.STICK,
+    ContactStatus.SLIP_PLUS,
+    ContactStatus.SLIP_MINUS,
+    ContactStatus.SLIP,
+)
+
+
+@dataclass(frozen=True)
+class Stability(Sealed):
+    """Whether an equilibrium runs away (theory, section 15).
+
+    It runs away if the body, left there, can leave along a straight line with a displacement that grows like exp(rho
+    t): it cannot rest in it. If it does not run away, nothing more is said: a motion that slips to and fro may grow all
+    the same.
+
+    Attributes
+    ----------
+    verdict : "runs away", "does not run away" or "undecided"
+        The first two are proven.
+    growth_rates : tuple of float
+        rho = sqrt(mu) of the motions that were found, the largest first [1 / time].
+    motions : tuple of (n,) arrays
+        Their directions, with a largest component of one.
+    bounds : tuple of (float, float)
+        Proven bounds of every growth rate.
+    reason : str
+        Why, in a sentence.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> problem = enumsol.gallery.taper()
+    >>> [found.verdict for found in enumsol.enumerate_roots(problem, alpha=0.2).stability()]
+    ['does not run away', 'runs away', 'does not run away']
+    """
+
+    verdict: Verdict
+    growth_rates: tuple[float, ...]
+    motions: tuple[Floats, ...] = field(repr=False)
+    bounds: tuple[tuple[float, float], ...] = field(repr=False)
+    reason: str
+
+
+class Stabilities:
+    """Verdicts on roots of one problem; parts that nothing connects are examined by themselves and only once.
+
+    Parameters
+    ----------
+    problem : ContactProblem or ContactProblem3D
+    mass : (n, n) array or sparse, or None
+        In place of ``problem.mass``.
+
+    Raises
+    ------
+    InvalidArgumentError
+        There is no mass, or it cannot be used.
+    """
+
+    def __init__(self, problem: Any, mass: Any = None) -> None:
+        self.problem = problem
+        self._mass = mass
+        A, rows = sp.csc_array(problem.A), sp.csr_array(problem.contact_rows)
+        self._tangents = rows.shape[0] // problem.p - 1
+        links = sp.csr_array(abs(A) + abs(self._mass))
+        count, self._part = connected_components(links, directed=False)
+        # a row that touches several parts connects them
+        joins = sp.csr_array((np.ones(problem.n), (np.arange(problem.n), self._part)), shape=(problem.n, count))
+        of_nodes = sum(abs(rows[k * problem.p : (k + 1) * problem.p]) for k in range(self._tangents + 1)) @ joins
+        joined = sp.csr_array(of_nodes.T @ of_nodes)
+        _, together = connected_components(joined, directed=False)
+        self._part = together[self._part]
+        first = np.array([of_nodes.indices[of_nodes.indptr[i]] for i in range(problem.p)])
+        self._node_part = together[first]
+        self._known: dict[Any, Proven] = {}
+        self._stiffness: dict[Any, DynamicStiffness] = {}
+
+    def of(self, root: Root) -> Stability:
+        """The verdict on one root."""
+        reason = self._not_known(root)
+        if reason is not None:
+            return Stability("undecided", (), (), (), reason)
+        found: list[tuple[float, tuple[float, float], Floats]] = []
+        gaps: list[tuple[float, float]] = []
+        limits, F = 0, _friction(self.problem, root.alpha)
+        rubs = np.any([f.mid > 0 for f in F], axis=0)
+        for part in np.unique(self._node_part):
+            nodes = np.flatnonzero(self._node_part == part)
+            kinds = [_kind(root.active[i], rubs[i]) for i in nodes]
+            limits += sum(kind == "limit" for kind in kinds)
+            if "limit" not in kinds:
+                continue
+            key = (int(part), tuple(root.active[i] for i in nodes), None if self._tangents == 1 else id(root))
+            stiffness, motions, dofs = self._setting(root, F, int(part), nodes, kinds)
+            if key not in self._known:
+                self._known[key] = StabilitySearch(stiffness, motions).run()
+            proven = self._known[key]
+            gaps += proven.gaps
+            for _, motion in proven.growing:
+                found.append((*self._growth(motion.mu), self._shape(stiffness, motions, motion, dofs)))
+        if found:
+            found.sort(key=lambda item: -item[0])
+            rates, bounds, shapes = zip(*found, strict=True)
+            one = f"{len(found)} motions grow" if len(found) > 1 else "a motion grows"
+            return Stability("runs away", rates, shapes, bounds, f"{one} along a straight line")
+        if gaps:
+            low, high = (float(np.sqrt(mu)) for mu in gaps[0])
+            return Stability("undecided", (), (), (), f"growth rates from {low:.3g} to {high:.3g} are not excluded")
+        if not limits:
+            reason = "no contact node is at its limit of friction"
+        else:
+            reason = f"no motion grows with {counted(limits, 'contact node')} at the limit of friction"
+        return Stability("does not run away", (), (), (), reason)
+
+    def _not_known(self, root: Root) -> str | None:
+        """Why the statuses of a root do not tell enough."""
+        if root.enclosure is None:
+            return "the root was found in floats, and its statuses are not proven"
+        if any(_OPEN in root.active[i] for i in self._unsure(root)):
+            return "a contact node may be open or touch, which the bounds of this root do not decide"
+        return None
+
+    @staticmethod
+    def _unsure(root: Root) -> tuple[int, ...]:
+        """Nodes of which bounds alone say what they do, and leave more than one status."""
+        if root.regular or root.exact_slips is not None:
+            return ()
+        return tuple(i for i, statuses in enumerate(root.active) if len(statuses) > 1)
+
+    @staticmethod
+    def _growth(mu: tuple[float, float]) -> tuple[float, tuple[float, float]]:
+        low, high = np.sqrt(mu[0]) * (1 - 2.0**-50), np.sqrt(mu[1]) * (1 + 2.0**-50)
+        return float(np.sqrt(0.5 * (mu[0] + mu[1]))), (float(low), float(high))
+
+    def _setting(
+        self, root: Root, F: list[Ball], part: int, nodes: Any, kinds: list[str]
+    ) -> tuple[DynamicStiffness, Motions, Any]:
+        """Stiffness of the rows of a part that are in contact, how they may move, and its degrees of freedom."""
+        problem, p = self.problem, self.problem.p
+        dofs = np.flatnonzero(self._part == part)
+        rows: list[int] = []
+        for k in range(self._tangents + 1):
+            for i, kind in zip(nodes.tolist(), kinds, strict=True):
+                if kind == "open" or (k and F[k - 1].mid[i] == 0):
+                    continue
+                rows.append(k * p + i)
+        key = (part, tuple(rows))
+        if key not in self._stiffness:
+            modes = springs = None
+            A, M = sp.csc_array(problem.A), self._mass
+            B = sp.csr_array(sp.csr_array(problem.contact_rows)[rows][:, dofs])
+            if not problem.held:
+                N = problem.modes.N[dofs]
+                modes = N[:, np.any(N != 0, axis=0)]
+                springs = sp.csc_array(problem.modes.springs())[dofs][:, dofs]
+            cut = [sp.csc_array(sp.csr_array(matrix)[dofs][:, dofs]) for matrix in (A, M)]
+            self._stiffness[key] = DynamicStiffness(cut[0], cut[1], B, modes, springs)
+        place = {row: at for at, row in enumerate(rows)}
+        columns: list[Ball] = []
+        slopes: list[Ball] = []
+        signed: list[bool] = []
+        touching: list[Touching] = []
+        limits, unsure = (
+            [i for i, kind in zip(nodes.tolist(), kinds, strict=True) if kind == "limit"],
+            self._unsure(root),
+        )
+        for i in limits:
+            move, slope = _limit(root, F, i)
+            for into, column, normal in ((columns, move, 0.0), (slopes, move, slope)):
+                full = Ball.exact(np.zeros(len(rows)))
+                for k in range(self._tangents):
+                    if (row := (k + 1) * p + i) in place:
+                        full[place[row]] = column[k]
+                if isinstance(normal, Ball):
+                    full[place[i]] = -normal
+                into.append(full)
+            signed.append(True)
+        for i, kind in zip(nodes.tolist(), kinds, strict=True):
+            if kind != "touching":
+                continue
+            own = [i, *((k + 1) * p + i for k in range(self._tangents) if (k + 1) * p + i in place)]
+            start = len(columns)
+            for row in own:
+                full = Ball.exact(np.zeros(len(rows)))
+                full[place[row]] = -1.0 if row == i else 1.0
+                columns.append(full)
+                signed.append(row == i)
+            touching.append(Touching(start, tuple(range(start + 1, start + len(own))), _smaller(F, i)))
+        empty = Ball.exact(np.zeros((len(rows), 0)))
+        motions = Motions(
+            _stacked(columns) if columns else empty,
+            _stacked(slopes) if slopes else empty,
+            np.array(signed, dtype=bool),
+            tuple(touching),
+            tuple(k for k, i in enumerate(limits) if i in unsure),
+        )
+        return self._stiffness[key], motions, dofs
+
+    def _shape(self, stiffness: DynamicStiffness, motions: Motions, motion: Any, dofs: Any) -> Floats:
+        """Displacements of a motion that grows, (n,), in floats."""
+        from enumsol.condensation.factorization import Factorization
+
+        mu = 0.5 * sum(motion.mu)
+        K = stiffness.at(motion.mu[0])
+        assert K is not None
+        forces = K.mid @ (motions.moves.mid @ motion.x.mid)
+        v = Factorization(sp.csc_array(stiffness.A + mu * stiffness.M)).solve(stiffness.rows.T @ forces)
+        whole = np.zeros(self.problem.n)
+        whole[dofs] = v / np.max(np.abs(v))
+        return whole
+
+
+def _kind(active: frozenset[ContactStatus], friction: bool) -> str:
+    """What a node may do: stay open or stuck, slide at its limit, or leave where it touches without force."""
+    if active == {_OPEN}:
+        return "open"
+    if _OPEN in active:
+        return "touching"
+    return "limit" if friction and active != {_STICK} else "stuck"
+
+
+def _friction(problem: Any, alpha: Any) -> list[Ball]:
+    """F along every axis, as balls (p,)."""
+    exact = alpha if isinstance(alpha, Fraction) else Fraction(float(alpha))
+    first, slope = (np.asarray(part).reshape(problem.p, -1) for part in problem.affine_friction)
+    balls = []
+    for k in range(first.shape[1]):
+        F, inexact = nearest_floats(exactly_at(exact, first[:, k], slope[:, k]))
+        balls.append(Ball(F, np.where(inexact, 2 * UNIT * F + TINY, 0.0)))
+    return balls
+
+
+def _limit(root: Root, F: list[Ball], i: int) -> tuple[list[Ball], Ball]:
+    """Tangential move of a node at its limit, by axis, and by how much T_i sinks meanwhile (theory, (15.3))."""
+    if len(F) == 1:
+        sign = 1.0 if _PLUS in root.active[i] else -1.0
+        return [Ball.exact(np.array(sign))], F[0][i]
+    assert root.enclosure is not None
+    bounds = root.enclosure.lambda_t[i]
+    inverse = [_inverse(f[i]) for f in F]
+    force = [Ball(0.5 * (low + high), 0.5 * (high - low) * SAFE + TINY) for low, high in bounds]
+    shares = [x * y for x, y in zip(force, inverse, strict=True)]
+    length = float(np.hypot(*(x.mid for x in shares)))
+    # |v / |v| - m / |m|| <= 2 |v - m| / |m|
+    off = 2.0 * float(np.hypot(*(x.rad for x in shares))) / length * SAFE + 8 * UNIT
+    typical = max(float(f.mid[i]) for f in F)
+    moves = [
+        Ball(np.array(typical * float(x.mid) / length), np.array(typical * off * SAFE)) * y
+        for x, y in zip(shares, inverse, strict=True)
+    ]
+    return moves, Ball.exact(np.array(typical))
+
+
+def _inverse(F: Ball) -> Ball:
+    """1 / F; of no friction at all zero, since no force is along that axis."""
+    mid = float(F.mid)
+    return (
+        Ball.exact(np.array(0.0))
+        if mid == 0
+        else Ball(np.array(1 / mid), np.array((2 * float(F.rad) / mid + 2 * UNIT) / mid))
+    )
+
+
+def _stacked(columns: list[Ball]) -> Ball:
+    """Columns beside each other."""
+    return Ball(np.stack([c.mid for c in columns], axis=1), np.stack([c.rad for c in columns], axis=1))
+
+
+def _smaller(F: list[Ball], i: int) -> Ball:
+    """The smaller coefficient of a node."""
+    return F[int(np.argmin([f.mid[i] for f in F]))][i]

@@ -1,0 +1,356 @@
+"""The trusted core of directional stability: no growing motion for a range of mu, or one (theory, section 15).
+
+A motion u* + exp(rho t) v, mu = rho^2, moves the rows of the contact nodes by w = R x, with a component x_i of x for
+every node at its limit (how far it slides, at least zero) and for every direction of a node that touches without
+force; all other rows stand still. K(mu) (`condensation.dynamic`) gives the change of forces, y = -K(mu) w. At a node at
+its limit r_i = F y_n - s y_t = T_i'K(mu) R x is at least zero, too, and x_i r_i = 0.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from enumsol.arithmetic.balls import TINY, UNIT, Ball, dense_eigenvalue_bound, determinant_sign, solution, upper_norm
+from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from enumsol.condensation.dynamic import DynamicStiffness
+    from enumsol.support.array_types import Floats, Mask
+
+
+@dataclass(frozen=True, eq=False)
+class Touching:
+    """A node that touches without force: components of x in which it leaves the obstacle and slides, and F.
+
+    Attributes
+    ----------
+    leaves : int
+        Its rows move by -w_n.
+    slides : tuple of int
+    F : Ball of shape ()
+        Its coefficient, the smaller one of two.
+    """
+
+    leaves: int
+    slides: tuple[int, ...]
+    F: Ball
+
+
+@dataclass(frozen=True, eq=False)
+class Motions:
+    """Directions in which contact rows may begin to move at an equilibrium, k of them (theory, (15.3)).
+
+    Attributes
+    ----------
+    moves : Ball (m, k)
+        R: how every component of x moves the rows. First come the nodes at their limit.
+    slopes : Ball (m, l)
+        T_i of every node at its limit: a slip and a rise with w_n = -F |w_t|.
+    signed : (k,) bool array
+        Components that are at least zero.
+    touching : tuple of Touching
+        Nodes that touch without force.
+    unsure : tuple of int
+        Nodes that may be at their limit or stick: where x_i = 0, r_i may have either sign.
+    """
+
+    moves: Ball
+    slopes: Ball
+    signed: Mask
+    touching: tuple[Touching, ...] = ()
+    unsure: tuple[int, ...] = ()
+
+    @cached_property
+    def leaning(self) -> Ball:
+        """T_i of nodes at their limit, and moves of those that touch, (m, k)."""
+        return Ball.beside(self.slopes, self.moves[:, self.limits :])
+
+    @property
+    def limits(self) -> int:
+        """Number of nodes at their limit, l."""
+        return self.slopes.shape[1]
+
+
+@dataclass(frozen=True, eq=False)
+class NoMotion:
+    """Numbers by which nothing grows for mu in a range, with some nodes decided (theory, 15.4).
+
+    Attributes
+    ----------
+    low, high : float
+        Ends of the range; ``high`` may be infinite.
+    beside : float or None
+        Another mu, below ``low`` or above ``high``: K is concave, and its slope from there bounds it from above. None:
+        that it increases does.
+    slides, stays : tuples of signed components
+        Those with r_i = 0, and with x_i = 0; r is y_n of a node that touches.
+    weights : (k, k) array
+        kappa. Entries beside (i, i) in rows of signed components are at most zero in columns of signed components, and
+        zero in others; a node that touches may lean by at most F. Rows of components that slide are free.
+    products : pair of (k, k) arrays
+        N at both ends, of entries >= 0 that belong to signed components and of zeros.
+    """
+
+    low: float
+    high: float
+    beside: float | None
+    slides: tuple[int, ...]
+    stays: tuple[int, ...]
+    weights: Floats
+    products: tuple[Floats, Floats]
+
+    def holds(self, stiffness: DynamicStiffness, motions: Motions) -> bool:
+        """True if it is proven that nothing grows in the range."""
+        if not 0 <= self.low < self.high or not self._admitted(motions):
+            return False
+        known = self._ends(stiffness)
+        if known is None:
+            return False
+        (first, first_bend), (last, last_bend) = known
+        kept = np.setdiff1d(np.arange(len(motions.signed)), self.stays)
+        if not len(kept):
+            return True
+        left, right = motions.leaning @ Ball.exact(self.weights[:, kept]), motions.moves[:, kept]
+        apart = left - right
+        for K, bend, N in zip((first, last), (first_bend, last_bend), self.products, strict=True):
+            Q = _across(left, K, right).symmetric - Ball.exact(N[np.ix_(kept, kept)]).symmetric
+            if bend is not None:
+                Q = Q - Ball.exact(np.array(0.25)) * _across(apart, bend, apart).symmetric
+            if not positive(Q):
+                return False
+        return True
+
+    def _admitted(self, motions: Motions) -> bool:
+        """Whether the numbers have the signs that the theorem asks for."""
+        k, signed = len(motions.signed), motions.signed
+        decided = {*self.slides, *self.stays}
+        if len(decided) != len(self.slides) + len(self.stays) or not all(0 <= i < k and signed[i] for i in decided):
+            return False
+        if self.weights.shape != (k, k) or any(N.shape != (k, k) for N in self.products):
+            return False
+        if not all(np.all(np.isfinite(a)) for a in (self.weights, *self.products)):
+            return False
+        beside = self.weights.copy()
+        beside[list(self.slides)] = 0.0
+        # a component that is zero may be multiplied by anything
+        beside[:, list(self.stays)] = 0.0
+        beside[signed, signed] = 0.0
+        for node in motions.touching:
+            own = list(node.slides)
+            if node.leaves in self.slides:
+                beside[own] = 0.0
+                continue
+            share = self.weights[own, own]
+            lean = float(np.linalg.norm(beside[node.leaves, own])) * (1 + 2.0**-40)
+            if np.any(share != share[:1]) or (own and not lean <= share[0] * float(node.F.low) * (1 - 2.0**-40)):
+                return False
+            beside[node.leaves, own] = beside[own, own] = 0.0
+        pairs = np.outer(signed, signed)
+        if np.any(beside[list(motions.unsure)]):
+            return False
+        return (
+            bool(np.all(beside[:, signed] <= 0))
+            and not np.any(beside[~signed])
+            and not np.any(beside[:, ~signed])
+            and all(bool(np.all(N[pairs] >= 0)) and not np.any(N[~pairs]) for N in self.products)
+        )
+
+    def _ends(self, stiffness: DynamicStiffness) -> tuple[tuple[Ball, Ball | None], ...] | None:
+        """At either end K or, for an infinite one, its slope, with a bound of how far K lies above the chord there."""
+        low, high, beside = self.low, self.high, self.beside
+        K = stiffness.at(low)
+        if K is None:
+            return None
+        if beside is not None and not (beside < low or high < beside < np.inf):
+            return None
+        other = None if beside is None else stiffness.at(beside)
+        if beside is not None and other is None:
+            return None
+        if np.isinf(high):
+            if other is None or beside is None:
+                limit = stiffness.stiffest
+                return None if limit is None else ((K, None), (K, limit - K))
+            limit = stiffness.steepest
+            return (
+                None
+                if limit is None
+                else ((K, None), (limit, (K - other) * _ratio(1, Fraction(low) - Fraction(beside)) - limit))
+            )
+        end = stiffness.at(high)
+        if end is None:
+            return None
+        if other is None or beside is None:
+            return ((K, end - K), (end, None)) if stiffness.increases else None
+        if beside < low:
+            return (K, None), (
+                end,
+                K + (K - other) * _ratio(Fraction(high) - Fraction(low), Fraction(low) - Fraction(beside)) - end,
+            )
+        return (
+            K,
+            end - (other - end) * _ratio(Fraction(high) - Fraction(low), Fraction(beside) - Fraction(high)) - K,
+        ), (end, None)
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """A motion that grows, as it is enclosed.
+
+    Attributes
+    ----------
+    mu : pair of float
+        Bounds of the square of its growth rate.
+    x : Ball (k,)
+    """
+
+    mu: tuple[float, float]
+    x: Ball
+
+
+@dataclass(frozen=True, eq=False)
+class Growing:
+    """A range of mu in which a motion grows, and what every node does in it (theory, 15.5).
+
+    Attributes
+    ----------
+    low, high : float
+    slides : tuple of indices of the nodes at their limit that slide
+    touching : tuple of status codes
+        Of the nodes that touch without force.
+    """
+
+    low: float
+    high: float
+    slides: tuple[int, ...]
+    touching: tuple[int, ...] = ()
+
+    def found(self, stiffness: DynamicStiffness, motions: Motions) -> Motion | None:
+        """The motion, if it is proven to be there."""
+        k = len(motions.signed)
+        if motions.unsure or not 0 < self.low < self.high < np.inf or len(self.touching) != len(motions.touching):
+            return None
+        if list(self.slides) != sorted({*self.slides}) or not all(0 <= i < motions.limits for i in self.slides):
+            return None
+        first, last, rows = stiffness.at(self.low), stiffness.at(self.high), self.equations(motions)
+        if first is None or last is None or rows is None or not rows[1] or not stiffness.increases:
+            return None
+        left, own = rows
+        right = motions.moves[:, own]
+        signs = [determinant_sign(_across(left, K, right)) for K in (first, last)]
+        if signs[0] * signs[1] >= 0:
+            return None
+        # K(low) <= K(mu) <= K(high)
+        spread = np.sqrt(np.maximum((last - first).high.diagonal(), 0.0)) * (1 + 2.0**-40) + TINY
+        K = Ball(first.mid, (first.rad + np.outer(spread, spread)) * (1 + 2.0**-40))
+        vector = _null_vector(_across(left, K, right))
+        if vector is None:
+            return None
+        x = Ball.exact(np.zeros(k))
+        x[own] = vector[:, 0]
+        forces = K @ (right @ vector)
+        return Motion((self.low, self.high), x) if self._strict(motions, x, forces) else None
+
+    def equations(self, motions: Motions) -> tuple[Ball, list[int]] | None:
+        """Rows whose work vanishes, as columns, and the components that are not zero."""
+        rows, own = [motions.slopes[:, list(self.slides)]], list(self.slides)
+        for node, code in zip(motions.touching, self.touching, strict=True):
+            if code == OPEN:
+                columns = [node.leaves, *node.slides]
+                rows.append(motions.moves[:, columns])
+            elif code in (SLIP_PLUS, SLIP_MINUS) and len(node.slides) == 1:
+                columns = list(node.slides)
+                rows.append(_slope(motions, node, code))
+            elif code == STICK:
+                continue
+            else:
+                return None
+            own += columns
+        return Ball.beside(*rows), own
+
+    def _strict(self, motions: Motions, x: Ball, forces: Ball) -> bool:
+        """Whether every node does what it is said to do, strictly; ``forces`` are K w = -y."""
+
+        def positive_number(value: Ball) -> bool:
+            return bool(np.all(value.mid - value.rad > 0))
+
+        for i in range(motions.limits):
+            if not positive_number(x[i : i + 1] if i in self.slides else motions.slopes[:, [i]].T @ forces):
+                return False
+        for node, code in zip(motions.touching, self.touching, strict=True):
+            if code == OPEN:
+                tests = [x[node.leaves : node.leaves + 1]]
+            else:
+                pressure = motions.moves[:, [node.leaves]].T @ forces
+                if code == STICK:
+                    if len(node.slides) != 1:
+                        return False
+                    tests = [_slope(motions, node, slip).T @ forces for slip in (SLIP_PLUS, SLIP_MINUS)]
+                else:
+                    own = x[list(node.slides)]
+                    tests = [own if code == SLIP_PLUS else -own]
+                tests.append(pressure)
+            if not all(positive_number(test) for test in tests):
+                return False
+        return True
+
+
+def _slope(motions: Motions, node: Touching, code: int) -> Ball:
+    """T of a node that touches and begins to slip."""
+    along, leaves = motions.moves[:, list(node.slides)], motions.moves[:, [node.leaves]]
+    return leaves * Ball(node.F.mid.reshape(1, 1), node.F.rad.reshape(1, 1)) + (along if code == SLIP_PLUS else -along)
+
+
+def _null_vector(M: Ball) -> Ball | None:
+    """All x with M x = 0 and c'x = 1 for a suitable c, of every singular matrix in a ball, (q, 1)."""
+    q = len(M.mid)
+    if q == 1:
+        return Ball.exact(np.ones((1, 1)))
+    if not M.finite:
+        return None
+    U, _, V = np.linalg.svd(M.mid)
+    dropped = int(np.argmax(np.abs(U[:, -1])))
+    kept = np.delete(np.arange(q), dropped)
+    bordered = Ball.joined(M[kept], Ball.exact(V[-1:] * (np.sign(np.sum(V[-1])) or 1.0)))
+    return solution(bordered, Ball.exact(np.eye(q)[:, -1:]))
+
+
+def _across(left: Ball, K: Ball, right: Ball) -> Ball:
+    """left' K right."""
+    return left.T @ (K @ right)
+
+
+def _ratio(above: Fraction | int, below: Fraction) -> Ball:
+    """A quotient of rationals as a ball that can multiply matrices."""
+    value = float(above / below)
+    return Ball(np.array(value), np.array(2 * UNIT * abs(value) + TINY))
+
+
+def positive(Q: Ball) -> bool:
+    """True if all symmetric matrices in a ball are positive definite."""
+    if not Q.finite or np.any(Q.mid.diagonal() <= 0):
+        return False
+    unit = np.exp2(-np.round(0.5 * np.log2(Q.mid.diagonal())))
+    scale = unit[:, None] * unit
+    return dense_eigenvalue_bound(Q.mid * scale) > float(upper_norm(Q.rad * scale + TINY)) * (1 + 2.0**-40)
+
+
+def covers(
+    leaves: Sequence[NoMotion], slides: frozenset[int] = frozenset(), stays: frozenset[int] = frozenset()
+) -> bool:
+    """True if every way in which nodes at their limit slide or stay is one that some leaf is about."""
+    fitting = [leaf for leaf in leaves if not stays & {*leaf.slides} and not slides & {*leaf.stays}]
+    if any(slides >= {*leaf.slides} and stays >= {*leaf.stays} for leaf in fitting):
+        return True
+    # the leaves ask for something of a node that is not decided
+    asked = [i for leaf in fitting for i in (*leaf.slides, *leaf.stays) if i not in slides and i not in stays]
+    if not asked:
+        return False
+    more = frozenset(asked[:1])
+    return covers(fitting, slides | more, stays) and covers(fitting, slides, stays | more)
