@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property, partial
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,31 +20,28 @@ from enumsol.proof.records import UndecidedRecord
 from enumsol.proof.writer import ProofWriter, unit_exponents
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.search.space.known_curves import Curves, joined
-from enumsol.search.space.piece_parallel import spread_over
-from enumsol.search.space.piece_tree import OpenLeaf, PieceTree
+from enumsol.search.space.piece_tree import OpenLeaf, PieceTree, SpreadPieces
 from enumsol.search.space.space_setup import SpaceSolvers
-from enumsol.support.deadlines import look, remaining
+from enumsol.support.deadlines import TimeOverError, look, remaining
 from enumsol.trusted.space.curve_chains import apart
 from enumsol.trusted.space.curve_parts import arcs_over
 from enumsol.trusted.space.solution_curve import AlphaProblem
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterator, Sequence
     from concurrent.futures import Executor
-
-    from numpy.typing import NDArray
 
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.proof.curve_records import CurvePart
     from enumsol.search.outcome import StopReason
+    from enumsol.support.array_types import Floats
     from enumsol.trusted.space.curve_chains import CurveChain
     from enumsol.trusted.space.curve_parts import Run, Turn
 
-    Array = NDArray[np.float64]
 
-#: Nodes of a search at one alpha that is to find curves.
-_SAMPLED = 500
+#: Where solutions are sampled if more than one curve may be needed, as shares of the interval; nodes of a search there.
+_SAMPLED, _NODES = (Fraction(15, 16), Fraction(1, 2), Fraction(1, 16)), 500
 #: After so many curves that are not new, or neither whole nor as long as this share of the interval, no further one is
 #: followed.
 _FAILURES, _LONG = 3, 2.0**-6
@@ -101,7 +98,11 @@ class SpaceCover:
         """Balls for all alpha; NotEnclosedError where there are none."""
         return enclosure_of(self.problem)
 
-    def _units(self) -> tuple[Array, Array]:
+    @cached_property
+    def _given(self) -> AlphaProblem:
+        return AlphaProblem.of(self.enclosure)
+
+    def _units(self) -> tuple[Floats, Floats]:
         system = SpaceSolvers(self.problem, sum(self.interval) / 2, "verified").system
         return system.force, system.length
 
@@ -118,24 +119,46 @@ class SpaceCover:
         NotEnclosedError
             The data cannot be enclosed.
         """
-        given = AlphaProblem.of(self.enclosure)
-
-        def more(x: Array) -> CurveChain | None:
-            chain = chain_through(given, self.problem, x, self.interval, self._take)
-            if chain is not None and not self._take(chain):
-                chain = None
-            # what is left open costs as much at every further point of the same curve
-            self.failed += chain is None or not self._is_of_use(chain)
-            curves.more = more if self.failed < _FAILURES else None
-            return chain
-
-        curves = Curves(self.enclosure, self.interval, more if self.failed < _FAILURES else None, self._solutions)
+        curves = Curves(self.enclosure, self.interval, final=self.failed >= _FAILURES)
         tree = PieceTree(self.enclosure, self.interval, self._units(), curves, max_nodes, tick)
+        search = tree if executor is None else SpreadPieces(executor, tree)
         try:
-            tree.run(None if executor is None else partial(spread_over, executor))
+            search.run()
+            while tree.wanted is not None:
+                for x in self._points(curves) if tree.wanted.x is None else [tree.wanted.x]:
+                    self._follow(x, curves)
+                search.run()
+        except TimeOverError:
+            tree.stop_for_time()
         finally:
+            search.end()
             self.records, self.nodes, self.stopped = tree.records, tree.nodes, tree.stopped
             self.settled = tree.settled and bool(tree.records)
+
+    def _follow(self, x: Floats, curves: Curves) -> None:
+        """Follow a curve through a solution, unless a known one seems to pass through it."""
+        if curves.final or curves.is_known(x):
+            return
+        chain = chain_through(self._given, self.problem, x, self.interval, self._take)
+        new = chain is not None and self._take(chain)
+        # what is left open costs as much at every further point of the same curve
+        self.failed += chain is None or not new or not self._is_of_use(chain)
+        curves.final = self.failed >= _FAILURES
+        if chain is not None and new:
+            curves.take(chain)
+
+    def _points(self, curves: Curves) -> Iterator[Floats]:
+        """Solutions at some alphas, as many as short searches find: forces, rigid displacements if any, and alpha."""
+        curves.sampled = True
+        low, high = self.interval
+        for alpha in (low + share * (high - low) for share in _SAMPLED):
+            look()
+            seconds = remaining()
+            # seconds that it has at least
+            left = None if seconds is None else max(seconds, 1e-3)
+            for root in enumerate_roots(self.problem, alpha, max_nodes=_NODES, time_limit=left):
+                rigid = np.zeros(0) if root.rigid_coordinates is None else root.rigid_coordinates
+                yield np.concatenate([root.lambda_n, *root.lambda_t.T, rigid, [float(alpha)]])
 
     def _is_of_use(self, chain: CurveChain) -> bool:
         alphas, (low, high) = [end for joint in chain.joints for end in joint.alphas], self.interval
@@ -147,16 +170,6 @@ class SpaceCover:
         if new:
             self.chains.append(chain)
         return new
-
-    def _solutions(self, alpha: Fraction) -> list[Array]:
-        """Forces of solutions at an alpha, as many as a short search finds, with rigid displacements if any."""
-        look()
-        seconds = remaining()
-        # seconds that it has at least
-        left = None if seconds is None else max(seconds, 1e-3)
-        roots = enumerate_roots(self.problem, alpha, max_nodes=_SAMPLED, time_limit=left)
-        rigid = [np.zeros(0) if root.rigid_coordinates is None else root.rigid_coordinates for root in roots]
-        return [np.concatenate([root.lambda_n, *root.lambda_t.T, q]) for root, q in zip(roots, rigid, strict=True)]
 
     def proof(self, cuts: Sequence[tuple[Sequence[Run | Turn], Sequence[CurvePart]]] | None = None) -> Proof:
         """Curves and tree for ``enumsol.verify``.
@@ -175,7 +188,7 @@ class SpaceCover:
                 "data": "problem",
                 **({} if self.problem.held else {"max_rigid_displacement": self.problem.rigid_reach}),
                 **unit_exponents(*self._units()),
-                "steps": AlphaProblem.of(self.enclosure).steps.tolist(),
+                "steps": self._given.steps.tolist(),
             }
         )
         arcs, open_parts = None if cuts is None else 0, 0
