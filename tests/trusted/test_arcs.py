@@ -9,9 +9,8 @@ from effort import some
 from exact_arcs import Truth, arc_system, beside, check_slopes, exact_of, interval_at, random_cases, two_zeros, widened
 
 from enumsol.arithmetic.rationals import rational
-from enumsol.trusted.arcs.over_parts import expansions, over_parts
+from enumsol.trusted.arcs.over_parts import bernstein_values, expansions, over_parts, signs_beyond, to_bernstein
 from enumsol.trusted.arcs.selection_balls import ArcSelection
-from enumsol.trusted.arcs.series import bernstein_values, signs_beyond, to_bernstein
 
 
 def selections(count):

@@ -17,6 +17,7 @@ import numpy as np
 from enumsol.branches.enclosed.cutting import ArcPart, OpenCause, Trace
 from enumsol.branches.enclosed.joining import EventPlace, Joined, join
 from enumsol.branches.enclosed.tracing import trace
+from enumsol.branches.enclosed.zeros import enclosed
 from enumsol.branches.unfinished import END_ELSEWHERE, SHORT_INTERVAL, TOLD_APART, Effort
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.search.outcome import Stop
@@ -142,7 +143,7 @@ class TracedProblem:
         if high - low <= width:
             return None
         precise = self.precise(found.selection.rows.codes, found.side)
-        return None if precise is None else precise.enclosed(part.condition, low, high, width / 4)
+        return None if precise is None else enclosed(precise.functions, part.condition, low, high, width / 4)
 
     # -- values ----------------------------------------------------------------------------------------------------
 
@@ -156,26 +157,26 @@ class TracedProblem:
             if alpha == self.origin:
                 return np.zeros(2 * self.problem.p), np.zeros(2 * self.problem.p)
             factor, side = abs(alpha - self.origin), 1.0 if alpha > self.origin else -1.0
-        enclosed = self.selection(codes, side).at(float(alpha)) if self.sparing or not precisely else None
-        close = enclosed is not None and all(_is_close(part.mid, part.rad) for part in enclosed[:2])
+        plain = self.selection(codes, side).at(float(alpha)) if self.sparing or not precisely else None
+        close = plain is not None and all(_is_close(part.mid, part.rad) for part in plain[:2])
         precise = self.precise(codes, side) if precisely and not close else None
         if precise is not None:
             found = precise.forces(alpha)
             if found is not None:
                 return tuple(np.array([float(v.mid()) for v in part]) * float(factor) for part in found)  # type: ignore[return-value]
-        enclosed = enclosed or self.selection(codes, side).at(float(alpha))
-        if enclosed is None:
+        plain = plain or self.selection(codes, side).at(float(alpha))
+        if plain is None:
             return None
-        forces, w, _ = enclosed
+        forces, w, _ = plain
         return forces.mid * self.force * float(factor), w.mid * self.length * float(factor)
 
     def slip_signs(self, codes: Codes, alpha: Fraction, nodes: Sequence[int]) -> Mapping[int, int]:
         """Signs of w_t of some nodes at a selection's solution, 0 where they are not proven."""
         side = 0.0 if self.origin is None else 1.0 if alpha > self.origin else -1.0
-        enclosed = self.selection(codes, side).at(float(alpha)) if alpha != self.origin else None
-        if enclosed is None:
+        found = self.selection(codes, side).at(float(alpha)) if alpha != self.origin else None
+        if found is None:
             return dict.fromkeys(nodes, 0)
-        w, p = enclosed[1], self.problem.p
+        w, p = found[1], self.problem.p
         return {i: int(w.mid[p + i] > 2 * w.rad[p + i]) - int(w.mid[p + i] < -2 * w.rad[p + i]) for i in nodes}
 
 

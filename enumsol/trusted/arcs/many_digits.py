@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
 #: Bits of the arithmetic.
 PRECISION = 320
-#: Zeros are enclosed to 2^-ZERO_BITS relative to the interval, and closer ones are one.
-ZERO_BITS = 200
 
 
 def upper(value: arb) -> float:
@@ -56,11 +54,6 @@ class precision:  # noqa: N801 (a context manager, used like a function)
 
     def __exit__(self, *error: object) -> None:
         ctx.prec = self._before
-
-
-def rounded(alpha: Fraction, low: Fraction, high: Fraction, unit: Fraction) -> Fraction:
-    """An alpha within bounds at a multiple of a unit from the first: ends of enclosures keep few digits."""
-    return min(max(low + round((alpha - low) / unit) * unit, low), high)
 
 
 def matrix(rows: list[list[Any]]) -> Any:
@@ -96,12 +89,6 @@ def sign_of(value: arb) -> int:
 def signs_of(values: arb_mat) -> Signs:
     """Signs of the balls in a column."""
     return np.array([sign_of(values[k, 0]) for k in range(values.nrows())], dtype=np.int8)
-
-
-def fraction_of(value: arb) -> Fraction:
-    """The exact value of an arb without radius."""
-    mantissa, exponent = (int(part) for part in value.man_exp())
-    return Fraction(mantissa) * Fraction(2) ** exponent
 
 
 #: Residuals are refined to this many bits, beside columns of size one; the error of S has twice as many.

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, upper_sum
-from enumsol.trusted.arcs.over_parts import Expansion, expansions
-from enumsol.trusted.arcs.series import bernstein_values
+from enumsol.trusted.arcs.over_parts import Expansion, bernstein_values, expansions
 from enumsol.trusted.over_interval import PieceNumbers, definite
 from enumsol.trusted.selection import signed
 from enumsol.trusted.status_rows import OPEN
