@@ -14,8 +14,7 @@ import numpy as np
 from flint import fmpq_mat
 
 from enumsol.arithmetic.rationals import rational
-from enumsol.branches.enclosed.following import Followed, TracedProblem, follow_selections
-from enumsol.branches.enclosed.make_traced import make_traced
+from enumsol.branches.enclosed.following import Followed, TracedProblem, follow_selections, make_traced
 from enumsol.branches.enclosed.single_branches import ClosedPieces
 from enumsol.branches.exact.gluing import glue, make_vertices
 from enumsol.branches.exact.known_selections import KnownSelections

@@ -11,7 +11,7 @@ from problems3d import random_over_alpha
 from proof_tools import bytes_of
 
 from enumsol import branch_graph
-from enumsol.branches.space import cover
+from enumsol.branches.space import space_graph as cover
 from enumsol.search.space import piece_tree
 
 

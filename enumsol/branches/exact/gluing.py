@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
     from enumsol.branches.elements import Pair
-    from enumsol.branches.exact.selection_arcs import SelectionArcs, SelectionEvent
+    from enumsol.branches.exact.known_selections import SelectionArcs, SelectionEvent
     from enumsol.condensation.exact import ExactCondensed
     from enumsol.selections.solution import ActiveSets, SelectionSolution
     from enumsol.support.array_types import Codes

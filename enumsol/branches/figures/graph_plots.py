@@ -17,14 +17,20 @@ from enumsol.branches.figures.curves import (
     side_by_side,
     state_columns,
 )
-from enumsol.branches.figures.marks import GREY, MARKERS, STATUS_STYLES, colour_of, handles, index_style, narrow_changes
 from enumsol.branches.figures.panels import (
+    GREY,
+    MARKERS,
+    STATUS_STYLES,
     Panel,
+    colour_of,
     draw_numbers,
     draw_open_ranges,
     draw_steps,
     drawn_range,
     family_range,
+    handles,
+    index_style,
+    narrow_changes,
     sheet_range,
 )
 from enumsol.branches.roots_at import roots_at
