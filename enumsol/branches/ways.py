@@ -29,7 +29,7 @@ from enumsol.errors import TooLargeError
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.search.certifiers.interval_certifiers import ExactIntervalCertifier, VerifiedIntervalCertifier
 from enumsol.search.interval.subintervals import (
-    FastIntervalCertifier,
+    IntervalCertifier,
     IntervalSearch,
     on_weak_springs,
     run_parallel,
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from enumsol.branches.unfinished import Tick
     from enumsol.model.problem import ContactProblem
     from enumsol.proof.proof_file import Proof
-    from enumsol.search.interval.subintervals import IntervalCertifier, SearchedPiece
+    from enumsol.search.interval.subintervals import SearchedPiece
     from enumsol.support.array_types import Codes
 
 Arithmetic = Literal["fast", "verified", "exact"]
@@ -244,7 +244,7 @@ class ByAlgebra(PlaneWay):
         arithmetic: Arithmetic,
     ) -> ByAlgebra:
         """With the certifier of an arithmetic."""
-        certifier: IntervalCertifier = FastIntervalCertifier()
+        certifier: IntervalCertifier = IntervalCertifier()
         if not problem.held:
             certifier = VerifiedIntervalCertifier(problem, None)
             certifier.checkable = arithmetic == "verified"

@@ -27,9 +27,6 @@ if TYPE_CHECKING:
 #: Zeros are enclosed to 2^-ZERO_BITS relative to the interval in many digits, and closer ones are one: with more bits
 #: several zeros are told apart that rounding in PRECISION bits may hide.
 ZERO_BITS = 200
-#: Imaginary parts (tau) of what counts as a zero; coefficients that do not matter for it, by the polynomial's size and
-#: by its error; sizes by errors of what counts as flat, and errors of what counts as rough.
-_NEAR_REAL, _NOISE, _SHARE, _FLAT, _ROUGH = 1e-2, 2.0**-48, 0.01, 32.0, 1e-9
 
 
 class SeriesZeros:
@@ -50,8 +47,7 @@ class SeriesZeros:
 
     def __init__(self, expansion: Expansion) -> None:
         self.expansion, self.apart = expansion, 1e-5 * (expansion.high - expansion.low)
-        series = expansion.series
-        self.rough = series.truncated and bool(np.median(series.error / (expansion.size + TINY)) > _ROUGH)
+        self.rough = expansion.truncated and bool(np.median(expansion.error / (expansion.size + TINY)) > 1e-9)
 
     def split(self) -> Number | None:
         """None: cuts are made around zeros."""
@@ -59,36 +55,37 @@ class SeriesZeros:
 
     def zeros(self, condition: int) -> Sequence[Number]:
         """Alphas inside the interval at which a condition seems to vanish."""
-        of, series = self.expansion, self.expansion.series
-        polynomial = series.coefficients[condition]
+        of = self.expansion
+        polynomial = of.coefficients[condition]
         # trailing noise would only give roots far away
-        noise = max(_NOISE * float(of.size[condition]), _SHARE * float(of.rounded[condition]))
+        noise = max(2.0**-48 * float(of.size[condition]), 0.01 * float(of.rounded[condition]))
         kept = np.flatnonzero(np.abs(polynomial) > noise)
         last = int(kept[-1]) if len(kept) else 0
         if last < 2:
             real = -polynomial[:1] / polynomial[1] if last else np.empty(0)
         else:
             roots = np.linalg.eigvals(_companion(polynomial[: last + 1]))
-            real = np.sort(roots.real[np.abs(roots.imag) < _NEAR_REAL])
-        found = [series.middle + series.radius * float(x) for x in real]
+            # what is so near to a real number may be one
+            real = np.sort(roots.real[np.abs(roots.imag) < 1e-2])
+        found = [of.middle + of.radius * float(x) for x in real]
         return [alpha for alpha in found if of.low < alpha < of.high]
 
     def flat(self, condition: int) -> bool:
         """True if a condition is nowhere larger than the bound of its error allows to tell."""
-        return bool(self.expansion.size[condition] <= _FLAT * self.expansion.rounded[condition])
+        return bool(self.expansion.size[condition] <= 32.0 * self.expansion.rounded[condition])
 
     def near(self, condition: int, low: Number, high: Number) -> Bounds:
         """Presumed bounds of the only zero of a condition in a part."""
-        of, series = self.expansion, self.expansion.series
-        value, slope = series.coefficients[condition].tolist(), of.slope[condition].tolist()
+        of = self.expansion
+        value, slope = of.coefficients[condition].tolist(), of.slope[condition].tolist()
         first, last = of.tau(float(low), float(high))
         tau, rise = 0.5 * (first + last), 0.0
         for _ in range(4):
             rise = _horner(slope, tau)
             step = _horner(value, tau) / rise if rise else np.inf
             tau = min(max(tau - step, first), last)
-        zero = series.middle + series.radius * tau
-        reach = 1.01 * float(of.rounded[condition]) / abs(rise) * series.radius if rise else np.inf
+        zero = of.middle + of.radius * tau
+        reach = 1.01 * float(of.rounded[condition]) / abs(rise) * of.radius if rise else np.inf
         reach += 32.0 * float(np.spacing(max(abs(of.low), abs(of.high))))
         return zero - reach, zero + reach
 
@@ -115,10 +112,10 @@ class SeriesZeros:
 
     def _rise(self, condition: int, alpha: float) -> float:
         """Slope of a condition over t at an alpha at which it vanishes, nearly."""
-        of, series = self.expansion, self.expansion.series
-        tau = (alpha - series.middle) / series.radius
-        t = _horner(series.coefficients[-1].tolist(), tau)
-        return _horner(of.slope[condition].tolist(), tau) / t / series.radius if t else np.inf
+        of = self.expansion
+        tau = (alpha - of.middle) / of.radius
+        t = _horner(of.coefficients[-1].tolist(), tau)
+        return _horner(of.slope[condition].tolist(), tau) / t / of.radius if t else np.inf
 
 
 class ShortZeros:

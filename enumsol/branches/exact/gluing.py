@@ -76,7 +76,7 @@ class ExactArcValues(ArcValues):
         return _as_floats(self.exact, rational(alpha), point)
 
 
-def _as_floats(exact: ExactCondensed, alpha: fmpq, point: Any) -> Pair:
+def _as_floats(exact: ExactCondensed, alpha: fmpq, point: Sequence[fmpq]) -> Pair:
     """Contact forces and displacements at a point."""
     size = 2 * exact.p
     moves = [as_float(g - dot(row, point)) for g, row in zip(exact.at(alpha)[0][:size], exact.rows, strict=False)]

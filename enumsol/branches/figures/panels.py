@@ -15,6 +15,9 @@ from enumsol.support.plotting import area_entry, line_entry, plain_axes
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping, Sequence
 
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
     from enumsol.branches.claims import Claims, MultiplicitySteps
     from enumsol.branches.elements import Arc, Vertex
     from enumsol.model.problem import ContactProblem
@@ -95,8 +98,6 @@ def handles(
 #: Where along a curve a label may stand, the best place first, and on which sides of it.
 _ALONG = (0.5, 0.65, 0.35, 0.8, 0.2, 0.9, 0.1, 0.97, 0.03)
 _SIDES = ((0.0, 1.0), (0.0, -1.0), (0.7, 0.7), (-0.7, 0.7), (0.7, -0.7), (-0.7, -0.7), (1.0, 0.0), (-1.0, 0.0))
-#: Distances from the curve [points], and pixels between labels.
-_AWAY, _APART = (5.0, 9.0), 2.0
 
 
 class Label(NamedTuple):
@@ -107,7 +108,7 @@ class Label(NamedTuple):
     curve: Floats
 
 
-def place_labels(axis: Any, labels: Sequence[Label], obstacles: Iterable[Floats]) -> list[Label]:
+def place_labels(axis: Axes, labels: Sequence[Label], obstacles: Iterable[Floats]) -> list[Label]:
     """Write labels beside their curves; returns those for which there was no room.
 
     Parameters
@@ -142,7 +143,7 @@ def place_labels(axis: Any, labels: Sequence[Label], obstacles: Iterable[Floats]
         boxes.append(np.array([found - size / 2, found + size / 2]))
         # kept in data coordinates: it stays with its curve when the figure is scaled
         text.set_transform(axis.transData)
-        text.set_position(axis.transData.inverted().transform(found))
+        text.set_position(tuple(axis.transData.inverted().transform(found).tolist()))
         text.set_gid("branch number")
     return left
 
@@ -154,12 +155,14 @@ def _place(
     line = line[np.all((line >= frame[0] - 1) & (line <= frame[1] + 1), axis=1)]
     if not len(line):
         return None
-    for away in _AWAY:
+    # distances from the curve [points]
+    for away in (5.0, 9.0):
         for share in _ALONG:
             foot = line[min(int(share * len(line)), len(line) - 1)]
             for side in _SIDES:
                 middle = foot + np.array(side) * (away * pixel + size / 2)
-                low, high = middle - size / 2 - _APART, middle + size / 2 + _APART
+                # some pixels between labels
+                low, high = middle - size / 2 - 2.0, middle + size / 2 + 2.0
                 if np.any(low < frame[0]) or np.any(high > frame[1]):
                     continue
                 if any(np.all(low < box[1]) and np.all(high > box[0]) for box in boxes):
@@ -179,11 +182,8 @@ def dense(line: Floats, step: float) -> Floats:
     return np.stack([np.interp(at, along, line[:, 0]), np.interp(at, along, line[:, 1])], axis=1)
 
 
-#: Narrower than this part of the interval, a change cannot be seen; at most so many are shown, and none that is
-#: narrower than this relative to alpha: the numbers beside it would hardly differ.
-_NARROW, _MOST, _NARROWEST = 0.02, 2, 1e-10
-#: What is shown on both sides, by the width of the narrow part.
-_MARGIN = 0.75
+#: Narrower than this part of the interval, a change cannot be seen.
+_NARROW = 0.02
 
 
 def narrow_changes(steps: MultiplicitySteps, interval: tuple[float, float]) -> list[tuple[float, float]]:
@@ -203,7 +203,8 @@ def narrow_changes(steps: MultiplicitySteps, interval: tuple[float, float]) -> l
     # change, first and last alpha, width of the narrowest step
     found: list[tuple[int, float, float, float]] = []
     for k, (count, lo, hi) in enumerate(plateaus):
-        if len(plateaus) == 1 or not _NARROWEST * max(abs(lo), abs(hi)) < hi - lo < least:
+        # the numbers beside a narrower one would hardly differ
+        if len(plateaus) == 1 or not 1e-10 * max(abs(lo), abs(hi)) < hi - lo < least:
             continue
         change = max(abs(count - plateaus[j][0]) for j in (k - 1, k + 1) if 0 <= j < len(plateaus))
         largest, first, last, width = found[-1] if found else (0, lo, float("-inf"), 0.0)
@@ -213,22 +214,19 @@ def narrow_changes(steps: MultiplicitySteps, interval: tuple[float, float]) -> l
         else:
             found.append((change, lo, hi, hi - lo))
     found.sort(key=lambda item: (-item[0], item[2] - item[1]))
-    margins = [(lo, hi, _MARGIN * (hi - lo)) for _, lo, hi, _ in found[:_MOST]]
+    # at most two are shown, with more than half of their width on both sides
+    margins = [(lo, hi, 0.75 * (hi - lo)) for _, lo, hi, _ in found[:2]]
     return sorted((max(a, lo - margin), min(b, hi + margin)) for lo, hi, margin in margins)
 
 
 class Panel(NamedTuple):
     """Axes with curves of arcs, by their numbers: their places side by side, branches, and the column drawn."""
 
-    axis: Any
+    axis: Axes
     drawn: dict[int, Curve]
     places: dict[int, CurvePlace]
     branch_of: Mapping[int, int]
     column: int
-
-
-#: Points of a sheet, and branches that a label names one by one.
-_SHEET, _NAMED = 9, 4
 
 
 def drawn_range(vertices: Iterable[Vertex], quantity: Quantity) -> Floats:
@@ -272,7 +270,7 @@ def sheet_range(
     """Alphas with smallest and largest values on a sheet, of forces; displacements of a sheet are not drawn."""
     if quantity.dimension != "force":
         return None
-    alphas, ranges = arc.sampled(_SHEET), []
+    alphas, ranges = arc.sampled(9), []
     for alpha in alphas[1:-1]:
         points = np.concatenate([family.vertices for family in roots_at(float(alpha)).families])
         forces = points.transpose(0, 2, 1).reshape(len(points), -1)
@@ -283,7 +281,7 @@ def sheet_range(
     return alphas, low, high
 
 
-def draw_steps(axis: Any, steps: MultiplicitySteps, window: tuple[float, float]) -> bool:
+def draw_steps(axis: Axes, steps: MultiplicitySteps, window: tuple[float, float]) -> bool:
     """The number of solutions over alpha; returns whether dots show other numbers at single alphas."""
     edges = [float(alpha) for alpha in steps.alphas]
     if steps.between:
@@ -297,13 +295,13 @@ def draw_steps(axis: Any, steps: MultiplicitySteps, window: tuple[float, float])
         axis.plot([x for x, _ in special], [n for _, n in special], ".", color=GREY, markersize=5)
     axis.set_ylabel("solutions" if steps.exact else "solutions,\nat least")
     axis.set_ylim(0, max([*steps.between, *steps.at], default=1) * 1.1 + 0.4)
-    axis.yaxis.get_major_locator().set_params(integer=True, nbins=5)
+    axis.locator_params(axis="y", integer=True, nbins=5)
     plain_axes(axis)
     axis.set_xlim(*window)
     return bool(special)
 
 
-def draw_open_ranges(axis: Any, claims: Claims, window: tuple[float, float]) -> bool:
+def draw_open_ranges(axis: Axes, claims: Claims, window: tuple[float, float]) -> bool:
     """Shade where solutions may be missing, if that is not everywhere; returns whether some of it is seen."""
     seen = [(float(low), float(high)) for low, high in claims.open_ranges if low <= window[1] and window[0] <= high]
     if not claims.partly:
@@ -313,7 +311,7 @@ def draw_open_ranges(axis: Any, claims: Claims, window: tuple[float, float]) -> 
     return bool(seen)
 
 
-def draw_numbers(figure: Any, panels: Sequence[Panel], alone: Any) -> None:
+def draw_numbers(figure: Figure, panels: Sequence[Panel], alone: Axes | None) -> None:
     """Numbers of branches beside their curves, and a note of what coincides or has no room.
 
     The note stands below the figure, or below ``alone``, the only panel in a figure of the user's.
@@ -332,8 +330,8 @@ def draw_numbers(figure: Any, panels: Sequence[Panel], alone: Any) -> None:
         without: set[int] = set()
         written: set[int] = set()
         for panel in panels:
-            for text in [text for text in panel.axis.texts if text.get_gid() == "branch number"]:
-                text.remove()
+            for number in [text for text in panel.axis.texts if text.get_gid() == "branch number"]:
+                number.remove()
             here, missing = _number(panel)
             written |= here
             without |= missing
@@ -375,16 +373,16 @@ def _colour(branches: set[int]) -> str:
     return colour_of(*branches) if len(branches) == 1 else GREY
 
 
-def _pixels(axis: Any, polygon: Floats) -> float:
+def _pixels(axis: Axes, polygon: Floats) -> float:
     """Length of the part that can be seen."""
-    window = axis.get_window_extent()
+    window = np.array(axis.get_window_extent())
     points = dense(axis.transData.transform(polygon), 3.0)
-    inside = np.all((points >= window.min - 1) & (points <= window.max + 1), axis=1)
+    inside = np.all((points >= window[0] - 1) & (points <= window[1] + 1), axis=1)
     return 3.0 * float(np.count_nonzero(inside) - 1) if np.any(inside) else 0.0
 
 
 def _names(numbers: list[int]) -> str:
-    if len(numbers) <= _NAMED:
+    if len(numbers) <= 4:
         return ", ".join(map(str, numbers))
     return f"{numbers[0]}, {numbers[1]}, .. {numbers[-1]} ({len(numbers)})"
 

@@ -70,7 +70,7 @@ class _Along:
 
     def __init__(self, expansion: Expansion, numbers: PieceNumbers) -> None:
         self._rows, self._system = expansion.selection.rows, expansion.selection.system
-        self._series, self._numbers = expansion.series, numbers
+        self._series, self._numbers = expansion, numbers
         self._ends = expansion.tau(expansion.low, expansion.high)
         system, series = self._system, self._series
         self._rubbing = (system.F0 != 0) | (system.F1 != 0)

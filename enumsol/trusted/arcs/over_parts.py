@@ -72,39 +72,70 @@ class OverInterval:
         return np.flatnonzero(self.conditions == 0)
 
 
+@dataclass(frozen=True, eq=False)
 class Expansion:
     """Conditions of a selection over [low, high] as polynomials in tau with bounds of their errors; t is the last.
 
-    tau runs from -1 to 1. At every alpha they are the conditions of z, that is t times those of y.
+    alpha is middle + tau radius, |tau| <= 1. At every alpha they are the conditions of z, that is t times those of y.
 
     Attributes
     ----------
     selection : ArcSelection
-    low, high : float
-    series : Series
-    size, rounded : (m + 1,) arrays
-        Bounds of the polynomials, and of their errors.
+    low, high, middle, radius : float
+    coefficients : (m + 1, terms + 1) array
+    error, slope_error : (m + 1,) arrays
+        Bounds of the errors of values and of derivatives by tau.
+    truncated : bool
+        What the series leaves out is the largest part of its error.
+    bordered : Ball
+        N at the middle.
     """
 
-    def __init__(self, selection: ArcSelection, low: float, high: float, series: Series) -> None:
-        self.low, self.high, self.series = low, high, series
-        self.selection = selection
-        coefficients = series.coefficients
-        # the sums below have coefficients of Bernstein polynomials that add up to at most these sizes
-        k = gamma(8 * coefficients.shape[1])
-        size, self.slope = (
-            upper_sum(np.abs(coefficients), axis=1),
-            coefficients[:, 1:] * np.arange(1, coefficients.shape[1]),
-        )
-        self.steepest = upper_sum(np.abs(self.slope), axis=1)
-        self.rounded = (series.error + k * size) * SAFE
-        self.slope_rounded = (series.slope_error + k * self.steepest) * SAFE
-        self.size = size
+    selection: ArcSelection
+    low: float
+    high: float
+    middle: float
+    radius: float
+    coefficients: Floats
+    error: Floats
+    slope_error: Floats
+    truncated: bool
+    bordered: Ball
+
+    @cached_property
+    def slope(self) -> Floats:
+        """Coefficients of the derivatives by tau."""
+        return np.asarray(self.coefficients[:, 1:] * np.arange(1, self.coefficients.shape[1]))
+
+    @cached_property
+    def size(self) -> Floats:
+        """Bounds of the polynomials."""
+        return np.asarray(upper_sum(np.abs(self.coefficients), axis=1))
+
+    @cached_property
+    def steepest(self) -> Floats:
+        """Bounds of the derivatives."""
+        return np.asarray(upper_sum(np.abs(self.slope), axis=1))
+
+    @cached_property
+    def _rounding(self) -> float:
+        # Bernstein polynomials have coefficients that add up to at most these sizes
+        return gamma(8 * self.coefficients.shape[1])
+
+    @cached_property
+    def rounded(self) -> Floats:
+        """Bounds of the errors of values from Bernstein coefficients."""
+        return np.asarray((self.error + self._rounding * self.size) * SAFE)
+
+    @cached_property
+    def slope_rounded(self) -> Floats:
+        """Bounds of the errors of derivatives, likewise."""
+        return np.asarray((self.slope_error + self._rounding * self.steepest) * SAFE)
 
     @cached_property
     def orientation(self) -> int:
         """Sign of det N."""
-        return determinant_sign(self.series.bordered)
+        return determinant_sign(self.bordered)
 
     @cached_property
     def unbalanced(self) -> bool:
@@ -117,11 +148,11 @@ class Expansion:
 
     def slack(self) -> float:
         """Bound of the error of tau of an alpha."""
-        return 8.0 * UNIT * (1.0 + max(abs(self.low), abs(self.high)) / self.series.radius)
+        return 8.0 * UNIT * (1.0 + max(abs(self.low), abs(self.high)) / self.radius)
 
     def tau(self, low: float, high: float) -> tuple[float, float]:
         """The part in terms of tau, rounded outward."""
-        slack, middle, radius = self.slack(), self.series.middle, self.series.radius
+        slack, middle, radius = self.slack(), self.middle, self.radius
         ends = (low - middle) / radius - slack, (high - middle) / radius + slack
         return max(ends[0], -1.0), min(ends[1], 1.0)
 
@@ -132,10 +163,8 @@ def expansions(asked: Sequence[Asked], errors: float = 1.0) -> list[Expansion | 
     Bounds of errors are multiplied by ``errors``: a search asks for more than its checker, which may round otherwise.
     """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        found = expand(asked, errors)
-        return [
-            Expansion(*what, series) if series else _nowhere(*what) for what, series in zip(asked, found, strict=True)
-        ]
+        found = _expanded(asked, errors)
+        return [one or _nowhere(*what) for what, one in zip(asked, found, strict=True)]
 
 
 def _nowhere(selection: ArcSelection, low: float, high: float) -> OverInterval | None:
@@ -152,7 +181,7 @@ def over_parts(asked: Sequence[tuple[Expansion | OverInterval, float, float]]) -
     groups: dict[int, list[tuple[int, tuple[Expansion, float, float]]]] = {}
     for k, (one, *part) in enumerate(asked):
         if isinstance(one, Expansion):
-            groups.setdefault(one.series.coefficients.shape[1], []).append((k, (one, part[0], part[1])))
+            groups.setdefault(one.coefficients.shape[1], []).append((k, (one, part[0], part[1])))
     for group in groups.values():
         for (k, _), known in zip(group, _over([one for _, one in group]), strict=True):
             found[k] = known
@@ -165,7 +194,7 @@ def _over(asked: Sequence[tuple[Expansion, float, float]]) -> list[OverInterval]
     places, counts = np.arange(len(asked)), np.array([len(e.rounded) - 1 for e in expansions])
     low, high = np.array([e.tau(*part) for e, *part in asked]).T
     rounded = _stacked([e.rounded for e in expansions], np.inf)
-    values = bernstein_values(_stacked([e.series.coefficients for e in expansions]), low, high)
+    values = bernstein_values(_stacked([e.coefficients for e in expansions]), low, high)
     signs = signs_beyond(values, rounded)
     t = signs[places, counts][:, None]
     # a root has all conditions >= 0 where t > 0, or all <= 0 where t < 0
@@ -209,35 +238,9 @@ def _stacked(parts: Sequence[Floats], fill: float = 0.0) -> Floats:
 _TERMS, _STEP = 16, 4
 
 
-@dataclass(frozen=True)
-class Series:
-    """Conditions at alpha = middle + tau radius as polynomials in tau, |tau| <= 1, with bounds of their errors.
-
-    Attributes
-    ----------
-    middle, radius : float
-    coefficients : (m + 1, terms + 1) array
-        Conditions of z, and t last.
-    error, slope_error : (m + 1,) arrays
-        Bounds of the errors of values and of derivatives by tau.
-    truncated : bool
-        What the series leaves out is the largest part of its error.
-    bordered : Ball
-        N at the middle.
-    """
-
-    middle: float
-    radius: float
-    coefficients: Floats
-    error: Floats
-    slope_error: Floats
-    truncated: bool
-    bordered: Ball
-
-
-def expand(asked: Sequence[Asked], errors: float) -> list[Series | None]:
+def _expanded(asked: Sequence[Asked], errors: float) -> list[Expansion | None]:
     """The series of selections over intervals; None where none is proven. Errors are multiplied by ``errors``."""
-    found: list[Series | None] = [None] * len(asked)
+    found: list[Expansion | None] = [None] * len(asked)
     plain = [selection.affine for selection, _, _ in asked]
     for first in (True, False):
         # where M is constant, z is affine with t = 1, unless M is singular
@@ -315,7 +318,7 @@ class _Stack:
                 v[b] = np.nan
         return np.asarray(v / np.linalg.norm(v, axis=1, keepdims=True))
 
-    def series(self) -> list[Series | None]:
+    def series(self) -> list[Expansion | None]:
         """The series, None where there is none."""
         k, H, H1 = self._k, self._H, self._H1
         H_rad, H1_rad = self._H_rad, self._H1_rad
@@ -359,7 +362,7 @@ class _Stack:
             for b, good in enumerate(np.isfinite(growth).tolist())
         ]
 
-    def _one(self, b: int, sums: Floats, values: Floats, slopes: Floats, *, truncated: bool) -> Series | None:
+    def _one(self, b: int, sums: Floats, values: Floats, slopes: Floats, *, truncated: bool) -> Expansion | None:
         """A series, without what was filled up."""
         size, m = self._sizes[b]
         rows, kept = [*range(m), -1], [*range(size), self._k - 1]
@@ -367,7 +370,8 @@ class _Stack:
         if not np.max(np.abs(sums)) < 2.0**1000:
             return None
         inner = np.ix_(kept, kept)
-        return Series(
+        return Expansion(
+            *self._asked[b],
             middle=float(self._middle[b]),
             radius=float(self._radius[b]),
             coefficients=sums[rows],
