@@ -179,6 +179,10 @@ class AlphaPiece:
         low, high = max(self.low - more, interval[0]), min(self.high + more, interval[1])
         return AlphaPiece(self.space, low, high) if factor else self
 
+    def over(self, low: Fraction, high: Fraction) -> AlphaPiece:
+        """Another piece."""
+        return AlphaPiece(self.space, low, high)
+
     def point_at(self, alpha: Fraction) -> AlphaPiece:
         """Piece of one alpha alone."""
         return AlphaPiece(self.space, alpha, alpha)

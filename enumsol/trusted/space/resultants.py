@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma
+from enumsol.condensation.space_condensed import EnclosedSpace
 from enumsol.model.sectors import SECTORS, direction, end_number
 from enumsol.trusted.floating_bounds import balanced, balancing, bounds_within
-from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, Multiplied, Row
+from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, Multiplied, Row, sector_margin
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.condensation.enclosure import EnclosedSystem
-    from enumsol.condensation.space_condensed import EnclosedSpace, PieceSpace
+    from enumsol.condensation.space_condensed import PieceSpace
     from enumsol.support.array_types import Floats
 
 #: A disc of forces lies in a polygon of so many corners.
@@ -23,6 +24,18 @@ _CORNERS = 16
 #: Binary digits of multipliers of the rows of balance over a piece.
 _DIGITS = 40
 _HALF = Ball.exact(np.array(0.5))
+
+
+def space_margin(
+    within: Any, codes: Sequence[int], lines: Sequence[Row], multipliers: Floats, errors: float = 1.0
+) -> float:
+    """Lower bound over a partial assignment in 3D; positive means that it holds no solution.
+
+    ``within`` is a system, or a SlipForm, an Ellipsoid or an AlphaPiece, which have bounds of their own.
+    """
+    if not isinstance(within, EnclosedSpace):
+        return float(within.margin(codes, lines, multipliers, errors))
+    return (sector_margin if within.held else floating_margin)(within, codes, lines, multipliers, errors)
 
 
 @np.errstate(over="ignore", invalid="ignore")
