@@ -13,7 +13,7 @@ from rational_forms import Forms, decimal_fraction, exact, integer, need
 from rational_zeros import cells, count, interpolated, one_sign, sign
 
 MOST_SYSTEMS = 2000
-#: Partners at an event: code and kind of row [4.3] of one, of the other.
+#: Partners at an event: code and kind of row [4.4] of one, of the other.
 PARTNERS = [((0, 4), (2, 0)), ((0, 4), (3, 0)), ((0, 4), (4, 0)), ((1, 2), (2, 5)), ((1, 3), (3, 6))]
 PARTNERS += [(other, one) for one, other in PARTNERS]
 #: Conditions of a body that nothing holds: both bounds of q_j, as those of a node p + j.
@@ -102,13 +102,13 @@ class Selection:
         return one_sign(self.own.determinant, x, y)
 
     def holds(self, x, y, index):
-        """[6.5] A part "h"."""
+        """[7.3] A part "h"."""
         need(self._index(x, y) == index, "the index of a part is another, or its selection is singular")
         for value in self._values:
             need(one_sign(value, x, y) == index, "a condition is not positive")
 
     def event(self, x, y, index, condition, rising, first, last):
-        """[6.5] A part "e"."""
+        """[7.3] A part "e"."""
         need(self._index(x, y) == index, "the index of an event is another, or its selection is singular")
         values = list(self._values)
         named = index * values.pop(condition)
@@ -121,7 +121,7 @@ class Selection:
         need(count(named.gcd(named.derivative()), x, y) == 0, "the zero of an event is multiple")
 
     def empty(self, x, y):
-        """[6.5] A part "n"."""
+        """[7.3] A part "n"."""
         if self._data.reach and self._data.unbalanced(self.codes, (x, y)):
             return
         if self._index(x, y) and any(one_sign(value, x, y) == -self._index(x, y) for value in self._values):
@@ -231,7 +231,7 @@ class Trace:
 
 
 class Arcs:
-    """[6.5] All arcs of a proof on [a, b]; alpha_0 or None; by codes where selections survive; closed pieces."""
+    """[7.3] All arcs of a proof on [a, b]; alpha_0 or None; by codes where selections survive; closed pieces."""
 
     def __init__(self, data, interval, origin, handed_on, closed):
         self._data, (self._a, self._b), self._closed = data, interval, closed

@@ -84,7 +84,7 @@ class ClosedPiece:
         return self._alone(along, x, middle, halvings - 1) and self._alone(along, middle, y, halvings - 1)
 
     def _tried(self, codes, side):
-        """[6.4] Whether there is one solution at some alphas, and one of these selections has it."""
+        """[7.4] Whether there is one solution at some alphas, and one of these selections has it."""
         for share in TRIED:
             alpha = self.x + share * (self.y - self.x)
             g = self.data.load(alpha) if not side else [side * value for value in self.data.g1]
