@@ -28,15 +28,11 @@ from enumsol.trusted.joint_roots import JointRoot
 from enumsol.trusted.positions import certain_statuses
 from enumsol.trusted.same_roots import told_apart
 from enumsol.trusted.status_rows import (
-    BACKWARD,
-    CONTACT,
-    FORWARD,
-    OPEN,
     ROW_KINDS,
     is_covering,
     row_signs,
 )
-from enumsol.trusted.uniqueness import ClosedSolution, only_solution, same_solution
+from enumsol.trusted.uniqueness import ClosedSolution, same_solution
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -44,7 +40,7 @@ if TYPE_CHECKING:
     from enumsol.checker.rational import Hull, RationalBody, RationalSystem
     from enumsol.checker.walk import Test
     from enumsol.proof.records import EnclosureRecord, Record
-    from enumsol.support.array_types import Codes, Floats, Mask
+    from enumsol.support.array_types import Codes, Mask
     from enumsol.trusted.at_alpha import Unsettled
     from enumsol.trusted.positions import Among
     from enumsol.trusted.precise_at_alpha import PreciseAtAlpha
@@ -59,7 +55,7 @@ _BATCH = 256
 
 
 @dataclass
-class Checker(TreeChecker):
+class Checker(TreeChecker[EnclosedSystem, "VerifiedSelection | ClosedSolution | JointRoot"]):
     """Checks one proof of a problem in 2D."""
 
     trees = Tree.PLANE, Tree.FLOATING_PLANE
@@ -202,7 +198,7 @@ class Checker(TreeChecker):
     def _in_many_digits(self, codes: Sequence[int]) -> VerifiedSelection | None:
         return None if self._precise is None else self._precise.solve(codes)
 
-    def _is_root(self, found: Any) -> bool:
+    def _is_root(self, found: object) -> bool:
         return isinstance(found, VerifiedSelection)
 
     @cached_property
@@ -220,8 +216,8 @@ class Checker(TreeChecker):
         self.bounded |= self._rests_on_reach(codes, [])
         return "it holds a root" if self._hull(codes).points else None
 
-    def _forces(self, found: VerifiedSelection | ClosedSolution | JointRoot) -> tuple[Ball, Floats]:
-        return found.force, self.force
+    def _wrongly_said(self, found: VerifiedSelection | ClosedSolution | JointRoot, said: EnclosureRecord) -> str | None:
+        return said.refusal(found.force, self.force, found.index)
 
     def _only_reference(self, codes: Codes, said: kinds.OnlyReference) -> str | None:
         if (reason := super()._only_reference(codes, said)) is not None:
@@ -246,7 +242,11 @@ class Checker(TreeChecker):
 
     def _closed(self, codes: Codes, said: kinds.Closed) -> str | None:
         if isinstance(said.at, int):
-            return self._closed_in_rationals(codes, said)
+            from enumsol.checker.rational import closed_in_rationals  # python-flint, not always needed
+
+            reason, point = closed_in_rationals(self.system, self._body, codes, said)
+            self.polytopes += [(said.selection, [point], 0)] if point else []
+            return reason
         ball = said.holds(self.system, self.force)
         if ball is None:
             return "its reduced problem is not proven to have one solution"
@@ -260,29 +260,7 @@ class Checker(TreeChecker):
     def _only_below(self, found: ClosedSolution | JointRoot, said: EnclosureRecord) -> str | None:
         """Look at what is said of a root that closes a subtree, or that selections share."""
         self._locate(found.core, found)
-        return said.refusal(*self._forces(found), found.index)
-
-    def _closed_in_rationals(self, codes: Codes, said: kinds.Closed) -> str | None:
-        from enumsol.arithmetic.rationals import to_fraction  # python-flint, not always needed
-
-        selection, free, rational = said.selection, said.free, self._body
-        slides = {i: code for i, code in enumerate(codes) if code in (FORWARD, BACKWARD)}
-        named = tuple(slides.get(i, code) for i, code in enumerate(selection))
-        point = rational.point(selection)
-        if point is None:
-            return "its selection is singular"
-        w = rational.moved(point)
-        least = {i: rational.least(selection[i], i, point) for i in range(rational.p)}
-        if any(least[i] < 0 for i in free) or any(w[i] > 0 if selection[i] == OPEN else point[i] < 0 for i in slides):
-            return "the point of its selection does not solve the reduced problem"
-        if not only_solution(self.system, named, free, np.asarray(said.weights), point, w):
-            return "its solution is not proven to be the only one"
-        touching = all(w[i] == 0 for i, code in enumerate(codes) if code == CONTACT)
-        holds = touching and all(least[i] >= 0 for i in range(rational.p) if i not in free)
-        if not same(said.at, int(holds)):
-            return "it holds another number of roots than it claims"
-        self.polytopes += [(selection, [tuple(to_fraction(x) for x in point)], 0)] if holds else []
-        return None
+        return self._wrongly_said(found, said)
 
     def _locate(self, name: Codes, ball: VerifiedSelection | ClosedSolution | JointRoot, codes: Codes = ()) -> None:
         del codes  # those that are certain follow from the balls

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 
 @dataclass
-class SpaceChecker(TreeChecker):
+class SpaceChecker(TreeChecker[EnclosedSpace, "SpaceRoot | LooseSolution"]):
     """Checks one proof of a problem in 3D."""
 
     trees = Tree.SPACE, Tree.FLOATING_SPACE
@@ -85,11 +85,11 @@ class SpaceChecker(TreeChecker):
     def _settled(self, system: EnclosedSpace, codes: Codes) -> SpaceRoot | Open | None:
         return settle(system, codes)
 
-    def _is_root(self, found: Any) -> bool:
+    def _is_root(self, found: object) -> bool:
         return isinstance(found, SpaceRoot)
 
-    def _forces(self, found: SpaceRoot | LooseSolution) -> tuple[Ball, Floats]:
-        return found.y, self.system.unit
+    def _wrongly_said(self, found: SpaceRoot | LooseSolution, said: EnclosureRecord) -> str | None:
+        return said.refusal(found.y, self.system.unit, found.index)
 
     def _at_rest(self) -> None:
         self.regular += 1
@@ -123,12 +123,12 @@ class SpaceChecker(TreeChecker):
         if (reason := self._regular(said.codes, known.root, said.enclosure)) is not None:
             self.fail(f"the root that is declared: {reason}")
 
-    def _regular(self, codes: Codes, found: Any, said: EnclosureRecord) -> str | None:
+    def _regular(self, codes: Codes, found: SpaceRoot | LooseSolution, said: EnclosureRecord) -> str | None:
         if isinstance(found, SpaceRoot):
             return super()._regular(codes, found, said)
         self.regular += 1
         self._locate(codes, found, codes)
-        return said.refusal(*self._forces(found), found.index)
+        return self._wrongly_said(found, said)
 
     def _in_box(self, codes: Codes, said: BoxedRoot) -> str | None:
         """The only solution of a box, in which all roots of a leaf lie, or the ellipsoid of an assignment."""
@@ -161,7 +161,7 @@ class SpaceChecker(TreeChecker):
             return "its roots are not proven to lie in its box"
         self.boxed.append((codes, found))
         self._locate(codes, found)
-        return said.enclosure.refusal(*self._forces(found), found.index)
+        return self._wrongly_said(found, said.enclosure)
 
     # -- counting --------------------------------------------------------------------------------------------------
 

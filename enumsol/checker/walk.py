@@ -5,10 +5,10 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 from enumsol.checker.reports import MAX_FAILURES, VerificationReport
-from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
+from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
 from enumsol.proof import leaves as kinds
 from enumsol.proof.reading import RecordError, RefusedError, quoted, same
@@ -24,12 +24,15 @@ if TYPE_CHECKING:
     from enumsol.condensation.data import Data
     from enumsol.proof.proof_file import Proof
     from enumsol.proof.records import EnclosureRecord, Record
-    from enumsol.support.array_types import Codes, Floats, Mask
+    from enumsol.support.array_types import Codes, Mask
     from enumsol.trusted.positions import Among
 
     #: Checks what a leaf of one kind says; the reason when it proves nothing.
     Test = Callable[[Codes, Any], str | None]
 
+#: Balls of a problem, and roots of its leaves.
+System = TypeVar("System", bound=EnclosedSystem)
+Root = TypeVar("Root")
 _REPORT_EVERY = 256
 #: Forms that are kept as they were made: a file that alternates between more has each of them made again.
 _KEPT = 16
@@ -65,7 +68,7 @@ class Located:
 
 
 @dataclass
-class TreeChecker(ABC):
+class TreeChecker(ABC, Generic[System, Root]):
     """Checks one proof: its header, then the tree alone, then every leaf.
 
     Whatever does not fit together is found before anything is computed, which may take long.
@@ -149,11 +152,11 @@ class TreeChecker(ABC):
         return self.trees[0 if self.problem.held else 1]
 
     @cached_property
-    def free(self) -> Any:
+    def free(self) -> System:
         """The system with bounds of the rigid displacement beyond which there are no solutions."""
         return self.system if self.problem.held else self._without_bound()
 
-    def _either(self, holds: Callable[[Any], bool]) -> bool:
+    def _either(self, holds: Callable[[System], bool]) -> bool:
         """Whether something holds of the system, if possible without the bound of the rigid displacement."""
         if holds(self.free):
             return True
@@ -173,11 +176,11 @@ class TreeChecker(ABC):
 
     @property
     @abstractmethod
-    def system(self) -> Any:
+    def system(self) -> System:
         """Balls for the data in the proof's units."""
 
     @abstractmethod
-    def _without_bound(self) -> Any:
+    def _without_bound(self) -> System:
         """See ``free``, for a body that nothing holds."""
 
     @abstractmethod
@@ -189,26 +192,26 @@ class TreeChecker(ABC):
         """Limits of what a record of this kind may say at this assignment."""
 
     @abstractmethod
-    def _settled(self, system: Any, codes: Codes) -> Any:
+    def _settled(self, system: System, codes: Codes) -> Any:
         """The root of a complete assignment, None where it has none, or that this is open."""
 
     @abstractmethod
-    def _is_root(self, found: Any) -> bool:
+    def _is_root(self, found: object) -> bool:
         """True if what a complete assignment holds is a root."""
 
     @abstractmethod
-    def _forces(self, found: Any) -> tuple[Ball, Floats]:
-        """The forces of a root as a ball, and their units."""
+    def _wrongly_said(self, found: Root, said: EnclosureRecord) -> str | None:
+        """Why the ball and the index that are said to be those of a root are not, or None."""
 
     @abstractmethod
-    def _locate(self, name: Codes, found: Any, codes: Codes = ()) -> None:
+    def _locate(self, name: Codes, found: Root, codes: Codes = ()) -> None:
         """Take note of where a root is, by its name and, if they are known, its codes."""
 
     @abstractmethod
     def _at_rest(self) -> None:
         """Count the root of the unloaded body."""
 
-    def _flush(self, *, last: bool) -> None:  # noqa: B027 (in 3D nothing waits)
+    def _flush(self, *, last: bool) -> None:
         """Check what waits, at the end or when it has become much."""
 
     @abstractmethod
@@ -333,13 +336,13 @@ class TreeChecker(ABC):
         proven = self._either(lambda system: said.holds(known, codes, system.reach))
         return None if proven else "the root that was declared is not proven to be the only one in it"
 
-    def _regular(self, codes: Codes, found: Any, said: EnclosureRecord) -> str | None:
+    def _regular(self, codes: Codes, found: Root, said: EnclosureRecord) -> str | None:
         """Count a regular root of a leaf, and look at what is said of it."""
         self.roots.append((codes, found))
         if not self.problem.held and not self.bounded:
             self.bounded = not self._is_root(self._settled(self.free, codes))
         self._locate(codes, found, codes)
-        return said.refusal(*self._forces(found), found.index)
+        return self._wrongly_said(found, said)
 
     def _declare(self, record: list[Any]) -> None:
         """Take note of what later leaves refer to."""

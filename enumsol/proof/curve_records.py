@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from enumsol.proof.leaves import ClosingRecord
 from enumsol.proof.reading import (
     RecordError,
     check_complete,
@@ -14,7 +13,7 @@ from enumsol.proof.reading import (
     quoted,
     rational_from,
 )
-from enumsol.proof.records import Limits, Record, Tree
+from enumsol.proof.records import ClosingRecord, Limits, Record, Tree
 from enumsol.trusted.space.curve_runs import Run
 from enumsol.trusted.space.solution_curve import CurveBox
 

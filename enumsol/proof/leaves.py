@@ -25,7 +25,7 @@ from enumsol.proof.reading import (
     selection_from,
     weights_from,
 )
-from enumsol.proof.records import EnclosureRecord, Limits, Record, Tree
+from enumsol.proof.records import ClosingRecord, EnclosureRecord, Limits, Record, Tree
 from enumsol.support.array_types import Codes, Floats, Indices
 from enumsol.trusted.exclusion import Terms, exclusion_margin
 from enumsol.trusted.floating_bounds import is_unbalanced
@@ -34,9 +34,20 @@ from enumsol.trusted.status_rows import CONTACT, ROW_KINDS, SLIP_MINUS, SLIP_PLU
 from enumsol.trusted.uniqueness import closed_solution, lone_root, numbers_of
 
 if TYPE_CHECKING:
+    from enumsol.condensation.space_condensed import EnclosedSpace
     from enumsol.proof.reading import Row
     from enumsol.trusted.joint_roots import JointRoot
+    from enumsol.trusted.over_interval import EnclosedPiece
+    from enumsol.trusted.quadratic_forms import EnclosedForm
+    from enumsol.trusted.reference import Reference
+    from enumsol.trusted.space.pieces import AlphaPiece
+    from enumsol.trusted.space.product_forms import Ellipsoid
+    from enumsol.trusted.space.slip_forms import SlipForm
+    from enumsol.trusted.space.space_reference import SpaceReference
     from enumsol.trusted.uniqueness import ClosedSolution
+
+    #: What multipliers bound.
+    Bounded = EnclosedSystem | EnclosedForm | EnclosedPiece | SlipForm | Ellipsoid | AlphaPiece
 
 #: Last entry of a record that is to be tested in rational arithmetic.
 RATIONAL = "rational"
@@ -98,7 +109,7 @@ class Excluded(Record):
             raise RecordError("it has multipliers beside those of a form of products")
         return cls([checked_row(row, limits.p) for row in rows], values, by)
 
-    def holds(self, within: Any, codes: Codes, errors: float = 1.0) -> bool:
+    def holds(self, within: Bounded, codes: Codes, errors: float = 1.0) -> bool:
         """True if the assignment is proven to hold no solution (theory, sections 6, 12.2, 12.9 and 14).
 
         Parameters
@@ -108,10 +119,10 @@ class Excluded(Record):
         errors : how often error bounds are subtracted: 1 proves, a writer of proofs takes more
         """
         if not isinstance(self.rows, list):
-            return exclusion_margin(within, codes, self.rows, self.values, errors) > 0
+            return exclusion_margin(cast("Any", within), codes, self.rows, self.values, errors) > 0
         from enumsol.trusted.space.resultants import space_margin  # in 3D only
 
-        return space_margin(within, codes, self.rows, self.values, errors) > 0
+        return space_margin(cast("Any", within), codes, self.rows, self.values, errors) > 0
 
     @property
     def lines(self) -> list[Row]:
@@ -141,15 +152,15 @@ class Unbalanced(Record):
         """A number for each rigid mode."""
         return cls(numbers_from(entries[0], limits.modes))
 
-    def holds(self, within: Any, codes: Codes) -> bool:
+    def holds(self, within: EnclosedSystem | AlphaPiece, codes: Codes) -> bool:
         """True if no forces below the assignment balance the load, of a system or an AlphaPiece (theory, (14.7))."""
         if not isinstance(within, EnclosedSystem):
-            return bool(within.is_unbalanced(codes, self.direction))
+            return within.is_unbalanced(codes, self.direction)
         if within.tangents == 1:
             return is_unbalanced(within, codes, self.direction)
         from enumsol.trusted.space.resultants import is_unbalanced_in_space  # in 3D only
 
-        return is_unbalanced_in_space(cast("Any", within), codes, self.direction)
+        return is_unbalanced_in_space(cast("EnclosedSpace", within), codes, self.direction)
 
 
 # -- complete assignments ----------------------------------------------------------------------------------------------
@@ -258,10 +269,6 @@ class RootSetRecord(Solved):
 # -- one solution at most ----------------------------------------------------------------------------------------------
 
 
-class ClosingRecord(Record):
-    """Base of leaves below which there can be one solution only."""
-
-
 @dataclass(frozen=True, eq=False)
 class Closed(ClosingRecord):
     """With an enclosure, or a count of 1, that solution is a root, else it is none.
@@ -357,7 +364,7 @@ class Alone(ClosingRecord):
         strengths = numbers_from(more[0], 2 * limits.p).reshape(2, -1)
         return cls(chosen, weights, enclosure, strengths, multipliers_from(more[1:], ROW_KINDS * limits.p))
 
-    def holds(self, system: Any, codes: Codes, errors: float = 1.0) -> Any:
+    def holds(self, system: EnclosedSystem, codes: Codes, errors: float = 1.0) -> Any:
         """The only solution below the assignment, None where that is not proven (theory, sections 6.13 and 12.6).
 
         A VerifiedSelection; in 3D a SpaceRoot, or an OnlySolution where no leaf is named. ``errors`` as of Excluded.
@@ -366,12 +373,13 @@ class Alone(ClosingRecord):
             return lone_root(system, codes, self.selection, self.numbers, self.strengths, *self.terms)
         from enumsol.trusted.space import space_uniqueness as space  # in 3D only
 
+        given = cast("EnclosedSpace", system)
         if any(code != UNDECIDED for code in codes):
-            return space.lone_root(system, codes, self.numbers, self.selection, errors)
+            return space.lone_root(given, codes, self.numbers, self.selection, errors)
         if self.selection:
-            return space.only_root(system, self.numbers, self.selection, errors)
+            return space.only_root(given, self.numbers, self.selection, errors)
         force, _ = self.enclosure.numbers(len(system.g))
-        return space.only_solution_in_space(system, self.numbers, force[: len(codes)], errors)
+        return space.only_solution_in_space(given, self.numbers, force[: len(codes)], errors)
 
     def entries(self) -> Iterable[Any]:
         """Multipliers as two texts."""
@@ -462,12 +470,12 @@ class OnlyReference(ClosingRecord):
             raise RecordError("its rows are not numbers of rows")
         return row
 
-    def holds(self, known: Any, codes: Codes, reach: Floats) -> bool:
+    def holds(self, known: Reference | SpaceReference, codes: Codes, reach: Floats) -> bool:
         """True if no other root lies below the assignment than that of a form, a Reference or SpaceReference.
 
         ``reach``: within these bounds of the rigid displacement (theory, section 14.11).
         """
-        return bool(known.is_only_root(codes, self.rows, self.products, reach))
+        return known.is_only_root(codes, self.rows, self.products, reach)
 
     def entries(self) -> Iterable[Any]:
         """Without an enclosure where there is none."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, fields
 from enum import Flag, auto
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 import numpy as np
 
@@ -25,6 +25,8 @@ from enumsol.trusted.status_rows import UNDECIDED, refines
 
 if TYPE_CHECKING:
     from enumsol.arithmetic.balls import Ball
+    from enumsol.condensation.enclosure import EnclosedSystem
+    from enumsol.condensation.space_condensed import EnclosedSpace
 
 #: Covers underflow of one product.
 _SUBNORMAL = 2.0**-1070
@@ -134,6 +136,10 @@ class Record:
                 yield from value
             elif value is not None:
                 yield value.ravel() if isinstance(value, np.ndarray) else value
+
+
+class ClosingRecord(Record):
+    """Base of leaves below which there can be one solution only."""
 
 
 # -- branchings and forms ----------------------------------------------------------------------------------------------
@@ -268,7 +274,7 @@ class DeclaredForm(Record):
         return all(mine == UNDECIDED or refines(code, mine) for code, mine in zip(codes, self.codes, strict=True))
 
     @np.errstate(over="ignore", invalid="ignore")
-    def form(self, system: Any) -> Any:
+    def form(self, system: EnclosedSystem) -> Any:
         """The form of an assignment, its ellipsoid, or the form of a root; None where it is not proven to be definite.
 
         An EnclosedForm or Reference, in 3D a SlipForm (of the whole tree), Ellipsoid or SpaceReference.
@@ -286,8 +292,9 @@ class DeclaredForm(Record):
         from enumsol.trusted.space.slip_forms import SlipForm
         from enumsol.trusted.space.space_reference import SpaceReference
 
+        given = cast("EnclosedSpace", system)
         if not system.held:
-            return SpaceReference.of(system, self.codes, self.numbers, *self.more.tolist())
+            return SpaceReference.of(given, self.codes, self.numbers, *self.more.tolist())
         if all(code == UNDECIDED for code in self.codes):
-            return SlipForm.of(system, self.numbers)
-        return Ellipsoid.of(system, self.codes, self.more / system.unit, self.numbers)
+            return SlipForm.of(given, self.numbers)
+        return Ellipsoid.of(given, self.codes, self.more / given.unit, self.numbers)

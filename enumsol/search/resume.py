@@ -177,6 +177,6 @@ class Replay:
         if isinstance(leaf, leaves.OnlyReference):
             return search.closed(item, None, again=True)
         boxed = isinstance(leaf, leaves.BoxedRoot) and leaf.by is None
-        if isinstance(leaf, leaves.ClosingRecord) and not boxed:
+        if isinstance(leaf, records.ClosingRecord) and not boxed:
             return search.closed(item, search.relaxations.energy(item.codes), again=True)
         return (boxed or isinstance(leaf, leaves.Solved)) and search.settled(item)

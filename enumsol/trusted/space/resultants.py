@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -26,16 +26,20 @@ _DIGITS = 40
 _HALF = Ball.exact(np.array(0.5))
 
 
-def space_margin(
-    within: Any, codes: Sequence[int], lines: Sequence[Row], multipliers: Floats, errors: float = 1.0
-) -> float:
-    """Lower bound over a partial assignment in 3D; positive means that it holds no solution.
+class Bounding(Protocol):
+    """A form, or a piece of alpha, that has bounds of its own: SlipForm, Ellipsoid and AlphaPiece."""
 
-    ``within`` is a system, or a SlipForm, an Ellipsoid or an AlphaPiece, which have bounds of their own.
-    """
+    def margin(self, codes: Sequence[int], rows: Sequence[Row], values: Floats, errors: float = 1.0) -> float:
+        """See ``space_margin``."""
+
+
+def space_margin(
+    within: EnclosedSpace | Bounding, codes: Sequence[int], rows: Sequence[Row], values: Floats, errors: float = 1.0
+) -> float:
+    """Lower bound over a partial assignment in 3D; positive means that it holds no solution."""
     if not isinstance(within, EnclosedSpace):
-        return float(within.margin(codes, lines, multipliers, errors))
-    return (sector_margin if within.held else floating_margin)(within, codes, lines, multipliers, errors)
+        return within.margin(codes, rows, values, errors)
+    return (sector_margin if within.held else floating_margin)(within, codes, rows, values, errors)
 
 
 @np.errstate(over="ignore", invalid="ignore")

@@ -7,7 +7,7 @@ longer than one, node by node.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -73,4 +73,4 @@ class SlipForm(QuadraticForm):
 
     def margin(self, codes: Sequence[int], rows: Sequence[Row], values: Floats, errors: float = 1.0) -> float:
         """See ``sector_margin``."""
-        return sector_margin(self.system, codes, rows, values, errors, self)  # type: ignore[arg-type]
+        return sector_margin(cast("EnclosedSpace", self.system), codes, rows, values, errors, self)
