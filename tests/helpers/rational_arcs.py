@@ -58,7 +58,7 @@ class Selection:
     def __init__(self, data, codes, side):
         self._data, self.codes, self.side, self._p = data, codes, side, len(codes)
         groups = [{0: 4}, {2: 5, 3: 6}, dict.fromkeys((1, 2, 3, 4), 0), {1: 2}, {1: 3}]
-        #: [6.5, conditions] Kind of row and node, by number.
+        #: [7.3, conditions] Kind of row and node, by number.
         self.conditions = [(group[code], i) for group in groups for i, code in enumerate(codes) if code in group]
         modes = range(self._p, self._p + len(data.reach))
         self.conditions += [(kind, i) for kind in BOUNDS for i in modes]
@@ -168,7 +168,7 @@ class Selection:
 
 
 class Trace:
-    """[6.5, arcs] The arcs of one trace, from left to right."""
+    """[7.3, arcs] The arcs of one trace, from left to right."""
 
     def __init__(self, data, codes, side):
         self.selection, self.codes, self.side = Selection(data, codes, side), codes, side
@@ -240,7 +240,7 @@ class Arcs:
         self._traces = []
 
     def _spans(self, pieces):
-        """[6.5, traces] Ends and side."""
+        """[7.3, traces] Ends and side."""
         joined = []
         for x, y in sorted(pieces):
             if joined and joined[-1][1] == x and x != self._origin:
@@ -300,7 +300,7 @@ class Arcs:
         return trace
 
     def _paired(self):
-        """[6.5, events] Events without a partner, and pairs."""
+        """[7.3, events] Events without a partner, and pairs."""
         events = [(trace, *event) for trace in self._traces for event in trace.events if event[0][0] not in BOUNDS]
         partners = [[other for other in events if _partners(event, other)] for event in events]
         for event, found in zip(events, partners, strict=True):

@@ -1,4 +1,4 @@
-"""[6.3, pieces without a tree] Pieces of graph proofs that are closed by their arcs, for rational_checker.
+"""[7.2, m] Pieces of graph proofs that are closed by their arcs, for rational_checker.
 
 Nothing of enumsol is imported. That a solution is the only one is not believed because a form is definite: at some
 alphas of every piece all selections are tried as well. Numbers in brackets are sections of docs/proof_format.md.
