@@ -17,7 +17,7 @@ from flint import fmpq, fmpq_mat
 from enumsol.arithmetic.rationals import is_positive_definite, rational
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.enclosure import NotEnclosedError
-from enumsol.condensation.free_displacements import exact_matrices, free_displacements, solved
+from enumsol.condensation.unloaded import exact_matrices, free_displacements, solved
 from enumsol.trusted.status_rows import CONDITIONS, FORBIDDEN, NONNEGATIVE
 
 if TYPE_CHECKING:

@@ -24,7 +24,7 @@ from enumsol.arithmetic.balls import (
     sparse_eigenvalue_bound,
     upper_norm,
 )
-from enumsol.condensation.data import CondensableData, exactly_at
+from enumsol.condensation.data import ProblemData, exactly_at
 from enumsol.condensation.products import Products, scaled
 from enumsol.errors import EnumsolError
 from enumsol.support.arguments import alpha_value
@@ -63,7 +63,7 @@ class CondensedEnclosure(Sealed):
     free: tuple[Floats, Floats] | None = field(default=None, repr=False)
 
     @classmethod
-    def from_problem(cls, problem: CondensableData, products: Products | None = None) -> CondensedEnclosure:
+    def from_problem(cls, problem: ProblemData, products: Products | None = None) -> CondensedEnclosure:
         """Enclose S and g from the problem's own matrices; ``products`` of it are taken if they are known.
 
         Of a body that nothing holds these are those of the body on springs.
@@ -79,7 +79,7 @@ class CondensedEnclosure(Sealed):
             enclosed = cls._from_problem(problem, products)
         return enclosed._finite()
 
-    def restarted(self, problem: CondensableData, products: Products) -> CondensedEnclosure:
+    def restarted(self, problem: ProblemData, products: Products) -> CondensedEnclosure:
         """The enclosure of a problem of the same body with another load or slip offset: S is what it is here.
 
         Raises
@@ -128,7 +128,7 @@ class CondensedEnclosure(Sealed):
         return self
 
     @classmethod
-    def _from_problem(cls, problem: CondensableData, products: Products | None) -> CondensedEnclosure:
+    def _from_problem(cls, problem: ProblemData, products: Products | None) -> CondensedEnclosure:
         products = Products.of(problem) if products is None else products
         if not products.bounded:
             raise NotEnclosedError(_OVERFLOW)
@@ -252,7 +252,7 @@ def float_at(alpha: Fraction) -> tuple[float, float]:
     return value, 0.0 if Fraction(value) == alpha else 2 * UNIT * abs(value) + TINY
 
 
-def _displaced(problem: CondensableData, products: Products, rad: Floats) -> tuple[Floats, ...]:
+def _displaced(problem: ProblemData, products: Products, rad: Floats) -> tuple[Floats, ...]:
     """g0, g1 and B A^-1 f, each with its radius, from products with the radii ``rad``."""
     size, offset = len(products.mid), np.concatenate([problem.gap, problem.slip_offset.ravel(order="F")])
     free, free_rad = products.mid[:, size:] * products.lift, rad[:, size:] * products.lift + TINY
@@ -266,7 +266,7 @@ def _displaced(problem: CondensableData, products: Products, rad: Floats) -> tup
     return g0, g0_rad, free[:, 1], free_rad[:, 1], free[:, 0], free_rad[:, 0]
 
 
-def _smallest_eigenvalue(problem: CondensableData, scale: Floats) -> float:
+def _smallest_eigenvalue(problem: ProblemData, scale: Floats) -> float:
     """Estimate of the smallest eigenvalue of the scaled A by inverse iteration."""
     vector = np.random.default_rng(1).normal(size=problem.n)
     value = 1.0

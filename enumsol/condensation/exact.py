@@ -14,8 +14,7 @@ from flint import fmpq, fmpq_mat
 
 from enumsol.arithmetic.rationals import is_positive_definite, rational, rational_matrix
 from enumsol.condensation.data import EXACT_DOF_LIMIT, ProblemData
-from enumsol.condensation.free_displacements import solved
-from enumsol.condensation.unloaded import CondensedData, vanishing_alpha
+from enumsol.condensation.unloaded import solved, vanishing_alpha
 from enumsol.errors import InvalidProblemError, TooLargeError
 from enumsol.support.array_types import Alpha
 from enumsol.support.deadlines import look, tell
@@ -238,7 +237,7 @@ class ExactCondensed:
     reach: tuple[Any, ...] = ()
 
     @classmethod
-    def from_problem(cls, problem: CondensedData) -> ExactCondensed:
+    def from_problem(cls, problem: ProblemData) -> ExactCondensed:
         """Condense A, Bn, Bt, f, load_slope, gap, slip_offset and friction without any rounding; on springs, with G, h.
 
         Raises
@@ -268,7 +267,7 @@ class ExactCondensed:
         return fmpq_mat([list(row) for row in self.rows])
 
     @classmethod
-    def from_condensed(cls, problem: CondensedData) -> ExactCondensed:
+    def from_condensed(cls, problem: ProblemData) -> ExactCondensed:
         """The exact values of S, g and F as computed in floats."""
         condensed = problem.condensed
         vectors = (condensed.g0, condensed.g1, condensed.F0, condensed.F1)

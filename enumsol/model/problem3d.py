@@ -10,9 +10,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.model.contact_body import ContactBody, friction_values, span, vector
+from enumsol.model.contact_body import ContactBody, check_signs, friction_values, span, vector
 from enumsol.model.friction import ConstantFriction, FrictionTable, friction_law, friction_pair
-from enumsol.model.mesh import BodyMesh
 from enumsol.support.arguments import alpha_value, instance_of
 from enumsol.support.array_arguments import real_array, real_matrix, vector_of
 from enumsol.support.immutable import Immutable, SealedMatrix, sealed
@@ -20,7 +19,7 @@ from enumsol.support.immutable import Immutable, SealedMatrix, sealed
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from enumsol.condensation.condensed import Condensation
+    from enumsol.model.mesh import BodyMesh
     from enumsol.model.problem import ContactProblem
     from enumsol.support.array_types import AlphaLike, ArrayLike, Floats
 
@@ -214,13 +213,10 @@ class ContactProblem3D(ContactBody):
         self._slope = sealed(friction_pair(friction_slope, "friction_slope", p))
         self.slip_offset = _slip_offset(slip_offset, p)
         self.areas = None if areas is None else _areas(areas, p)
-        self.mesh = None if mesh is None else instance_of(mesh, BodyMesh, "mesh").check(self.n, p, 3)
         self.slip_mean = None if slip_mean is None else instance_of(slip_mean, SlipMean, "slip_mean").check(self.n, p)
         if isinstance(self.law, ConstantFriction) and not np.any(self._slope):
-            _check_signs(self.law.values, self.node_ids, "")
-        self._hold(rigid_modes, max_rigid_displacement)
-        self._freeze()
-        self.on_springs.factorization.check_positive_definite()
+            check_signs(self.law.values, self.node_ids)
+        self._complete(mesh, rigid_modes, max_rigid_displacement)
 
     @property
     def Bt1(self) -> sp.csr_array:  # noqa: N802 (the field's letter)
@@ -262,19 +258,6 @@ class ContactProblem3D(ContactBody):
         """True if the coefficients are functions of the slip: then only successive approximations are offered."""
         return self.law.depends_on_slip
 
-    @property
-    def depends_on_alpha(self) -> bool:
-        """True if friction or load change with alpha."""
-        return self.load_slope is not None or bool(np.any(self._slope))
-
-    @cached_property
-    def condensed(self) -> Condensation:
-        """The problem condensed to its 3p contact forces."""
-        self.check_held("condensation")
-        from enumsol.condensation.condensed import Condensation  # scipy's solvers come with the first use
-
-        return Condensation.from_problem(self)
-
     def coefficients(self, alpha: AlphaLike, slip: ArrayLike) -> Floats:
         """Coefficients F1, F2 at alpha for slips of shape (p,) [length], shape (p, 2).
 
@@ -290,21 +273,9 @@ class ContactProblem3D(ContactBody):
         slip = real_array(slip, "slip", error=InvalidArgumentError)
         if slip.shape != (self.p,):
             raise InvalidArgumentError(f"slip has shape {slip.shape}; expected (p,) = ({self.p},)")
-        F = friction_values(exact, self.law.at(slip).ravel(), self._slope.ravel()).reshape(self.p, 2)
-        _check_signs(F, self.node_ids, f" at alpha = {float(exact):g}", error=InvalidArgumentError)
+        F = friction_values(exact, self.law.at(slip), self._slope)
+        check_signs(F, self.node_ids, f" at alpha = {float(exact):g}", error=InvalidArgumentError)
         return F
-
-    def friction_at(self, alpha: AlphaLike) -> Floats:
-        """Coefficients F1, F2 at alpha, shape (p, 2).
-
-        Raises
-        ------
-        InvalidArgumentError
-            alpha is not finite, a coefficient is negative there, or the coefficients depend on the solution.
-        """
-        if self.depends_on_solution:
-            raise self._no_constants()
-        return self.coefficients(alpha, np.zeros(self.p))
 
     def _no_constants(self) -> InvalidArgumentError:
         return InvalidArgumentError(
@@ -333,17 +304,6 @@ class ContactProblem3D(ContactBody):
     def __repr__(self) -> str:
         slope = "" if not np.any(self._slope) else f" + alpha [{span(self._slope[:, 0])}, {span(self._slope[:, 1])}]"
         return self._text(f"{self.law}{slope}")
-
-
-def _check_signs(
-    F: Floats,
-    labels: tuple[Any, ...],
-    where: str,
-    error: type[InvalidProblemError | InvalidArgumentError] = InvalidProblemError,
-) -> None:
-    if np.any(F < 0):
-        node, axis = np.unravel_index(int(np.argmin(F)), F.shape)
-        raise error(f"friction F{axis + 1}{where} is {F[node, axis]:g} at contact node {labels[node]}; expected F >= 0")
 
 
 def _slip_offset(value: ArrayLike, p: int) -> Floats:

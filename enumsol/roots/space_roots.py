@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, Ball
-from enumsol.condensation.condensed import Condensation, condensation_of
+from enumsol.condensation.condensed import CondensedProblem, condensation_of
 from enumsol.condensation.enclosure import moved_by_modes
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.statuses import CONTACT, FRICTIONLESS, OPEN, STICK, UNDECIDED, ContactStatus, space_status
@@ -139,9 +139,9 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         return np.array([_around(*pair) for pair in zip(*loose_angles(self.solvers.enclosed, found), strict=True)])
 
     @cached_property
-    def _condensed(self) -> Condensation:
+    def _condensed(self) -> CondensedProblem:
         """Condensation with which roots compute their displacements."""
-        found: Condensation = condensation_of(self.problem)
+        found: CondensedProblem = condensation_of(self.problem)
         return found
 
     def _in_units(self, rigid: Ball) -> Ball:
