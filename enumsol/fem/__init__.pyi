@@ -7,7 +7,7 @@ from .assembly import (
     stiffness as stiffness,
     triangle_stiffness as triangle_stiffness,
 )
-from .bases import cell_stresses as cell_stresses
+from .bases import MeshNorms as MeshNorms, cell_stresses as cell_stresses, h1_norms as h1_norms
 from .basis_problems import basis_contact_problem as basis_contact_problem
 from .mesh_checks import lame as lame
 from .mesh_files import read_mesh as read_mesh, read_solid as read_solid
@@ -27,7 +27,6 @@ from .meshes import (
     rectangle as rectangle,
     trapezoid as trapezoid,
 )
-from .norms import MeshNorms as MeshNorms, h1_norms as h1_norms
 from .scenes import Scene as Scene
 from .solid_problems import (
     facet_forces as facet_forces,

@@ -8,7 +8,7 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.bases import between_corners, facet_basis
-from enumsol.fem.mesh_checks import unit_vectors, vectors_of_all
+from enumsol.fem.mesh_checks import SAME, unit_vectors, vectors_of_all
 from enumsol.fem.restrained import Body, Supports, axes_of, movable, problem_of
 from enumsol.support.arguments import shown
 from enumsol.support.array_arguments import plain_array, real_array, real_matrix
@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
 
-#: Of two places of one node, as a share of the extent of the mesh.
-_SAME = 1e-9
 #: Nodal integrals of normals below this share of the largest are rounding.
 _NO_PRESSURE = 1e-6
 
@@ -128,7 +126,7 @@ def _nodes_of(basis: Any) -> tuple[Integers, Floats]:
         where = np.asarray(basis.doflocs)[:, dofs]  # (d, N, components)
         apart = np.max(np.abs(where - where[:, :, :1]))
         vectors = (
-            dofs.size == basis.N and dimension in (2, 3) and apart <= _SAME * np.max(np.ptp(where[:, :, 0], axis=1))
+            dofs.size == basis.N and dimension in (2, 3) and apart <= SAME * np.max(np.ptp(where[:, :, 0], axis=1))
         )
     except (AttributeError, TypeError, ValueError, IndexError):
         vectors = False

@@ -14,6 +14,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.fem.mesh_checks import SAME
 from enumsol.fem.restrained import Supports
 from enumsol.support.arguments import finite_number, one_of, shown
 from enumsol.support.array_arguments import real_array, short_vector
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
     from enumsol.fem.options import Options
     from enumsol.support.array_types import Floats, Integers, Mask
 
-#: Positions in a plane of symmetry may differ from it by this share of the extent of the body.
-_SAME = 1e-9
 #: What is smaller in a combination of rigid motions is rounding.
 _ROUNDED = 1e-12
 #: Of the energies of rigid motions in the supports, the least as a share of the largest that holds a body.
@@ -154,7 +153,7 @@ class Held:
         """Axes to which a plane through all of these nodes is perpendicular."""
         points = self._mesh.points
         extent = float(np.max(np.ptp(points, axis=0)))
-        return np.flatnonzero(np.ptp(points[nodes], axis=0) <= _SAME * extent).tolist()
+        return np.flatnonzero(np.ptp(points[nodes], axis=0) <= SAME * extent).tolist()
 
     def _fix(self, part: str, nodes: Integers, component: int, value: float) -> None:
         differ = self._fixed[nodes, component] & (self._values[nodes, component] != value)

@@ -14,6 +14,9 @@ from enumsol.support.arguments import finite_number, one_of, positive_number, sh
 from enumsol.support.array_arguments import plain_array, real_array, short_vector
 from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
 
+#: Coordinates that differ by less than this share of the extent of a mesh are equal: much larger, nodes of a fine mesh
+#: would be one.
+SAME = 1e-9
 #: Largest coordinates of which areas and volumes are computed, by dimension.
 LARGEST_COORDINATE = {2: 1e150, 3: 1e100}
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.fem.file_counts import Deck, deck_of, refuse_partial
-from enumsol.fem.mesh_checks import positions
+from enumsol.fem.mesh_checks import SAME, positions
 from enumsol.fem.meshes import ALL, PartedMesh, SolidMesh
 from enumsol.model.cells import KINDS, TRIANGLES, as_quadrilaterals, boundary_facets, facet_rows, numbers_of_nodes
 from enumsol.support.arguments import file_path, shown
@@ -26,8 +26,6 @@ from enumsol.support.array_types import Floats, Integers, NDArray
 from enumsol.support.files import DAMAGE, unreadable
 from enumsol.support.messages import shortened
 
-#: Third coordinates of a plane mesh may differ by this share of its extent.
-_PLANE = 1e-9
 _PHYSICAL = "gmsh:physical"
 #: What meshio calls the families of a MED file, of cells and of points; numbers of groups in formats without names.
 _FAMILIES = ("cell_tags", "point_tags")
@@ -215,7 +213,7 @@ def _plane(points: NDArray[Any]) -> Floats:
     if points.ndim == 2 and points.shape[1] == 3:
         nodes = positions(points, 3)
         extents = np.ptp(nodes, axis=0)
-        if extents[2] > _PLANE * np.max(extents):
+        if extents[2] > SAME * np.max(extents):
             raise InvalidArgumentError(
                 f"the mesh has plane cells and z from {nodes[:, 2].min():g} to {nodes[:, 2].max():g}; "
                 "expected a plane mesh with the same z everywhere, or cells of a body in 3D"
@@ -385,7 +383,7 @@ def solid_cells(points: Floats, cells: Integers, labels: Integers | None = None)
     InvalidArgumentError
         As `solid_mesh` does.
     """
-    from enumsol.fem.solid_geometry import solid_mesh  # not for plane meshes
+    from enumsol.fem.solid_problems import solid_mesh  # not for plane meshes
 
     if cells.shape[1] == 20:
         points, cells = completed(points, cells)

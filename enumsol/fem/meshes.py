@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.mesh_checks import elements, positions
+from enumsol.fem.mesh_checks import SAME, elements, positions
 from enumsol.model.cells import KINDS, boundary_facets, by_kind
 from enumsol.support.arguments import one_of, positive_integer, positive_number, shown
 from enumsol.support.array_arguments import plain_array, short_vector
@@ -286,8 +286,6 @@ def _structured(nx: int, ny: int, x: Floats, y: Floats, *, mirrored: bool) -> Me
 
 #: Most cells along one side of a box.
 MOST_CELLS_OF_A_SIDE = 1_000
-#: Coordinates that differ by less than this share of the extent are equal.
-_SAME = 1e-9
 #: The six tetrahedra of a cell: ways along its edges from its first corner to the opposite one.
 _PATHS = ((0, 1, 2, 6), (0, 2, 3, 6), (0, 3, 7, 6), (0, 7, 4, 6), (0, 4, 5, 6), (0, 5, 1, 6))
 
@@ -382,7 +380,7 @@ def blocks(points: ArrayLike, facets: ArrayLike, ratio: int) -> Integers:
     surface = elements(facets, "facets", (3, 4), len(nodes))
     width = positive_integer(ratio, "ratio")
     low, high = nodes[surface].min(axis=1), nodes[surface].max(axis=1)
-    same = _SAME * max(float(np.max(high.max(axis=0) - low.min(axis=0))), np.finfo(np.float64).tiny)
+    same = SAME * max(float(np.max(high.max(axis=0) - low.min(axis=0))), np.finfo(np.float64).tiny)
     flat = np.max(high, axis=0) - np.min(low, axis=0) <= same
     if np.sum(flat) != 1:
         raise _no_grid("they do not lie in one plane perpendicular to an axis")

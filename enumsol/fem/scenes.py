@@ -96,7 +96,7 @@ class Scene(SceneData):
         surface = contacts.facets if any(group.pair is not None for group in contacts.groups) else None
         more: dict[str, Any] = {}
         if self.dimension == 3:
-            from enumsol.fem.solid_geometry import outward  # not for plane bodies
+            from enumsol.fem.solid_problems import outward  # not for plane bodies
 
             surface, more = outward(contacts.facets, mesh.cells), {"areas": contacts.areas}
         gaps, coefficients = self.gaps, self.coefficients
