@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -325,6 +325,7 @@ def solved(S: Floats, right: Floats) -> Floats:
         return np.asarray(np.linalg.lstsq(S, right, rcond=None)[0])
 
 
-def condensation_of(problem: Any) -> Any:
+def condensation_of(problem: ProblemData) -> CondensedProblem:
     """``problem.condensed``, or that of a body that nothing holds."""
-    return problem.condensed if problem.held else replace(problem.on_springs.condensed, problem=problem)
+    condensed: CondensedProblem = problem.on_springs.condensed
+    return condensed if problem.held else replace(condensed, problem=problem)

@@ -206,7 +206,7 @@ class CondensedEnclosure(Sealed):
         return arrays
 
 
-def enclosure_of(problem: Any) -> CondensedEnclosure:
+def enclosure_of(problem: ProblemData) -> CondensedEnclosure:
     """``problem.enclosure``, or that of a body that nothing holds: S and g are those of the body on springs."""
     enclosure: CondensedEnclosure = problem.on_springs.enclosure
     return enclosure if problem.held else replace(enclosure, problem=problem)
@@ -278,7 +278,7 @@ def _smallest_eigenvalue(problem: ProblemData, scale: Floats) -> float:
     return value
 
 
-def moved_by_modes(problem: Any) -> Ball:
+def moved_by_modes(problem: ProblemData) -> Ball:
     """B N, by what each rigid mode moves the contact nodes, (2p, r) or (3p, r)."""
     return _product(problem.contact_rows, problem.modes.N)
 
@@ -291,7 +291,7 @@ def _in_units(value: Ball, unit: Floats) -> Ball:
     return Ball(value.mid * unit, np.where(value.rad > 0, value.rad * unit + TINY, 0.0))
 
 
-def _product(left: Any, right: Floats) -> Ball:
+def _product(left: Floats | sp.csr_array, right: Floats) -> Ball:
     """The product of two matrices, the first of which may be sparse, with the error of its sums; zeros are exact."""
     mid = np.asarray(left @ right)
     size = np.asarray(abs(left) @ np.abs(right))
@@ -335,7 +335,7 @@ class RigidRows:
         return cls(Ball.exact(np.zeros((0, size))), Ball.exact(nothing), Ball.exact(nothing), nothing, nothing)
 
     @classmethod
-    def of(cls, problem: object, alpha: Fraction, force: Floats, length: Floats) -> RigidRows:
+    def of(cls, problem: ProblemData, alpha: Fraction, force: Floats, length: Floats) -> RigidRows:
         """Rows of a problem at one alpha, enclosed; errors as ``along``."""
         rows = cls.along(problem, force, length)
         if not np.any(rows.slope.size):
@@ -348,7 +348,7 @@ class RigidRows:
         return replace(rows, h=h)
 
     @classmethod
-    def along(cls, problem: Any, force: Floats, length: Floats) -> RigidRows:
+    def along(cls, problem: ProblemData, force: Floats, length: Floats) -> RigidRows:
         """Rows of a problem at alpha = 0, enclosed.
 
         Raises

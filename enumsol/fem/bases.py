@@ -18,6 +18,10 @@ from enumsol.support.array_arguments import vector_of
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from skfem import BilinearForm, CellBasis, DiscreteField, FacetBasis
+    from skfem.assembly.form.form import FormExtraParams
+    from skfem.element import Element
+
     from enumsol.model.problem3d import AnyProblem, ContactProblem3D
     from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
 
@@ -58,7 +62,7 @@ class Block:
         The nodes that are corners of cells, in order: scikit-fem's vertices.
     """
 
-    basis: Any
+    basis: CellBasis
     dofs: Integers
     nodes: Integers
     rows: Integers
@@ -109,7 +113,7 @@ class NodalBasis:
     shape: tuple[int, int]
     thickness: Floats | None = None
 
-    def matrix(self, form: Any) -> sp.csc_array:
+    def matrix(self, form: BilinearForm) -> sp.csc_array:
         """The matrix of a bilinear form of scikit-fem, made exactly symmetric."""
         return self._gathered(lambda block: form.assemble(block.basis))
 
@@ -193,7 +197,7 @@ class NodalBasis:
         from skfem.helpers import ddot, div, sym_grad
         from skfem.models.elasticity import linear_elasticity
 
-        def energy(u: Any, v: Any, w: Any) -> Any:
+        def energy(u: DiscreteField, v: DiscreteField, w: FormExtraParams) -> Any:
             # as linear_elasticity has it, which makes an identity of every quadrature point and is slow in 3D
             return w.lam * div(u) * div(v) + 2.0 * w.mu * ddot(sym_grad(u), sym_grad(v))
 
@@ -278,7 +282,7 @@ def _block(points: Floats, rows: Integers, cells: Integers, degree: int, labels:
     return Block(basis, dofs, nodes, rows, np.unique(cells[:, : kind.corners]))
 
 
-def facet_basis(basis: Any, facets: Integers, *, lumped: bool = False) -> Any:
+def facet_basis(basis: CellBasis, facets: Integers, *, lumped: bool = False) -> FacetBasis:
     """scikit-fem's basis on facets; see `NodalBasis.on_part`."""
     from skfem import FacetBasis  # as above
 
@@ -294,7 +298,7 @@ def between_corners(element: object) -> bool:
     return isinstance(getattr(element, "elem", element), ElementTetP2)
 
 
-def _solid_stiffness(basis: Any, lam: Floats, mu: Floats) -> sp.coo_array:
+def _solid_stiffness(basis: CellBasis, lam: Floats, mu: Floats) -> sp.coo_array:
     """The stiffness in 3D that the form of the energy gives, for all pairs of functions of a cell at once."""
     # degrees of freedom of a cell are node by node, and a gradient is that of one component
     slopes = np.stack([basis.basis[j][0].grad[0] for j in range(0, basis.Nbfun, 3)])
@@ -322,7 +326,7 @@ def _serendipity() -> Any:
     return dataclass(repr=False)(type("MeshQuadS2", (skfem.MeshQuad2,), names))
 
 
-def _folded(corners: Floats, element: Any, quadrature: Floats) -> Mask:
+def _folded(corners: Floats, element: Element, quadrature: Floats) -> Mask:
     """Cells whose area or volume vanishes or changes its sign at a corner or a quadrature point."""
     places = np.concatenate([element.refdom.init_refdom()[0], quadrature], axis=1)
     slopes = [np.broadcast_to(element.lbasis(places, i)[1], places.shape) for i in range(corners.shape[1])]

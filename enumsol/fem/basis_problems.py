@@ -16,22 +16,30 @@ from enumsol.support.array_arguments import plain_array, real_array, real_matrix
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    import scipy.sparse as sp
+    from skfem import CellBasis, DiscreteField, Mesh
+    from skfem.assembly.dofs import DofsView
+    from skfem.assembly.form.form import FormExtraParams
+
+    from enumsol.fem.restrained import Tangents
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
+
+    Field = ArrayLike | Callable[[Floats], ArrayLike]
 
 #: Nodal integrals of normals below this share of the largest are rounding.
 _NO_PRESSURE = 1e-6
 
 
 def basis_contact_problem(
-    basis: Any,
-    stiffness: Any,
+    basis: CellBasis,
+    stiffness: ArrayLike | sp.sparray | sp.spmatrix,
     *,
-    contact: Any,
-    held: Any = (),
+    contact: str | ArrayLike | Callable[[Floats], ArrayLike],
+    held: ArrayLike | DofsView = (),
     displacements: ArrayLike | None = None,
-    normals: ArrayLike | Callable[[Floats], ArrayLike] | None = None,
-    tangents: Any = None,
+    normals: Field | None = None,
+    tangents: Tangents = None,
     forces: ArrayLike | None = None,
     forces_slope: ArrayLike | None = None,
     gap: ArrayLike | Callable[[Floats], float] = 0.0,
@@ -116,7 +124,7 @@ def basis_contact_problem(
     return problem_of(body, nodes, axes_of(tangents, nodes.normals), supports, **more)
 
 
-def _nodes_of(basis: Any) -> tuple[Integers, Floats]:
+def _nodes_of(basis: CellBasis) -> tuple[Integers, Floats]:
     """Degrees of freedom of every node (N, d), and the positions of the nodes (N, d)."""
     try:
         dimension = int(basis.mesh.dim())
@@ -138,8 +146,10 @@ def _nodes_of(basis: Any) -> tuple[Integers, Floats]:
     return dofs, np.ascontiguousarray(where[:, :, 0].T)
 
 
-def _held(held: Any, count: int) -> Mask:
-    numbers = held.flatten() if hasattr(held, "nodal_ix") else held
+def _held(held: ArrayLike | DofsView, count: int) -> Mask:
+    from skfem.assembly.dofs import DofsView  # as below
+
+    numbers = held.flatten() if isinstance(held, DofsView) else held
     array = plain_array(numbers, "held", error=InvalidArgumentError)
     mask = np.zeros(count, dtype=bool)
     if array.size == 0:
@@ -155,7 +165,7 @@ def _held(held: Any, count: int) -> Mask:
     return mask
 
 
-def _facets(mesh: Any, contact: Any) -> Integers:
+def _facets(mesh: Mesh, contact: object) -> Integers:
     try:
         facets = np.unique(np.asarray(mesh.normalize_facets(contact)))
         known = facets.dtype.kind in "iu" and facets.size > 0 and 0 <= facets[0] <= facets[-1] < mesh.nfacets
@@ -172,7 +182,7 @@ def _facets(mesh: Any, contact: Any) -> Integers:
     return facets.astype(np.int64)
 
 
-def _touching(basis: Any, facets: Integers, dofs: Integers) -> Integers:
+def _touching(basis: CellBasis, facets: Integers, dofs: Integers) -> Integers:
     """Nodes of facets that can be in contact."""
     on_facets = np.zeros(dofs.size, dtype=bool)
     on_facets[basis.get_dofs(facets).flatten()] = True
@@ -181,7 +191,7 @@ def _touching(basis: Any, facets: Integers, dofs: Integers) -> Integers:
     return np.flatnonzero(np.all(on_facets[dofs], axis=1))
 
 
-def _check_pressed(basis: object, facets: Integers, dofs: Integers, touching: Integers) -> None:
+def _check_pressed(basis: CellBasis, facets: Integers, dofs: Integers, touching: Integers) -> None:
     """Refuse nodes that a uniform pressure pulls at, or does not act on."""
     shares = integrals_over(basis, facets, lambda v, _: v[0])[dofs[touching, 0]]
     if np.min(shares) <= _NO_PRESSURE * np.max(shares):
@@ -191,7 +201,9 @@ def _check_pressed(basis: object, facets: Integers, dofs: Integers, touching: In
         )
 
 
-def _normals(basis: Any, facets: Integers, touching: Integers, dofs: Integers, places: Floats, given: Any) -> Floats:
+def _normals(
+    basis: CellBasis, facets: Integers, touching: Integers, dofs: Integers, places: Floats, given: Field | None
+) -> Floats:
     if given is not None:
         values = [given(place) for place in places[touching]] if callable(given) else given
         return unit_vectors(vectors_of_all(values, "normals", (len(touching), dofs.shape[1])), "normals")
@@ -199,14 +211,14 @@ def _normals(basis: Any, facets: Integers, touching: Integers, dofs: Integers, p
     return unit_vectors(pressed(integrals, touching), "normals of the boundary")
 
 
-def integrals_over(basis: object, facets: Integers, form: Callable[[Any, Any], Any]) -> Floats:
+def integrals_over(basis: CellBasis, facets: Integers, form: Callable[[Any, Any], Any]) -> Floats:
     """Integrals over facets of a linear form, by degrees of freedom; lumped as in `NodalBasis.on_part`."""
     from skfem import LinearForm  # here, too
 
     return np.asarray(LinearForm(form).assemble(facet_basis(basis, facets, lumped=True)))
 
 
-def outward_normal(v: Any, w: Any) -> Any:
+def outward_normal(v: DiscreteField, w: FormExtraParams) -> Any:
     """The linear form whose values at a node are the integral of the outward normal times its shape function."""
     from skfem.helpers import dot  # as above
 

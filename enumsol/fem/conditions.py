@@ -20,6 +20,9 @@ from enumsol.support.arguments import finite_number, one_of, shown
 from enumsol.support.array_arguments import real_array, short_vector
 
 if TYPE_CHECKING:
+    from skfem import DiscreteField
+    from skfem.assembly.form.form import FormExtraParams
+
     from enumsol.fem.bases import NodalBasis
     from enumsol.fem.meshes import PartedMesh
     from enumsol.fem.options import Options
@@ -293,14 +296,14 @@ def part_forces(body: NodalBasis, mesh: PartedMesh, loads: object, pressures: ob
     for part, value in by_part(loads, f"load{slope}").items():
         traction = short_vector(value, f"load{slope} of {part}", dimension)
 
-        def along(v: object, _: object, t: Floats = traction[:, None, None]) -> Any:
+        def along(v: DiscreteField, _: FormExtraParams, t: Floats = traction[:, None, None]) -> DiscreteField:
             return dot(t, v)
 
         total += body.on_part(mesh.part(part), part, along)
     for part, value in by_part(pressures, f"pressure{slope}").items():
         pressure = finite_number(value, f"pressure{slope} of {part}")
 
-        def inward(v: Any, w: Any, p: float = pressure) -> Any:
+        def inward(v: DiscreteField, w: FormExtraParams, p: float = pressure) -> DiscreteField:
             return -p * dot(w.n, v)
 
         total += body.on_part(mesh.part(part), part, inward)
@@ -320,11 +323,12 @@ def part_springs(body: NodalBasis, mesh: PartedMesh, springs: object) -> sp.csc_
                 f"spring of {part} is {shown(value)}; expected stiffnesses >= 0 along the normal and across it"
             )
         for k, axis in enumerate(np.eye(dimension)):
+            across = tangential * axis[:, None, None]
 
             def density(
-                v: Any, w: Any, k: int = k, e: Floats = axis, kn: float = normal, kt: float = tangential
-            ) -> Any:
-                return dot(kt * e[:, None, None] + (kn - kt) * w.n[k] * w.n, v)
+                v: DiscreteField, w: FormExtraParams, k: int = k, a: Floats = across, b: float = normal - tangential
+            ) -> DiscreteField:
+                return dot(a + b * w.n[k] * w.n, v)
 
             blocks[:, :, k] += body.on_part(mesh.part(part), part, density, lumped=True)
     shape = (count * dimension, count * dimension)

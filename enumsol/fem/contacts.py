@@ -17,6 +17,8 @@ from enumsol.model.cells import KINDS, boundary_facets, contact_nodes, facet_row
 from enumsol.support.arguments import finite_number, shown
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from enumsol.fem.bases import NodalBasis
     from enumsol.fem.meshes import PartedMesh
     from enumsol.fem.options import Options
@@ -57,7 +59,7 @@ class Pair:
     gap: float | None = None
 
     @classmethod
-    def of(cls, value: Any) -> Pair:
+    def of(cls, value: Sequence[Any]) -> Pair:
         """The pair given by two names, or by two names and a gap.
 
         Raises

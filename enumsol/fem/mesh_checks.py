@@ -129,7 +129,7 @@ def held_mask(held: ArrayLike, shape: tuple[int, ...]) -> Mask:
     return mask
 
 
-def vectors_of_all(value: ArrayLike, name: str, shape: tuple[int, ...]) -> Floats:
+def vectors_of_all(value: object, name: str, shape: tuple[int, ...]) -> Floats:
     """Vectors (k, dimension), one each or one for all."""
     array = real_array(value, name, error=InvalidArgumentError)
     if array.ndim == 1:

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
 
+    Tangents = ArrayLike | tuple[ArrayLike, ArrayLike] | None
+
 #: Components of unit normals below this are rounding of a right angle.
 RIGHT_ANGLE = 1e-9
 
@@ -259,7 +261,7 @@ def problem_of(
     return ContactProblem3D(*arrays, **more)
 
 
-def axes_of(tangents: object, normals: Floats) -> tuple[Floats, ...]:
+def axes_of(tangents: Tangents, normals: Floats) -> tuple[Floats, ...]:
     """Tangents for normals (p, 2) or (p, 3): one (p, 2), or two (p, 3).
 
     Parameters
@@ -283,7 +285,7 @@ def default_axes(normal: Floats) -> tuple[Floats, Floats]:
     return first, np.cross(normal, first)
 
 
-def _plane_axes(tangents: Any, normal: Floats) -> tuple[Floats]:
+def _plane_axes(tangents: Tangents, normal: Floats) -> tuple[Floats]:
     if tangents is None:
         return (np.stack([-normal[:, 1], normal[:, 0]], axis=1),)
     tangent = unit_vectors(vectors_of_all(tangents, "tangents", normal.shape), "tangents")
@@ -294,7 +296,7 @@ def _plane_axes(tangents: Any, normal: Floats) -> tuple[Floats]:
     return (tangent,)
 
 
-def _space_axes(tangents: object, normal: Floats) -> tuple[Floats, Floats]:
+def _space_axes(tangents: Tangents, normal: Floats) -> tuple[Floats, Floats]:
     if tangents is None:
         return default_axes(normal)
     if not (isinstance(tangents, (tuple, list)) and len(tangents) == 2):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -110,7 +110,7 @@ class SceneData:
         return found + [f"facets of the pair {pair}" for pair in pairs if part == pair.master]
 
 
-def _names(value: Any) -> Sequence[str]:
+def _names(value: str | Iterable[str] | None) -> Sequence[str]:
     """The parts that an option names."""
     return [value] if isinstance(value, str) else () if value is None else list(value)
 

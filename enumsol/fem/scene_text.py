@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +16,10 @@ from enumsol.model.shapes import acting_nodes, signs
 from enumsol.support.array_types import Floats, Integers
 from enumsol.support.messages import counted
 from enumsol.support.plotting import in_units, new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 #: Width of the column of titles.
 _TITLES = 10
@@ -117,7 +121,7 @@ def _contact(scene: SceneData) -> list[str]:
     return [*lines, *(f"{name} {_said(value)}" for name, value in coefficients.items() if value is not None)]
 
 
-def _said(value: Any) -> str:
+def _said(value: float | str | Mapping[str, float | str]) -> str:
     """A number, a word, or one of these for each of several parts."""
     if isinstance(value, Mapping):
         return ", ".join(f"{_said(own)} ({part})" for part, own in value.items())
@@ -133,13 +137,13 @@ _FORCE, _NORMAL = 0.16, 0.06
 _BODY, _EDGE, _LOAD, _SLOPE, _CONTACT = "#dfe6ee", "#aab6c3", "#b3202c", "#d9730d", "#1f5fa8"
 
 
-def draw_scene(scene: SceneData, units: tuple[str, str] | None = None) -> Any:
+def draw_scene(scene: SceneData, units: tuple[str, str] | None = None) -> Figure:
     """A figure of a `Scene`."""
     from matplotlib.collections import LineCollection, PolyCollection  # with the first figure
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     mesh, d = scene.mesh, scene.dimension
-    figure = new_figure(figsize=(8.0, 5.6))
+    figure: Figure = new_figure(figsize=(8.0, 5.6))
     ax = figure.add_subplot(**({"projection": "3d"} if d == 3 else {}))
     if d == 2:
         for _, cells in by_kind(2, mesh.cells):
@@ -190,10 +194,12 @@ def _edges(dimension: int, cells: Integers) -> Integers:
     return np.concatenate([along[:, k : k + 2] for k in range(along.shape[1] - 1)])
 
 
-def _arrows(ax: Any, places: Floats, vectors: Floats, colour: str, label: str | None = None) -> None:
+def _arrows(ax: Axes, places: Floats, vectors: Floats, colour: str, label: str | None = None) -> None:
     if places.shape[1] == 2:
-        options = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.004, "zorder": 4}
-        ax.quiver(*places.T, *vectors.T, color=colour, label=label, **options)
+        ax.quiver(
+            *(*places.T, *vectors.T), color=colour, label=label, angles="xy", scale_units="xy", scale=1.0, width=0.004,
+            zorder=4,
+        )  # fmt: skip
         ax.update_datalim(np.concatenate([places, places + vectors]))
     else:
         ax.quiver(*places.T, *vectors.T, color=colour, label=label, arrow_length_ratio=0.25)

@@ -612,7 +612,7 @@ def _contact_facets(contact: ArrayLike, count: int) -> Integers:
     return mesh_checks.elements(contact, "contact", (3, 4), count)
 
 
-def _rows(surface: ContactSurface, held: Mask, kind: str, ratio: int, patches: Any) -> SurfaceRows:
+def _rows(surface: ContactSurface, held: Mask, kind: str, ratio: int, patches: ArrayLike | None) -> SurfaceRows:
     width = positive_integer(ratio, "ratio")
     if kind == "nodes":
         if width != 1 or patches is not None:

@@ -117,7 +117,7 @@ class ContactSystem:
         h = solve_triangular(L, still + float(value) * slope, lower=True, check_finite=False)
         size = load_unit(np.append(g, h), block_diag(cholesky, np.eye(len(L))))
         force, length = factor * size, size / factor
-        rigid = size * np.linalg.inv(L.T)
+        rigid = np.asarray(size * np.linalg.inv(L.T), dtype=np.float64)
         return cls(problem, value, condensed, S, g / size, G, h / size, force, length, rigid, cholesky)
 
     @property

@@ -270,7 +270,7 @@ def on_table(
     f: Floats,
     **more: Any,
 ) -> Problem:
-    """Problem of a body that nothing but contact holds and that lies with these nodes on a table; ``kind`` is 2D or 3D.
+    """Problem of a body that lies with these nodes on a table and that nothing else holds; ``kind`` is 2D or 3D.
 
     The tangents are x and, in 3D, -y; the normal is downward.
     """

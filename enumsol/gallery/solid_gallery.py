@@ -15,7 +15,7 @@ from enumsol.support.array_arguments import real_array, short_vector
 
 if TYPE_CHECKING:
     from enumsol.fem.meshes import SolidMesh
-    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import ContactProblem3D, Friction
     from enumsol.support.array_types import ArrayLike, Floats, Integers
 
 #: A public test of the contact community: one contact, with friction 0.1.
@@ -23,7 +23,9 @@ _COMPLIANCE = ((15.0, -1.0, -2.0), (-1.0, 14.0, 1.0), (-2.0, 1.0, 16.0))
 _FREE_DISPLACEMENT = (-1.0, 2.0, 3.0)
 
 
-def one_node_3d(W: ArrayLike = _COMPLIANCE, q: ArrayLike = _FREE_DISPLACEMENT, friction: Any = 0.1) -> ContactProblem3D:
+def one_node_3d(
+    W: ArrayLike = _COMPLIANCE, q: ArrayLike = _FREE_DISPLACEMENT, friction: Friction = 0.1
+) -> ContactProblem3D:
     """Contact node given by its compliance: u = W r + q with u_n >= 0, r_n >= 0, u_n r_n = 0, and friction against u_t.
 
     In (normal, first tangent, second tangent), with the signs of contact solvers: u_n is the opening, r_n the pressing

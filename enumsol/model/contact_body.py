@@ -22,7 +22,7 @@ from enumsol.support.immutable import Immutable, SealedMatrix, sealed
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from enumsol.condensation.condensed import CondensedProblem
     from enumsol.condensation.enclosure import CondensedEnclosure
@@ -78,7 +78,7 @@ class ContactBody(Immutable):
         f: ArrayLike,
         gap: ArrayLike,
         load_slope: ArrayLike | None,
-        node_ids: object,
+        node_ids: Iterable[object] | None,
         coordinates: ArrayLike | None,
     ) -> None:
         stiffness = real_matrix(A, "A")
@@ -523,7 +523,7 @@ def _dependent_rows(unit: sp.csr_array, gram: Floats) -> Indices:
     return np.flatnonzero(np.abs(vectors[:, 0]) > 0.1 * np.max(np.abs(vectors[:, 0])))
 
 
-def _node_ids(value: Any, p: int) -> tuple[Any, ...]:
+def _node_ids(value: Iterable[object] | None, p: int) -> tuple[Any, ...]:
     if value is None:
         return tuple(range(p))
     wanted = f"expected a sequence of {p} distinct labels"

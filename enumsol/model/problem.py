@@ -14,7 +14,7 @@ from enumsol.support.arguments import exact_number, instance_of, shown
 from enumsol.support.immutable import sealed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from enumsol.model.mesh import BodyMesh
     from enumsol.support.array_types import ArrayLike, Floats
@@ -99,7 +99,7 @@ class ContactProblem(ContactBody):
         friction_slope: ArrayLike | None = None,
         load_slope: ArrayLike | None = None,
         slip_offset: ArrayLike = 0.0,
-        node_ids: object = None,
+        node_ids: Iterable[object] | None = None,
         coordinates: ArrayLike | None = None,
         mesh: BodyMesh | None = None,
         rigid_modes: ArrayLike | None = None,

@@ -19,7 +19,7 @@ from enumsol.support.array_arguments import plain_array, real_array, real_matrix
 from enumsol.support.immutable import Immutable, Sealed, SealedMatrix, sealed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
     from enumsol.model.mesh import BodyMesh
     from enumsol.model.problem import ContactProblem
@@ -403,14 +403,11 @@ class ContactProblem3D(ContactBody):
         Bt2: ArrayLike | sp.sparray | sp.spmatrix,
         f: ArrayLike,
         gap: ArrayLike = 0.0,
-        friction: float
-        | tuple[ArrayLike, ArrayLike]
-        | FrictionTable
-        | Callable[[int, float], float | tuple[float, float]] = 0.5,
+        friction: Friction = 0.5,
         friction_slope: float | tuple[ArrayLike, ArrayLike] = 0.0,
         load_slope: ArrayLike | None = None,
         slip_offset: ArrayLike = 0.0,
-        node_ids: object = None,
+        node_ids: Iterable[object] | None = None,
         coordinates: ArrayLike | None = None,
         areas: ArrayLike | None = None,
         mesh: BodyMesh | None = None,
@@ -536,3 +533,5 @@ def _areas(value: ArrayLike, p: int) -> Floats:
 if TYPE_CHECKING:
     #: A problem in 2D or in 3D.
     AnyProblem = ContactProblem | ContactProblem3D
+    #: Coefficients of a problem in 3D.
+    Friction = float | tuple[ArrayLike, ArrayLike] | FrictionTable | Callable[[int, float], float | tuple[float, float]]
