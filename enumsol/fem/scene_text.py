@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -144,7 +144,7 @@ def draw_scene(scene: SceneData, units: tuple[str, str] | None = None) -> Figure
 
     mesh, d = scene.mesh, scene.dimension
     figure: Figure = new_figure(figsize=(8.0, 5.6))
-    ax = figure.add_subplot(**({"projection": "3d"} if d == 3 else {}))
+    ax: Any = figure.add_subplot(**({"projection": "3d"} if d == 3 else {}))
     if d == 2:
         for _, cells in by_kind(2, mesh.cells):
             outlines = mesh.points[cells[:, KINDS[2, cells.shape[1]].outline]]
