@@ -20,7 +20,7 @@ import scipy.sparse as sp
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem import mesh_checks
 from enumsol.fem.bases import FLAT, nodal_basis
-from enumsol.fem.restrained import Supports, axes_of, gathered, loaded, movable, problem_of, with_springs
+from enumsol.fem.restrained import Body, axes_of, gathered, movable, problem_of
 from enumsol.model.cells import numbers_of_nodes
 from enumsol.model.mesh import BodyMesh
 
@@ -255,19 +255,18 @@ def contact_problem(
     (24, 4)
     """
     nodes, bodies = plane_mesh(points, cells)
-    supports = Supports.held(mesh_checks.held_mask(held, nodes.shape))
+    fixed = mesh_checks.held_mask(held, nodes.shape)
     touching = mesh_checks.node_numbers(contact, "contact", len(nodes))
-    if np.any(entirely := np.all(supports.fixed[touching], axis=1)):
+    if np.any(entirely := np.all(fixed[touching], axis=1)):
         node = int(touching[np.argmax(entirely)])
         raise InvalidArgumentError(f"contact names node {node}, which is held; expected free nodes only")
-    A = with_springs(stiffness(nodes, bodies, lame), springs, nodes.shape)
+    body = Body.of_nodes(stiffness(nodes, bodies, lame), fixed, springs, forces, forces_slope)
     normal = mesh_checks.unit_vectors(mesh_checks.vectors_of_all(normals, "normals", (len(touching), 2)), "normals")
-    contact_nodes = movable(touching, normal, supports)
+    contact_nodes = movable(touching, normal, body.supports)
     problem = problem_of(
-        loaded(A, forces, forces_slope, nodes.shape),
+        body,
         contact_nodes,
         axes_of(tangents, contact_nodes.normals),
-        supports,
         gap=gap,
         friction=friction,
         friction_slope=friction_slope,

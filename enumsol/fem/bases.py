@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.mesh_checks import cell_name, check_every_node_is_used
+from enumsol.fem.mesh_checks import cell_name, check_every_node_is_used, check_facets
 from enumsol.model.cells import KINDS, by_kind
 from enumsol.support.arguments import instance_of
 from enumsol.support.array_arguments import vector_of
@@ -170,15 +170,9 @@ class NodalBasis:
                 f"{name} has facets of {facets.shape[1]} nodes; expected {count}, as the cells have"
             )
         keys = [tuple(key) for key in np.sort(facets[:, :corners], axis=1).tolist()]
-        numbers = np.array([self._outer.get(key, (-1, -1)) for key in keys], dtype=np.int64)
-        if np.any(numbers < 0):
-            k = int(np.argmin(numbers[:, 0]))
-            raise InvalidArgumentError(
-                f"{name} row {k}, nodes {facets[k].tolist()}, is not a facet on the boundary of the body; "
-                "expected facets of one cell each"
-            )
-        if len(set(keys)) != len(keys):
-            raise InvalidArgumentError(f"{name} names a facet twice; expected distinct facets")
+        found = [self._outer.get(key, -1) for key in keys]
+        check_facets(found, facets, name)
+        numbers = np.array(found, dtype=np.int64).reshape(-1, 2)
         return [numbers[numbers[:, 0] == k, 1] for k in range(len(self.blocks))]
 
     @cached_property

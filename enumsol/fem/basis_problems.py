@@ -120,8 +120,8 @@ def basis_contact_problem(
     more = {"gap": [gap(place) for place in at] if callable(gap) else gap, "coordinates": at, **more}
     more.setdefault("node_ids", nodes.nodes.tolist())
     slope = None if forces_slope is None else _vector(forces_slope, "forces_slope", dofs.size)
-    body = Body(A, _vector(forces, "forces", dofs.size), slope, dofs)
-    return problem_of(body, nodes, axes_of(tangents, nodes.normals), supports, **more)
+    body = Body(A, _vector(forces, "forces", dofs.size), slope, supports, dofs)
+    return problem_of(body, nodes, axes_of(tangents, nodes.normals), **more)
 
 
 def _nodes_of(basis: CellBasis) -> tuple[Integers, Floats]:

@@ -12,7 +12,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.fem.basis_problems import outward_normal, pressed
 from enumsol.fem.conditions import Held, Obstacle, names_of
 from enumsol.fem.mesh_checks import unit_vectors
-from enumsol.fem.restrained import ContactNodes, means_of_nodes, movable
+from enumsol.fem.restrained import ContactRows, means_of_nodes, movable
 from enumsol.model.cells import KINDS, boundary_facets, contact_nodes, facet_rows
 from enumsol.support.arguments import finite_number, shown
 
@@ -135,7 +135,7 @@ class Contacts:
 
     Attributes
     ----------
-    rows : ContactNodes
+    rows : ContactRows
         The p of them.
     gaps : (p,) array
         Distances to the obstacle or to the other body, 0 for a foundation of the shape of the body [length].
@@ -149,7 +149,7 @@ class Contacts:
         One for all contact parts, then one for each pair; the nodes come in this order.
     """
 
-    rows: ContactNodes
+    rows: ContactRows
     gaps: Floats
     parts: list[str]
     facets: Integers
@@ -171,7 +171,7 @@ def contacts_of(body: NodalBasis, mesh: PartedMesh, options: Options, held: Held
     parts, pairs = names_of(options.contact, "contact"), Pair.all_of(options.pairs)
     if not parts and not pairs:
         raise InvalidArgumentError("contact names no part; expected the contact boundary, or pairs")
-    found: list[tuple[ContactNodes, Floats, Group]] = []
+    found: list[tuple[ContactRows, Floats, Group]] = []
     groups: list[tuple[list[str], Pair | None]] = [(parts, None)] if parts else []
     groups += [([pair.slave], pair) for pair in pairs]
     on, areas, taken = [], [], np.zeros(0, dtype=np.int64)
@@ -184,7 +184,7 @@ def contacts_of(body: NodalBasis, mesh: PartedMesh, options: Options, held: Held
         on.append(facets)
         areas.append(body.on_part(facets, names[0], lambda v, _: v[0], lumped=True)[rows.nodes, 0])
         taken = np.concatenate([taken, rows.nodes])
-    rows = ContactNodes(
+    rows = ContactRows(
         sp.csr_array(sp.vstack([rows.means for rows, _, _ in found])),
         np.concatenate([rows.normals for rows, _, _ in found]),
         np.any([rows.apart for rows, _, _ in found], axis=0),
@@ -227,7 +227,7 @@ def _group(
     obstacle: object,
     pair: Pair | None,
     taken: Integers,
-) -> tuple[ContactNodes, Floats, Group]:
+) -> tuple[ContactRows, Floats, Group]:
     """Contact nodes with their normals on some facets, and the distances to what they face."""
     dimension = mesh.points.shape[1]
     touching = along(facets) if dimension == 2 else np.unique(contact_nodes(dimension, facets))
@@ -264,7 +264,7 @@ def _group(
 
 def _paired(
     body: NodalBasis, mesh: PartedMesh, touching: Integers, normals: Floats, held: Held, pair: Pair
-) -> tuple[ContactNodes, Floats, Group]:
+) -> tuple[ContactRows, Floats, Group]:
     """Nodes that face the other part of a pair, relative to it."""
     facets = _facets(body, mesh, [pair.master])
     apart = ~np.isin(touching, facets)  # a node of both, as at the tip of a crack, is in contact with itself

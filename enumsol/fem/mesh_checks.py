@@ -5,6 +5,7 @@ Each function gives the value in a plain type and raises InvalidArgumentError fo
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
@@ -72,6 +73,18 @@ def check_every_node_is_used(cells: Integers, count: int, name: str, kind: str) 
     if len(used) != count:
         lone = int(np.setdiff1d(np.arange(count), used)[0])
         raise InvalidArgumentError(f"{name} leave node {lone} out; expected every node in some {kind}")
+
+
+def check_facets(found: Sequence[object], facets: Integers, name: str) -> None:
+    """Raise InvalidArgumentError if a facet of the boundary is found twice, or -1 for one that is none."""
+    if -1 in found:
+        k = found.index(-1)
+        raise InvalidArgumentError(
+            f"{name} row {k}, nodes {facets[k].tolist()}, is not a facet on the boundary of the body; "
+            "expected facets of one cell each"
+        )
+    if len(set(found)) != len(found):
+        raise InvalidArgumentError(f"{name} names a facet twice; expected distinct facets")
 
 
 def lame_coefficients(value: object, dimension: int) -> tuple[float, float]:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     import os
 
     from enumsol.fem.options import Options, Plane
-    from enumsol.fem.restrained import ContactNodes
+    from enumsol.fem.restrained import ContactRows
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import Floats
 
@@ -108,10 +108,9 @@ class Scene(SceneData):
         normal, *slips = (-np.sum(moved * axis, axis=1) for axis in (nodes.normals, *axes))
         slip_offset = slips[0] if len(slips) == 1 else np.stack(slips, axis=1)
         problem = problem_of(
-            Body(stiffness, self.forces.ravel(), self.slope.ravel() if np.any(self.slope) else None),
+            Body(stiffness, self.forces.ravel(), self.slope.ravel() if np.any(self.slope) else None, supports),
             nodes,
             axes,
-            supports,
             modes=modes,
             mesh=lambda left: BodyMesh.of_dofs(mesh.points, mesh.cells, left, supports.values, surface, lame=self.lame),
             gap=gaps + normal,
@@ -168,7 +167,7 @@ def _plane(mesh: PartedMesh) -> Plane:
     return "strain"
 
 
-def _axes(nodes: ContactNodes, axis: object, dimension: int) -> tuple[Floats, ...]:
+def _axes(nodes: ContactRows, axis: object, dimension: int) -> tuple[Floats, ...]:
     if axis is None:
         return axes_of(None, nodes.normals)
     if dimension == 2:

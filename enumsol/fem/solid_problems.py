@@ -127,14 +127,7 @@ def outward(facets: Integers, cells: Integers) -> Integers:
             f"contact has facets of {facets.shape[1]} nodes; expected {boundary.shape[1]}, as {name} have"
         )
     rows = facet_rows(facets, boundary, facets.shape[1])
-    if -1 in rows:
-        k = rows.index(-1)
-        raise InvalidArgumentError(
-            f"contact row {k}, nodes {facets[k].tolist()}, is not a facet on the boundary of the body; "
-            "expected facets of one cell each"
-        )
-    if len(set(rows)) != len(rows):
-        raise InvalidArgumentError("contact names a facet twice; expected distinct facets")
+    mesh_checks.check_facets(rows, facets, "contact")
     return boundary[rows]
 
 
@@ -581,7 +574,7 @@ def solid_contact_problem(
     mask = mesh_checks.held_mask(held, nodes.shape)
     rows = _rows(surface, mask, one_of(multipliers, "multipliers", ("nodes", "elements")), ratio, patches)
     normal, first, second = local_axes(rows, normals, axes)
-    A = restrained.with_springs(solid_stiffness(nodes, bodies, lame), springs, nodes.shape)
+    body = restrained.Body.of_nodes(solid_stiffness(nodes, bodies, lame), mask, springs, forces, forces_slope)
     dofs, free = restrained.plain_dofs(nodes.shape), np.flatnonzero(~mask.ravel())
     of_facets, mean = rows.rows_of_facets, None
     if of_facets is not None:
@@ -589,10 +582,9 @@ def solid_contact_problem(
         offset = real_array(slip_offset, "slip_offset")
         mean = SlipMean(*_slips(surface, of_facets, (first, second), offset, dofs, free), weights)
     problem = restrained.problem_of(
-        restrained.loaded(A, forces, forces_slope, nodes.shape),
+        body,
         restrained.ContactRows(rows.means, normal, np.zeros_like(mask)),
         (first, second),
-        restrained.Supports.held(mask),
         mesh=lambda left: BodyMesh.of_dofs(nodes, bodies, left, None, surface.facets, of_facets, lame),
         gap=gap,
         friction=friction,
