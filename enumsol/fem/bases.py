@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.mesh_checks import cell_name, check_every_node_is_used, check_facets
+from enumsol.fem.meshes import cell_name, check_every_node_is_used, check_facets
 from enumsol.model.cells import KINDS, by_kind
 from enumsol.support.arguments import instance_of
 from enumsol.support.array_arguments import vector_of

@@ -9,9 +9,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.basis_problems import outward_normal, pressed
+from enumsol.fem.assembly import outward_normal, pressed
 from enumsol.fem.conditions import Held, Obstacle, names_of
-from enumsol.fem.mesh_checks import unit_vectors
+from enumsol.fem.meshes import unit_vectors
 from enumsol.fem.restrained import ContactRows, means_of_nodes, movable
 from enumsol.model.cells import KINDS, boundary_facets, contact_nodes, facet_rows
 from enumsol.support.arguments import finite_number, shown
@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.fem.bases import NodalBasis
+    from enumsol.fem.conditions import Options
     from enumsol.fem.meshes import PartedMesh
-    from enumsol.fem.options import Options
     from enumsol.support.array_types import Floats, Integers, Mask
 
 #: Cosine of the angle from which on a normal of the boundary points away from an obstacle, but for rounding.

@@ -18,8 +18,7 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.fem.file_counts import Deck, deck_of, refuse_partial
-from enumsol.fem.mesh_checks import SAME, positions
-from enumsol.fem.meshes import ALL, PartedMesh, SolidMesh
+from enumsol.fem.meshes import ALL, SAME, PartedMesh, SolidMesh, positions
 from enumsol.model.cells import KINDS, TRIANGLES, as_quadrilaterals, boundary_facets, facet_rows, numbers_of_nodes
 from enumsol.support.arguments import file_path, shown
 from enumsol.support.array_types import Floats, Integers, NDArray

@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.mesh_checks import nodal_vectors, spring_stiffnesses, unit_vectors, vectors_of_all
+from enumsol.fem.meshes import nodal_vectors, spring_stiffnesses, unit_vectors, vectors_of_all
 from enumsol.model.problem import ContactProblem
 from enumsol.support.arguments import shown
 

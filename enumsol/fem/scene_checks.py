@@ -8,13 +8,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
+from enumsol.fem.assembly import outward_normal
 from enumsol.fem.bases import SIMPLICES, corners_of, place_of
-from enumsol.fem.basis_problems import outward_normal
 from enumsol.fem.conditions import holding
 from enumsol.fem.contacts import Group, faced
 from enumsol.fem.file_counts import taken_as
-from enumsol.fem.mesh_checks import SAME, cell_name, unit_vectors
-from enumsol.fem.meshes import PartedMesh
+from enumsol.fem.meshes import SAME, PartedMesh, cell_name, unit_vectors
 from enumsol.fem.scene_data import SceneData
 from enumsol.model.cells import boundary_facets
 from enumsol.support.array_types import Floats, Integers, Mask

@@ -15,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.fem import mesh_checks, restrained
+from enumsol.fem import meshes, restrained
 from enumsol.fem.bases import FLAT, nodal_basis
 from enumsol.fem.meshes import blocks
 from enumsol.model.cells import HEXAHEDRON, KINDS, boundary_facets, facet_rows
@@ -50,8 +50,8 @@ def solid_mesh(
     InvalidArgumentError
         The mesh is not valid: shapes, node numbers, a node in no cell, a cell that is flat or inside out.
     """
-    nodes = mesh_checks.positions(points, 3)
-    bodies = mesh_checks.elements(cells, "cells", kinds, len(nodes))
+    nodes = meshes.positions(points, 3)
+    bodies = meshes.elements(cells, "cells", kinds, len(nodes))
     kind = KINDS[3, bodies.shape[1]]
     corners = nodes[bodies[:, : kind.corners]]
     size = np.max(np.ptp(corners, axis=1), axis=1) ** 3
@@ -72,13 +72,13 @@ def solid_mesh(
         "is turned inside out at a corner; expected hexahedra with corners in the order of VTK",
         labels,
     )
-    mesh_checks.check_every_node_is_used(bodies, len(nodes), "cells", "cell")
+    meshes.check_every_node_is_used(bodies, len(nodes), "cells", "cell")
     return nodes, bodies
 
 
 def _refuse(wrong: Mask, found: str, labels: Integers | None) -> None:
     if np.any(wrong):
-        raise InvalidArgumentError(f"{mesh_checks.cell_name(int(np.argmax(wrong)), labels)} {found}")
+        raise InvalidArgumentError(f"{meshes.cell_name(int(np.argmax(wrong)), labels)} {found}")
 
 
 def _tetrahedron_volumes(corners: Floats) -> Floats:
@@ -127,7 +127,7 @@ def outward(facets: Integers, cells: Integers) -> Integers:
             f"contact has facets of {facets.shape[1]} nodes; expected {boundary.shape[1]}, as {name} have"
         )
     rows = facet_rows(facets, boundary, facets.shape[1])
-    mesh_checks.check_facets(rows, facets, "contact")
+    meshes.check_facets(rows, facets, "contact")
     return boundary[rows]
 
 
@@ -351,9 +351,9 @@ def local_axes(multipliers: SurfaceRows, normals: ArrayLike | None, axes: object
     """
     shape = multipliers.places.shape
     if normals is None:
-        normal = mesh_checks.unit_vectors(multipliers.vectors, "normals of the contact surface")
+        normal = meshes.unit_vectors(multipliers.vectors, "normals of the contact surface")
     else:
-        normal = mesh_checks.unit_vectors(mesh_checks.vectors_of_all(normals, "normals", shape), "normals")
+        normal = meshes.unit_vectors(meshes.vectors_of_all(normals, "normals", shape), "normals")
         inward = np.sum(normal * multipliers.vectors, axis=1) <= 0
         if np.any(inward):
             k = int(np.argmax(inward))
@@ -375,7 +375,7 @@ def local_axes(multipliers: SurfaceRows, normals: ArrayLike | None, axes: object
 def _field(value: object, places: Floats) -> Floats:
     if callable(value):
         value = [value(place) for place in places]
-    return mesh_checks.vectors_of_all(real_array(value, "axes", error=InvalidArgumentError), "axes", places.shape)
+    return meshes.vectors_of_all(real_array(value, "axes", error=InvalidArgumentError), "axes", places.shape)
 
 
 def _not_orthonormal(i: int, j: int, row: int, one: Floats, two: Floats) -> InvalidArgumentError:
@@ -422,7 +422,7 @@ def solid_stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, floa
     >>> fem.solid_stiffness(mesh.points, mesh.cells, lame=(1, 1)).shape
     (36, 36)
     """
-    lam, mu = mesh_checks.lame_coefficients(lame, 3)
+    lam, mu = meshes.lame_coefficients(lame, 3)
     return nodal_basis(*solid_mesh(points, cells)).stiffness(lam, mu)
 
 
@@ -449,7 +449,7 @@ def solid_body_forces(points: ArrayLike, cells: ArrayLike, density: ArrayLike) -
     [0.0, 0.0, -8.0]
     """
     nodes, bodies = solid_mesh(points, cells)
-    values = mesh_checks.vectors_of_all(density, "density", (len(bodies), 3))
+    values = meshes.vectors_of_all(density, "density", (len(bodies), 3))
     return restrained.gathered(bodies, shape_volumes(nodes, bodies), values, len(nodes))
 
 
@@ -477,9 +477,9 @@ def facet_forces(points: ArrayLike, facets: ArrayLike, traction: ArrayLike) -> F
     >>> fem.facet_forces(corners, [[0, 1, 2]], traction=(0, 0, -1)).round(12)[:, 2].tolist()
     [-1.0, -1.0, -1.0]
     """
-    nodes = mesh_checks.positions(points, 3)
-    surface = mesh_checks.elements(facets, "facets", (3, 4), len(nodes))
-    density = mesh_checks.vectors_of_all(traction, "traction", (len(surface), 3))
+    nodes = meshes.positions(points, 3)
+    surface = meshes.elements(facets, "facets", (3, 4), len(nodes))
+    density = meshes.vectors_of_all(traction, "traction", (len(surface), 3))
     values, weights = facet_quadrature(nodes, surface)
     return restrained.gathered(surface, weights @ values, density, len(nodes))
 
@@ -571,7 +571,7 @@ def solid_contact_problem(
     """
     nodes, bodies = solid_mesh(points, cells)
     surface = ContactSurface(nodes, outward(_contact_facets(contact, len(nodes)), bodies))
-    mask = mesh_checks.held_mask(held, nodes.shape)
+    mask = meshes.held_mask(held, nodes.shape)
     rows = _rows(surface, mask, one_of(multipliers, "multipliers", ("nodes", "elements")), ratio, patches)
     normal, first, second = local_axes(rows, normals, axes)
     body = restrained.Body.of_nodes(solid_stiffness(nodes, bodies, lame), mask, springs, forces, forces_slope)
@@ -601,7 +601,7 @@ def solid_contact_problem(
 def _contact_facets(contact: ArrayLike, count: int) -> Integers:
     if plain_array(contact, "contact", error=InvalidArgumentError).size == 0:
         raise InvalidArgumentError("contact has no facets; expected (k, 3) or (k, 4) node numbers of the surface")
-    return mesh_checks.elements(contact, "contact", (3, 4), count)
+    return meshes.elements(contact, "contact", (3, 4), count)
 
 
 def _rows(surface: ContactSurface, held: Mask, kind: str, ratio: int, patches: ArrayLike | None) -> SurfaceRows:

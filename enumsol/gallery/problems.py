@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from enumsol import fem
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.mesh_checks import lame_coefficients
+from enumsol.fem.meshes import lame_coefficients
 from enumsol.model.contact_body import ContactBody
 from enumsol.model.mesh import BodyMesh
 from enumsol.model.problem import ContactProblem
