@@ -202,6 +202,8 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
         As in SpaceSystem.
     """
 
+    tangents = 2
+
     tau: Indices
     unit: Floats
 
