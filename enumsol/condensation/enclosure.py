@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import scipy.sparse as sp
@@ -392,7 +392,11 @@ class EnclosedSystem:
     g, g_rad : (2p,) arrays
     F, F_rad : (p,) arrays
     rows : RigidRows, by default none
+    tangents : int
+        Tangential directions of a contact node: 1 in 2D, 2 in 3D.
     """
+
+    tangents: ClassVar[int] = 1
 
     S: Floats
     S_rad: Floats

@@ -201,6 +201,8 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
         As in SpaceSystem.
     """
 
+    tangents = 2
+
     tau: Indices
     unit: Floats
 

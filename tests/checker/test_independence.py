@@ -25,7 +25,7 @@ def inside(room, *modules):
 CHECKERS = inside("checker", "verify", "plane_checker", "graph_checker", "history_checker", "space_graph")
 IN_SPACE = {
     *("enumsol.checker.space_checker", "enumsol.condensation.space_condensed", "enumsol.model.sectors"),
-    *inside("trusted.space", "resultants", "sector_rows", "slip_forms", "leaves", "boxed_solution"),
+    *inside("trusted.space", "resultants", "sector_rows", "leaves", "boxed_solution"),
     *inside("trusted.space", "product_forms", "natural_map", "space_uniqueness", "turning"),
     *inside("trusted.space", "leaf_conditions", "leaf_equations"),
 }
@@ -99,7 +99,6 @@ SHARED = {
     "proof.reading": {"fits", "rational_text"},
     "proof.records": None,
     "proof.curve_records": None,
-    "proof.declared_forms": None,
     "proof.leaves": None,
     "proof.writer": None,
     "model.sectors": None,
