@@ -47,9 +47,8 @@ SHARED = {
     "condensation.enclosure": {
         *("CondensedEnclosure", "EnclosedSystem", "NotEnclosedError", "RigidRows", "enclosure_of", "moved_by_modes")
     },
-    "condensation.free_displacements": {"solved"},
     "condensation.space_condensed": {"AlphaSpace", "EnclosedSpace", "PieceSpace", "SpaceSystem"},
-    "condensation.unloaded": {"CondensedData", "never_loaded", "vanishing_alpha"},
+    "condensation.unloaded": {"never_loaded", "solved", "vanishing_alpha"},
     "trusted.arcs.only_branch": {"only_roots"},
     "trusted.arcs.selection_balls": None,
     "trusted.exclusion": {"Terms", "exclusion_margin"},
