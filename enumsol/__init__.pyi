@@ -87,4 +87,5 @@ from .roots.root_set import (
     SearchStats as SearchStats,
     Undecided as Undecided,
 )
+from .roots.stability import Stability as Stability, stability as stability
 from .search.outcome import SearchProgress as SearchProgress

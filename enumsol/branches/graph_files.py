@@ -60,6 +60,7 @@ _PROBLEM = {
     **dict.fromkeys(("Bt?", "Bt1?", "Bt2?"), _MATRIX),
     "f": Array(None),
     "node_ids": [is_label],
+    "mass?": _MATRIX,
     "mesh?": Maybe({"motion": _MATRIX}),
     "max_rigid_displacement?": Maybe(float),
 }
@@ -214,6 +215,7 @@ def _problem_record(problem: AnyProblem) -> dict[str, Any]:
         "load_slope": None if problem.load_slope is None else problem.load_slope.tolist(),
         "node_ids": list(problem.node_ids),
         **_rigid_record(problem),
+        **({} if problem.mass is None else {"mass": _matrix_record(problem.mass)}),
         "coordinates": None if problem.coordinates is None else problem.coordinates.tolist(),
         "mesh": _mesh_record(problem.mesh),
     }
@@ -268,6 +270,7 @@ def _problem(record: dict[str, Any], size: int) -> AnyProblem:
         else BodyMesh(mesh["points"], mesh["cells"], matrix(mesh["motion"]), mesh["offset"], lame=mesh.get("lame")),
         "rigid_modes": record.get("rigid_modes"),
         "max_rigid_displacement": record.get("max_rigid_displacement"),
+        "mass": matrix(record["mass"]) if "mass" in record else None,
     }
     plane = "Bt" in record
     matrices: Any = [matrix(record[name]) for name in ("A", *_ROWS[plane])]

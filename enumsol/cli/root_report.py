@@ -84,7 +84,7 @@ def roots_as_json(found: RootSet, problem: str) -> str:
         **taken(found, "unique", "by_one_certificate", "stopped", "notes", "index_sum"),
         **({} if bound is None else {"max_rigid_displacement": bound.largest, "bound_needed": bound.needed}),
         "node_ids": found.node_ids,
-        "roots": [_root(root) for root in found],
+        "roots": [_root(root) | _stability(found, k) for k, root in enumerate(found)],
         "families": [_family(family) for family in found.families],
         "undecided": [_undecided(item) for item in found.undecided],
         "stats": taken(found.stats, *_STATS),
@@ -113,6 +113,12 @@ def _root(root: Root) -> dict[str, Any]:
         **taken(root, "index", "regular", "margin"),
         **more,
     }
+
+
+def _stability(found: RootSet, k: int) -> dict[str, Any]:
+    if found.verdicts is None:
+        return {}
+    return {"stability": taken(found.verdicts[k], "verdict", "growth_rates", "bounds", "reason")}
 
 
 def _undecided(item: Undecided) -> dict[str, Any]:

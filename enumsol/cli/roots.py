@@ -43,6 +43,9 @@ StopAfter = Annotated[int | None, options.count("Stop at N roots; 2 decides whet
 Unique = Annotated[
     bool, typer.Option("--unique", help="Only report whether there is one solution; stop at a second one.")
 ]
+WithStability = Annotated[
+    bool, typer.Option("--stability", help="Say which roots run away; PROBLEM has a mesh or a mass.")
+]
 Jobs = Annotated[int, options.count("Number of processes that search (tree).")]
 ProofFile = Annotated[str | None, options.file("--proof", "Write the proof (verified).")]
 Resume = Annotated[
@@ -67,6 +70,7 @@ class Search:
     arithmetic: HowExact = "verified"
     method: HowSearched = "tree"
     unique: Unique = False
+    stability: WithStability = False
     stop_after: StopAfter = None
     max_nodes: options.MaxNodes = None
     time_limit: options.TimeLimit = None
@@ -156,7 +160,10 @@ class Search:
         asked: dict[str, Any] = {name: getattr(self, name) for name in names}
         asked |= {"stop_after": 2 if self.unique else self.stop_after, "proof_path": self.proof_file}
         with common.workers(self.jobs) as executor, SearchDisplay() as display:
-            return enumerate_roots(problem, alpha, executor=executor, progress=display, **asked)
+            found = enumerate_roots(problem, alpha, executor=executor, progress=display, **asked)
+        if self.stability:
+            found.stability()
+        return found
 
 
 @options.with_options(*Search.as_options(), after=2)

@@ -1,7 +1,7 @@
 """The dynamic stiffness of contact rows: K(mu) = (B (A + mu M)^-1 B')^-1, in balls (theory, section 15.2).
 
 K(mu) is the stiffness with which contact rows resist motions that grow like exp(rho t), mu = rho^2. It increases with
-mu and is concave (theory, 15.3), so that its values at a few mu bound it everywhere.
+mu and is concave (theory, Lemma 15.2), so that its values at a few mu bound it everywhere.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from enumsol.errors import InvalidProblemError
 if TYPE_CHECKING:
     from fractions import Fraction
 
-    from enumsol.support.array_types import AlphaLike, Floats
+    from enumsol.support.array_types import Floats
 
 
 class Pencil:
@@ -36,21 +36,11 @@ class Pencil:
     load_slope: Floats | None = None
     offset_radius: Floats | None = None
     exact_offset: tuple[Fraction, ...] | None = None
-    held, modes, rigid_reach = True, None, 0.0
+    held = True
 
     def __init__(self, A: sp.csc_array, rows: sp.csr_array) -> None:
         self.A, self.contact_rows, self.n = A, rows, A.shape[0]
         self.f, self.gap, self.slip_offset = np.zeros(self.n), np.zeros(rows.shape[0]), np.zeros(0)
-
-    @property
-    def on_springs(self) -> Pencil:
-        """Itself: it is held."""
-        return self
-
-    def load_at(self, alpha: AlphaLike) -> Floats:
-        """No load, (n,)."""
-        del alpha
-        return self.f
 
     @cached_property
     def factorization(self) -> Factorization:
@@ -71,8 +61,9 @@ class Pencil:
             A is not proven positive definite.
         """
         try:
-            products = Products.of(self)
-            enclosed = CondensedEnclosure.from_problem(self, products)
+            itself: Any = self  # as much of a problem as condensing asks for
+            products = Products.of(itself)
+            enclosed = CondensedEnclosure.from_problem(itself, products)
         except InvalidProblemError as error:
             raise NotEnclosedError(str(error)) from None
         S, m = Ball(enclosed.S, enclosed.S_rad), len(enclosed.S)

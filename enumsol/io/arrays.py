@@ -78,12 +78,13 @@ _SYNONYMS = {
     "gap0": "gap",
     "mu": "friction",
     "dload": "load_slope",
+    "m": "mass",
     "nodes": "node_ids",
     "labels": "node_ids",
     "points": "coordinates",
     "coords": "coordinates",
 }
-_COMMON = ("gap", "friction", "load_slope", "slip_offset", "node_ids", "coordinates")
+_COMMON = ("gap", "friction", "load_slope", "slip_offset", "node_ids", "coordinates", "mass")
 #: Names of the arrays of a BodyMesh: one of "mesh_motion" and "mesh_dofs" is required, and all of MESH.
 MESH, SURFACE = ("mesh_points", "mesh_cells"), ("mesh_offset", "mesh_facets", "mesh_rows", "mesh_lame")
 _MESH = (*MESH, "mesh_motion", "mesh_dofs", *SURFACE)
@@ -92,7 +93,7 @@ _MESH_TABLES = (*MESH, "mesh_offset", "mesh_facets", "mesh_lame")
 RIGID = ("rigid_modes", "max_rigid_displacement")
 LAYOUT_2D = Layout(
     contact=("A", "Bn", "Bt"),
-    matrices=("A", "Bn", "Bt", "mesh_motion"),
+    matrices=("A", "Bn", "Bt", "mass", "mesh_motion"),
     tables=("coordinates", *_MESH_TABLES, RIGID[0]),
     broadcast=("gap", "friction", "friction0", "friction1", "slip_offset", RIGID[1]),
     optional=(*_COMMON, "friction0", "friction1", *_MESH, *RIGID),
@@ -108,7 +109,7 @@ TABLE = ("friction_table_slip", "friction_table_1", "friction_table_2")
 _SLOPES = ("friction_slope_1", "friction_slope_2")
 LAYOUT_3D = Layout(
     contact=("A", "Bn", "Bt1", "Bt2"),
-    matrices=("A", "Bn", "Bt1", "Bt2", *MEAN[:2], MEAN[3], "mesh_motion"),
+    matrices=("A", "Bn", "Bt1", "Bt2", *MEAN[:2], MEAN[3], "mass", "mesh_motion"),
     tables=("coordinates", "slip_offset", *_MESH_TABLES, "slip_mean_offset", *TABLE[1:], RIGID[0]),
     broadcast=("gap", "friction", "friction_1", "friction_2", *_SLOPES, RIGID[1]),
     optional=(
@@ -193,7 +194,7 @@ def _closest_known(name: str, layout: Layout) -> str | None:
 
 
 #: Arguments of both problems that are arrays of the same names.
-_SAME = ("gap", "load_slope", "slip_offset", "node_ids", "coordinates", "areas")
+_SAME = ("gap", "load_slope", "slip_offset", "node_ids", "coordinates", "areas", "mass")
 _FRICTION_SLOPE = ("friction_slope_1", "friction_slope_2")
 
 
@@ -229,7 +230,9 @@ def arrays_of(problem: AnyProblem) -> dict[str, Any]:
     else:
         arrays = {name: getattr(problem, name) for name in (*LAYOUT_3D.required, "gap", "slip_offset")}
         arrays |= _arrays_of_law(problem) | dict(zip(_FRICTION_SLOPE, problem.friction_slope, strict=True))
-    more = {name: getattr(problem, name, None) for name in ("load_slope", "coordinates", "areas", "rigid_modes")}
+    more = {
+        name: getattr(problem, name, None) for name in ("load_slope", "coordinates", "areas", "rigid_modes", "mass")
+    }
     if problem.max_rigid_displacement is not None:
         more["max_rigid_displacement"] = np.array([problem.max_rigid_displacement])
     mean, mesh = getattr(problem, "slip_mean", None), problem.mesh

@@ -14,6 +14,7 @@ import scipy.sparse as sp
 
 from enumsol.condensation.data import exactly_at
 from enumsol.errors import EnumsolError, InvalidArgumentError, InvalidProblemError, NotHeldError
+from enumsol.model.mass import checked_mass
 from enumsol.model.mesh import BodyMesh
 from enumsol.model.rigid_modes import RigidModes, largest_displacement
 from enumsol.support.arguments import alpha_value, instance_of, shown
@@ -117,6 +118,28 @@ class ContactBody(Immutable):
         return sp.csr_array(sp.vstack([matrix.matrix() for matrix in self._rows.values()], format="csr"))
 
     @property
+    def mass(self) -> sp.csc_array | None:
+        """Mass that was given, sparse (n, n), or None; a new object as A is [force time^2 / length]."""
+        return None if self._mass is None else self._mass.matrix()
+
+    @property
+    def inertia(self) -> sp.csc_array:
+        """The mass that was given, or that of the mesh with a density of one, which changes no verdict (n, n).
+
+        Raises
+        ------
+        InvalidArgumentError
+            Neither a mass nor a mesh is known.
+        """
+        if self._mass is not None:
+            return self._mass.matrix()
+        if self.mesh is None:
+            raise InvalidArgumentError(
+                "the problem has no mass and no mesh; expected mass, an (n, n) matrix, of the problem or of this call"
+            )
+        return self.mesh.mass()
+
+    @property
     def n(self) -> int:
         """Number of degrees of freedom."""
         return self._A.shape[0]
@@ -127,14 +150,19 @@ class ContactBody(Immutable):
         return self._rows["Bn"].shape[0]
 
     def _complete(
-        self, mesh: BodyMesh | None, rigid_modes: ArrayLike | None, max_rigid_displacement: float | None
+        self,
+        mesh: BodyMesh | None,
+        rigid_modes: ArrayLike | None,
+        max_rigid_displacement: float | None,
+        mass: ArrayLike | sp.sparray | sp.spmatrix | None,
     ) -> None:
-        """Take the mesh and the arguments about a body that nothing holds; nothing changes from here on."""
+        """Take the mesh, the mass and the arguments about a body that nothing holds; nothing changes from here on."""
         if mesh is not None:
             self.mesh = instance_of(mesh, BodyMesh, "mesh").check(self.n, self.p, len(self._rows))
         self.modes = RigidModes.of(rigid_modes, self.A)
         self.rigid_modes = None if self.held else self.modes.N
         self.max_rigid_displacement = largest_displacement(max_rigid_displacement, self.modes)
+        self._mass = None if mass is None else SealedMatrix.of(checked_mass(mass, self.A, self.modes.N))
         self._freeze()
         self.on_springs.factorization.check_positive_definite()
 
@@ -155,7 +183,7 @@ class ContactBody(Immutable):
         if self.held:
             return self
         # pictures of it are of no use, nor are bounds of a rigid displacement
-        without = {"A", *self._rows, "coordinates", "areas", "mesh", "rigid_modes", "max_rigid_displacement"}
+        without = {"A", "mass", *self._rows, "coordinates", "areas", "mesh", "rigid_modes", "max_rigid_displacement"}
         data = {name: value for name, value in self.arguments.items() if name not in without}
         known = {"offset_radius": self.offset_radius, "exact_offset": self.exact_offset}
         if self._origin is not None:
@@ -369,10 +397,13 @@ class ContactBody(Immutable):
             kind, vectors = kind + b", from a ball", [*vectors, self.offset_radius.ravel()]
         if not self.held:
             kind, vectors = kind + b", held by nothing", [*vectors, self.modes.N.ravel(), np.array([self.rigid_reach])]
+        matrices = [self.A]
+        if self._mass is not None:
+            kind, matrices = kind + b", with mass", [self.A, self._mass.matrix()]
         digest = hashlib.sha256(kind)
         parts: list[Any] = [np.array([self.n, self.p])]
         rows = (sp.csc_array(matrix.matrix()).sorted_indices() for matrix in self._rows.values())
-        for matrix in (self.A, *rows):
+        for matrix in (*matrices, *rows):
             parts += [matrix.indptr, matrix.indices, matrix.data]
         for part in (*parts, *vectors):
             numbers = "<f8" if part.dtype.kind == "f" else "<i8"

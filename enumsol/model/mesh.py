@@ -88,6 +88,13 @@ class BodyMesh(Immutable):
         self.lame = None if lame is None else _lame(lame, len(self.cells))
         self._freeze()
 
+    def mass(self) -> sp.csc_array:
+        """Consistent mass of the degrees of freedom for a density of one, (n, n) [length^d]."""
+        from enumsol.model.mass import consistent_mass  # scipy's solvers come with it
+
+        of_nodes = consistent_mass(self.points, self.cells, np.ones(len(self.cells)))
+        return sp.csc_array(self.motion.T @ sp.kron(of_nodes, sp.eye_array(self.points.shape[1])) @ self.motion)
+
     @classmethod
     def of_dofs(
         cls,

@@ -71,6 +71,10 @@ class ContactProblem(ContactBody):
         these a thousand times the largest displacement of a contact node if springs as stiff as the body held it,
         rounded up to a power of two.
 
+    mass : (n, n) array_like or sparse, or None
+        Mass, symmetric and positive semidefinite [force time^2 / length]; it says which equilibria run away
+        (`stability`) and changes nothing else. Without it that of ``mesh`` with a uniform density.
+
     Raises
     ------
     InvalidProblemError
@@ -104,11 +108,12 @@ class ContactProblem(ContactBody):
         mesh: BodyMesh | None = None,
         rigid_modes: ArrayLike | None = None,
         max_rigid_displacement: float | None = None,
+        mass: ArrayLike | sp.sparray | sp.spmatrix | None = None,
     ) -> None:
         super().__init__(A, {"Bn": Bn, "Bt": Bt}, f, gap, load_slope, node_ids, coordinates)
         self.friction, self.friction_slope = _friction(*given_friction(friction, friction_slope), self.p)
         self.slip_offset = vector(slip_offset, "slip_offset", self.p, broadcast=True)
-        self._complete(mesh, rigid_modes, max_rigid_displacement)
+        self._complete(mesh, rigid_modes, max_rigid_displacement, mass)
 
     @property
     def Bt(self) -> sp.csr_array:  # noqa: N802 (the field's letter)

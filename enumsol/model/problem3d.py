@@ -372,6 +372,10 @@ class ContactProblem3D(ContactBody):
     rigid_modes, max_rigid_displacement
         Of a body that nothing holds, as in `ContactProblem`.
 
+    mass : (n, n) array_like or sparse, or None
+        Mass, symmetric and positive semidefinite [force time^2 / length]; it says which equilibria run away
+        (`stability`) and changes nothing else. Without it that of ``mesh`` with a uniform density.
+
     Raises
     ------
     InvalidProblemError
@@ -414,6 +418,7 @@ class ContactProblem3D(ContactBody):
         slip_mean: SlipMean | None = None,
         rigid_modes: ArrayLike | None = None,
         max_rigid_displacement: float | None = None,
+        mass: ArrayLike | sp.sparray | sp.spmatrix | None = None,
     ) -> None:
         super().__init__(A, {"Bn": Bn, "Bt1": Bt1, "Bt2": Bt2}, f, gap, load_slope, node_ids, coordinates)
         p = self.p
@@ -424,7 +429,7 @@ class ContactProblem3D(ContactBody):
         self.slip_mean = None if slip_mean is None else instance_of(slip_mean, SlipMean, "slip_mean").check(self.n, p)
         if isinstance(self.law, ConstantFriction) and not np.any(self._slope):
             check_signs(self.law.values, self.node_ids)
-        self._complete(mesh, rigid_modes, max_rigid_displacement)
+        self._complete(mesh, rigid_modes, max_rigid_displacement, mass)
 
     @property
     def Bt1(self) -> sp.csr_array:  # noqa: N802 (the field's letter)

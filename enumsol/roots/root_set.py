@@ -20,11 +20,13 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import pandas as pd
+    import scipy.sparse as sp
 
     from enumsol.model.statuses import ContactStatus
     from enumsol.proof.proof_file import Proof
+    from enumsol.roots.stability import Stability
     from enumsol.search.certifiers.protocol import Escalations
-    from enumsol.support.array_types import Alpha, Floats
+    from enumsol.support.array_types import Alpha, ArrayLike, Floats
 
 _PRINTED_ROOTS, _PRINTED_REGIONS = 20, 5
 _HEADS = ("", "index", "regular", "margin", "max lambda_n", "contact")
@@ -32,6 +34,9 @@ _HEADS = ("", "index", "regular", "margin", "max lambda_n", "contact")
 _EXPLAINED = (
     "index: the sign of a determinant; regular: no node is between two statuses",
     "margin: distance to the next change of status, relative to the largest values",
+)
+_OF_STABILITY = (
+    "stability: whether the body can leave it along a straight line, growing (proven where it is decided)",
 )
 
 #: Rotations above this are not small [degrees]: their cosine differs from one by 1.5 percent.
@@ -248,7 +253,37 @@ class RootSet(Sequence[Root], Immutable):
         self.certified_data = certified_data
         self.proof = proof
         self.rigid_bound = rigid_bound
+        self._found: dict[str, tuple[Stability, ...]] = {}
         self._freeze()
+
+    def stability(self, *, mass: ArrayLike | sp.sparray | sp.spmatrix | None = None) -> tuple[Stability, ...]:
+        """Which roots run away, one verdict a root in their order (see `enumsol.stability`); families are left out.
+
+        Printed root sets and tables have a column of them from then on, for the last mass that was asked for.
+
+        Parameters
+        ----------
+        mass : (n, n) array_like or sparse, optional
+            By default that of the problem.
+
+        Raises
+        ------
+        InvalidArgumentError, InvalidProblemError
+            As `enumsol.stability`.
+        """
+        from enumsol.roots.stability import Stabilities  # sparse graphs and solvers come with it
+
+        if not len(self):
+            return ()
+        if mass is not None or self.verdicts is None:
+            asked = Stabilities(self[0].problem, mass)
+            self._found["verdicts"] = tuple(asked.of(root) for root in self)
+        return self._found["verdicts"]
+
+    @property
+    def verdicts(self) -> tuple[Stability, ...] | None:
+        """What `stability` found last, or None."""
+        return self._found.get("verdicts")
 
     @property
     def complete(self) -> bool:
@@ -344,6 +379,7 @@ class RootSet(Sequence[Root], Immutable):
                 },
                 "index": np.repeat(np.array([root.index for root in self], dtype=object), p),
                 "regular": np.repeat(np.array([root.regular for root in self], dtype=bool), p),
+                **self._stability_column(p),
             }
         )
 
@@ -390,6 +426,11 @@ class RootSet(Sequence[Root], Immutable):
         within = "" if self.rigid_bound is None else f", {self.rigid_bound.words()}"
         return f"complete: yes ({about}{how}{within})"
 
+    def _stability_column(self, p: int) -> dict[str, Any]:
+        """Verdicts, if they were asked for."""
+        verdicts = self.verdicts
+        return {} if verdicts is None else {"stability": np.repeat([found.verdict for found in verdicts], p)}
+
     def _heading(self) -> str:
         heading = f"RootSet at alpha = {float(self.alpha):g}: {counted(len(self), 'root')}"
         if self.families:
@@ -398,8 +439,13 @@ class RootSet(Sequence[Root], Immutable):
             heading = found_of(heading, self.at_least)
         return f"{heading} ({self.arithmetic}, {self.method})"
 
-    def _rows(self) -> list[tuple[str, str, str, str, str, str]]:
-        """Rows printed of the first roots: number, index, whether regular, margin, largest force, statuses."""
+    @property
+    def _heads(self) -> tuple[str, ...]:
+        return (*_HEADS[:-1], "stability", _HEADS[-1]) if self.verdicts is not None else _HEADS
+
+    def _rows(self) -> list[tuple[str, ...]]:
+        """Rows printed of the first roots: number, index, whether regular, margin, force, perhaps verdict, statuses."""
+        verdicts = self.verdicts
         return [
             (
                 str(k),
@@ -407,6 +453,7 @@ class RootSet(Sequence[Root], Immutable):
                 "yes" if root.regular else "no",
                 f"{root.margin:.2e}",
                 f"{np.max(root.lambda_n):.5g}",
+                *(() if verdicts is None else (verdicts[k].verdict,)),
                 summary(root.statuses),
             )
             for k, root in enumerate(self._roots[:_PRINTED_ROOTS])
@@ -448,16 +495,17 @@ class RootSet(Sequence[Root], Immutable):
         return [*lines, f"index sum: {note}", self.closing_line]
 
     def __repr__(self) -> str:
-        rows = [_HEADS, *self._rows()] if len(self) else []
-        widths = (6, 5, 7, 9, 12)
+        rows = [self._heads, *self._rows()] if len(self) else []
+        widths = (6, 5, 7, 9, 12, *(17,) * (len(self._heads) - len(_HEADS)))
         table = [" ".join(f"{c:>{w}}" for c, w in zip(row, widths, strict=False)) + f"  {row[-1]}" for row in rows]
         return "\n".join([self._heading(), *table, *self._explained(), *self._notes()])
 
     def _explained(self) -> tuple[str, ...]:
-        return _EXPLAINED if len(self) else ()
+        more = _OF_STABILITY if self.verdicts is not None else ()
+        return (*_EXPLAINED, *more) if len(self) else ()
 
     def _repr_html_(self) -> str:
-        table = html_table(("root", *_HEADS[1:]), self._rows()) if len(self) else ""
+        table = html_table(("root", *self._heads[1:]), self._rows()) if len(self) else ""
         return html_lines([self._heading()]) + table + html_lines([*self._explained(), *self._notes()])
 
 

@@ -14,15 +14,19 @@ from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.dynamic import DynamicStiffness
 from enumsol.condensation.enclosure import nearest_floats
+from enumsol.errors import InvalidArgumentError
+from enumsol.model.mass import checked_mass
 from enumsol.model.statuses import ContactStatus
 from enumsol.search.stability import Proven, StabilitySearch
+from enumsol.support.arguments import shown
 from enumsol.support.immutable import Sealed
 from enumsol.support.messages import counted
 from enumsol.trusted.running_away import Motions, Touching
 
 if TYPE_CHECKING:
+    from enumsol.model.problem3d import AnyProblem
     from enumsol.roots.root import Root
-    from enumsol.support.array_types import Floats
+    from enumsol.support.array_types import ArrayLike, Floats
 
 Verdict = Literal["runs away", "does not run away", "undecided"]
 _OPEN, _STICK, _PLUS, _MINUS, _SLIP = (
@@ -70,24 +74,73 @@ class Stability(Sealed):
     reason: str
 
 
+def stability(
+    problem: AnyProblem, root: Root, *, mass: ArrayLike | sp.sparray | sp.spmatrix | None = None
+) -> Stability:
+    """Whether an equilibrium runs away: whether the body can leave it along a straight line, growing exponentially.
+
+    The verdicts "runs away" and "does not run away" are proven, for the statuses of the root, in the linearized motion
+    with Coulomb's law in terms of velocities and without damping (theory, section 15; in 3D to first order). One that
+    does not run away may be unstable all the same.
+
+    Parameters
+    ----------
+    problem : ContactProblem or ContactProblem3D
+    root : Root
+        One of ``enumerate_roots(problem, alpha)``, in verified or exact arithmetic.
+    mass : (n, n) array_like or sparse, optional
+        Symmetric and positive semidefinite; by default ``problem.mass``, or that of the mesh with a uniform density
+        [force time^2 / length].
+
+    Returns
+    -------
+    Stability
+
+    Raises
+    ------
+    InvalidArgumentError
+        There is no mass, friction depends on the solution, or ``root`` is no root of this problem.
+    InvalidProblemError
+        The mass cannot be used.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> problem = enumsol.gallery.taper()
+    >>> sliding = enumsol.enumerate_roots(problem, alpha=0.2)[1]
+    >>> found = enumsol.stability(problem, sliding)
+    >>> found.verdict, len(found.growth_rates)
+    ('runs away', 1)
+    """
+    if not hasattr(root, "enclosure"):
+        raise InvalidArgumentError(f"root is {shown(root)}; expected a root of enumerate_roots, not a family of them")
+    if root.problem is not problem and root.problem.fingerprint != problem.fingerprint:
+        raise InvalidArgumentError("root solves another problem; expected one of enumerate_roots(problem, alpha)")
+    return Stabilities(problem, mass).of(root)
+
+
 class Stabilities:
     """Verdicts on roots of one problem; parts that nothing connects are examined by themselves and only once.
 
     Parameters
     ----------
     problem : ContactProblem or ContactProblem3D
-    mass : (n, n) array or sparse, or None
-        In place of ``problem.mass``.
+    mass : (n, n) array_like or sparse, or None
+        In place of ``problem.inertia``.
 
     Raises
     ------
+    InvalidProblemError
+        The mass cannot be used.
     InvalidArgumentError
-        There is no mass, or it cannot be used.
+        There is none, or friction depends on the solution.
     """
 
-    def __init__(self, problem: Any, mass: Any = None) -> None:
+    def __init__(self, problem: AnyProblem, mass: ArrayLike | sp.sparray | sp.spmatrix | None = None) -> None:
         self.problem = problem
-        self._mass = mass
+        if getattr(problem, "depends_on_solution", False):
+            raise InvalidArgumentError("friction depends on the solution; expected constant coefficients")
+        self._mass = problem.inertia if mass is None else checked_mass(mass, problem.A, problem.modes.N)
         A, rows = sp.csc_array(problem.A), sp.csr_array(problem.contact_rows)
         self._tangents = rows.shape[0] // problem.p - 1
         links = sp.csr_array(abs(A) + abs(self._mass))

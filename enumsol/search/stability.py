@@ -479,7 +479,7 @@ class Spectrum:
         """K(mu), (m, m)."""
         weights = np.maximum(1.0 + (mu - self._shift) * self._tau, 1e-14)
         try:
-            return Ball.exact(np.linalg.inv((self._rows / weights) @ self._rows.T))
+            return Ball.exact(np.asarray(np.linalg.inv((self._rows / weights) @ self._rows.T), dtype=np.float64))
         except np.linalg.LinAlgError:
             return None
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -23,6 +23,17 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.dynamic import DynamicStiffness
     from enumsol.support.array_types import Floats, Mask
+
+
+class Stiffness(Protocol):
+    """K(mu), in balls or, for what is only tried, in floats."""
+
+    @property
+    def increases(self) -> bool:
+        """True if K(mu) increases with mu."""
+
+    def at(self, mu: float) -> Ball | None:
+        """K(mu), (m, m); None where it is not known."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +91,7 @@ class Motions:
 
 @dataclass(frozen=True, eq=False)
 class NoMotion:
-    """Numbers by which nothing grows for mu in a range, with some nodes decided (theory, 15.4).
+    """Numbers by which nothing grows for mu in a range, with some nodes decided (theory, section 15.3).
 
     Attributes
     ----------
@@ -216,7 +227,7 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class Growing:
-    """A range of mu in which a motion grows, and what every node does in it (theory, 15.5).
+    """A range of mu in which a motion grows, and what every node does in it (theory, section 15.4).
 
     Attributes
     ----------
@@ -231,7 +242,7 @@ class Growing:
     slides: tuple[int, ...]
     touching: tuple[int, ...] = ()
 
-    def found(self, stiffness: DynamicStiffness, motions: Motions) -> Motion | None:
+    def found(self, stiffness: Stiffness, motions: Motions) -> Motion | None:
         """The motion, if it is proven to be there."""
         k = len(motions.signed)
         if motions.unsure or not 0 < self.low < self.high < np.inf or len(self.touching) != len(motions.touching):

@@ -30,6 +30,7 @@ DATA = {
     "slip_offset": lambda problem: problem.slip_offset + 0.25,
     "rigid_modes": lambda problem: 2 * problem.rigid_modes,
     "max_rigid_displacement": lambda problem: 3.0,
+    "mass": lambda problem: sp.eye_array(problem.n),
 }
 PLANE = DATA | {"Bt": lambda problem: 2 * problem.Bt}
 SPACE = DATA | {
@@ -57,7 +58,7 @@ HELD_BY_NOTHING = ("rigid_modes", "max_rigid_displacement")
 #: What there are no graphs of: friction that depends on the slip, and in 3D bodies that nothing holds.
 NOT_IN_GRAPHS = [("space", argument) for argument in ("slip_mean", *HELD_BY_NOTHING)]
 #: What is condensed, or refused.
-NOT_KEPT = {"A", "Bn", "Bt", "f", "load_slope", "mesh", *HELD_BY_NOTHING}
+NOT_KEPT = {"A", "Bn", "Bt", "f", "load_slope", "mass", "mesh", *HELD_BY_NOTHING}
 
 
 def changed(name, argument):
