@@ -102,6 +102,8 @@ class DynamicStiffness:
 
     def at(self, mu: float) -> Ball | None:
         """K(mu), (m, m) [force / length]; None where it is not enclosed."""
+        if not self.rows.shape[0]:
+            return Ball.exact(np.zeros((0, 0)))
         if mu not in self._known:
             try:
                 self._known[mu] = self._inverse(self._compliance(mu)) if mu or self.held else self._slow()
@@ -175,7 +177,7 @@ class DynamicStiffness:
         """
         K, m = self.at(0.0), self.rows.shape[0]
         size = float(np.max(np.abs(load), initial=0.0))
-        if K is None or not size:
+        if K is None or not size or not m:
             return None if K is None else Ball.exact(np.zeros(m))
         # a load is one more row: B A^-1 f'
         rows = sp.csr_array(sp.vstack([self.rows, sp.csr_array(load[None, :])]))

@@ -106,8 +106,8 @@ def rates(problem: AnyProblem, root: Root, load_rate: ArrayLike) -> Rates:
     >>> import enumsol
     >>> problem = enumsol.gallery.get("taper-8").build()
     >>> sliding = enumsol.enumerate_roots(problem, alpha=0.2)[1]
-    >>> len(enumsol.rates(problem, sliding, problem.f).ways)
-    1
+    >>> enumsol.rates(problem, sliding, problem.f).jumps, enumsol.rates(problem, sliding, -problem.f).jumps
+    (True, False)
     """
     load = vector_of(load_rate, "load_rate", problem.n)
     asked = Stabilities(problem, sp.eye_array(problem.n, format="csc"))
