@@ -28,7 +28,7 @@ from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
 from enumsol.search.certifiers.protocol import (
     WIDEN,
     Bound,
-    RecordingCertifier,
+    Certifier,
     Refine,
     UndecidedPart,
 )
@@ -121,7 +121,7 @@ def _towards(code: int, vector: np.ndarray) -> float:
     return float(middle @ vector / np.linalg.norm(middle))
 
 
-class SpaceCertifier(RecordingCertifier):
+class SpaceCertifier(Certifier):
     """Proves prunings and leaves with the trusted core, and writes the proof.
 
     Parameters
@@ -266,7 +266,7 @@ class SpaceCertifier(RecordingCertifier):
         self._leaf(Alone(codes or (), numbers, self._ball(found)))
         return [found]
 
-    def alone(self, codes: Codes, numbers: Floats, leaf: Codes) -> list[SpaceRoot] | None:
+    def alone_in(self, codes: Codes, numbers: Floats, leaf: Codes) -> list[SpaceRoot] | None:
         """The root of a leaf, if no other solution has the statuses of an assignment, and that record written; or None.
 
         Parameters
