@@ -18,7 +18,7 @@ from flint import fmpq, fmpq_mat
 from enumsol.arithmetic.rationals import is_positive_definite, rational
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.enclosure import NotEnclosedError
-from enumsol.condensation.free_displacements import exact_matrices, free_displacements, solved
+from enumsol.condensation.unloaded import exact_matrices, free_displacements, solved
 from enumsol.proof.reading import same
 from enumsol.trusted.status_rows import BACKWARD, CONDITIONS, CONTACT, FORBIDDEN, FORWARD, NONNEGATIVE, OPEN
 from enumsol.trusted.uniqueness import only_solution
