@@ -185,7 +185,7 @@ class Certifier(ABC):
     _escalations: Escalations | None = None
 
     def __init__(self, recorder: Recorder | None = None) -> None:
-        self.recorder: Recorder = recorder or Unrecorded()
+        self.recorder: Recorder = Unrecorded() if recorder is None else recorder
         self.sliding: dict[int, int] = {}
         self.bounded = False
         self._verified: dict[Codes, Any] = {}

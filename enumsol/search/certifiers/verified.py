@@ -50,8 +50,6 @@ _ROW_NAMES = {
     RowKind.SLIP_FORWARD: "the slip condition of node {}",
     RowKind.SLIP_BACKWARD: "the slip condition of node {}",
 }
-#: The enclosure of a root that a leaf is tested for; the leaf is written with another one.
-NOWHERE = records.EnclosureRecord(None, None, None)
 #: How a node slips, or is about to, where one of these kinds of rows is zero.
 _SLIPS = {2: SLIP_PLUS, 5: SLIP_PLUS, 3: SLIP_MINUS, 6: SLIP_MINUS}
 
@@ -226,7 +224,7 @@ class VerifiedCertifier(protocol.Certifier):
         if self._enclosed is None:
             return None
         more = proposal.strengths, self._allowed(codes, *bound.multipliers())
-        leaf = leaves.Alone(proposal.selection, proposal.weights, NOWHERE, *more)
+        leaf = leaves.Alone(proposal.selection, proposal.weights, records.NOWHERE, *more)
         root = leaf.holds(self._enclosed, codes)
         if root is None:
             return None
@@ -346,7 +344,7 @@ class VerifiedCertifier(protocol.Certifier):
             slips = None if ball is None else _between(codes, ball)
             if not slips or self._enclosed is None:
                 return None
-            leaf = leaves.SharedRoot(tuple(sorted(slips.items())), NOWHERE)
+            leaf = leaves.SharedRoot(tuple(sorted(slips.items())), records.NOWHERE)
             core, root = leaf.core(codes), leaf.holds(self._enclosed, codes)
             # one that is known has other nodes between stick and slip
             if root is None or any(known.core == core for known in shared):
