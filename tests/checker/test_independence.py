@@ -26,7 +26,7 @@ CHECKERS = inside("checker", "verify", "plane_checker", "graph_checker", "histor
 IN_SPACE = {
     *("enumsol.checker.space_checker", "enumsol.condensation.space_condensed", "enumsol.model.sectors"),
     *inside("trusted.space", "resultants", "sector_rows", "slip_forms", "leaves", "boxed_solution"),
-    *inside("trusted.space", "product_forms", "natural_map", "space_uniqueness", "turning"),
+    *inside("trusted.space", "product_forms", "natural_map", "krawczyk", "space_uniqueness", "turning"),
     *inside("trusted.space", "leaf_conditions", "leaf_equations"),
 }
 #: The search: its rooms, and what it alone uses of rooms that it shares with the checkers.
@@ -79,10 +79,9 @@ SHARED = {
     "trusted.space.resultants": None,
     "trusted.space.space_reference": {"SpaceProduct", "SpaceReference"},
     "trusted.space.turning": {"turned_by"},
-    "trusted.space.boxed_solution": {
-        *("Box", "BoxedSolution", "apart_in_boxes", "box_around", "is_inside", "proposed_rho", "solution_in_box")
-    },
+    "trusted.space.boxed_solution": {*("Box", "BoxedSolution", "BoxProblem", "apart_in_boxes", "is_inside", "solution_in_box")},
     "trusted.space.product_forms": {"CONE", "SIGNED", "Ellipsoid", "Frame", "refines"},
+    "trusted.space.krawczyk": {"Contraction", "NaturalMap", "Step"},
     "trusted.space.solution_curve": None,
     "trusted.space.curve_chains": None,
     "trusted.space.curve_events": None,
@@ -91,7 +90,7 @@ SHARED = {
     "trusted.space.piece_forms": {"PieceWeights", "how_far_off"},
     "trusted.space.pieces": {"AlphaPiece", "lie_along"},
     "trusted.space.space_uniqueness": {
-        *("LARGEST_UNIT", "LooseSolution", "OnlySolution"),
+        *("LooseSolution", "OnlySolution", "moderate_units"),
         *("equations", "lone_root", "only_root", "only_solution_in_space"),
     },
     "proof.begun": None,

@@ -10,6 +10,7 @@ import numpy as np
 
 from enumsol.arithmetic.balls import Ball
 from enumsol.arithmetic.rationals import simplest
+from enumsol.search.space.curve_proposals import placed
 from enumsol.trusted.space.curve_runs import KnownCurve
 from enumsol.trusted.space.pieces import lie_along
 from enumsol.trusted.space.solution_curve import AlphaProblem
@@ -137,7 +138,7 @@ class Curves:
         """True if a solution seems to lie on a known curve; no claim."""
         if not self._boxes:
             return False
-        return bool(np.any(self._around(self._given.placed(x), np.zeros_like(x))))
+        return bool(np.any(self._around(placed(self._given, x), np.zeros_like(x))))
 
     def _around(self, x: Floats, rad: Floats) -> Mask:
         """Which boxes seem to hold a point, and all that is within a radius of it along t; no claim."""

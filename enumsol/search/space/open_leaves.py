@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import nearly_singular
+from enumsol.search.space.product_search import box_around
 from enumsol.search.space.space_fathoming import NEAR, Point
 from enumsol.search.space.space_newton import Isotropic
-from enumsol.trusted.space.boxed_solution import BoxedSolution, box_around, is_inside, solution_in_box
+from enumsol.trusted.space.boxed_solution import BoxedSolution, is_inside, solution_in_box
 from enumsol.trusted.space.leaf_equations import with_free_bounds
 from enumsol.trusted.space.leaves import Open, settle
 from enumsol.trusted.space.turning import turned_by

@@ -14,9 +14,9 @@ import numpy as np
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of, parts_around, places, span, width_of
 from enumsol.proof.curve_records import OnCurve, ThroughCurveBox
 from enumsol.proof.records import NoRoot
+from enumsol.search.space.curve_proposals import curve_point, unplaced
 from enumsol.search.space.piece_multipliers import unbalanced
 from enumsol.search.space.space_fathoming import without_sectors
-from enumsol.trusted.space.solution_curve import curve_point
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -72,7 +72,7 @@ def points_on(arc: LeafArc, known: KnownCurve, parts: CurveParts, codes: Codes) 
 def _narrow(problem: AlphaProblem, x: Floats, codes: Codes, nodes: Sequence[int]) -> Codes:
     """A leaf of narrow sectors around a solution, (zeta, alpha)."""
     leaf, p = list(codes), len(codes)
-    y = (problem.unplaced(x)[:-1] / problem.ratio.mid)[p : 3 * p].reshape(2, p)
+    y = (unplaced(problem, x)[:-1] / problem.ratio.mid)[p : 3 * p].reshape(2, p)
     for i in nodes:
         # sectors of this level around the point, or narrower ones
         up = DEEPEST + 2 - max(12, level_of(codes[i] - SECTORS))

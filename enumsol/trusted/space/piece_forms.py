@@ -15,9 +15,9 @@ from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, upper_norm
 from enumsol.trusted.space.sector_rows import UNDECIDED
 from enumsol.trusted.space.space_uniqueness import (
     EQUATION_WEIGHTS,
-    LARGEST_UNIT,
     equations,
     least_eigenvalue,
+    moderate_units,
     slip_sizes,
 )
 
@@ -93,7 +93,7 @@ def only_on_curve(
         return False
     if not float(piece[1] - piece[0]) > TINY:
         return False
-    if np.max(np.maximum(system.unit, 1.0 / system.unit)) > LARGEST_UNIT:
+    if not moderate_units(system.unit):
         return False
     with np.errstate(all="ignore"):
         unit = np.where(system.tau >= 0, system.unit[system.tau], 1.0)

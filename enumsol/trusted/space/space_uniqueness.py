@@ -83,6 +83,11 @@ class LooseSolution:
         return cls(y, w, loose, stick, slip, index, **more)
 
 
+def displacements(system: EnclosedSpace, y: Ball) -> Ball:
+    """w = g - S y."""
+    return Ball(system.g, system.g_rad) - (Ball(system.S, system.S_rad) @ y[:, None])[:, 0]
+
+
 class OnlySolution(LooseSolution):
     """The one solution of a problem."""
 
@@ -292,13 +297,15 @@ class SpaceWeights:
         return off
 
 
+def moderate_units(unit: Floats) -> bool:
+    """True if nothing underflows with these units of tau."""
+    return bool(np.max(np.maximum(unit, 1.0 / unit)) <= LARGEST_UNIT)
+
+
 def in_range(system: EnclosedSpace) -> bool:
     """True if nothing underflows with units of tau, and the discs have the radius one."""
     discs = system.discs
-    return bool(
-        np.max(np.maximum(system.unit, 1.0 / system.unit)) <= LARGEST_UNIT
-        and np.all((discs.mid == 1.0) & (discs.rad == 0))
-    )
+    return moderate_units(system.unit) and bool(np.all((discs.mid == 1.0) & (discs.rad == 0)))
 
 
 @dataclass(frozen=True)
@@ -358,20 +365,16 @@ class _Form:
             has = (tau[:, k] >= 0) & (n > 0)
             part = Ball.exact(n[has]) * self.turn[has, k]
             y.mid[tau[has, k]], y.rad[tau[has, k]] = part.mid, part.rad
-        reach = self._moved(self._change(n, self._displacements(y))) / self.least * SAFE
+        reach = self._moved(self._change(n, displacements(self.system, y))) / self.least * SAFE
         if not np.isfinite(reach):
             return None
         y = Ball(y.mid, (y.rad + reach) * SAFE)
-        w = self._displacements(y)
+        w = displacements(self.system, y)
         # open at every solution
         for i in np.flatnonzero((n == 0) & (w.mid[:p] + w.rad[:p] < 0)):
             y.rad[[i, *tau[i][tau[i] >= 0]]] = 0.0
-        w = self._displacements(y)
+        w = displacements(self.system, y)
         return OnlySolution.of(self.system, y, w, 1) if self.serves(y, w, errors) else None
-
-    def _displacements(self, y: Ball) -> Ball:
-        S, g = Ball(self.system.S, self.system.S_rad), Ball(self.system.g, self.system.g_rad)
-        return g - (S @ Ball(y.mid[:, None], y.rad[:, None]))[:, 0]
 
     def _change(self, n: Floats, w: Ball) -> Floats:
         """Bound of the change of the load, row by row, that makes a point with these lambda_n a solution."""
