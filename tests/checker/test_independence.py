@@ -79,7 +79,9 @@ SHARED = {
     "trusted.space.resultants": None,
     "trusted.space.space_reference": {"SpaceProduct", "SpaceReference"},
     "trusted.space.turning": {"turned_by"},
-    "trusted.space.boxed_solution": {*("Box", "BoxedSolution", "BoxProblem", "apart_in_boxes", "is_inside", "solution_in_box")},
+    "trusted.space.boxed_solution": {
+        *("Box", "BoxedSolution", "BoxProblem", "apart_in_boxes", "is_inside", "solution_in_box")
+    },
     "trusted.space.product_forms": {"CONE", "SIGNED", "Ellipsoid", "Frame", "refines"},
     "trusted.space.krawczyk": {"Contraction", "NaturalMap", "Step"},
     "trusted.space.solution_curve": None,
