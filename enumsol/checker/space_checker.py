@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from enumsol.checker.walk import Test
     from enumsol.proof.records import Record
     from enumsol.support.array_types import Codes, Floats
-    from enumsol.trusted.space.space_reference import SpaceReference
+    from enumsol.trusted.space.space_reference import LeafReference
 
 _OPEN = "what it holds is not proven"
 _NO_FORM = "no form that is convex was declared over it"
@@ -95,7 +95,7 @@ class SpaceChecker(TreeChecker):
     def _without_bound(self) -> EnclosedSpace:
         return unbounded(self.system)
 
-    def _made(self, said: DeclaredForm) -> SlipForm | Ellipsoid | SpaceReference | None:
+    def _made(self, said: DeclaredForm) -> SlipForm | Ellipsoid | LeafReference | None:
         return space_form(self.system, said)
 
     def _tests(self) -> dict[type[Record], Test]:

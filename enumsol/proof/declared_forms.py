@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from enumsol.proof.records import DeclaredForm
     from enumsol.trusted.space.product_forms import Ellipsoid
     from enumsol.trusted.space.slip_forms import SlipForm
-    from enumsol.trusted.space.space_reference import SpaceReference
+    from enumsol.trusted.space.space_reference import LeafReference
 
 
 def plane_form(system: EnclosedSystem, said: DeclaredForm) -> EnclosedForm | Reference | None:
@@ -27,7 +27,7 @@ def plane_form(system: EnclosedSystem, said: DeclaredForm) -> EnclosedForm | Ref
         return EnclosedForm.of(system, said.codes, said.numbers.reshape(4, -1), float(said.more[0]))
 
 
-def space_form(system: EnclosedSpace, said: DeclaredForm) -> SlipForm | Ellipsoid | SpaceReference | None:
+def space_form(system: EnclosedSpace, said: DeclaredForm) -> SlipForm | Ellipsoid | LeafReference | None:
     """The form of the whole tree, the ellipsoid of an assignment, or the form of a root, in 3D; None if not proven.
 
     Raises
@@ -37,10 +37,10 @@ def space_form(system: EnclosedSpace, said: DeclaredForm) -> SlipForm | Ellipsoi
     """
     from enumsol.trusted.space.product_forms import Ellipsoid
     from enumsol.trusted.space.slip_forms import SlipForm
-    from enumsol.trusted.space.space_reference import SpaceReference
+    from enumsol.trusted.space.space_reference import LeafReference
 
     if not system.held:
-        return SpaceReference.of(system, said.codes, said.numbers, *said.more.tolist())
+        return LeafReference.of(system, said.codes, said.numbers, *said.more.tolist())
     if all(code == UNDECIDED for code in said.codes):
         return SlipForm.of(system, said.numbers)
     with np.errstate(over="ignore", invalid="ignore"):

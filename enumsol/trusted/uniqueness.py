@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.support.array_types import Codes, Floats, Indices, Mask
+    from enumsol.trusted.uniqueness_forms import UniqueForm
 
 
 #: Radii of forces by the largest force, beyond which a solution is hardly placed.
@@ -123,7 +124,7 @@ def only_solution(
         reduced = Reduced.of(system, selection, free)
         numbers = None if reduced is None else Weights.of(reduced, weights)
         numbers = None if reduced is None or numbers is None else numbers.at(reduced, point, w)
-        return reduced.sign if reduced is not None and numbers is not None and reduced.least(numbers) > 0 else 0
+        return reduced.sign if reduced is not None and numbers is not None and numbers.form(reduced) is not None else 0
 
 
 def same_solution(
@@ -197,13 +198,13 @@ class Reduced(Components):
                 # R is S and h is g: so these are x and w here, and w is closer than R times the radii of x gives it
                 x, w = root.force[self.at.places], root.w[self.at.places]
                 numbers = numbers.beside(x, self.at.tangential[numbers.normal])
-                alone = self._alone(x, w, numbers, self.least(numbers))
+                alone = self._alone(x, w, numbers, numbers.form(self))
                 return None if alone is None else replace(alone, regular=root)
-        least = self.least(numbers)
-        if not least > 0:
+        form = numbers.form(self)
+        if form is None:
             return None
         x = self.point(force, numbers)
-        reach = self.distance(x.mid, self._displacements(x), numbers) / least * SAFE
+        reach = self.distance(x.mid, self._displacements(x), numbers) / form.least * SAFE
         if not np.isfinite(reach):
             return None
         x = Ball(x.mid, (x.rad + reach) * SAFE)
@@ -212,11 +213,12 @@ class Reduced(Components):
             # open at every solution
             if self.selection[node] == OPEN and w.mid[i] + w.rad[i] < 0:
                 x.rad[[i, self.at.tangential[i]] if self.at.tangential[i] >= 0 else i] = 0.0
-        return self._alone(x, self._displacements(x), numbers, least)
+        return self._alone(x, self._displacements(x), numbers, form)
 
-    def _alone(self, x: Ball, w: Ball, numbers: Weights, least: float) -> ClosedSolution | None:
+    def _alone(self, x: Ball, w: Ball, numbers: Weights, form: UniqueForm | None) -> ClosedSolution | None:
         """The solution that is known to lie in a ball, if Q is definite for every theta that it may have there."""
-        return self._solution(x, w) if self.serves(numbers, x, w, least) else None
+        served = form is not None and form.serves(numbers.distances(self.at, x, w))
+        return self._solution(x, w) if served else None
 
     def _displacements(self, x: Ball) -> Ball:
         """w of the free components."""
@@ -310,8 +312,8 @@ def lone_root(
             return None
         x, w = root.force[part.at.places], root.w[part.at.places]
         numbers = numbers.beside(x, part.at.tangential[numbers.normal])
-        least = part.least(numbers, _squares(part, strengths))
-        return root if part.serves(numbers, x, w, least) else None
+        form = numbers.form(part, _squares(part, strengths))
+        return root if form is not None and form.serves(numbers.distances(part.at, x, w)) else None
 
 
 def _components(system: EnclosedSystem, codes: Sequence[int], selection: Sequence[int]) -> Components:

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, dense_eigenvalue_bound, upper_norm
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
 from enumsol.trusted.status_rows import BACKWARD, FORWARD, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, slip_directions
+from enumsol.trusted.uniqueness_forms import Multipliers, UniqueForm
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -121,13 +122,29 @@ class Weights:
         apart = t - slope * n
         return float(apart.size / low * SAFE)
 
-    def moved(self, change: Floats) -> float:
-        """Upper bound of ||D'delta||, |delta| <= change."""
-        m, n = len(self.mu), self.normal
-        along = self.mu * change[:m]
-        along[n] += self.kappa * self.slope.size * change[m:]
-        across = np.abs(self.nu) * change[n] + self.kappa * change[m:]
-        return float(upper_norm(np.concatenate([along, across]) * SAFE + TINY) * SAFE)
+    def distances(self, at: Unknowns, x: Ball, w: Ball) -> Floats:
+        """How far theta is at most from one that serves a solution within balls, (m,); infinite where that is open."""
+        found, t = np.zeros(len(self.mu)), at.tangential
+        for k, n in enumerate(self.normal):
+            found[n] = self.off(k, x[n], x[t[n]], w[n], w[t[n]])
+        return found
+
+    def multipliers(self, at: Unknowns) -> Multipliers:
+        """D of all nodes."""
+        unit = np.ones((len(self.mu), 1))
+        turn, push, kappa = Ball.exact(0.0 * unit), 0.0 * unit, np.ones(len(self.mu))
+        turn[self.normal, 0], push[self.normal, 0], kappa[self.normal] = self.slope, self.nu, self.kappa
+        return Multipliers(at.tangential[:, None], self.mu, kappa, turn, Ball.exact(push), unit)
+
+    def form(self, part: Components, further: Ball | None = None) -> UniqueForm | None:
+        """Q of theory, (6.9), of some components; None where it is not proven definite.
+
+        ``further``: rows whose squares are added to the form.
+        """
+        off, lost = np.zeros(len(self.mu)), np.zeros(len(self.mu))
+        lost[self.normal] = self.tau
+        off[self.normal] = np.where(self.tau > 0, self.friction.size, 0.0)
+        return UniqueForm.of(part.R, self.multipliers(part.at), off, lost, further)
 
 
 def _bounds(w_n: Any, w_t: Any) -> tuple[float, float, float]:
@@ -158,45 +175,6 @@ class Components:
     at: Unknowns
     R: Ball
 
-    def form(self, numbers: Weights) -> Ball:
-        """D'R, of which (6.9) is the symmetric part."""
-        R, n = self.R, self.at.normal
-        form, t = R.copy(), self.at.tangential[n]
-        along = R[: len(self.at.nodes)] * Ball.exact(numbers.mu[:, None])
-        turned = (numbers.slope * Ball.exact(numbers.kappa))[:, None]
-        across = R[n] * Ball.exact(numbers.nu[:, None]) + R[t] * Ball.exact(numbers.kappa[:, None])
-        for rows, part in ((np.arange(len(self.at.nodes)), along), (n, along[n] - R[t] * turned), (t, across)):
-            form[rows] = part
-        return form
-
-    def least(self, numbers: Weights, further: Ball | None = None) -> float:
-        """Lower bound of the smallest eigenvalue of Q (theory, (6.9)), at most 0 where none positive is proven.
-
-        ``further``: rows whose squares are added to the form.
-        """
-        if not len(self.at.places):
-            return 1.0
-        used = np.flatnonzero(numbers.tau > 0)
-        normal, tau = numbers.normal[used], numbers.tau[used]
-        # weights at least kappa F / sqrt(tau), for any rounding
-        weight = numbers.kappa[used] * numbers.friction.size[used] / np.sqrt(tau) * SAFE + TINY
-        T = self.R[self.at.tangential[normal]] * Ball.exact(weight[:, None])
-        square = T.T @ T
-        Q = self.form(numbers) - Ball(0.5 * square.mid, 0.5 * square.rad)
-        if further is not None:
-            Q = Q + further.T @ further
-        Q.mid[normal, normal] -= 0.5 * tau
-        Q.rad[normal, normal] += UNIT * (np.abs(Q.mid[normal, normal]) + tau)
-        Q = Q.symmetric
-        return float((dense_eigenvalue_bound(Q.mid) - upper_norm(Q.rad)) / SAFE) if Q.finite else 0.0
-
-    def serves(self, numbers: Weights, x: Ball, w: Ball, least: float) -> bool:
-        """Whether Q is definite for every theta that a solution in a ball may have."""
-        n, t = numbers.normal, self.at.tangential[numbers.normal]
-        off = np.array([numbers.off(k, x[a], x[b], w[a], w[b]) for k, (a, b) in enumerate(zip(n, t, strict=True))])
-        # at each of them Q is not smaller than this
-        return bool(least > upper_norm(numbers.kappa * off * upper_norm(self.R[t].size, axis=1)) * SAFE)
-
     def point(self, force: Floats, numbers: Weights) -> Ball:
         """Forces in the cones, with the statuses of the selection, near the given ones."""
         mid = np.array([0.0 if self.selection[i] == OPEN else max(float(force[i]), 0.0) for i in self.at.nodes])
@@ -218,4 +196,4 @@ class Components:
             if t >= 0:
                 slips = {STICK: size[t], SLIP_PLUS: down[t], SLIP_MINUS: up[t]}
                 change[t] = numbers.beyond(t - len(self.at.nodes), gap[i], up[t], down[t]) if apart else slips[code]
-        return numbers.moved(change)
+        return numbers.multipliers(self.at).moved(change)

@@ -77,7 +77,7 @@ SHARED = {
     "trusted.space.leaf_equations": {"with_free_bounds"},
     "trusted.space.leaves": None,
     "trusted.space.resultants": None,
-    "trusted.space.space_reference": {"SpaceProduct", "SpaceReference"},
+    "trusted.space.space_reference": {"LeafReference"},
     "trusted.space.turning": {"turned_by"},
     "trusted.space.boxed_solution": {
         *("Box", "BoxedSolution", "BoxProblem", "apart_in_boxes", "is_inside", "solution_in_box")
@@ -89,10 +89,9 @@ SHARED = {
     "trusted.space.curve_events": None,
     "trusted.space.curve_parts": None,
     "trusted.space.curve_runs": {"CurveParts", "KnownCurve", "Run"},
-    "trusted.space.piece_forms": {"PieceWeights", "how_far_off"},
     "trusted.space.pieces": {"AlphaPiece", "lie_along"},
     "trusted.space.space_uniqueness": {
-        *("LooseSolution", "OnlySolution", "moderate_units"),
+        *("LooseSolution", "OnlySolution", "PieceWeights", "how_far_off", "moderate_units"),
         *("equations", "lone_root", "only_root", "only_solution_in_space"),
     },
     "proof.begun": None,

@@ -6,6 +6,7 @@ from itertools import product
 import numpy as np
 import pytest
 from complete import proven_roots
+from enumsol.trusted.root_forms import Body, Multipliers, RootForm
 from floating_oracle import Oracle, random_body
 from proof_tools import kinds_of
 
@@ -14,7 +15,6 @@ from enumsol.arithmetic.balls import Ball
 from enumsol.search.floating_solvers import FloatingSolvers
 from enumsol.search.reference_closer import proposed, rows_of
 from enumsol.trusted.reference import Reference
-from enumsol.trusted.root_forms import Body, Multipliers, RootForm
 from enumsol.trusted.status_rows import FORBIDDEN, refines, row_signs
 
 #: Bodies with several solutions, some of which have a definite form, and some with one.

@@ -17,10 +17,10 @@ from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.search.space.piece_certificates import ExaminedPiece, runs_over
 from enumsol.trusted.space import curve_runs
 from enumsol.trusted.space.curve_runs import KnownCurve, Run
-from enumsol.trusted.space.piece_forms import PieceWeights, how_far_off
 from enumsol.trusted.space.pieces import AlphaPiece
 from enumsol.trusted.space.sector_rows import CONTACT, OPEN, STICK, UNDECIDED
 from enumsol.trusted.space.solution_curve import AlphaProblem, CurveBox, SolutionCurve
+from enumsol.trusted.space.space_uniqueness import PieceWeights, how_far_off
 
 INTERVAL = Fraction(0), Fraction(1)
 #: Nodes and seeds: at some of the many a fold, two curves, or changes of status.

@@ -14,10 +14,9 @@ from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
 from enumsol.condensation.space_condensed import PieceSpace
 from enumsol.trusted.space.leaf_arcs import LeafArc, arc_of
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
-from enumsol.trusted.space.piece_forms import only_on_curve
 from enumsol.trusted.space.resultants import is_unbalanced_in_space, swept_floating_margin
 from enumsol.trusted.space.sector_rows import swept_margin
-from enumsol.trusted.space.space_uniqueness import is_complete
+from enumsol.trusted.space.space_uniqueness import is_complete, only_on_curve
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
-from enumsol.trusted.root_forms import Body, Multipliers, RootForm, less, plus, times
 from enumsol.trusted.space.leaves import SpaceRoot, settle
 from enumsol.trusted.space.sector_rows import (
     ALONG,
@@ -23,38 +22,26 @@ from enumsol.trusted.space.sector_rows import (
     RIGHT,
     SLIP,
     STICK,
+    Row,
     row_sign,
     sector_row_terms,
 )
-from enumsol.trusted.space.space_uniqueness import SpaceWeights, in_range, is_complete, weighted
+from enumsol.trusted.space.space_uniqueness import SpaceWeights, in_range, is_complete
+from enumsol.trusted.uniqueness_forms import Body, RootForm, RootReference
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.condensation.space_condensed import EnclosedSpace
     from enumsol.support.array_types import Codes, Floats
-    from enumsol.trusted.space.sector_rows import Row
-
-    #: Two tight rows, and a positive factor.
-    SpaceProduct = tuple[Row, Row, float]
 
 
 @dataclass(frozen=True)
-class SpaceReference:
-    """A strict root of a leaf, and its form.
-
-    Attributes
-    ----------
-    system : EnclosedSpace
-    leaf : final codes
-    root : SpaceRoot
-    form : RootForm
-    """
+class LeafReference(RootReference[Row]):
+    """The strict root of a leaf, and its form."""
 
     system: EnclosedSpace
-    leaf: Codes
     root: SpaceRoot
-    form: RootForm
 
     @classmethod
     def of(cls, system: EnclosedSpace, leaf: Codes, numbers: Floats, balance: float, share: float) -> Self | None:
@@ -77,49 +64,34 @@ class SpaceReference:
             root = settle(system, leaf)
             if not isinstance(root, SpaceRoot):
                 return None
-            multipliers = _multipliers(system, weights, root, np.array(leaf) != OPEN, share)
-            if multipliers is None:
-                return None
-            form = RootForm.of(Body(Ball(system.S, system.S_rad), system.rows.G), multipliers, balance)
-        return None if form is None else cls(system, tuple(leaf), root, form)
+            off, loaded = weights.distances(system, root.y, root.w), (root.y, np.array(leaf) != OPEN)
+            body = Body(Ball(system.S, system.S_rad), system.rows.G)
+            form = RootForm.of(body, weights.multipliers(system), off, loaded, balance, share)
+        return None if form is None else cls(system, tuple(leaf), form, root)
 
-    def is_only_root(
-        self, codes: Sequence[int], rows: Sequence[Row], products: Sequence[SpaceProduct], reach: Floats
-    ) -> bool:
-        """True if every root below an assignment, with |q| within reach, is this one.
-
-        Parameters
-        ----------
-        codes : (partial) status codes
-        rows : rows on displacements that are equations below the assignment and at the root
-        products : pairs of rows that are nonnegative below the assignment and not positive at the root, and a factor
-        reach : (r,) array, bounds of q, may be infinite
+    def allow(self, codes: Sequence[int], rows: Sequence[Row], tight: Sequence[Row]) -> bool:
+        """True if the first rows are equations, and the others nonnegative but not positive at the root.
 
         Raises
         ------
         ValueError
             A node has no such row.
         """
-        rows, tight = sorted(set(rows)), sorted({row for one, other, _ in products for row in (one, other)})
-        coefficients = self.rows(rows), self.rows(tight)
-        if not all(self.is_equation(codes, row) for row in rows) or not all(self.is_tight(codes, row) for row in tight):
-            return False
-        if not all(0 < factor < np.inf for *_, factor in products):
-            return False
-        numbered = [(tight.index(one), tight.index(other), factor) for one, other, factor in products]
-        return self.form.is_only_root(*coefficients, numbered, reach)
+        for row in (*rows, *tight):
+            sector_row_terms(row, self.system.tau, len(self.system.g))
+        return all(self.is_equation(codes, row) for row in rows) and all(self.is_tight(codes, row) for row in tight)
 
     def is_equation(self, codes: Sequence[int], row: Row) -> bool:
         """True if a row on displacements vanishes below an assignment and at the root."""
         node = row[1]
-        return row[0] in (GAP, SLIP) and row_sign(codes[node], row) == row_sign(self.leaf[node], row) == FREE
+        return row[0] in (GAP, SLIP) and row_sign(codes[node], row) == row_sign(self.selection[node], row) == FREE
 
     def is_tight(self, codes: Sequence[int], row: Row) -> bool:
         """True if a row on displacements is nonnegative below an assignment, and not positive at the root."""
         kind, node, _ = row
         if kind not in (GAP, ALONG, LEFT, RIGHT) or row_sign(codes[node], row) not in (NONNEGATIVE, FREE):
             return False
-        code = self.leaf[node]
+        code = self.selection[node]
         if code == STICK or (kind == GAP and code != OPEN):
             return True
         with np.errstate(all="ignore"):
@@ -127,7 +99,13 @@ class SpaceReference:
         return bool(found.high[0, 0] <= 0)
 
     def rows(self, rows: Sequence[Row]) -> Ball:
-        """Rows as coefficients of w; ValueError where a node has no such row."""
+        """Rows as coefficients of w.
+
+        Raises
+        ------
+        ValueError
+            A node has no such row.
+        """
         size, unit = len(self.system.g), self.system.row_unit
         found = Ball.exact(np.zeros((len(rows), size)))
         for k, row in enumerate(rows):
@@ -137,37 +115,3 @@ class SpaceReference:
                 found.rad[k, i - size] = 0.0 if row[0] in (GAP, SLIP, ALONG) else UNIT * abs(found.mid[k, i - size])
         found.rad[:] = np.where(found.rad > 0, found.rad * SAFE + TINY, 0.0)
         return found
-
-
-def _multipliers(
-    system: EnclosedSpace, weights: SpaceWeights, root: SpaceRoot, loaded: np.ndarray, share: float
-) -> Multipliers | None:
-    """None where it is not known which theta serves."""
-    turn, push, p, y = weights.turn(system), weights.push(system), len(system.tau), root.y
-    form = weighted(system, weights.mu, weights.kappa, turn, push)
-    off = np.array([weights.off_at(system, i, y, root.w) for i in range(p)])
-    lost, cost, price = np.zeros(len(system.g)), np.zeros(len(system.g)), Ball.exact(weights.mu) * y[:p]
-    for k in range(2):
-        has = system.tau[:, k] >= 0
-        t = system.tau[has, k]
-        lost[t] = np.where(off[has] > 0, weights.kappa[has] * off[has] / system.unit[t] * SAFE + TINY, 0.0)
-        pushed = Ball(push[has, k], np.where(push[has, k] == 0, 0.0, TINY)) * y[t]
-        price[has] = price[has] + pushed
-    cost[:p] = np.where(loaded, np.maximum(price.low / SAFE, 0.0), 0.0)
-    if not np.all(np.isfinite(lost)):
-        return None
-    return Multipliers(form, _cross(system, weights, turn, push, share), lost, cost)
-
-
-def _cross(system: EnclosedSpace, weights: SpaceWeights, turn: Ball, push: Floats, share: float) -> Ball:
-    """C = -G (D - c), without radius where nothing is left of it."""
-    G, p = system.rows.G, len(system.tau)
-    C = Ball.exact(np.zeros(G.shape))
-    C[:, :p] = times(G[:, :p], less(share, weights.mu))
-    for k in range(2):
-        has = np.flatnonzero(system.tau[:, k] >= 0)
-        t, kappa = system.tau[has, k], weights.kappa[has]
-        C[:, has] = plus(C[:, has], times(times(G[:, t], turn[has, k]), Ball.exact(kappa)))
-        pushed = Ball(-push[has, k], np.where(push[has, k] == 0, 0.0, TINY))
-        C[:, t] = plus(times(G[:, has], pushed), times(G[:, t], less(share, kappa)))
-    return C
