@@ -9,7 +9,7 @@ import numpy as np
 from enumsol.arithmetic.balls import SAFE
 from enumsol.arithmetic.rationals import to_fraction
 from enumsol.proof.reading import same
-from enumsol.trusted.same_roots import told_apart
+from enumsol.trusted.joint_roots import told_apart
 from enumsol.trusted.status_rows import BACKWARD, CONTACT, FORWARD, OPEN
 from enumsol.trusted.uniqueness import ClosedSolution, closed_solution, only_solution, same_solution
 
@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.proof.records import Closed
     from enumsol.support.array_types import Codes, Floats
-    from enumsol.trusted.joint_roots import JointRoot
-    from enumsol.trusted.same_roots import Apart
+    from enumsol.trusted.joint_roots import Apart, JointRoot
 
     #: The core of a solution, and per node the codes that may hold there.
     Known = tuple[Codes, Sequence[frozenset[int]]]

@@ -22,9 +22,8 @@ from enumsol.proof.declared_forms import plane_form
 from enumsol.proof.proof_file import fraction_text
 from enumsol.proof.reading import RefusedError, data_of, friction_at, rational_from, same, units_from
 from enumsol.trusted.at_alpha import VerifiedSelection, holds_no_root, solve_selection
-from enumsol.trusted.confinement import without_bound
 from enumsol.trusted.exclusion import Leaves, Terms, exclusion_margins
-from enumsol.trusted.floating_bounds import is_unbalanced
+from enumsol.trusted.floating_bounds import is_unbalanced, without_bound
 from enumsol.trusted.joint_roots import JointRoot, joint_root
 from enumsol.trusted.positions import certain_statuses
 from enumsol.trusted.status_rows import ROW_KINDS, is_covering, row_signs

@@ -27,12 +27,12 @@ from enumsol.proof.records import (
     Tree,
     Unbalanced,
 )
+from enumsol.trusted.quadratic_forms import SlipForm
 from enumsol.trusted.space.boxed_solution import Box, BoxedSolution, apart_in_boxes, is_inside, solution_in_box
 from enumsol.trusted.space.leaves import Open, SpaceRoot, distinct_roots, settle
 from enumsol.trusted.space.product_forms import Ellipsoid
 from enumsol.trusted.space.resultants import floating_margin, is_unbalanced_in_space, unbounded
 from enumsol.trusted.space.sector_rows import OPEN, STICK, UNDECIDED, is_sector_covering, sector_margin
-from enumsol.trusted.space.slip_forms import SlipForm
 from enumsol.trusted.space.space_uniqueness import LooseSolution, lone_root, only_root, only_solution_in_space
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from enumsol.checker.walk import Test
     from enumsol.proof.records import Record
     from enumsol.support.array_types import Codes, Floats
-    from enumsol.trusted.space.space_reference import LeafReference
+    from enumsol.trusted.space.space_uniqueness import LeafReference
 
 _OPEN = "what it holds is not proven"
 _NO_FORM = "no form that is convex was declared over it"

@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.condensation.space_condensed import EnclosedSpace
     from enumsol.proof.records import DeclaredForm
+    from enumsol.trusted.quadratic_forms import SlipForm
     from enumsol.trusted.space.product_forms import Ellipsoid
-    from enumsol.trusted.space.slip_forms import SlipForm
-    from enumsol.trusted.space.space_reference import LeafReference
+    from enumsol.trusted.space.space_uniqueness import LeafReference
 
 
 def plane_form(system: EnclosedSystem, said: DeclaredForm) -> EnclosedForm | Reference | None:
@@ -35,9 +35,9 @@ def space_form(system: EnclosedSpace, said: DeclaredForm) -> SlipForm | Ellipsoi
     ValueError
         A multiplier is not allowed.
     """
+    from enumsol.trusted.quadratic_forms import SlipForm
     from enumsol.trusted.space.product_forms import Ellipsoid
-    from enumsol.trusted.space.slip_forms import SlipForm
-    from enumsol.trusted.space.space_reference import LeafReference
+    from enumsol.trusted.space.space_uniqueness import LeafReference
 
     if not system.held:
         return LeafReference.of(system, said.codes, said.numbers, *said.more.tolist())

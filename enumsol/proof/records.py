@@ -205,8 +205,8 @@ class DeclaredForm(Record):
     codes : of the assignment for which it is made, or of the leaf that holds the root
     numbers : array
         For a body that is held, in 2D the four rows of its multipliers one after the other; in 3D those of
-        ``trusted.space.slip_forms.SlipForm`` over the whole tree, else those of ``product_forms.Ellipsoid``. For
-        other bodies those of ``trusted.reference.Reference`` or ``trusted.space.space_reference.LeafReference``.
+        ``trusted.quadratic_forms.SlipForm`` over the whole tree, else those of ``product_forms.Ellipsoid``. For
+        other bodies those of ``trusted.reference.Reference`` or ``trusted.space.space_uniqueness.LeafReference``.
     more : array
         In 2D the weight of the equations; of an ellipsoid a point near its centre; of a root balance and share.
     enclosure : EnclosureRecord or None

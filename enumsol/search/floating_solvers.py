@@ -24,9 +24,8 @@ from enumsol.search.solvers import Solvers
 from enumsol.search.splitting import PlaneSplitting
 from enumsol.selections.solution import SelectionSolution
 from enumsol.trusted.at_alpha import holds_no_root, solve_selection
-from enumsol.trusted.confinement import motion_against, without_bound
 from enumsol.trusted.exclusion import Terms, exclusion_margin
-from enumsol.trusted.floating_bounds import is_unbalanced
+from enumsol.trusted.floating_bounds import is_unbalanced, motion_against, without_bound
 from enumsol.trusted.joint_roots import JointRoot, joint_root
 from enumsol.trusted.reference import Reference
 from enumsol.trusted.selection import PENETRATION, SLIP_BACKWARD, SLIP_FORWARD

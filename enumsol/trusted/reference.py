@@ -11,8 +11,8 @@ from enumsol.arithmetic.balls import Ball
 from enumsol.trusted.at_alpha import VerifiedSelection, solve_selection
 from enumsol.trusted.selection import PENETRATION, SLIP_BACKWARD, SLIP_FORWARD, Unknowns
 from enumsol.trusted.status_rows import FREE, NONNEGATIVE, OPEN, final_codes, refines, row_signs
-from enumsol.trusted.uniqueness_forms import Body, RootForm, RootReference
-from enumsol.trusted.uniqueness_weights import Components, Weights
+from enumsol.trusted.uniqueness import Components, Weights
+from enumsol.trusted.uniqueness_forms import RootForm, RootReference
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -61,15 +61,15 @@ class Reference(RootReference[int]):
             if root is None or not root.is_root:
                 return None
             at = Unknowns(system.p, np.arange(system.p), friction, np.zeros(system.p, dtype=np.intp))
-            body = Body(Ball(system.S, system.S_rad)[np.ix_(at.places, at.places)], system.rows.G[:, at.places])
-            part = Components(system, tuple(selection), at, body.S)
+            S, G = Ball(system.S, system.S_rad)[np.ix_(at.places, at.places)], system.rows.G[:, at.places]
+            part = Components(system, tuple(selection), at, S)
             numbers = Weights.of(part, np.concatenate([weights, np.zeros(len(at.normal))]))
             if numbers is None:
                 return None
             x, w = root.force[at.places], root.w[at.places]
             numbers = numbers.beside(x, at.tangential[at.normal])
             loaded = x, np.array(selection) != OPEN
-            form = RootForm.of(body, numbers.multipliers(at), numbers.distances(at, x, w), loaded, balance, share)
+            form = RootForm.of(S, G, numbers.multipliers(at), numbers.distances(at, x, w), loaded, balance, share)
             return None if form is None else cls(system, tuple(selection), form, root, at)
 
     def lies_below(self, codes: Sequence[int]) -> bool:

@@ -174,26 +174,14 @@ def _smallest(S: Ball, numbers: Multipliers, off: Floats, lost: Floats, held: Ba
 
 
 @dataclass(frozen=True)
-class Body:
-    """Compliance and rigid rows for the changes d of some components of lambda: G d = 0, w - w* = G'e - S d.
-
-    Attributes
-    ----------
-    S : Ball (m, m)
-    G : Ball (r, m)
-    """
-
-    S: Ball
-    G: Ball
-
-
-@dataclass(frozen=True)
 class RootForm:
     """The form of a root in (d, e): the changes of lambda and of q to another root.
 
     Attributes
     ----------
-    body : Body
+    S : Ball (m, m)
+    G : Ball (r, m)
+        Compliance and rigid rows: G d = 0, w - w* = G'e - S d.
     least, tilt : float
         The form is at least ``least`` |d|^2 + (m - tilt) |e|^2 where the small matrix is at least m.
     table : Ball (m + r, m + r)
@@ -204,7 +192,8 @@ class RootForm:
         What the square root of -w_n d_n costs: mu lambda*_n + nu lambda*_t from below, of loaded nodes; 0 elsewhere.
     """
 
-    body: Body
+    S: Ball
+    G: Ball
     least: float
     tilt: float
     table: Ball
@@ -213,13 +202,20 @@ class RootForm:
 
     @classmethod
     def of(
-        cls, body: Body, numbers: Multipliers, off: Floats, loaded: tuple[Ball, Mask], balance: float, share: float
+        cls,
+        S: Ball,
+        G: Ball,
+        numbers: Multipliers,
+        off: Floats,
+        loaded: tuple[Ball, Mask],
+        balance: float,
+        share: float,
     ) -> Self | None:
         """None where the form plus ``balance`` |G d|^2 is not proven definite in d.
 
         Parameters
         ----------
-        body : Body
+        S, G : Balls of shapes (m, m) and (r, m)
         numbers : Multipliers
         off : (p,) array
             Distance of theta from one that serves the root.
@@ -228,28 +224,28 @@ class RootForm:
         share : c of theory, (14.14)
         """
         force, closed = loaded
-        lost, cost = np.zeros(len(body.S.mid)), np.zeros(len(body.S.mid))
+        lost, cost = np.zeros(len(S.mid)), np.zeros(len(S.mid))
         for k, places in enumerate(numbers.places.T):
             has = np.flatnonzero((places >= 0) & (off > 0))
             lost[places[has]] = numbers.kappa[has] * off[has] / numbers.unit[has, k] * SAFE + TINY
         if not np.all(np.isfinite(lost)):
             return None
         cost[: len(off)] = np.where(closed, np.maximum(numbers.price(force).low / SAFE, 0.0), 0.0)
-        weighted = body.G * Ball.exact(np.array(np.sqrt(balance)))
-        Q = (numbers.form(body.S) + weighted.T @ weighted).symmetric
+        weighted = G * Ball.exact(np.array(np.sqrt(balance)))
+        Q = (numbers.form(S) + weighted.T @ weighted).symmetric
         smallest = _least(Q)
         if not smallest > 0:
             return None
         # m |d|^2 is left out of what is factorized
-        m, C = 0.5 * smallest, numbers.cross(body.G, share)
-        table = _table(Ball.joined(body.S, C), Q - Ball.exact(m * np.eye(len(Q.mid))), m / SAFE)
-        along, turned = (float(upper_norm(lost * _sizes(rows))) for rows in (body.S, body.G.T))
+        m, C = 0.5 * smallest, numbers.cross(G, share)
+        table = _table(Ball.joined(S, C), Q - Ball.exact(m * np.eye(len(Q.mid))), m / SAFE)
+        along, turned = (float(upper_norm(lost * _sizes(rows))) for rows in (S, G.T))
         if table is None or not along <= 0.25 * m / SAFE:
             return None
         # products may underflow
-        tilted = np.any((lost > 0) & (_sizes(body.G.T) > 0))
+        tilted = np.any((lost > 0) & (_sizes(G.T) > 0))
         tilt = turned * turned / m * SAFE * SAFE + TINY if tilted else 0.0
-        return cls(body, 0.5 * m / SAFE, tilt, table, ~_used(C), cost)
+        return cls(S, G, 0.5 * m / SAFE, tilt, table, ~_used(C), cost)
 
     def is_only_root(self, equations: Ball, tight: Ball, products: Sequence[Product], reach: Floats) -> bool:
         """True if no other root has its changes of w in these rows, and |q| within reach.
@@ -265,7 +261,7 @@ class RootForm:
         """
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             r, M = len(self.idle), self.small_matrix(equations, tight, products)
-            moved = ~_zero(Ball.joined(equations, tight)) @ ~_zero(self.body.G).T
+            moved = ~_zero(Ball.joined(equations, tight)) @ ~_zero(self.G).T
             idle = self.idle & ~np.any(moved, axis=0)
             used = np.flatnonzero(np.append(~idle, np.ones(len(M.mid) - r, dtype=bool)))
             lacking = _lacks(M[np.ix_(used, used)])
@@ -290,7 +286,7 @@ class RootForm:
             K = rows @ self.table[:m, :m] @ rows.T
             # u = -rows S
             crossed = rows @ self.table[:m, m:] * Ball.exact(np.array(-0.5))
-            T = Ball.beside(crossed - rows @ self.body.G.T, Ball.exact(np.eye(len(rows.mid))[:, k:]))
+            T = Ball.beside(crossed - rows @ self.G.T, Ball.exact(np.eye(len(rows.mid))[:, k:]))
             # any Y is a choice; with what is not finite M proves nothing
             inverse = np.linalg.pinv(np.where(np.isfinite(K.mid), K.mid, 0.0), hermitian=True, rcond=_LACKING)
             Y = Ball.exact(inverse @ T.mid)
@@ -302,14 +298,14 @@ class RootForm:
         """True if gaps of loaded nodes cost more than the form lacks (theory, (14.17))."""
         loaded = np.flatnonzero(self.cost > 0)
         rows = Ball.joined(Ball.exact(np.diag(self.cost)[loaded]), equations)
-        moved = rows @ self.body.G.T
+        moved = rows @ self.G.T
         square = _least((moved.T @ moved).symmetric)
         if not square > 0:
             return False
         if lacking == 0:
             return True
         steep = float(np.sqrt(square)) / SAFE
-        pushed = float(upper_norm(_sizes(rows @ self.body.S)))
+        pushed = float(upper_norm(_sizes(rows @ self.S)))
         most = float(upper_norm(2.0 * reach * SAFE))
         within = 2.0 * lacking * most * SAFE < steep
         return bool(within and lacking * (2.0 * pushed / steep) ** 2 * SAFE * SAFE < self.least)

@@ -25,7 +25,7 @@ def inside(room, *modules):
 CHECKERS = inside("checker", "verify", "plane_checker", "graph_checker", "history_checker", "space_graph")
 IN_SPACE = {
     *("enumsol.checker.space_checker", "enumsol.condensation.space_condensed", "enumsol.model.sectors"),
-    *inside("trusted.space", "resultants", "sector_rows", "slip_forms", "leaves", "boxed_solution"),
+    *inside("trusted.space", "resultants", "sector_rows", "leaves", "boxed_solution"),
     *inside("trusted.space", "product_forms", "natural_map", "krawczyk", "space_uniqueness", "turning"),
     *inside("trusted.space", "leaf_conditions", "leaf_equations"),
 }
@@ -53,9 +53,8 @@ SHARED = {
     "trusted.arcs.only_branch": {"only_roots"},
     "trusted.arcs.selection_balls": None,
     "trusted.exclusion": {"Terms", "exclusion_margin"},
-    "trusted.floating_bounds": {"is_unbalanced"},
     "trusted.joint_roots": {"JointRoot", "joint_root"},
-    "trusted.confinement": {"motion_against", "motion_beside", "without_bound"},
+    "trusted.floating_bounds": {"is_unbalanced", "motion_against", "motion_beside", "without_bound"},
     "trusted.arcs.many_digits": {"affordable"},
     "trusted.arcs.over_parts": None,
     "trusted.over_interval": {"EnclosedPiece", "PieceNumbers", "as_computed"},
@@ -69,15 +68,12 @@ SHARED = {
     },
     "trusted.at_alpha": {"VerifiedSelection", "holds_no_root", "solve_selection"},
     "trusted.precise_at_alpha": {"PreciseAtAlpha"},
-    "trusted.quadratic_forms": {"EnclosedForm", "Equations"},
+    "trusted.quadratic_forms": {"EnclosedForm", "Equations", "SlipForm"},
     "trusted.status_rows": None,
     "trusted.space.sector_rows": None,
-    "trusted.space.slip_forms": {"SlipForm"},
-    "trusted.space.leaf_arcs": {"LeafArc"},
     "trusted.space.leaf_equations": {"with_free_bounds"},
     "trusted.space.leaves": None,
     "trusted.space.resultants": None,
-    "trusted.space.space_reference": {"LeafReference"},
     "trusted.space.turning": {"turned_by"},
     "trusted.space.boxed_solution": {
         *("Box", "BoxedSolution", "BoxProblem", "apart_in_boxes", "is_inside", "solution_in_box")
@@ -89,9 +85,9 @@ SHARED = {
     "trusted.space.curve_events": None,
     "trusted.space.curve_parts": None,
     "trusted.space.curve_runs": {"CurveParts", "KnownCurve", "Run"},
-    "trusted.space.pieces": {"AlphaPiece", "lie_along"},
+    "trusted.space.pieces": {"AlphaPiece", "LeafArc", "lie_along"},
     "trusted.space.space_uniqueness": {
-        *("LooseSolution", "OnlySolution", "PieceWeights", "how_far_off", "moderate_units"),
+        *("LeafReference", "LooseSolution", "OnlySolution", "PieceWeights", "how_far_off", "moderate_units"),
         *("equations", "lone_root", "only_root", "only_solution_in_space"),
     },
     "proof.begun": None,

@@ -28,9 +28,8 @@ if TYPE_CHECKING:
     from enumsol.search.space.piece_certificates import ExaminedPiece
     from enumsol.support.array_types import Codes, Floats, Mask
     from enumsol.trusted.space.curve_runs import CurveParts, KnownCurve
-    from enumsol.trusted.space.leaf_arcs import LeafArc
     from enumsol.trusted.space.leaves import Open, SpaceRoot
-    from enumsol.trusted.space.pieces import AlphaPiece
+    from enumsol.trusted.space.pieces import AlphaPiece, LeafArc
     from enumsol.trusted.space.solution_curve import AlphaProblem
 
 #: Around the directions of known curves sectors get more room by this share of what these turn by, and are no narrower

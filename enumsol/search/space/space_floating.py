@@ -21,10 +21,10 @@ from enumsol.search.floating_solvers import WEAK, weakly_held
 from enumsol.search.space.space_references import reference_numbers, space_closer
 from enumsol.search.space.space_search import SpaceCertifier
 from enumsol.search.space.space_setup import SpaceSolvers
-from enumsol.trusted.confinement import motion_beside
+from enumsol.trusted.floating_bounds import motion_beside
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
 from enumsol.trusted.space.resultants import floating_margin, is_unbalanced_in_space, resultants, unbounded
-from enumsol.trusted.space.space_reference import LeafReference
+from enumsol.trusted.space.space_uniqueness import LeafReference
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.space.leaves import SpaceRoot
     from enumsol.trusted.space.sector_rows import Row
-    from enumsol.trusted.space.space_reference import LeafReference
+    from enumsol.trusted.space.space_uniqueness import LeafReference
 
 #: Eigenvalues of the small matrix, relative to its largest one, that count as none; what of rows counts as none.
 _NONE, _NOTHING = 1e-9, 1e-8

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.space_condensed import EnclosedSpace
     from enumsol.support.array_types import Floats, Indices
-    from enumsol.trusted.space.slip_forms import SlipForm
+    from enumsol.trusted.quadratic_forms import SlipForm
 
 
 OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS, CONTACT, UNDECIDED = range(7)
