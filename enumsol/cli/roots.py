@@ -43,15 +43,6 @@ StopAfter = Annotated[int | None, options.count("Stop at N roots; 2 decides whet
 Unique = Annotated[
     bool, typer.Option("--unique", help="Only report whether there is one solution; stop at a second one.")
 ]
-MirrorAxis = Annotated[
-    Literal["x", "y", "z"] | None,
-    typer.Option(
-        "--mirror",
-        help="Direction across which body, supports and load are symmetric: report which roots are mirror images.",
-        rich_help_panel=options.OUTPUT,
-        show_default=False,
-    ),
-]
 Jobs = Annotated[int, options.count("Number of processes that search (tree).")]
 ProofFile = Annotated[str | None, options.file("--proof", "Write the proof (verified).")]
 Resume = Annotated[
@@ -71,7 +62,6 @@ class Search:
     ----------
     *_file : names of the files that results go to; None where there is none
     unique : whether the only question is if there is one solution
-    mirror : the direction across which roots are paired
     """
 
     arithmetic: HowExact = "verified"
@@ -81,7 +71,6 @@ class Search:
     max_nodes: options.MaxNodes = None
     time_limit: options.TimeLimit = None
     jobs: Jobs = 1
-    mirror: MirrorAxis = None
     proof_file: ProofFile = None
     resume: Resume = False
     json_file: options.JsonFile = None
@@ -128,11 +117,8 @@ class Search:
         """
         output.check_places(self.vtu_file, problem, name)
         output.check_scripts(self.report_file, problem)
-        check_mirror(problem, alpha, self.mirror)
         units = common.units_of(name, self.units)
         found, ended = common.so_far(lambda: self._found(problem, alpha))
-        if self.mirror is not None and len(found):
-            found = found.mirrored(self.mirror)
         output.deliver(
             (self.vtu_file, lambda path: _write_vtu(problem, found, path)),
             (self.report_file, lambda path: self._write_page(found, path, name, source, scene)),
@@ -189,22 +175,6 @@ def roots(problem: options.ProblemArgument, alpha: AtAlpha, *, quiet: options.Qu
     search.check()
     value = common.parse_alpha(alpha)
     search.answer(problem, common.load_problem(problem), value, problem)
-
-
-def check_mirror(problem: AnyProblem, alpha: Alpha, mirror: str | None) -> None:
-    """Refuse a mirror under which the problem changes, before the search.
-
-    Raises
-    ------
-    InvalidArgumentError
-        Contact nodes or data have no mirror images.
-    """
-    if mirror is None:
-        return
-    from enumsol.model.mirrors import Mirror  # numpy: not for --help
-    from enumsol.roots.mirrored import SYMMETRIC, problem_asymmetry
-
-    problem_asymmetry(problem, alpha, Mirror.across(problem, mirror), SYMMETRIC)
 
 
 def _write_vtu(problem: AnyProblem, found: RootSet, path: str) -> None:

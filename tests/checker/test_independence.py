@@ -47,9 +47,8 @@ SHARED = {
     "condensation.enclosure": {
         *("CondensedEnclosure", "EnclosedSystem", "NotEnclosedError", "RigidRows", "enclosure_of", "moved_by_modes")
     },
-    "condensation.free_displacements": {"solved"},
     "condensation.space_condensed": {"AlphaSpace", "EnclosedSpace", "PieceSpace", "SpaceSystem"},
-    "condensation.unloaded": {"CondensedData", "never_loaded", "vanishing_alpha"},
+    "condensation.unloaded": {"never_loaded", "solved", "vanishing_alpha"},
     "trusted.arcs.only_branch": {"only_roots"},
     "trusted.arcs.selection_balls": None,
     "trusted.exclusion": {"Terms", "exclusion_margin"},
@@ -68,7 +67,7 @@ SHARED = {
     },
     "trusted.at_alpha": {"VerifiedSelection", "holds_no_root", "solve_selection"},
     "trusted.precise_at_alpha": {"PreciseAtAlpha"},
-    "trusted.quadratic_forms": {"EnclosedForm", "Equations", "SlipForm"},
+    "trusted.quadratic_forms": {"EnclosedForm", "Equations"},
     "trusted.status_rows": None,
     "trusted.space.sector_rows": None,
     "trusted.space.leaf_equations": {"with_free_bounds"},
@@ -95,7 +94,6 @@ SHARED = {
     "proof.reading": {"fits", "rational_text"},
     "proof.records": None,
     "proof.curve_records": None,
-    "proof.declared_forms": None,
     "proof.leaves": None,
     "proof.writer": None,
     "model.sectors": None,

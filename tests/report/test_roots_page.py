@@ -34,7 +34,7 @@ def found():
         two, *(np.kron(np.eye(2), part.toarray()) for part in rows[1:4]), np.tile(node.f, 2), friction=5.0, **places
     )
     return {
-        "wedge": enumerate_roots(wedge, 3).mirrored("x"),
+        "wedge": enumerate_roots(wedge, 3),
         "turned": enumerate_roots(gallery.get("wedge3d-2-3").build(), 1),
         "many": enumerate_roots(gallery.chain(2), 5),
         "plane": enumerate_roots(gallery.get("wedge-8-5").build(), 3),
@@ -79,7 +79,7 @@ def test_bodies_and_forces_are_those_of_the_roots(found, pages, name):
         expected = shape.contact_forces(problem, root.lambda_n, root.lambda_t)
         np.testing.assert_allclose(forces, expected, rtol=1e-5, atol=1e-6 * np.max(np.abs(expected), initial=0))
         if d == 3:
-            rows, ways = slip_directions(problem, root)
+            rows, ways = slip_directions(problem, root.u_t, root.statuses)
             slip = np.reshape(record["w"], (3, -1))[1:, rows]
             drawn = np.einsum("ki,ikc->ic", slip, np.array(data["body"]["tangents"])[rows])
             drawn /= np.linalg.norm(drawn, axis=1, keepdims=True)
@@ -110,8 +110,6 @@ def test_words_and_tables(found, pages):
     assert "The problem has 9 isolated solutions at this alpha, and no other." in reader.text
     assert reader.text.count("complete: yes (proven)") == 2
     assert "Sum of the indices: +1." in reader.text
-    assert "0 pairs, 9 symmetric roots" in reader.text
-    assert reader.text.count("its own mirror image") == 9
     assert found["wedge"][0].problem.fingerprint in reader.text
     assert sum("data-root" in attributes for tag, attributes in reader.tags if tag == "tr") == 9
     assert "Undecided" not in reader.text

@@ -15,8 +15,8 @@ import numpy as np
 from enumsol.branches.space.chains import chain_through
 from enumsol.condensation.enclosure import enclosure_of
 from enumsol.proof.curve_records import CurveBoxRecord
+from enumsol.proof.leaves import UndecidedRecord
 from enumsol.proof.proof_file import PROOF_VERSION, Proof
-from enumsol.proof.records import UndecidedRecord
 from enumsol.proof.writer import ProofWriter, unit_exponents
 from enumsol.roots.enumerate import enumerate_roots
 from enumsol.search.space.known_curves import Curves, joined

@@ -13,7 +13,7 @@ import numpy as np
 
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of, parts_around, places, span, width_of
 from enumsol.proof.curve_records import OnCurve, ThroughCurveBox
-from enumsol.proof.records import NoRoot
+from enumsol.proof.leaves import NoRoot
 from enumsol.search.space.curve_proposals import curve_point, unplaced
 from enumsol.search.space.piece_multipliers import unbalanced
 from enumsol.search.space.space_fathoming import without_sectors

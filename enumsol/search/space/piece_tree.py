@@ -15,7 +15,8 @@ from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of, width_level
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.proof.curve_records import CutPiece, OnCurve
-from enumsol.proof.records import Branching, Excluded
+from enumsol.proof.leaves import Excluded
+from enumsol.proof.records import Branching
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.outcome import StopReason
 from enumsol.search.space.known_curves import Curves, middle_of

@@ -12,7 +12,6 @@ import numpy as np
 from enumsol.condensation.enclosure import NotEnclosedError, enclosure_of
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.statuses import UNDECIDED
-from enumsol.proof.declared_forms import space_form
 from enumsol.proof.records import Limits, Tree
 from enumsol.proof.writer import Recorder
 from enumsol.relaxation.convex_forms import SlipFormAscent
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
 
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.support.array_types import Alpha, Codes, Floats
-    from enumsol.trusted.quadratic_forms import SlipForm
+    from enumsol.trusted.space.sector_rows import SlipForm
 
 #: Nodes examined with the energy before a form that knows where the body slides is tried (theory, section 12.2).
 NODES = 256
@@ -139,4 +138,4 @@ class SpaceSolvers(SearchSetup):
         system, tree = self.system, Tree.SPACE if self.problem.held else Tree.FLOATING_SPACE
         codes, modes = (UNDECIDED,) * system.p, self.problem.modes.r
         limits = Limits(codes, tree, components=len(system.g), modes=modes)
-        return Reader(limits, partial(space_form, self.enclosed))
+        return Reader(limits, self.enclosed)
