@@ -13,7 +13,7 @@ from enumsol.relaxation.imposed_rows import with_implied
 from enumsol.relaxation.interval_relaxation import IntervalRowKind, IntervalSystem, interval_rows
 from enumsol.search.certifiers.protocol import FORM_ERRORS, energy_margin
 from enumsol.search.certifiers.rational_certifier import accepted, energy_bound_positive
-from enumsol.search.interval.subintervals import IntervalCertifier, Piece
+from enumsol.search.subintervals import IntervalCertifier, Piece
 from enumsol.selections.rational_selections import ExactSelections
 from enumsol.trusted.exclusion import exclusion_margin
 from enumsol.trusted.over_interval import EnclosedPiece, as_computed
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     from enumsol.model.problem import ContactProblem
     from enumsol.search.certifiers.protocol import Margin
-    from enumsol.search.interval.interval_tree import EmptyLeaf
+    from enumsol.search.interval_tree import EmptyLeaf
     from enumsol.support.array_types import Floats
 
 #: Bounds must be this large [energy unit of the piece], so that a checker that sums in another order agrees.

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from enumsol.trusted.space.solution_curve import AlphaProblem, SolutionCurve
 
 #: What a writer of proofs asks for.
-_ERRORS = 2.0
+ERRORS = 2.0
 #: How much more room the radii have than the curve seems to need, in the hope that this suffices for what the room
 #: itself adds; the least radius relative to the largest; and steps of Newton's method.
 _ROOMS, _LEAST, _STEPS = (1.2, 1.3, 1.5, 1.5, 1.5, 1.5, 1.5), 1e-3, 8
@@ -182,16 +182,16 @@ def _contraction(near: NaturalMap, *, roomy: bool) -> Contraction | None:
         if shares is None:
             return None
         side = near.beside(step, shares)
-        step, found = near.tried(radius, _ERRORS, side)
+        step, found = near.tried(radius, ERRORS, side)
         if found is not None and not roomy and np.any(side):
             # a checker begins without a side, from where another treatment of a corner may be come to
-            found = near.mapped(radius, _ERRORS)
+            found = near.mapped(radius, ERRORS)
         if found is not None:
             break
     if found is None or straight is None or not roomy:
         return found
     # parts of the curve are to have room beside it
-    larger = (near.mapped(factor * found.radius, _ERRORS) for factor in _factors(straight, found))
+    larger = (near.mapped(factor * found.radius, ERRORS) for factor in _factors(straight, found))
     return next((one for one in larger if one is not None), None)
 
 

@@ -15,6 +15,7 @@ import scipy.sparse
 
 from enumsol.model.sectors import DEEPEST, SECTORS, cut, level_of, width_of
 from enumsol.model.statuses import CONTACT, UNDECIDED
+from enumsol.search.space.curve_proposals import ERRORS
 from enumsol.support.conic import conic_answer
 from enumsol.support.deadlines import look, remaining
 from enumsol.trusted.space.boxed_solution import Box, BoxedSolution, BoxProblem, solution_in_box
@@ -27,8 +28,6 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Codes, Floats
 
 
-#: What a writer of proofs asks for (see ``Ellipsoid.of``).
-_ERRORS = 2.0
 #: The radius of the ellipsoid that a program is scaled for should be within this of the one that it finds.
 _SCALED, _RESCALINGS = 30.0, 2
 #: Rank of the forms up to which a program is begun: beyond, its preparation alone takes more than a second, in which
@@ -131,12 +130,12 @@ class ProductSearch:
     def _boxed(self, ellipsoid: Ellipsoid) -> BoxedSolution | None:
         """The one solution in a box around an ellipsoid, if that is proven."""
         for known in self._boxes:
-            if ellipsoid.is_in(known.box, _ERRORS):
+            if ellipsoid.is_in(known.box, ERRORS):
                 return known
         for rho in self._rho:
             box = _box(ellipsoid, rho)
-            found = None if box is None else solution_in_box(self._system, box, _ERRORS)
-            if found is not None and ellipsoid.is_in(found.box, _ERRORS):
+            found = None if box is None else solution_in_box(self._system, box, ERRORS)
+            if found is not None and ellipsoid.is_in(found.box, ERRORS):
                 self._boxes.append(found)
                 return found
         return None
@@ -215,7 +214,7 @@ class ProductSearch:
                 break
             size *= float(root)
         centre = at + T @ u
-        ellipsoid = Ellipsoid.of(self._system, codes, centre, z, _ERRORS)
+        ellipsoid = Ellipsoid.of(self._system, codes, centre, z, ERRORS)
         if ellipsoid is None:
             return None
         self._near = centre
