@@ -70,7 +70,7 @@ class SpaceClosing(Protocol):
         normal : (p,) array, lambda_n near the solution
         """
 
-    def alone(self, codes: Codes, numbers: Floats, leaf: Codes) -> list[Any] | None:
+    def alone_in(self, codes: Codes, numbers: Floats, leaf: Codes) -> list[Any] | None:
         """The root of a leaf, as a list, if no other solution has the statuses of an assignment; None if not proven."""
 
     def fathom(self, codes: Codes, tree: Sequence[Branched | Missed | Enclosed]) -> list[Any]:
@@ -155,7 +155,7 @@ class SpaceCloser(TreeCloser):
             held = equations(self._certifier.enclosed, statuses, _WEIGHT).mid
             numbers = point.numbers(self._enough, better=False, held=held)
             if numbers is not None:
-                found = self._certifier.alone(statuses, numbers, point.codes)
+                found = self._certifier.alone_in(statuses, numbers, point.codes)
         if found is None:
             self._tried.add(statuses)
         return found
