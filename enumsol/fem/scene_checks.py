@@ -14,7 +14,7 @@ from enumsol.fem.conditions import holding
 from enumsol.fem.contacts import Group, faced
 from enumsol.fem.file_counts import taken_as
 from enumsol.fem.meshes import SAME, PartedMesh, cell_name, unit_vectors
-from enumsol.fem.scene_data import SceneData
+from enumsol.fem.scenes import Scene
 from enumsol.model.cells import boundary_facets
 from enumsol.support.array_types import Floats, Integers, Mask
 from enumsol.support.messages import counted
@@ -42,12 +42,12 @@ _STEEP = 5.0
 _UNLIKE = 1e8
 
 
-def _bodies(scene: SceneData) -> Integers:
+def _bodies(scene: Scene) -> Integers:
     """Number of the connected body of each node, (N,)."""
     return np.asarray(np.argmax([piece.nodes for piece in scene.pieces], axis=0))
 
 
-def refuse_overlaps(scene: SceneData) -> None:
+def refuse_overlaps(scene: Scene) -> None:
     """Refuse meshes in which cells of one connected body overlap, but for parts of bodies that are a pair.
 
     As cells that share a facet are on different sides of it (`fem.bases.refuse_wrong_sides`), a body can overlap itself
@@ -99,7 +99,7 @@ def _refuse_covered(mesh: PartedMesh, own: tuple[Integers, Integers], facets: In
                 )
 
 
-def refuse_walls(scene: SceneData) -> None:
+def refuse_walls(scene: Scene) -> None:
     """Refuse contact parts where another body touches them: the foundation would be a wall between the two.
 
     Raises
@@ -137,7 +137,7 @@ def refuse_walls(scene: SceneData) -> None:
                 )
 
 
-def refuse_pairs(scene: SceneData) -> None:
+def refuse_pairs(scene: Scene) -> None:
     """Refuse pairs of two sides of one body that face away from each other, through the body.
 
     Raises
@@ -165,7 +165,7 @@ def refuse_pairs(scene: SceneData) -> None:
             )
 
 
-def _refuse_cracks(scene: SceneData, nodes: Integers, parts: list[str]) -> None:
+def _refuse_cracks(scene: Scene, nodes: Integers, parts: list[str]) -> None:
     """Refuse parts that are a face of a crack: nodes of the same body are where theirs are."""
     from scipy.spatial import cKDTree  # not needed for paths that read no mesh
 
@@ -190,7 +190,7 @@ def _refuse_cracks(scene: SceneData, nodes: Integers, parts: list[str]) -> None:
             )
 
 
-def scene_notes(scene: SceneData) -> list[str]:
+def scene_notes(scene: Scene) -> list[str]:
     """Notes on what may not have been intended."""
     checks = (
         *(_formulations, _unjoined, _unfaced, _shared, _alone, _rest, _loaded_contact),
@@ -200,12 +200,12 @@ def scene_notes(scene: SceneData) -> list[str]:
         return [note for check in checks for note in check(scene)]
 
 
-def _formulations(scene: SceneData) -> list[str]:
+def _formulations(scene: Scene) -> list[str]:
     """Notes on elements of the file that others take the place of."""
     return taken_as(scene.mesh.types)
 
 
-def _unjoined(scene: SceneData) -> list[str]:
+def _unjoined(scene: Scene) -> list[str]:
     """Notes on nodes of the boundary at one place, but for those of contacts: cracks, and bodies that seem joined."""
     from scipy.spatial import cKDTree  # as above
 
@@ -241,7 +241,7 @@ def _nodes_of(mesh: PartedMesh, group: Group) -> Mask:
     return mask
 
 
-def _turning(scene: SceneData) -> list[str]:
+def _turning(scene: Scene) -> list[str]:
     """Notes on pairs of a body that could roll, whose normals turn along the contact more than what they face does."""
     mesh, notes, first = scene.mesh, [], 0
     hold = holding(scene.held.supports, sp.csc_array(scene.springs.shape))
@@ -263,7 +263,7 @@ def _turning(scene: SceneData) -> list[str]:
     return notes
 
 
-def _unfaced(scene: SceneData) -> list[str]:
+def _unfaced(scene: Scene) -> list[str]:
     """Nodes of pairs without contact."""
     return [
         f"{group.missed} of {group.missed + group.count} nodes of {pair.slave} face nothing of "
@@ -273,7 +273,7 @@ def _unfaced(scene: SceneData) -> list[str]:
     ]
 
 
-def _shared(scene: SceneData) -> list[str]:
+def _shared(scene: Scene) -> list[str]:
     """Nodes of pairs that have the contact of another one."""
     return [
         f"{counted(group.shared, 'node')} of {pair.slave} {'belong' if group.shared > 1 else 'belongs'} to "
@@ -283,7 +283,7 @@ def _shared(scene: SceneData) -> list[str]:
     ]
 
 
-def _alone(scene: SceneData) -> list[str]:
+def _alone(scene: Scene) -> list[str]:
     """Bodies that nothing connects with the others."""
     if len(scene.pieces) < 2:
         return []
@@ -296,7 +296,7 @@ def _alone(scene: SceneData) -> list[str]:
     ]
 
 
-def _rest(scene: SceneData) -> list[str]:
+def _rest(scene: Scene) -> list[str]:
     """Nothing that acts on the bodies."""
     acting = np.any(scene.forces) or np.any(scene.slope) or np.any(scene.held.supports.values)
     if acting or np.any(scene.gaps < 0):
@@ -304,7 +304,7 @@ def _rest(scene: SceneData) -> list[str]:
     return ["nothing acts on the body: it has no load, press fit or given displacement, and rests"]
 
 
-def _loaded_contact(scene: SceneData) -> list[str]:
+def _loaded_contact(scene: Scene) -> list[str]:
     """Loads on contact parts."""
     corners = {tuple(sorted(row)) for row in scene.contacts.facets.tolist()}
     notes = []
@@ -316,7 +316,7 @@ def _loaded_contact(scene: SceneData) -> list[str]:
     return notes
 
 
-def _reach(scene: SceneData) -> list[str]:
+def _reach(scene: Scene) -> list[str]:
     """Gaps and press fits as large as a body."""
     extent, notes = _extent(scene), []
     for group, gaps in scene.gaps_of_groups:
@@ -333,7 +333,7 @@ def _reach(scene: SceneData) -> list[str]:
     return notes
 
 
-def _strains(scene: SceneData) -> dict[str, float]:
+def _strains(scene: Scene) -> dict[str, float]:
     """Approximate strains of the body by the loads and by their slopes."""
     thickness = 1.0 if scene.body.thickness is None else float(np.min(scene.body.thickness))
     force = float(np.min(_stiffness(scene))) * _extent(scene) ** (scene.dimension - 1) * thickness
@@ -343,12 +343,12 @@ def _strains(scene: SceneData) -> dict[str, float]:
     }
 
 
-def _stiffness(scene: SceneData) -> Floats:
+def _stiffness(scene: Scene) -> Floats:
     """Moduli lambda + 2 mu of the cells."""
     return np.asarray(np.atleast_2d(scene.lame) @ (1.0, 2.0))
 
 
-def _proportions(scene: SceneData) -> list[str]:
+def _proportions(scene: Scene) -> list[str]:
     """Notes on loads and press fits, or gaps that only strain can close, that are out of proportion."""
     strain, extent, notes = max(_strains(scene).values()), _extent(scene), []
     held = not scene.options.spring and not any(p.free_motions(scene.mesh.points, scene.hold) for p in scene.pieces)
@@ -364,7 +364,7 @@ def _proportions(scene: SceneData) -> list[str]:
     return notes
 
 
-def _units(scene: SceneData) -> list[str]:
+def _units(scene: Scene) -> list[str]:
     """Loads, displacements and moduli of absurd size."""
     notes, extent, stiffness = [], _extent(scene), _stiffness(scene)
     for name, strain in _strains(scene).items():
@@ -391,12 +391,12 @@ def _units(scene: SceneData) -> list[str]:
     return notes
 
 
-def _extent(scene: SceneData) -> float:
+def _extent(scene: Scene) -> float:
     """Extent of the largest body [length]."""
     return max(float(np.max(np.ptp(scene.mesh.points[piece.nodes], axis=0))) for piece in scene.pieces)
 
 
-def _friction(scene: SceneData) -> list[str]:
+def _friction(scene: Scene) -> list[str]:
     """Coefficients that no pair of materials has."""
     notes = []
     for name, value in (("friction", scene.options.friction), ("friction2", scene.options.friction2)):
@@ -407,7 +407,7 @@ def _friction(scene: SceneData) -> list[str]:
     return notes
 
 
-def _held(scene: SceneData) -> list[str]:
+def _held(scene: Scene) -> list[str]:
     """A bound of rigid displacements where nothing can move as a whole."""
     if scene.options.max_rigid_displacement is None:
         return []

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from enumsol.condensation.space_condensed import AlphaSpace, PieceSpace
+    from enumsol.condensation.space_condensed import AlphaSpace
     from enumsol.support.array_types import Codes
     from enumsol.trusted.space.curve_runs import KnownCurve, Run
     from enumsol.trusted.space.sector_rows import Row
