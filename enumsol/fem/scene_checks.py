@@ -122,12 +122,12 @@ def refuse_walls(scene: Scene) -> None:
         if not np.any(own):
             continue
         outward = scene.body.on_part(others, "boundary", outward_normal)
-        seen = faced(mesh.points, nodes[own], group.normals[own], others, outward, others[:0])
-        touching = nodes[own][seen.found][seen.gaps == 0.0]
+        found, weights, gaps = faced(mesh.points, nodes[own], group.normals[own], others, outward, others[:0])
+        touching = nodes[own][found][gaps == 0.0]
         for part in group.parts:
             here = np.intersect1d(touching, mesh.nodes(part))
             if len(here) > _WALL * np.sum(np.isin(nodes[own], mesh.nodes(part))):
-                beside = np.unique(seen.weights[np.flatnonzero(seen.gaps == 0.0)].indices)
+                beside = np.unique(weights[np.flatnonzero(gaps == 0.0)].indices)
                 names = [name for name, rows in mesh.facets.items() if np.all(np.isin(beside, rows))]
                 other = names[0] if names else "OTHER"
                 touched = f"those of {other}" if names else "the boundary of another body"
