@@ -411,7 +411,7 @@ class _Facets:
 
     @cached_property
     def centres(self) -> Floats:
-        """Of the facets, (m, d)."""
+        """Centres of the facets, (m, d)."""
         return np.asarray(np.einsum("m,fmd->fd", self.values(self.centre[None])[:, 0], self.places))
 
     @cached_property

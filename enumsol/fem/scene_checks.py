@@ -24,22 +24,8 @@ from enumsol.support.messages import counted
 _INSIDE = 1e-3
 #: Share of the contact nodes of a part that may touch another body before that is refused as a wall between both.
 _WALL = 0.5
-#: Press fits, and given displacements, above these parts of the extent of the largest body are not small.
-_FIT, _SMALL = 0.05, 0.25
-#: A node that is deeper in what it faces than this share of a facet faces it through the body.
-_DEEP = 0.5
-#: Strains by loads above this come from wrong units: the length of the body.
-_ABSURD = 1.0
-#: Loads that strain the body by less than this are hardly intended.
-_NOTHING = 1e-12
-#: Normals of a pair that turn away by more than this from those they face make a pocket [degrees].
-_TURN = 10.0
 #: Loads and press fits that strain the body so differently are hardly in the same units.
 _UNEVEN = 1e5
-#: Coefficients of friction above this are rare.
-_STEEP = 5.0
-#: A ratio of moduli above this is often a wrong unit.
-_UNLIKE = 1e8
 
 
 def _bodies(scene: Scene) -> Integers:
@@ -154,9 +140,9 @@ def refuse_pairs(scene: Scene) -> None:
         if group.pair is None:
             continue
         facets = mesh.part(group.pair.master)
-        # nodes of faces of a crack may be a little beyond the other face where that is curved
+        # nodes of faces of a crack may be a little beyond the other face where that is curved: less than half a facet
         length = np.max(np.ptp(mesh.points[facets], axis=1))
-        deep = np.sum(places[own] * group.normals, axis=1) > _DEEP * length
+        deep = np.sum(places[own] * group.normals, axis=1) > 0.5 * length
         faced = body[facets.ravel()]
         if np.any(deep) and np.all(np.isin(faced, body[rows.nodes[own][deep]])) and len(np.unique(faced)) == 1:
             raise InvalidArgumentError(
@@ -254,7 +240,7 @@ def _turning(scene: Scene) -> list[str]:
         outward = scene.body.on_part(mesh.part(pair.master), pair.master, outward_normal)
         facing = unit_vectors(np.asarray(sp.csr_array(-rows).maximum(0) @ outward), "normals of the other side")
         apart = float(np.degrees(np.max(np.arccos(np.clip(-np.sum(facing * group.normals, axis=1), -1.0, 1.0)))))
-        if apart > _TURN:
+        if apart > 10.0:  # degrees, of a pocket
             notes.append(
                 f"the normals of the pair {pair} turn along the contact, up to {apart:.0f} degrees away from the "
                 "normals of what they face: as they stay so, a body that could roll or slide along is caught as in a "
@@ -325,7 +311,7 @@ def _reach(scene: Scene) -> list[str]:
                 f"the smallest gap of {group} is {gaps.min():.3g}, more than the extent {extent:.3g} of the body: it "
                 "will not be in contact"
             )
-        elif gaps.min() < -_FIT * extent:
+        elif gaps.min() < -0.05 * extent:
             notes.append(
                 f"the press fit of {group} is {-gaps.min():.3g}, which is not small beside the extent {extent:.3g} of "
                 "the body, as displacements have to be"
@@ -368,22 +354,22 @@ def _units(scene: Scene) -> list[str]:
     """Loads, displacements and moduli of absurd size."""
     notes, extent, stiffness = [], _extent(scene), _stiffness(scene)
     for name, strain in _strains(scene).items():
-        if strain > _ABSURD:
+        if strain > 1.0:  # by the length of the body
             notes.append(
                 f"the {name} would strain the body by about {strain:.2g}, which is far from small; are young and "
                 f"the {name} in the same units?"
             )
-        elif 0 < strain < _NOTHING:
+        elif 0 < strain < 1e-12:
             notes.append(
                 f"the {name} would strain the body by about {strain:.2g}, which is next to nothing; are young and the "
                 f"{name} in the same units?"
             )
     moved = float(np.max(np.abs(scene.held.supports.values)))
-    if moved > _SMALL * extent:
+    if moved > 0.25 * extent:
         notes.append(
             f"a displacement of {moved:.3g} is given, which is not small beside the extent {extent:.3g} of the body"
         )
-    if np.max(stiffness) > _UNLIKE * np.min(stiffness):
+    if np.max(stiffness) > 1e8 * np.min(stiffness):
         notes.append(
             f"the moduli of parts differ by a factor of {np.max(stiffness) / np.min(stiffness):.2g}; are all in the "
             "same unit?"
@@ -402,7 +388,7 @@ def _friction(scene: Scene) -> list[str]:
     for name, value in (("friction", scene.options.friction), ("friction2", scene.options.friction2)):
         each = value.values() if isinstance(value, Mapping) else [value]
         steep = max((float(own) for own in each if own is not None), default=0.0)
-        if steep > _STEEP:
+        if steep > 5.0:
             notes.append(f"{name} is {steep:g}; coefficients of friction above 1 are rare")
     return notes
 

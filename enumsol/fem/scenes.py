@@ -122,7 +122,7 @@ class Scene:
         return conditions.holding(self.held.supports, self.springs)
 
     def uses(self, part: str) -> list[str]:
-        """What the options say of a part of the boundary."""
+        """Uses of a part of the boundary, as the options name it."""
         found = [name for name in _USES if part in _names(getattr(self.options, name))]
         pairs = [group.pair for group in self.contacts.groups if group.pair is not None]
         found += [f"contact nodes of the pair {pair}" for pair in pairs if part == pair.slave]
