@@ -14,7 +14,7 @@ import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, Ball, determinant_sign, smaller, solution, upper_sum
 from enumsol.trusted.same_roots import told_apart
-from enumsol.trusted.space.natural_map import MARGIN, Discs, Step, middle_inverse
+from enumsol.trusted.space.natural_map import MARGIN, Discs, Step, are_steps, middle_inverse
 from enumsol.trusted.space.space_uniqueness import LARGEST_UNIT, LooseSolution
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def solution_in_box(system: EnclosedSpace, box: Box, errors: float = 1.0) -> Box
     system : EnclosedSpace
         S is proven positive definite.
     box : Box
-        Its radius and rho are positive.
+        Its radius and rho are positive; both components of tau of a node have the same rho but for units.
     errors : 1 proves; a writer of proofs takes more, so that a checker comes to the same answer
     """
     finite = all(np.all(np.isfinite(numbers)) for numbers in box.numbers)
@@ -158,7 +158,8 @@ def _moderate(system: EnclosedSpace) -> bool:
 class _NaturalMap:
     """N(y) = y - P(y + rho w) in (lambda_n, tau) without units (theory, (12.10)), y = c + T zeta, T = (I + rho S)^-1.
 
-    rho is one number for lambda_n and one for tau of every node: which ones does not matter for what is proven.
+    rho is one number for lambda_n and one for tau of every node, the same for both components: which ones does not
+    matter for what is proven.
 
     Attributes
     ----------
@@ -178,12 +179,14 @@ class _NaturalMap:
 
     @classmethod
     def of(cls, system: EnclosedSpace, rho: Floats) -> _NaturalMap | None:
-        """With these rho, scaled; None where T is not enclosed."""
+        """With these rho, scaled; None where they do not serve or T is not enclosed."""
         # powers of two: what is rounded is less than TINY
         pair = np.outer(system.unit, system.unit)
         S = Ball(system.S / pair, system.S_rad / pair * SAFE + TINY)
         g = Ball(system.g / system.unit, system.g_rad / system.unit * SAFE + TINY)
         rho = rho * system.unit**2
+        if not are_steps(rho, system.tau):
+            return None
         whole = Ball.exact(np.eye(len(rho)))
         T = solution(whole + S * Ball.exact(rho[:, None]), whole)
         if T is None or not T.finite:

@@ -562,6 +562,22 @@ def middle_inverse(M: Ball) -> tuple[Floats, Floats] | None:
     return Y, (Ball.exact(np.eye(len(Y))) - Ball.exact(Y) @ M).size
 
 
+def are_steps(rho: Floats, tau: Indices) -> bool:
+    """True if numbers serve as rho of a natural map: positive, and one for both components of tau of every node.
+
+    Zeros of a map with two numbers there are no solutions (theory, (12.10) and (12.16)).
+
+    Parameters
+    ----------
+    rho : (m,) array
+        In the variables in which discs are round.
+    tau : (p, 2) array of int
+        See ``Discs``.
+    """
+    one, other = tau[np.all(tau >= 0, axis=1)].T
+    return bool(np.all(np.isfinite(rho)) and np.all(rho > 0) and np.array_equal(rho[one], rho[other]))
+
+
 @dataclass(frozen=True)
 class Step:
     """x - Y N(x), N the natural map, for all x = c + t d + b within a radius of a point c, |t| <= h.
