@@ -5,12 +5,11 @@ from fractions import Fraction
 from itertools import pairwise
 
 from enumsol.arithmetic.rationals import rational
-from enumsol.branches.enclosed.following import TracedProblem, follow_selections
+from enumsol.branches.enclosed.following import TracedProblem, follow_selections, make_traced
 from enumsol.branches.enclosed.joining import EventPlaceKind
-from enumsol.branches.enclosed.make_traced import make_traced
-from enumsol.branches.exact.gluing import glue, make_vertices
-from enumsol.branches.exact.known_selections import KnownSelections
-from enumsol.branches.ways import ByAlgebra
+from enumsol.branches.gluing import glue
+from enumsol.branches.known_selections import KnownSelections
+from enumsol.branches.ways import by_algebra
 from enumsol.condensation.exact import ExactCondensed
 
 
@@ -40,14 +39,14 @@ def two_graphs(problem, interval):
     a, b = (Fraction(end) for end in interval)
     exact = ExactCondensed.from_problem(problem)
     traced = TracedProblem(problem, (a, b), exact.zero)
-    way = ByAlgebra.of(problem, (a, b), exact, "verified")
+    way = by_algebra(problem, (a, b), exact, "verified")
     search = way.begin()
     search.run()
     followed = follow_selections(traced, search.pieces, cut_short=search.stopped is not None)
-    gluing = glue(KnownSelections(exact, rational(a), rational(b), cut_short=False), search.selections)
+    known = KnownSelections(exact, rational(a), rational(b), cut_short=False)
+    theirs = glue(known, search.selections)[:2]
     ours = make_traced(traced, followed.joined)
-    theirs = make_vertices(gluing), gluing.edges
-    return TwoGraphs(theirs, ours, followed.joined, followed.reasons, gluing.reasons)
+    return TwoGraphs(theirs, ours, followed.joined, followed.reasons, known.reasons)
 
 
 def differences(graphs):

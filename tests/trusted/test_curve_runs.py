@@ -12,15 +12,15 @@ from scipy.optimize import linprog
 
 from enumsol import enumerate_roots
 from enumsol.arithmetic.balls import Ball
-from enumsol.branches.space.cover import SpaceCover
+from enumsol.branches.space.space_graph import ByCurves
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.search.space.piece_certificates import ExaminedPiece, runs_over
 from enumsol.trusted.space import curve_runs
 from enumsol.trusted.space.curve_runs import KnownCurve, Run
-from enumsol.trusted.space.piece_forms import PieceWeights, how_far_off
 from enumsol.trusted.space.pieces import AlphaPiece
 from enumsol.trusted.space.sector_rows import CONTACT, OPEN, STICK, UNDECIDED
 from enumsol.trusted.space.solution_curve import AlphaProblem, CurveBox, SolutionCurve
+from enumsol.trusted.space.space_uniqueness import PieceWeights, how_far_off
 
 INTERVAL = Fraction(0), Fraction(1)
 #: Nodes and seeds: at some of the many a fold, two curves, or changes of status.
@@ -32,7 +32,7 @@ PIECES = [INTERVAL, (Fraction(1, 3), Fraction(2, 5)), (Fraction(5, 8), Fraction(
 
 @functools.cache
 def known_curves(p, seed):
-    cover = SpaceCover(random_over_alpha(p, seed), INTERVAL)
+    cover = ByCurves(random_over_alpha(p, seed), INTERVAL)
     cover.search(max_nodes=60)
     given = AlphaProblem.of(cover.problem.enclosure)
     return cover, [KnownCurve(given, chain) for chain in cover.chains]
@@ -197,10 +197,11 @@ def test_a_curve_holds_a_ball_if_all_its_corners_are_held():
         d, G = d / (e @ d), rng.standard_normal((size, count))
         radius, shares = 0.2 + rng.exponential(size=size), 2 * rng.exponential(size=count)
         half = 2 * float(rng.exponential())
-        near = SimpleNamespace(unit=np.ones(size), c=c, d=d, e=e)
+        near = SimpleNamespace(d=d, border=e[None])
         step = SimpleNamespace(G=Ball.exact(G))
         found = SimpleNamespace(near=near, step=step, radius=radius, shares=shares)
-        curve = SolutionCurve(CurveBox(c, d, e, half, radius, np.ones(size - 1)), 1, found)
+        box, problem = CurveBox(c, d, e, half, radius, np.ones(size - 1)), SimpleNamespace(unit=np.ones(size))
+        curve = SolutionCurve(box, 1, problem, found)
         middle = c + rng.uniform(-half, half) * d + G @ (rng.uniform(-0.9, 0.9, count) * shares)
         x = Ball(middle, 0.05 * rng.exponential(size=size))
         held = curve.holds(x)
