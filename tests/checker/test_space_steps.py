@@ -13,8 +13,7 @@ from proof_tools import of_kind, proof_of, put, records_of, replaced, why_refuse
 from space_judge_mutants import checked, judged
 from trees import by_the_tree
 
-from enumsol.branches.space.cover import SpaceCover
-from enumsol.trusted.space.solution_curve import AlphaProblem
+from enumsol import branch_graph
 
 LOW, HIGH = Fraction(49, 100), Fraction(51, 100)
 WHY = "both components of a tau need the same step"
@@ -31,10 +30,8 @@ def boxed_root(ratio):
 
 def curve(ratio, rho, steps):
     """A proof that all solutions over an interval lie on a curve with coordinates of such steps, in one box."""
-    cover = SpaceCover(SLIDING, (LOW, HIGH))
-    cover.search(max_nodes=100)
-    header = {**records_of(cover.proof())[0], "steps": steps}
-    given = AlphaProblem.of(SLIDING.enclosure)
+    header = records_of(branch_graph(SLIDING, (LOW, HIGH)).proof)[0]
+    assert header["steps"] == [1.0, 0.25, 0.25]
 
     def point(alpha):
         y = sliding_node(alpha, ratio)
@@ -45,10 +42,9 @@ def curve(ratio, rho, steps):
         direction = (point(alpha + 0.01) - point(alpha - 0.01)) / 0.02
         return ["w", point(alpha).tolist(), direction.tolist(), [0.0, 0.0, 0.0, 1.0], [size] * 4, rho, half]
 
-    assert given.steps.tolist() == [1.0, 0.25, 0.25]
     thetas = [x / float(alpha) for alpha in (LOW, HIGH) for x in sliding_node(float(alpha), ratio)[1:].tolist()]
     return [
-        header,
+        {**header, "steps": steps},
         {"curve": 1},
         box(0.488, 0.0, 0.01),
         box(0.5, 0.02, 0.05),
