@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from enumsol.roots.root import Polytope
     from enumsol.support.array_types import Floats
 
-#: Step of difference quotients along an arc, relative to its length.
-_DIFFERENCE = 1e-6
 #: What a graph must have.
 _ASKED = ("problem", "interval", "arcs", "vertices", "branches", "complete", "reasons")
 
@@ -191,7 +189,7 @@ class GraphMap:
             if distance >= 0.999 * best:
                 break
             best = distance
-            step = _DIFFERENCE * (high - low)
+            step = 1e-6 * (high - low)
             # a distance below this fraction of the tolerance need not be made smaller
             if best <= 1e-4 * self.tolerance or step == 0:
                 break

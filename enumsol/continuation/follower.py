@@ -39,13 +39,6 @@ if TYPE_CHECKING:
 
 _Path = TypeVar("_Path", bound=PathData)
 
-#: Conditions may be negative by this much at a point that is converged to rounding.
-ROUNDING = 1e-12
-#: Without checks a transition point may lie behind by this times h_min or eps; steps are refused beyond it.
-UNCHECKED_REACH = 100.0
-#: Selection changes in a row without moving after which the path is stuck at a point where many selections meet.
-MAX_CHANGES_IN_PLACE = 32
-
 
 @dataclass(frozen=True)
 class _Step:
@@ -244,7 +237,8 @@ class Follower(Generic[_Path]):
         row = equation.metric @ tangent
         tolerance = self.options.transition_tolerance
         x = smooth_newton(equation, codes, correction.x, row, float(row @ correction.x), tolerance)
-        if x is None or np.min(equation.slacks(codes, x)) < -ROUNDING:
+        # conditions may be negative by this much at a point that is converged to rounding
+        if x is None or np.min(equation.slacks(codes, x)) < -1e-12:
             return None
         tangent = curve_tangent(equation, codes, x, self.sign)
         return None if tangent is None else TangentPoint(x, codes, tangent)
@@ -273,7 +267,8 @@ class Follower(Generic[_Path]):
             return self._stop(PathStatus.FRICTION)
         arrival = next_kink(equation, self.current, self.sign, options.transition_tolerance)
         if arrival is None and not options.check_steps:
-            reach = UNCHECKED_REACH * max(options.h_min, options.eps)
+            # how far behind a transition point may lie; steps are refused beyond it
+            reach = 100.0 * max(options.h_min, options.eps)
             arrival = passed_kink(equation, self.current, self.sign, options.transition_tolerance, reach)
         if arrival is None:
             return self._stalled("no transition point was found ahead")
@@ -284,7 +279,8 @@ class Follower(Generic[_Path]):
         equation, options = self.equation, self.options
         moved = equation.norm(arrival.x - self.current.x) > SAME_POINT
         self._in_place = 0 if moved else self._in_place + 1
-        if self._in_place > MAX_CHANGES_IN_PLACE:
+        # many selections meet at this point
+        if self._in_place > 32:
             return self._stalled("the selection changes repeatedly at one point")
         try:
             keep, others = continuations(equation, arrival, self.sign)

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from enumsol.roots.local_branch import LocalBranchTest
     from enumsol.support.array_types import Floats, Integers, NDArray
 
-#: |d alpha / ds| below this is a vertical piece of the path: at a regular point it is well above rounding.
-VERTICAL_TOLERANCE = 1e-9
 _PRINTED_TRANSITIONS = 12
 #: The arrays of a path, one row per point.
 ARRAYS = ("alpha", "lambda_n", "lambda_t", "u_n", "u_t", "codes", "steps", "corrections", "arclength")
@@ -228,7 +226,8 @@ class PathData(Sequence[PathPoint], Sealed):
                 direction = -direction
                 continue
             for value in (transition.dalpha_before, transition.dalpha_after):
-                sign = 0 if abs(value) <= VERTICAL_TOLERANCE * self._alpha_scale else int(np.sign(value))
+                # a vertical piece: at a regular point it is well above this rounding
+                sign = 0 if abs(value) <= 1e-9 * self._alpha_scale else int(np.sign(value))
                 if sign and direction and sign != direction:
                     found.append(transition)
                 direction = sign or direction

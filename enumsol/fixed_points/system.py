@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 
     Problem = ContactProblem | ContactProblem3D
 
-#: Forces of a body that nothing holds that are so many times the load are taken for none.
-_MOST_FORCE = 1e6
 #: Most that coefficients may be, and given forces and slips, in units in which those of the load have size 1.
 _LARGEST = 1e100
 
@@ -164,7 +162,8 @@ class ContactSystem:
         Of a body that nothing holds there is no such bound; forces so large are taken for none (theory, section 14.10).
         """
         if self.modes:
-            return np.full(self.m, _MOST_FORCE)
+            # larger forces are taken for none
+            return np.full(self.m, 1e6)
         inverse = solve_triangular(self.cholesky, np.eye(len(self.S)), lower=True, check_finite=False)
         return np.asarray(self.load_energy * np.linalg.norm(inverse, axis=0))
 

@@ -29,8 +29,8 @@ LABELS = {
     "dissipated": "work of friction since the start",
 }
 _DIMENSIONS = {"displacement": "length", "lambda_n": "force", "lambda_t": "force", "dissipated": "work"}
-#: Histories that have a colour of their own; ends that are labelled.
-_COLOURED, _NAMED = 10, 24
+#: Histories that have a colour of their own.
+_COLOURED = 10
 #: Where a name may stand beside the end of a history, in points, best first; points on a line that it should not hide.
 _BESIDE = [(side * 6, up) for far in (4, 14, 24, 34, 44) for side in (1, -1) for up in (far, -far - 6)]
 _ALONG = np.linspace(0.0, 1.0, 16)
@@ -133,7 +133,7 @@ def _name_ends(data: HistoryData, across: dict[Node, float], up: dict[Node, floa
     ]
     lines = ax.transData.transform(np.concatenate(drawn)) if drawn else np.empty((0, 2))
     names: list[Any] = []
-    for nodes in list(places.values())[:_NAMED]:
+    for nodes in list(places.values())[:24]:
         text = ", ".join(f"{step}.{number}" for step, number in nodes[:4]) + (", ..." if len(nodes) > 4 else "")
         label = ax.annotate(
             text, (across[nodes[0]], up[nodes[0]]), xytext=(0, 0), textcoords="offset points", fontsize=8

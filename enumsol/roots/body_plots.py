@@ -40,12 +40,8 @@ MARKS = {
 }
 _FORCE, _SLIP, _BODY, _EDGE, _BEFORE = "#b3202c", "#0a7d7a", "#dfe6ee", "#8796a8", "#dcdcdc"
 _BEFORE_IN_SPACE, _BEFORE_LINE = "#5b6672", {"linewidths": 0.8, "linestyles": "dashed"}
-#: Length of an arrow along a slip on the contact surface, whatever the slip, as a part of its size.
-_LONG = 0.15
 #: Points between a title and what is below it, by dimension: seen from below, axes of a solid stand on top.
 _PAD = {2: 6.0, 3: 18.0}
-#: Bodies side by side, and how many are drawn at most.
-_ACROSS, MOST_BODIES = 3, 12
 
 
 def draw_body(
@@ -77,9 +73,9 @@ def draw_bodies(roots: Sequence[Any], scale: float | None = None, units: tuple[s
         raise InvalidArgumentError("there are no isolated roots to draw; expected at least one")
     problem = roots[0].problem
     shape = body_shape(problem)
-    drawn = roots[:MOST_BODIES]
+    drawn = roots[:12]
     factors, arrows = _factors(drawn, problem, shape, scale)
-    across = min(_ACROSS, len(drawn))
+    across = min(3, len(drawn))
     rows = -(-len(drawn) // across)
     figure = new_figure(figsize=(4.0 * across, 3.6 * rows + 0.8))
     one_scale = len(set(factors)) == 1
@@ -248,7 +244,8 @@ def draw_slips(root: Any, problem: ContactProblem3D, ax: Any, units: tuple[str, 
     slides = np.array([found is ContactStatus.SLIP for found in root.statuses]) & (size > 0)
     if np.any(slides):
         begin, d = places[slides][:, shown], moves[slides] / size[slides, None]
-        length = _LONG * float(np.max(np.ptp(places, axis=0))) or 1.0
+        # arrows of one length, whatever the slip
+        length = 0.15 * float(np.max(np.ptp(places, axis=0))) or 1.0
         options = {"angles": "xy", "scale_units": "xy", "scale": 1 / length, "width": 0.009, "zorder": 4}
         low, high = np.min(size[slides]), np.max(size[slides])
         said = f"{low:.3g}" if np.isclose(low, high) else f"{low:.3g} to {high:.3g}"

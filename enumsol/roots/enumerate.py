@@ -88,8 +88,6 @@ class AtRest:
 
 
 Method = Literal["tree", "exhaustive"]
-#: The exhaustive method reports progress this often [seconds].
-_REPORT_SECONDS = 0.1
 
 
 def enumerate_roots(
@@ -326,7 +324,7 @@ class _Enumeration(Enumeration[Solvers]):
             if solution is not None:
                 outcome.solutions.append(solution)
             now = time.perf_counter()
-            due = now - reported > _REPORT_SECONDS or (solution is None and outcome.selections % BLOCK == 0)
+            due = now - reported > 0.1 or (solution is None and outcome.selections % BLOCK == 0)
             if self.progress is not None and (due or outcome.selections == total):
                 reported = now
                 share = outcome.selections / total

@@ -46,10 +46,6 @@ if TYPE_CHECKING:
 _SLIPS = {2: SLIP_PLUS, 5: SLIP_PLUS, 3: SLIP_MINUS, 6: SLIP_MINUS}
 #: Stiffness of the springs of the relaxations, relative to that of the body (theory, section 14.5).
 WEAK = 2.0**-20
-#: Weight of multipliers that are zero, relative to the largest: they change only where the others cannot do it.
-_SPARE = 2.0**-20
-#: How often multipliers that would change their sign are set to zero, and what is left is balanced again.
-_BALANCES = 8
 
 
 class FloatingSolvers(Solvers):
@@ -164,8 +160,10 @@ def in_balance(system: EnclosedSystem, codes: Codes, rows: Indices, values: Floa
     table = np.bincount(rows, values, minlength=signs.size).reshape(-1, p)
     y = np.concatenate([table[PENETRATION], table[SLIP_BACKWARD] - table[SLIP_FORWARD]])
     size = np.abs(y)
-    weight = np.where(low | high, size + _SPARE * np.max(size), 0.0)
-    for _ in range(_BALANCES):
+    # those that are zero change only where the others cannot do it
+    weight = np.where(low | high, size + 2.0**-20 * np.max(size), 0.0)
+    # those that would change their sign become zero, and what is left is balanced again
+    for _ in range(8):
         step = np.linalg.lstsq((G * weight) @ G.T, h - G @ y, rcond=1e-13)[0]
         y = y + weight * (step @ G)
         wrong = np.where(y < 0, ~low, ~high) & (y != 0)
