@@ -13,7 +13,7 @@ from enumsol.roots.root import summary
 from enumsol.support.messages import TextEnum, counted
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Iterable, Iterator, Sequence
 
     import pandas as pd
 
@@ -320,7 +320,7 @@ class AuditReport:
         return f"{'ok' if self.ok else 'not ok'}, {visits}"
 
     @staticmethod
-    def _listed(items: Any) -> Iterator[str]:
+    def _listed(items: Iterable[AuditedPoint | Jump | MissedArc | str]) -> Iterator[str]:
         found = tuple(items)
         for item in found[:_PRINTED]:
             yield f"    {_line(item)}"

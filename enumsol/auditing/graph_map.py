@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 _ASKED = ("problem", "interval", "arcs", "vertices", "branches", "complete", "reasons")
 
 
-def checked_graph(graph: Any) -> BranchGraph:
+def checked_graph(graph: object) -> BranchGraph:
     """The argument ``graph`` as a branch graph.
 
     Raises
@@ -38,14 +38,13 @@ def checked_graph(graph: Any) -> BranchGraph:
         It is something else.
     """
     lacking = [name for name in _ASKED if not hasattr(graph, name)]
-    if lacking or not isinstance(graph.problem, ContactBody):
+    if lacking or not isinstance(getattr(graph, "problem", None), ContactBody):
         why = f", which has no {lacking[0]}" if lacking else ""
         raise InvalidArgumentError(
             f"graph is a {type(graph).__name__}{why}; expected a BranchGraph, which holds arcs over an interval "
             "(of branch_graph or BranchGraph.load)"
         )
-    found: BranchGraph = graph
-    return found
+    return cast("BranchGraph", graph)
 
 
 class GraphPlaceKind(TextEnum):

@@ -243,7 +243,9 @@ def build_root(problem: ContactProblem, alpha: Alpha, equation: CondensedEquatio
     return _root_of_floats(problem, alpha, equation, x, isolated=False)
 
 
-def _root_of_floats(problem: Any, alpha: Alpha, equation: ScaledEquation, x: Floats, *, isolated: bool = True) -> Root:
+def _root_of_floats(
+    problem: AnyProblem, alpha: Alpha, equation: ScaledEquation, x: Floats, *, isolated: bool = True
+) -> Root:
     """The Root at a point x of the condensed equation; not regular where a condition holds with equality.
 
     ``isolated``: it is not known to belong to a continuum.

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import astuple, dataclass, field, replace
 from functools import cached_property
 from operator import add
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, overload
 
 import numpy as np
 
@@ -188,7 +188,11 @@ class PathData(Sequence[PathPoint], Sealed):
     def __len__(self) -> int:
         return len(self.alpha)
 
-    def __getitem__(self, item: Any) -> Any:
+    @overload
+    def __getitem__(self, item: int) -> PathPoint: ...
+    @overload
+    def __getitem__(self, item: slice) -> tuple[PathPoint, ...]: ...
+    def __getitem__(self, item: int | slice) -> PathPoint | tuple[PathPoint, ...]:
         if isinstance(item, slice):
             return tuple(self[k] for k in range(*item.indices(len(self))))
         try:

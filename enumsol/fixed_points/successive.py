@@ -90,7 +90,7 @@ class FixedPointProgress:
 def successive_approximations(
     problem: Problem,
     alpha: AlphaLike,
-    start: Any = None,
+    start: object = None,
     tolerance: float = 1e-10,
     max_iterations: int = 1000,
     anderson: int = 0,
@@ -189,7 +189,7 @@ class _Iteration:
         self.motion: Floats | None = None
         self.started = time.perf_counter()
 
-    def run(self, start: Any, limit: int) -> FixedPoint:
+    def run(self, start: object, limit: int) -> FixedPoint:
         system = self.system
         self.bound, self.slip = self._start(start)
         self.data = TrescaData(system, self.bound, system.coefficients(self.slip))
@@ -202,7 +202,7 @@ class _Iteration:
             lambda found: f" after {counted(found.iterations, 'iteration')}",
         )
 
-    def _iterated(self, start: Any, limit: int) -> FixedPoint:
+    def _iterated(self, start: object, limit: int) -> FixedPoint:
         system = self.system
         outcome, period = Outcome.ROUNDING, None
         try:
@@ -212,8 +212,8 @@ class _Iteration:
                 self.x, _, _ = solve_scaled(replace(self.data, bound=unbounded), self.x)
                 self.bound, self.slip = self._image()
                 outcome = Outcome.ROUNDING
-            # one or two corrections for the rounding of S are enough where it is not almost singular
-            for _ in range(5 + 1):
+            # one or two corrections for the rounding of S are enough unless it is almost singular
+            for _ in range(6):
                 ended, period = self._iterate(limit)
                 better = self._rounding(ended)
                 settled = ended is Outcome.CONVERGED and self.rounding <= self.tolerance
@@ -258,7 +258,7 @@ class _Iteration:
             self.rounding = max(self.rounding, *self.sizes[-_PATIENCE:])
         return better
 
-    def _start(self, start: Any) -> tuple[Floats, Floats]:
+    def _start(self, start: object) -> tuple[Floats, Floats]:
         """Scaled slip bounds and slips to begin with."""
         system, p = self.system, self.system.p
         slip: Any = 0.0
@@ -305,7 +305,7 @@ class _Iteration:
     def _reach(self, moved: float) -> float:
         """Distance from the limit for an increment, by the contraction seen in the last ones (theory, (11.11))."""
         self.sizes.append(moved)
-        recent = self.sizes[-5 - 1 :]
+        recent = self.sizes[-6:]
         if self.depth or not recent[0]:  # mixed iterates do not shrink as those of Psi do
             return moved
         ratio = (moved / recent[0]) ** (1.0 / (len(recent) - 1)) if len(recent) > 1 else 1.0
@@ -361,7 +361,7 @@ class _Iteration:
         )
 
 
-def fixed_point_residual(problem: Problem, root: Any) -> float:
+def fixed_point_residual(problem: Problem, root: object) -> float:
     """Distance by which Psi moves a root, relative to the load [-].
 
     The largest change of a contact force when the Tresca problem with the root's normal forces as slip bounds, and
@@ -393,7 +393,7 @@ def fixed_point_residual(problem: Problem, root: Any) -> float:
     return float(np.max(np.abs(image - x)[: system.m]))
 
 
-def is_fixed_point(problem: Problem, root: Any, tolerance: float = 1e-8) -> bool:
+def is_fixed_point(problem: Problem, root: object, tolerance: float = 1e-8) -> bool:
     """True if a root is a fixed point of Psi within a tolerance (theory, section 11.3).
 
     With coefficients that do not depend on the solution the fixed points are exactly the solutions with Coulomb

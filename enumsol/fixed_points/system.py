@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import block_diag, cho_solve, solve_triangular
@@ -258,13 +258,13 @@ class ContactSystem:
         return np.concatenate([normal, tangential.T.ravel(), rigid])
 
 
-def driven(problem: Any, alpha: Alpha, slip_bound: Floats, coefficients: Floats, motion: Floats) -> str:
+def driven(problem: Problem, alpha: Alpha, slip_bound: Floats, coefficients: Floats, motion: Floats) -> str:
     """In words: how the load drives the body along a rigid displacement, and how friction resists at given bounds."""
-    moved = problem.rigid_modes @ motion
+    moved = problem.modes.N @ motion
     slips = (problem.contact_rows @ moved)[problem.p :].reshape(-1, problem.p).T
     work = float(problem.load_at(alpha) @ moved)
     against = float(slip_bound @ np.linalg.norm(coefficients * slips, axis=1))
     return (
-        f"along {modes_of(problem.rigid_modes, motion)} the load drives it with {work:.4g}, and friction within these "
+        f"along {modes_of(problem.modes.N, motion)} the load drives it with {work:.4g}, and friction within these "
         f"bounds resists with at most {against:.4g}"
     )

@@ -233,7 +233,7 @@ def solve_tresca(
     alpha: AlphaLike,
     *,
     slip: ArrayLike | None = None,
-    start: Any = None,
+    start: object = None,
     solver: Solver = "newton",
 ) -> TrescaSolution:
     """The one solution of the contact problem with friction of Tresca's type (theory, sections 11.2 and 14.10).

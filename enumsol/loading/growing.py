@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     from enumsol.loading.history_data import HistoryData, Node
     from enumsol.model.problem3d import AnyProblem
     from enumsol.roots.root_set import RootSet
+    from enumsol.support.array_types import Alpha
     from enumsol.support.keeping import Ending
 
     #: Of a parent's root (None in the first step) and the roots of the next step, those that are followed.
@@ -403,7 +404,7 @@ class _Growing:
             self.bases[key] = restarted(self.problem, start, step.load, step.friction)
         return self.bases[key]
 
-    def _open(self, problem: object, alpha: object, roots: RootSet, item: _Waiting) -> tuple[str, ...]:
+    def _open(self, problem: AnyProblem, alpha: Alpha, roots: RootSet, item: _Waiting) -> tuple[str, ...]:
         """Why a stage is not complete, in words."""
         reasons = []
         if roots.families:
@@ -415,7 +416,7 @@ class _Growing:
             reasons.append(self._undecided(problem, alpha, roots, item))
         return tuple(reasons)
 
-    def _undecided(self, problem: Any, alpha: Any, roots: RootSet, item: _Waiting) -> str:
+    def _undecided(self, problem: AnyProblem, alpha: Alpha, roots: RootSet, item: _Waiting) -> str:
         first = roots.undecided[0]
         text = f"{counted(len(roots.undecided), 'part')} undecided ({first.reason})"
         if item.start.radius is None or self.search["arithmetic"] != "verified":

@@ -485,11 +485,11 @@ _COLOURS = ("#ffffff", "#c9b7dd", "#f2b56b", "#d97b5a", "#c04d6b", "#8a3b82", "#
 _UNIQUE, _FOLD = "#2a8a4a", "#222222"
 
 
-def draw_map(name: str, rows: Sequence[MapRow], curves: Sequence[Any], title: str, ax: Any) -> Any:
+def draw_map(name: str, rows: Sequence[MapRow], curves: Sequence[Any], title: str, place: object) -> Any:
     """A figure; see MultiplicityMap.plot."""
     from matplotlib.patches import Rectangle
 
-    ax = axes_of(ax, (7.0, 4.8))
+    ax = axes_of(place, (7.0, 4.8))
     order = sorted(range(len(rows)), key=lambda k: rows[k].value)
     edges = _edges([rows[k].value for k in order])
     seen: dict[int, bool] = {}

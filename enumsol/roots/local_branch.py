@@ -6,7 +6,7 @@ from collections.abc import Sequence, Set
 from dataclasses import dataclass
 from itertools import product
 from math import prod
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from enumsol.support.immutable import Sealed
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
+    from enumsol.condensation.condensed import Condensation
     from enumsol.model.problem3d import AnyProblem
 
 
@@ -144,12 +145,12 @@ def local_branch_test(problem: AnyProblem, root: SolutionPoint) -> LocalBranchTe
     dimension = 2 if isinstance(problem, ContactProblem) else 3
     if np.ndim(root.u_t) != dimension - 1:
         raise InvalidArgumentError(f"root is one in {5 - dimension}D; expected one in {dimension}D, as is the problem")
-    return branch_test(condensation_of(problem), root)
+    return branch_test(condensation_of(problem), problem.affine_friction, root)
 
 
-def branch_test(condensed: Any, root: SolutionPoint) -> LocalBranchTest:
-    """The test at a root of a condensation; see local_branch_test."""
-    alpha, (F0, F1) = float(root.alpha), condensed.problem.affine_friction
+def branch_test(condensed: Condensation, friction: tuple[Floats, Floats], root: SolutionPoint) -> LocalBranchTest:
+    """The test at a root, from F at alpha = 0 and its slope; see local_branch_test."""
+    alpha, (F0, F1) = float(root.alpha), friction
     frictionless = (F0 == 0) & (F1 == 0)
     frictionless = frictionless if frictionless.ndim == 1 else np.all(frictionless, axis=1)
     active = []

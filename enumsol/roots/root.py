@@ -202,7 +202,7 @@ class Root(ContactState):
         InvalidArgumentError
             Friction depends on the solution.
         """
-        return branch_test(self._condensed, self)
+        return branch_test(self._condensed, self.problem.affine_friction, self)
 
     @property
     def exact_slips(self) -> tuple[Fraction, ...] | None:

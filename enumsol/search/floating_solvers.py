@@ -33,7 +33,7 @@ from enumsol.trusted.selection import PENETRATION, SLIP_BACKWARD, SLIP_FORWARD
 from enumsol.trusted.status_rows import CONDITIONS, FORBIDDEN, FREE, SLIP_MINUS, SLIP_PLUS, STICK, row_signs
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from enumsol.proof.writer import Recorder
     from enumsol.search.certifiers.protocol import Margin
@@ -81,7 +81,7 @@ class FloatingSolvers(Solvers):
 
     @cached_property
     def exclusions(self) -> Exclusions | None:
-        """What excludes assignments, for the certifiers of both arithmetics; None without balls."""
+        """Ways to exclude assignments, for the certifiers of both arithmetics; None without balls."""
         if self._enclosed[0] is None:
             return None
         return Exclusions(self._enclosed[0], self._rests_on_reach, within=self._rounding_decides)
@@ -280,7 +280,7 @@ class FloatingCertifier(VerifiedCertifier):
         exclusions: Exclusions | None,
         exact: Callable[[], FloatingExactCertifier | None],
         recorder: Recorder,
-        node_ids: Any,
+        node_ids: Sequence[Any],
     ) -> None:
         super().__init__(scaled, None, exact, recorder, node_ids)
         self._exclusions, self._exactly = exclusions, exact

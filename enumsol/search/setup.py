@@ -52,7 +52,7 @@ class SearchSetup(ABC):
     scaled: Any
     _engine: Any
 
-    def __init__(self, problem: AnyProblem, alpha: Alpha, arithmetic: Any) -> None:
+    def __init__(self, problem: AnyProblem, alpha: Alpha, arithmetic: str) -> None:
         if arithmetic == "fast" and not problem.held:
             raise InvalidArgumentError(f'arithmetic is "fast" for a body that nothing holds; expected {self._offered}')
         self.problem: Any = problem

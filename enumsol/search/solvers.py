@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from fractions import Fraction
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Literal, TypeVar, cast
 
 import numpy as np
 
@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from enumsol.trusted.precise_at_alpha import PreciseAtAlpha
 
 Arithmetic = Literal["fast", "verified", "exact"]
+_T = TypeVar("_T")
 
 
 def make_engine(system: ScaledSystem, name: str | None = None) -> Engine:
@@ -284,7 +285,7 @@ def _positive(system: EnclosedSystem) -> bool:
         return False
 
 
-def _present(value: Any) -> Any:
+def _present(value: _T | None) -> _T:
     if value is None:
         raise AssertionError("this arithmetic has no such solver")
     return value
