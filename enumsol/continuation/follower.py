@@ -10,7 +10,7 @@ import numpy as np
 
 from enumsol.continuation.corrector import Correction, moore_penrose, smooth_newton
 from enumsol.continuation.path_data import PathData, PathStatus, PointKind
-from enumsol.continuation.recorder import SAME_POINT, Landmarks, PathRecorder
+from enumsol.continuation.recorder import SAME_POINT, Landmarks, PathRecorder, points_of
 from enumsol.continuation.scaled_equation import STATUS_TOLERANCE
 from enumsol.continuation.tangents import RATE_TOLERANCE, Tangent, curve_tangent, orientation
 from enumsol.continuation.transitions import (
@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     from enumsol.support.keeping import Ending
 
 _Path = TypeVar("_Path", bound=PathData)
+#: How a path ended, and why in a sentence.
+_Stop = tuple[PathStatus, str]
 
 
 @dataclass(frozen=True)
@@ -48,12 +50,6 @@ class _Step:
     kinks: tuple[Kink, ...]
     length: float
     corrections: int
-
-
-@dataclass(frozen=True)
-class _Stop:
-    status: PathStatus
-    message: str
 
 
 #: Why a path ended, in a sentence.
@@ -106,7 +102,8 @@ class Follower(Generic[_Path]):
         self._friction_ends = False
         (low, high), margin, scale = self.interval, self.options.overshoot, self.equation.alpha_scale
         self._low, self._high = (low - margin) / scale, (high + margin) / scale
-        self._landmarks = Landmarks.of(self.equation, first, self.options.transition_tolerance, visited)
+        others = list(points_of(self.equation, visited))
+        self._landmarks = Landmarks(self.equation, first, self.options.transition_tolerance, others)
         self.record = PathRecorder(self.equation)
         self.record.add(first, PointKind.START)
 
@@ -123,7 +120,7 @@ class Follower(Generic[_Path]):
 
     def _cut_short(self, ending: Ending) -> _Path:
         """The path to its last point."""
-        return self._path(_Stop(PathStatus.INTERRUPTED, f"{Stop(StopReason.of(ending))} {self._so_far}"))
+        return self._path((PathStatus.INTERRUPTED, f"{Stop(StopReason.of(ending))} {self._so_far}"))
 
     @property
     def _so_far(self) -> str:
@@ -132,8 +129,8 @@ class Follower(Generic[_Path]):
     def _path(self, stop: _Stop) -> _Path:
         return self._kind(
             **self.record.found(),
-            status=stop.status,
-            message=stop.message,
+            status=stop[0],
+            message=stop[1],
             orientation=self.sign,
             interval=self.interval,
             options=replace(self.options, alpha_scale=self.equation.alpha_scale),
@@ -144,7 +141,7 @@ class Follower(Generic[_Path]):
     def _stop(self, status: PathStatus, alpha: float | None = None, **words: object) -> _Stop:
         """The end of the path at an alpha, by default the current one."""
         at = self.equation.alpha(self.current.x) if alpha is None else alpha
-        return _Stop(status, _SENTENCES[status].format(alpha=at, **words))
+        return status, _SENTENCES[status].format(alpha=at, **words)
 
     def _stalled(self, reason: str) -> _Stop:
         return self._stop(PathStatus.STALLED, reason=reason, least=self.options.h_min)

@@ -134,13 +134,6 @@ class Landmarks:
     tolerance: float
     points: list[tuple[Floats, Codes, bool]]
 
-    @classmethod
-    def of(
-        cls, equation: ScaledEquation, origin: TangentPoint, tolerance: float, visited: Sequence[PathData]
-    ) -> Landmarks:
-        """Landmarks of a path that begins at ``origin`` where others have been followed."""
-        return cls(equation, origin, tolerance, list(_of_others(equation, visited)))
-
     def add(self, point: TangentPoint) -> None:
         """Add a transition point of the path itself."""
         self.points.append((point.x, point.codes, False))
@@ -195,7 +188,7 @@ class Landmarks:
         return x is not None and equation.norm(x - point.x) <= SAME_POINT
 
 
-def _of_others(equation: ScaledEquation, visited: Sequence[PathData]) -> Iterator[tuple[Floats, Codes, bool]]:
+def points_of(equation: ScaledEquation, visited: Sequence[PathData]) -> Iterator[tuple[Floats, Codes, bool]]:
     """Starts, transition points and ends of other paths, with the statuses on both sides."""
     for path in visited:
         for k, kind in enumerate(path.kinds):

@@ -255,14 +255,10 @@ class TrescaData:
 
         node_n = np.flatnonzero(active)
         node_s, axis_s = np.nonzero(self.occurs & ~sliding[:, None])
-        node_a = np.flatnonzero(sliding & np.all(self.occurs, axis=1)) if d == 2 else np.empty(0, dtype=np.intp)
+        node_a = np.flatnonzero(sliding & np.all(self.occurs, axis=1) & (d == 2))
         delta = self.bound[node_a] / size[node_a]
         root = np.sqrt(delta)
-        across = (
-            root[:, None] * self.F[node_a] * np.stack([-along[node_a, -1], along[node_a, 0]], axis=1)
-            if d == 2
-            else np.empty((0, 2))
-        )
+        across = root[:, None] * self.F[node_a] * np.stack([-along[node_a, -1], along[node_a, 0]], axis=1)
         counts = np.cumsum([0, len(node_n), len(node_s), len(node_a)])
         columns = [np.arange(counts[k], counts[k + 1]) for k in range(3)]
         Q = sp.csc_array(

@@ -370,7 +370,8 @@ class _Growing:
             self.parents[len(self.stages) :] = [tuple(item.parents)]
             self.node_of[stage.number] = nodes
             self.stages.append(stage)
-            self.reasons += [f"step {number}{self._whence(item)}: {reason}" for reason in stage.reasons]
+            whence = f" from root {', '.join(map(named, item.parents))}" if item.parents else ""
+            self.reasons += [f"step {number}{whence}: {reason}" for reason in stage.reasons]
             if number < len(self.steps):
                 self._ends(stage, item, nodes, following)
             if self.progress is not None:
@@ -384,10 +385,6 @@ class _Growing:
             following = following[:most]
         self.followed.update(node for item in following for node in item.parents)
         return following
-
-    @staticmethod
-    def _whence(item: _Waiting) -> str:
-        return "" if not item.parents else " from root " + ", ".join(named(node) for node in item.parents)
 
     def _stage(self, number: int, step: LoadStep, item: _Waiting) -> Stage:
         problem = restarted(self._base(step), item.start)

@@ -124,14 +124,16 @@ def _kind(problem: AnyProblem, steps: Sequence[object]) -> dict[str, Any]:
     refinement = {"halvings": int, "settled": bool, "changed_at": [int], "reason": Maybe(str)}
     return {
         "arithmetic": {"verified", "exact", "fast"},
-        "steps": [{"alpha": Maybe(is_fraction), "friction": Maybe(_is_list), "load": Maybe(Array(problem.n))}],
+        "steps": [
+            {
+                "alpha": Maybe(is_fraction),
+                "friction": Maybe(lambda value: isinstance(value, list)),
+                "load": Maybe(Array(problem.n)),
+            }
+        ],
         **{"stages": [stage], "parents": [[node]], "followed": [node], "reasons": [str]},
         **{"seconds": is_number, "refinement": Maybe(refinement)},
     }
-
-
-def _is_list(value: object) -> bool:
-    return isinstance(value, list)
 
 
 def _check_nodes(record: dict[str, Any]) -> None:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from mpl_toolkits.mplot3d import Axes3D
 
     from enumsol.model.problem3d import AnyProblem, ContactProblem3D
-    from enumsol.roots.root import Root
+    from enumsol.roots.local_branch import ContactState
     from enumsol.support.array_types import Floats, Indices
 
 
@@ -52,7 +52,7 @@ _PAD = {2: 6.0, 3: 18.0}
 
 
 def draw_body(
-    root: Root,
+    root: ContactState,
     problem: AnyProblem,
     place: object = None,
     scale: float | None = None,
@@ -78,7 +78,7 @@ def draw_body(
     return figure_of(ax)
 
 
-def draw_bodies(roots: Sequence[Root], scale: float | None = None, units: tuple[str, str] | None = None) -> Any:
+def draw_bodies(roots: Sequence[Any], scale: float | None = None, units: tuple[str, str] | None = None) -> Any:
     """A figure of the deformed bodies of several roots side by side; see RootSet.plot_bodies."""
     if not roots:
         raise InvalidArgumentError("there are no isolated roots to draw; expected at least one")
@@ -105,7 +105,7 @@ def draw_bodies(roots: Sequence[Root], scale: float | None = None, units: tuple[
     return figure
 
 
-def _index(root: Root) -> str:
+def _index(root: Any) -> str:
     return "index unknown" if root.index is None else f"index {root.index:+d}"
 
 
@@ -113,13 +113,13 @@ def _scale_words(scale: float) -> str:
     return f"displacements times {scale:g}"
 
 
-def _strongest(roots: Sequence[Root], problem: object, shape: BodyShape) -> float:
+def _strongest(roots: Sequence[ContactState], problem: object, shape: BodyShape) -> float:
     """The largest nodal contact force of several roots [force]."""
     return max(largest_length(shape.contact_forces(problem, root.lambda_n, root.lambda_t)) for root in roots)
 
 
 def _factors(
-    roots: Sequence[Root], problem: object, shape: BodyShape, scale: float | None
+    roots: Sequence[ContactState], problem: object, shape: BodyShape, scale: float | None
 ) -> tuple[tuple[float, ...], float]:
     """Factors of the displacements of each root, and one of all forces."""
     arrows = arrow_scale(_strongest(roots, problem, shape), shape.size)
@@ -132,7 +132,7 @@ def _axes(figure: Figure, place: tuple[int, int, int], shape: BodyShape) -> Any:
     return figure.add_subplot(*place, projection="3d" if shape.points.shape[1] == 3 else None)
 
 
-def _draw(ax: Axes3D, root: Root, problem: AnyProblem, shape: BodyShape, scale: float, arrows: float) -> None:
+def _draw(ax: Axes3D, root: ContactState, problem: AnyProblem, shape: BodyShape, scale: float, arrows: float) -> None:
     moves = scale * shape.moves(root)
     points = shape.points + moves
     places = shape.at_rows(points)
@@ -204,7 +204,9 @@ def _name_axes(ax: object, dimension: int, units: tuple[str, str] | None) -> Non
         getattr(ax, f"set_{direction}label")(in_units(direction, "length", units), fontsize=8)
 
 
-def _legend(place: Axes | Figure, roots: Sequence[Root], strongest: float, units: tuple[str, str] | None) -> None:
+def _legend(
+    place: Axes | Figure, roots: Sequence[ContactState], strongest: float, units: tuple[str, str] | None
+) -> None:
     found = {status for root in roots for status in root.statuses}
     handles = [
         line_entry(status.value, linestyle="", marker=marker, markerfacecolor=face, markeredgecolor="black")
@@ -226,7 +228,7 @@ def _legend(place: Axes | Figure, roots: Sequence[Root], strongest: float, units
     place.legend(handles=handles, fontsize=8, frameon=False, **where)
 
 
-def draw_root(root: Root, problem: ContactProblem3D, ax: object, units: tuple[str, str] | None = None) -> Any:
+def draw_root(root: ContactState, problem: ContactProblem3D, ax: object, units: tuple[str, str] | None = None) -> Any:
     """See Root.plot."""
     if axes_or_none(ax) is not None or problem.mesh is None:
         return draw_slips(root, problem, ax, units)
@@ -236,7 +238,9 @@ def draw_root(root: Root, problem: ContactProblem3D, ax: object, units: tuple[st
     return figure
 
 
-def draw_slips(root: Root, problem: ContactProblem3D, place: object, units: tuple[str, str] | None = None) -> Any:
+def draw_slips(
+    root: ContactState, problem: ContactProblem3D, place: object, units: tuple[str, str] | None = None
+) -> Any:
     """Statuses and directions of slip on the contact surface."""
     if problem.coordinates is None:
         raise InvalidArgumentError("the problem has no coordinates; expected a problem made with coordinates=")
@@ -264,7 +268,7 @@ def draw_slips(root: Root, problem: ContactProblem3D, place: object, units: tupl
     ax.margins(0.15)
     ax.set_xlabel(in_units("xyz"[shown[0]], "length", units))
     ax.set_ylabel(in_units("xyz"[shown[1]], "length", units))
-    ax.set_title(f"directions of slip at alpha = {float(root.alpha):g}, index {root.index:+d}")
+    ax.set_title(f"directions of slip at alpha = {float(root.alpha):g}, {_index(root)}")
     ax.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), fontsize=8, frameon=False)
     return figure_of(ax)
 

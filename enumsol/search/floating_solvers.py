@@ -13,14 +13,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.condensation.condensed import ScaledSystem
-from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, RigidRows, enclosure_of
+from enumsol.condensation.enclosure import EnclosedSystem, RigidRows
 from enumsol.proof import records
 from enumsol.search.certifiers.protocol import Bound, Certifier, UndecidedPart
 from enumsol.search.certifiers.rational_certifier import ExactCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier, proven
 from enumsol.search.closing import TreeCloser
 from enumsol.search.reference_closer import LeadingCloser, reference_numbers
-from enumsol.search.solvers import Solvers
+from enumsol.search.solvers import Solvers, present
 from enumsol.search.splitting import PlaneSplitting
 from enumsol.selections.solution import SelectionSolution
 from enumsol.trusted.at_alpha import holds_no_root, solve_selection
@@ -62,19 +62,6 @@ class FloatingSolvers(Solvers):
         return self.rows.unit
 
     @cached_property
-    def exact(self) -> ExactSelections | None:
-        """Selections in rationals; None when the problem is too large for them."""
-        from enumsol.condensation.exact import ExactSystem, check_definite  # python-flint
-        from enumsol.selections.rational_selections import ExactSelections  # python-flint
-
-        if self.arithmetic != "exact" and not self._in_rationals:
-            return None
-        system = ExactSystem.from_problem(self.problem, self.alpha)
-        if self.enclosed is None:
-            check_definite(system.contact_compliance)
-        return ExactSelections(system)
-
-    @cached_property
     def exact_certifier(self) -> FloatingExactCertifier | None:
         """The certifier in rationals; None when the problem is too large."""
         return None if self.exact is None else FloatingExactCertifier(self.exact, self.scaled, self.exclusions)
@@ -82,9 +69,9 @@ class FloatingSolvers(Solvers):
     @cached_property
     def exclusions(self) -> Exclusions | None:
         """Ways to exclude assignments, for the certifiers of both arithmetics; None without balls."""
-        if self._enclosed[0] is None:
+        if self.enclosed is None:
             return None
-        return Exclusions(self._enclosed[0], self._rests_on_reach, within=self._rounding_decides)
+        return Exclusions(self.enclosed, self._rests_on_reach, within=self._rounding_decides)
 
     @cached_property
     def _rounding_decides(self) -> bool:
@@ -97,25 +84,12 @@ class FloatingSolvers(Solvers):
         """True if a complete selection without a solution may have one beyond the bound."""
         return self._rounding_decides or self.exact is None or self.exact.rests_on_reach(codes, None)
 
-    @cached_property
-    def _enclosed(self) -> tuple[EnclosedSystem | None, str]:
-        try:
-            enclosed = enclosure_of(self.problem).at(self.alpha, self.scaled.force, self.scaled.length)
-            definite = enclosed.smallest_eigenvalue > 0
-        except NotEnclosedError:
-            return None, "problem"
-        return (enclosed if definite else None), "problem"
-
     def certifier(self, recorder: Recorder | None) -> Certifier:
         """The certifier of this arithmetic."""
         if self.arithmetic == "exact":
-            if self.exact_certifier is None:
-                raise AssertionError("exact arithmetic has a solver, or refuses the problem")
-            return self.exact_certifier
-        if recorder is None:
-            raise AssertionError("verified arithmetic writes a proof")
+            return present(self.exact_certifier)
         ids = self.problem.node_ids
-        return FloatingCertifier(self.scaled, self.exclusions, lambda: self.exact_certifier, recorder, ids)
+        return FloatingCertifier(self.scaled, self.exclusions, lambda: self.exact_certifier, present(recorder), ids)
 
     @cached_property
     def relaxed(self) -> ScaledSystem:

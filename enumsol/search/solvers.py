@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from contextlib import suppress
 from fractions import Fraction
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Literal, TypeVar, cast
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Literal, TypeVar, cast
 import numpy as np
 
 from enumsol.condensation.data import EXACT_DOF_LIMIT, exactly_at
-from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
+from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, enclosure_of
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.model.statuses import UNDECIDED
 from enumsol.proof.declared_forms import plane_form
@@ -144,17 +145,15 @@ class Solvers(SearchSetup):
 
         if self.arithmetic != "exact" and not self._in_rationals:
             return None
-        # verified arithmetic asks about few selections, exact arithmetic about all
-        apart = self.arithmetic == "verified" and self.problem.n > FAST_EXACT_DOF
-        system = (
-            UncondensedSystem(self.problem, self.alpha, self._index)
-            if apart
-            else ExactSystem.from_problem(self.problem, self.alpha)
-        )
+        system: ExactSystem | UncondensedSystem
+        if self.problem.held and self.arithmetic == "verified" and self.problem.n > FAST_EXACT_DOF:
+            # verified arithmetic asks about few selections, exact arithmetic about all
+            system = UncondensedSystem(self.problem, self.alpha, self._index)
+        else:
+            system = ExactSystem.from_problem(self.problem, self.alpha)
         enclosed, data = self._enclosed
-        proven = enclosed is not None and data == "problem"
-        if not proven:
-            check_definite(system.S)
+        if enclosed is None or data == "condensed":
+            check_definite(system.contact_compliance if isinstance(system, ExactSystem) else system.S)
         return ExactSelections(system)
 
     @cached_property
@@ -169,16 +168,17 @@ class Solvers(SearchSetup):
     @cached_property
     def _enclosed(self) -> tuple[EnclosedSystem | None, str]:
         system = self.scaled
-        try:
-            enclosed = self.problem.enclosure.at(self.alpha, system.force, system.length)
-            if _positive(enclosed):
+        with suppress(NotEnclosedError):
+            enclosed = enclosure_of(self.problem).at(self.alpha, system.force, system.length)
+            if enclosed.smallest_eigenvalue > 0:
                 return enclosed, "problem"
-        except NotEnclosedError:
-            pass
-        if self._in_rationals or not self.problem.known_exactly:
+        if self._in_rationals or not (self.problem.known_exactly and self.problem.held):
             return None, "problem"
-        enclosed = EnclosedSystem.as_computed(system.S, system.g, system.F)
-        return (enclosed if _positive(enclosed) else None), "condensed"
+        with suppress(NotEnclosedError):
+            enclosed = EnclosedSystem.as_computed(system.S, system.g, system.F)
+            if enclosed.smallest_eigenvalue > 0:
+                return enclosed, "condensed"
+        return None, "condensed"
 
     @property
     def enclosed(self) -> EnclosedSystem | None:
@@ -204,10 +204,10 @@ class Solvers(SearchSetup):
         if self.arithmetic == "exact":
             from enumsol.search.certifiers.rational_certifier import ExactCertifier  # python-flint
 
-            return ExactCertifier(_present(self.exact), self.scaled, self.enclosed)
+            return ExactCertifier(present(self.exact), self.scaled, self.enclosed)
         ids = self.problem.node_ids
         exact = lambda: self.exact_certifier  # noqa: E731
-        return VerifiedCertifier(self.scaled, self.enclosed, exact, _present(recorder), ids, self._solved_precisely)
+        return VerifiedCertifier(self.scaled, self.enclosed, exact, present(recorder), ids, self._solved_precisely)
 
     def _solved_precisely(self, codes: Codes) -> VerifiedSelection | None:
         """The verified solution of a complete selection in many digits; None where that is not to be had."""
@@ -267,7 +267,7 @@ class Solvers(SearchSetup):
         if self.arithmetic == "fast":
             return not np.any(self.scaled.g)
         if self.arithmetic == "exact" and self.problem.held:
-            return not any(_present(self.exact).system.g)
+            return not any(present(self.exact).system.g)
         return super().unloaded()
 
     def reader(self) -> Reader:
@@ -278,14 +278,8 @@ class Solvers(SearchSetup):
         return Reader(limits, lambda said: None if system is None else plane_form(system, said))
 
 
-def _positive(system: EnclosedSystem) -> bool:
-    try:
-        return system.smallest_eigenvalue > 0
-    except NotEnclosedError:
-        return False
-
-
-def _present(value: _T | None) -> _T:
+def present(value: _T | None) -> _T:
+    """A part of the solvers that the arithmetic is known to have."""
     if value is None:
         raise AssertionError("this arithmetic has no such solver")
     return value
