@@ -113,27 +113,28 @@ def _scale_words(scale: float) -> str:
     return f"displacements times {scale:g}"
 
 
-def _strongest(roots: Sequence[ContactState], problem: object, shape: BodyShape) -> float:
+def _strongest(roots: Sequence[ContactState], problem: AnyProblem, shape: BodyShape) -> float:
     """The largest nodal contact force of several roots [force]."""
     return max(largest_length(shape.contact_forces(problem, root.lambda_n, root.lambda_t)) for root in roots)
 
 
 def _factors(
-    roots: Sequence[ContactState], problem: object, shape: BodyShape, scale: float | None
+    roots: Sequence[Any], problem: AnyProblem, shape: BodyShape, scale: float | None
 ) -> tuple[tuple[float, ...], float]:
     """Factors of the displacements of each root, and one of all forces."""
     arrows = arrow_scale(_strongest(roots, problem, shape), shape.size)
     if scale is not None:
         return (positive_number(scale, "scale"),) * len(roots), arrows
-    return own_scales([largest_length(shape.moves(root)) for root in roots], shape.size), arrows
+    moved = [largest_length(shape.moves(root.problem, root.u, root.alpha)) for root in roots]
+    return own_scales(moved, shape.size), arrows
 
 
 def _axes(figure: Figure, place: tuple[int, int, int], shape: BodyShape) -> Any:
     return figure.add_subplot(*place, projection="3d" if shape.points.shape[1] == 3 else None)
 
 
-def _draw(ax: Axes3D, root: ContactState, problem: AnyProblem, shape: BodyShape, scale: float, arrows: float) -> None:
-    moves = scale * shape.moves(root)
+def _draw(ax: Axes3D, root: Any, problem: AnyProblem, shape: BodyShape, scale: float, arrows: float) -> None:
+    moves = scale * shape.moves(root.problem, root.u, root.alpha)
     points = shape.points + moves
     places = shape.at_rows(points)
     forces = arrows * shape.contact_forces(problem, root.lambda_n, root.lambda_t)
@@ -153,7 +154,7 @@ def _draw(ax: Axes3D, root: ContactState, problem: AnyProblem, shape: BodyShape,
         _solid(ax, shape, points)
         x, y, z = first_view(row_frames(problem)[:, 0])
         ax.view_init(elev=np.degrees(np.arcsin(z)), azim=np.degrees(np.arctan2(y, x)))
-        slides, ways = slip_directions(problem, root)
+        slides, ways = slip_directions(problem, root.u_t, root.statuses)
         if len(slides):
             look = {"linewidth": 1.8, "arrow_length_ratio": 0.4, "zorder": 4}
             ax.quiver(*places[slides].T, *(SLIP_ARROW * shape.size * ways).T, color=_SLIP, **look)

@@ -29,7 +29,7 @@ from enumsol.support.immutable import Sealed
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
-    from enumsol.condensation.condensed import Condensation
+    from enumsol.condensation.condensed import CondensedProblem
     from enumsol.model.problem3d import AnyProblem
 
 
@@ -154,7 +154,7 @@ def local_branch_test(problem: AnyProblem, root: ContactState) -> LocalBranchTes
     return branch_test(condensation_of(problem), problem.affine_friction, root)
 
 
-def branch_test(condensed: Condensation, friction: tuple[Floats, Floats], root: ContactState) -> LocalBranchTest:
+def branch_test(condensed: CondensedProblem, friction: tuple[Floats, Floats], root: ContactState) -> LocalBranchTest:
     """The test at a root, from F at alpha = 0 and its slope; see local_branch_test."""
     alpha, (F0, F1) = float(root.alpha), friction
     frictionless = (F0 == 0) & (F1 == 0)
