@@ -18,7 +18,7 @@ from enumsol.search.closing import TreeCloser
 from enumsol.search.space.product_search import ProductSearch
 from enumsol.search.space.space_newton import Isotropic
 from enumsol.support.deadlines import look
-from enumsol.trusted.space.space_uniqueness import LARGEST_UNIT, equations
+from enumsol.trusted.space.space_uniqueness import equations, moderate_units
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -70,7 +70,7 @@ class SpaceClosing(Protocol):
         normal : (p,) array, lambda_n near the solution
         """
 
-    def alone(self, codes: Codes, numbers: Floats, leaf: Codes) -> list[Any] | None:
+    def alone_in(self, codes: Codes, numbers: Floats, leaf: Codes) -> list[Any] | None:
         """The root of a leaf, as a list, if no other solution has the statuses of an assignment; None if not proven."""
 
     def fathom(self, codes: Codes, tree: Sequence[Branched | Missed | Enclosed]) -> list[Any]:
@@ -155,7 +155,7 @@ class SpaceCloser(TreeCloser):
             held = equations(self._certifier.enclosed, statuses, _WEIGHT).mid
             numbers = point.numbers(self._enough, better=False, held=held)
             if numbers is not None:
-                found = self._certifier.alone(statuses, numbers, point.codes)
+                found = self._certifier.alone_in(statuses, numbers, point.codes)
         if found is None:
             self._tried.add(statuses)
         return found
@@ -183,7 +183,7 @@ class SpaceCloser(TreeCloser):
 
 def solved(system: SpaceSystem, near: Floats | None = None) -> tuple[Point, Floats] | None:
     """A solution in floats, and its forces (p, 3) in isotropic variables, near those of another one; or None."""
-    if np.max(np.maximum(system.unit, 1.0 / system.unit)) > LARGEST_UNIT:
+    if not moderate_units(system.unit):
         return None
     problem = Isotropic.of(system)
     y = problem.solution(near)

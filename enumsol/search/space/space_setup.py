@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.support.array_types import Alpha, Codes, Floats
-    from enumsol.trusted.space.slip_forms import SlipForm
+    from enumsol.trusted.space.sector_rows import SlipForm
 
 #: Nodes examined with the energy before a form that knows where the body slides is tried (theory, section 12.2).
 NODES = 256
