@@ -42,7 +42,7 @@ from enumsol.support.workers import workers_of
 if TYPE_CHECKING:
     from concurrent.futures import Executor
 
-    from enumsol.loading.history_data import HistoryData, Node
+    from enumsol.loading.history_data import Node
     from enumsol.model.problem3d import AnyProblem
     from enumsol.roots.root_set import RootSet
     from enumsol.support.array_types import Alpha

@@ -195,7 +195,7 @@ def _between(polynomials: Ball, ends: tuple[float, float]) -> tuple[Floats, Floa
 
 
 def _values(coefficients: Floats, tau: float) -> Floats:
-    """Polynomials at one tau; no claim rests on them."""
+    """About the values of polynomials at one tau; how far theta is off is bounded."""
     return np.asarray(coefficients @ tau ** np.arange(coefficients.shape[1]))
 
 

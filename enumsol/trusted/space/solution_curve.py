@@ -11,13 +11,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, determinant_sign, solution, upper_norm
 from enumsol.condensation.condensed import node_units
 from enumsol.condensation.enclosure import NotEnclosedError, RigidRows
+from enumsol.condensation.space_condensed import node_friction
 from enumsol.model.sectors import SECTORS
 from enumsol.trusted.space.krawczyk import Contraction, NaturalMap
 from enumsol.trusted.space.natural_map import Directions, Discs, upper_product
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from enumsol.condensation.data import ProblemData
     from enumsol.condensation.enclosure import CondensedEnclosure
 
     Array = NDArray[np.float64]
@@ -130,7 +132,7 @@ class AlphaProblem:
             ]
             rows, work = RigidRows.of(problem, Fraction(0), force, length), float(force[0] * length[0])
             data = _bordered(data, rows)
-            ratio = Ball.joined(_ratios(problem, occurs), Ball.exact(np.ones(len(rows.unit))))
+            ratio = Ball.joined(_ratios(problem), Ball.exact(np.ones(len(rows.unit))))
             force, length = np.append(force, rows.unit), np.append(length, work / rows.unit)
             S, g0, g1 = (part * ratio if part.mid.ndim == 1 else ratio[:, None] * part for part in data)
             inverse = Ball(1.0 / ratio.mid, (2.0 * ratio.rad / ratio.mid + 2 * UNIT) / ratio.mid * SAFE)
@@ -266,23 +268,14 @@ class AlphaProblem:
         return tuple(None if code < 0 else code for code in codes.tolist())
 
 
-def _ratios(problem: Any, occurs: NDArray[np.bool_]) -> Ball:
+def _ratios(problem: ProblemData) -> Ball:
     """Ratios of both coefficients, at the second component of nodes with two; 1 elsewhere, (3p,)."""
     p = problem.p
-    coefficients, slopes = np.array(problem.friction), np.array(problem.friction_slope)
     ratio = Ball.exact(np.ones(3 * p))
-    for i in np.flatnonzero(np.all(occurs, axis=0)):
-        (one, one_slope), (other, other_slope) = [
-            (Fraction(float(coefficients[k, i])), Fraction(float(slopes[k, i]))) for k in range(2)
-        ]
-        if one * other_slope != other * one_slope:
-            raise NotEnclosedError(
-                f"the ratio of the coefficients of friction of contact node {problem.node_ids[i]} changes with "
-                "alpha; expected a constant one"
-            )
-        q = other / one if one else other_slope / one_slope
-        exact = Fraction(float(q)) == q
-        ratio.mid[2 * p + i], ratio.rad[2 * p + i] = float(q), 0.0 if exact else 2 * UNIT * abs(float(q))
+    for i, (_, _, q) in enumerate(node_friction(problem)):
+        if q:
+            exact = Fraction(float(q)) == q
+            ratio.mid[2 * p + i], ratio.rad[2 * p + i] = float(q), 0.0 if exact else 2 * UNIT * abs(float(q))
     return ratio
 
 
