@@ -65,7 +65,7 @@ SHARED = {
     "trusted.uniqueness": {*("ClosedSolution", "closed_solution", "numbers_of", "only_solution", "same_solution")},
     "trusted.at_alpha": {"VerifiedSelection", "settled_selection", "solve_selection"},
     "trusted.precise_at_alpha": {"PreciseAtAlpha"},
-    "trusted.quadratic_forms": {"EnclosedForm", "Equations"},
+    "trusted.quadratic_forms": {"EnclosedForm", "Equations", "QuadraticForm"},
     "trusted.status_rows": None,
     "trusted.space.sector_rows": None,
     "trusted.space.leaf_equations": {"with_free_bounds"},
