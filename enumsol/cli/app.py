@@ -13,11 +13,11 @@ import typer
 
 from enumsol.cli.audit import audit
 from enumsol.cli.common import ExitStatus
-from enumsol.cli.files import FileCommand
 from enumsol.cli.fixed_point import fixed_point
 from enumsol.cli.follow import follow
 from enumsol.cli.graph import graph, report
 from enumsol.cli.history import history
+from enumsol.cli.options import add_command
 from enumsol.cli.problems import collection_app, gallery_app
 from enumsol.cli.roots import roots
 from enumsol.cli.solve import solve
@@ -42,7 +42,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 for _command in (solve, roots, table, graph, history, report, follow, audit, fixed_point, verify):
-    app.command(_command.__name__.replace("_", "-"), cls=FileCommand)(_command)
+    add_command(app, _command)
 app.add_typer(gallery_app, name="gallery")
 app.add_typer(collection_app, name="collection")
 

@@ -9,7 +9,7 @@ import typer
 
 from enumsol.cli.common import ExitStatus, finish, load_problem, parse_alpha, parse_interval, so_far
 from enumsol.cli.graph import build, read_graph
-from enumsol.cli.options import Arithmetic, JsonFile, ProblemArgument, Quiet, csv, file, number
+from enumsol.cli.options import Argument, Arithmetic, Number, OutputFile, Problem, Quiet
 from enumsol.cli.output import deliver
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.messages import counted
@@ -24,40 +24,19 @@ if TYPE_CHECKING:
 
 #: As of ``read_points``, which is not imported for --help.
 Columns = Literal["auto", "rows", "labels"]
-PointsArgument = Annotated[
-    str,
-    typer.Argument(
-        metavar="POINTS",
-        help="CSV with the columns alpha, lambda_n_X and lambda_t_X for every contact node X and, for several paths, "
-        "path; - is stdin.",
-        show_default=False,
-    ),
-]
-Tolerance = Annotated[
-    float,
-    typer.Option(
-        metavar="LENGTH",
-        help="Distance from every arc beyond which a point is off the graph, as explained above; dimensionless.",
-    ),
-]
-NamedBy = Annotated[
-    Columns, typer.Option(help="Whether the X of lambda_n_X is the node's row number (from 0) or its label.")
-]
 
 
 def audit(
-    problem: ProblemArgument,
-    points: PointsArgument,
-    first: Annotated[str | None, number("--from", "First alpha; default: that of the points.")] = None,
-    last: Annotated[str | None, number("--to", "Last alpha; default: that of the points.")] = None,
-    graph_file: Annotated[
-        str | None, file("--graph", "A graph written by enumsol graph --save.", None, "GRAPH")
-    ] = None,
-    arithmetic: Annotated[Arithmetic, typer.Option(help="Arithmetic of the graph, as in enumsol graph.")] = "verified",
-    tolerance: Tolerance = 1e-5,
-    columns: NamedBy = "auto",
-    json_file: JsonFile = None,
-    csv_file: Annotated[str | None, csv("point")] = None,
+    problem: Problem,
+    points: Argument,
+    first: Number | None = None,
+    last: Number | None = None,
+    graph_file: Annotated[str | None, typer.Option(metavar="GRAPH")] = None,
+    arithmetic: Arithmetic = "verified",
+    tolerance: Annotated[float, typer.Option(metavar="LENGTH")] = 1e-5,
+    columns: Columns = "auto",
+    json_file: OutputFile | None = None,
+    csv_file: OutputFile | None = None,
     quiet: Quiet = False,
 ) -> None:
     """Check POINTS, from any continuation code, against all solutions of PROBLEM.
@@ -83,6 +62,18 @@ def audit(
     not compared, whatever else was found, because their alpha is outside the interval of the graph, or because a graph
     that is known to be incomplete has no arc there; 2 on bad input; 130 on Ctrl-C; 74 if a result could not be written;
     141 if the program that read it has ended.
+
+    Parameters
+    ----------
+    points : CSV with the columns alpha, lambda_n_X and lambda_t_X for every contact node X and, for several paths,
+        path; - is stdin.
+    first : First alpha; default: that of the points.
+    last : Last alpha; default: that of the points.
+    graph_file : A graph written by enumsol graph --save.
+    arithmetic : Arithmetic of the graph, as in enumsol graph.
+    tolerance : Distance from every arc beyond which a point is off the graph, as explained above; dimensionless.
+    columns : Whether the X of lambda_n_X is the node's row number (from 0) or its label.
+    csv_file : Write a table with one row per point; - is stdout.
     """
     from enumsol.auditing import audit as check  # numpy and scipy: not for --help
     from enumsol.auditing.graph_map import checked_tolerance

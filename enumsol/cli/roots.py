@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 from dataclasses import dataclass
-from inspect import Parameter, signature
 from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
 
 import typer
@@ -20,81 +19,43 @@ if TYPE_CHECKING:
     from enumsol.roots.root_set import RootSet
     from enumsol.support.array_types import Alpha
 
-Method = Literal["tree", "exhaustive"]
-AtAlpha = Annotated[
-    str,
-    options.number(
-        "--alpha", "Parameter value: a decimal number, read as float64, or a fraction such as 8/3, taken exactly."
-    ),
-]
-HowExact = Annotated[
-    options.Arithmetic,
-    typer.Option(
-        help="verified: rigorous error bounds, with proof. fast: floats and a tolerance, never proven. "
-        "exact: rationals throughout, with proof, for small problems."
-    ),
-]
-HowSearched = Annotated[
-    Method, typer.Option(help="tree: a tree search. exhaustive: all 4^p selections, fast or exact, for small p.")
-]
-
-
-StopAfter = Annotated[int | None, options.count("Stop at N roots; 2 decides whether the solution is unique.")]
-Unique = Annotated[
-    bool, typer.Option("--unique", help="Only report whether there is one solution; stop at a second one.")
-]
-MirrorAxis = Annotated[
-    Literal["x", "y", "z"] | None,
-    typer.Option(
-        "--mirror",
-        help="Direction across which body, supports and load are symmetric: report which roots are mirror images.",
-        rich_help_panel=options.OUTPUT,
-        show_default=False,
-    ),
-]
-Jobs = Annotated[int, options.count("Number of processes that search (tree).")]
-ProofFile = Annotated[str | None, options.file("--proof", "Write the proof (verified).")]
-Resume = Annotated[
-    bool,
-    typer.Option(
-        "--resume", help="Resume from the proof in --proof FILE, if there is one.", rich_help_panel=options.OUTPUT
-    ),
-]
-CsvFile = Annotated[str | None, options.csv("root and contact node")]
-
 
 @dataclass(frozen=True)
 class Search:
     """A search at one alpha as its options describe it; every field is an option, in the order of the help.
 
-    Attributes
+    Parameters
     ----------
-    *_file : names of the files that results go to; None where there is none
-    unique : whether the only question is if there is one solution
-    mirror : the direction across which roots are paired
+    arithmetic : verified: rigorous error bounds, with proof. fast: floats and a tolerance, never proven. exact:
+        rationals throughout, with proof, for small problems.
+    method : tree: a tree search. exhaustive: all 4^p selections, fast or exact, for small p.
+    unique : Only report whether there is one solution; stop at a second one.
+    stop_after : Stop at N roots; 2 decides whether the solution is unique.
+    jobs : Number of processes that search (tree).
+    mirror : Direction across which body, supports and load are symmetric: report which roots are mirror images.
+    proof_file : Write the proof (verified).
+    resume : Resume from the proof in --proof FILE, if there is one.
+    csv_file : Write a table with one row per root and contact node; - is stdout.
+    report_file : Write an HTML page about the roots, with their deformed bodies.
     """
 
-    arithmetic: HowExact = "verified"
-    method: HowSearched = "tree"
-    unique: Unique = False
-    stop_after: StopAfter = None
-    max_nodes: options.MaxNodes = None
-    time_limit: options.TimeLimit = None
-    jobs: Jobs = 1
-    mirror: MirrorAxis = None
-    proof_file: ProofFile = None
-    resume: Resume = False
-    json_file: options.JsonFile = None
-    csv_file: CsvFile = None
-    vtu_file: options.VtuFile = None
-    report_file: options.ReportFile = None
-    units: options.Units = None
-
-    @classmethod
-    def as_options(cls, *without: str) -> list[Parameter]:
-        """The fields as options of a command, but for some."""
-        fields = signature(cls, eval_str=True).parameters.values()
-        return [field.replace(kind=Parameter.KEYWORD_ONLY) for field in fields if field.name not in without]
+    arithmetic: options.Arithmetic = "verified"
+    method: Literal["tree", "exhaustive"] = "tree"
+    unique: bool = False
+    stop_after: options.Count | None = None
+    max_nodes: options.Count | None = None
+    time_limit: options.Seconds | None = None
+    jobs: options.Count = 1
+    mirror: Annotated[
+        Literal["x", "y", "z"] | None, typer.Option(rich_help_panel=options.OUTPUT, show_default=False)
+    ] = None
+    proof_file: options.OutputFile | None = None
+    resume: options.OutputFlag = False
+    json_file: options.OutputFile | None = None
+    csv_file: options.OutputFile | None = None
+    vtu_file: options.OutputFile | None = None
+    report_file: options.OutputFile | None = None
+    units: options.Units | None = None
 
     def check(self) -> None:
         """Refuse options that contradict each other, and a proof to resume from that is not named.
@@ -173,8 +134,8 @@ class Search:
             return enumerate_roots(problem, alpha, executor=executor, progress=display, **asked)
 
 
-@options.with_options(*Search.as_options(), after=2)
-def roots(problem: options.ProblemArgument, alpha: AtAlpha, *, quiet: options.Quiet = False, **chosen: Any) -> None:
+@options.with_options(*options.options_of(Search), after=2)
+def roots(problem: options.Problem, alpha: options.Number, *, quiet: options.Quiet = False, **chosen: Any) -> None:
     """Find all solutions of PROBLEM at one ALPHA.
 
     Prints a table of the roots and whether it is complete; lambda_n and lambda_t are nodal forces, not pressures. The
@@ -184,6 +145,10 @@ def roots(problem: options.ProblemArgument, alpha: AtAlpha, *, quiet: options.Qu
     with nothing undecided), with --unique if yes or no is proven; 3 if something remained undecided, a limit cut the
     search short, or the indices do not add up to +1; 2 on bad input; 130 on Ctrl-C, after printing what was found so
     far; 74 if a result could not be written; 141 if the program that read it has ended.
+
+    Parameters
+    ----------
+    alpha : Parameter value: a decimal number, read as float64, or a fraction such as 8/3, taken exactly.
     """
     search = Search(**chosen)
     search.check()

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from enumsol.cli.common import ExitStatus, load_problem
-from enumsol.cli.options import JsonFile, ProblemArgument, Quiet
+from enumsol.cli.options import Argument, OutputFile, Problem, Quiet
 from enumsol.cli.output import deliver
 from enumsol.cli.progress import Display
 
@@ -25,17 +25,7 @@ _STEPS = {
 }
 
 
-def verify(
-    problem: ProblemArgument,
-    proof: Annotated[
-        str,
-        typer.Argument(
-            metavar="PROOF", help="A file written by --proof of enumsol roots, graph or history.", show_default=False
-        ),
-    ],
-    json_file: JsonFile = None,
-    quiet: Quiet = False,
-) -> None:
+def verify(problem: Problem, proof: Argument, json_file: OutputFile | None = None, quiet: Quiet = False) -> None:
     """Check the PROOF that a list of roots of PROBLEM, a branch graph or a history is complete.
 
     The checker imports nothing from the search: it computes the condensed problem anew and checks every leaf of the
@@ -44,6 +34,10 @@ def verify(
     Exit status: 0 if the proof holds and nothing is undecided; 3 if it holds but leaves selections undecided or, for a
     graph, holds no arcs or leaves parts of them undecided; 2 if it does not hold or cannot be read; 74 if the report
     could not be written; 141 if the program that read it has ended.
+
+    Parameters
+    ----------
+    proof : A file written by --proof of enumsol roots, graph or history.
     """
     # numpy and scipy: not for --help
     from enumsol.checker.verify import verify as check
