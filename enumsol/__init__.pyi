@@ -71,7 +71,6 @@ from .loading.maps import MultiplicityMap as MultiplicityMap, multiplicity_map a
 from .loading.steps import LoadStep as LoadStep
 from .model.friction import FrictionTable as FrictionTable
 from .model.mesh import BodyMesh as BodyMesh
-from .model.mirrors import Mirror as Mirror
 from .model.problem import ContactProblem as ContactProblem
 from .model.problem3d import ContactProblem3D as ContactProblem3D, SlipMean as SlipMean
 from .model.statuses import ContactStatus as ContactStatus, sign_array as sign_array

@@ -12,7 +12,6 @@ from enumsol.support.messages import visible
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from enumsol.roots.mirrored import MirrorImages
     from enumsol.roots.root import Root, RootFamily
     from enumsol.roots.root_set import RootSet, Undecided
     from enumsol.support.array_types import Floats
@@ -74,7 +73,7 @@ def uniqueness(found: RootSet) -> str:
 
 def roots_as_json(found: RootSet, problem: str) -> str:
     """The whole result; numbers read back as the same float64, what is not finite is null."""
-    bound, images = found.rigid_bound, found.mirror_images
+    bound = found.rigid_bound
     content = {
         "problem": problem,
         "alpha": float(found.alpha),
@@ -85,10 +84,7 @@ def roots_as_json(found: RootSet, problem: str) -> str:
         **taken(found, "unique", "by_one_certificate", "stopped", "notes", "index_sum"),
         **({} if bound is None else {"max_rigid_displacement": bound.largest, "bound_needed": bound.needed}),
         "node_ids": found.node_ids,
-        **({} if images is None else {"mirror": _mirror(images)}),
-        "roots": [
-            _root(root) | ({} if images is None else {"mirror_image": images.images[k]}) for k, root in enumerate(found)
-        ],
+        "roots": [_root(root) for root in found],
         "families": [_family(family) for family in found.families],
         "undecided": [_undecided(item) for item in found.undecided],
         "stats": taken(found.stats, *_STATS),
@@ -101,16 +97,6 @@ def _lines(value: object) -> str:
     if isinstance(value, list) and value and isinstance(value[0], dict):
         return "[\n" + ",\n".join(json.dumps(item) for item in value) + "\n]"
     return json.dumps(value, default=str)
-
-
-def _mirror(images: MirrorImages) -> dict[str, Any]:
-    """The symmetry of the problem, as far as --mirror shows it."""
-    asymmetry = images.asymmetry
-    return {
-        "asymmetry": asymmetry.bound,
-        **taken(asymmetry, "proven", "differs"),
-        **taken(images, "missing", "ambiguous"),
-    }
 
 
 def _root(root: Root) -> dict[str, Any]:

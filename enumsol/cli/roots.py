@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import shlex
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NoReturn
-
-import typer
+from typing import TYPE_CHECKING, Any, Literal, NoReturn
 
 from enumsol.cli import common, options, output, root_report
 from enumsol.cli.progress import SearchDisplay
@@ -32,7 +30,6 @@ class Search:
     unique : Only report whether there is one solution; stop at a second one.
     stop_after : Stop at N roots; 2 decides whether the solution is unique.
     jobs : Number of processes that search (tree).
-    mirror : Direction across which body, supports and load are symmetric: report which roots are mirror images.
     proof_file : Write the proof (verified).
     resume : Resume from the proof in --proof FILE, if there is one.
     csv_file : Write a table with one row per root and contact node; - is stdout.
@@ -46,9 +43,6 @@ class Search:
     max_nodes: options.Count | None = None
     time_limit: options.Seconds | None = None
     jobs: options.Count = 1
-    mirror: Annotated[
-        Literal["x", "y", "z"] | None, typer.Option(rich_help_panel=options.OUTPUT, show_default=False)
-    ] = None
     proof_file: options.OutputFile | None = None
     resume: options.OutputFlag = False
     json_file: options.OutputFile | None = None
@@ -89,11 +83,8 @@ class Search:
         """
         output.check_places(self.vtu_file, problem, name)
         output.check_scripts(self.report_file, problem)
-        check_mirror(problem, alpha, self.mirror)
         units = common.units_of(name, self.units)
         found, ended = common.so_far(lambda: self._found(problem, alpha))
-        if self.mirror is not None and len(found):
-            found = found.mirrored(self.mirror)
         output.deliver(
             (self.vtu_file, lambda path: _write_vtu(problem, found, path)),
             (self.report_file, lambda path: self._write_page(found, path, name, source, scene)),
@@ -154,22 +145,6 @@ def roots(problem: options.Problem, alpha: options.Number, *, quiet: options.Qui
     search.check()
     value = common.parse_alpha(alpha)
     search.answer(problem, common.load_problem(problem), value, problem)
-
-
-def check_mirror(problem: AnyProblem, alpha: Alpha, mirror: str | None) -> None:
-    """Refuse a mirror under which the problem changes, before the search.
-
-    Raises
-    ------
-    InvalidArgumentError
-        Contact nodes or data have no mirror images.
-    """
-    if mirror is None:
-        return
-    from enumsol.model.mirrors import Mirror  # numpy: not for --help
-    from enumsol.roots.mirrored import SYMMETRIC, problem_asymmetry
-
-    problem_asymmetry(problem, alpha, Mirror.across(problem, mirror), SYMMETRIC)
 
 
 def _write_vtu(problem: AnyProblem, found: RootSet, path: str) -> None:

@@ -11,7 +11,7 @@ function startRoots() {
   byId("bodies").hidden = data.roots.length === 0;
   data.roots.forEach((item, k) => {
     const kind = `index ${signed(item.index)}, ${item.regular ? "regular" : "not regular"}, margin ${short(item.margin)}`;
-    Object.assign(item, { key: k, id: `root-${k}`, name: `Root ${k}`, words: kind + (item.mirror ? `; ${item.mirror}` : "") });
+    Object.assign(item, { key: k, id: `root-${k}`, name: `Root ${k}`, words: kind });
   });
   pageButtons(drawCards);
   for (const row of document.querySelectorAll("tr[data-root]")) {

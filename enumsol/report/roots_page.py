@@ -85,8 +85,6 @@ def _answers(found: RootSet) -> list[str]:
     total = found.index_sum
     note = "" if found.adds_up else " (not +1: something is missing or wrong)"
     lines.append(f"Sum of the indices: {'unknown' if total is None else f'{total:+d}'}{note}.")
-    if found.mirror_images is not None:
-        lines += [f"{line[0].upper()}{line[1:]}." for line in found.mirror_images.notes(complete=found.complete)]
     return lines + [f"Note: {line}." for line in found.notes]
 
 
@@ -111,15 +109,12 @@ def _root_facts(found: RootSet, units: tuple[str, str] | None) -> list[tuple[str
 def _root_table(found: RootSet) -> str:
     if not len(found):
         return "<p>No isolated solution was found.</p>"
-    mirrored = found.mirror_images
     heads = ["root", "index", "regular", "margin", "max lambda_n", "statuses, node by node"]
     rows = []
     for k, root in enumerate(found[:_MOST_ROWS]):
         cells = [str(k), _signed(root.index), "yes" if root.regular else "no", f"{root.margin:.2e}"]
-        cells += [f"{np.max(root.lambda_n):.6g}"] + ([] if mirrored is None else [mirrored.words(k)])
-        rows.append((f' data-root="{k}" tabindex="0"', [*cells, summary(root.statuses)]))
-    if mirrored is not None:
-        heads.insert(5, "mirror image")
+        cells += [f"{np.max(root.lambda_n):.6g}", summary(root.statuses)]
+        rows.append((f' data-root="{k}" tabindex="0"', cells))
     return table_text("All roots", heads, rows) + _more(len(found), "roots")
 
 
@@ -207,17 +202,16 @@ def roots_content(found: RootSet, scene: Scene | None = None) -> dict[str, Any]:
         "statuses": STATUS_NAMES,
         "tangents": listed[0].lambda_t[:1].size if listed else 1,
         "all": len(found),
-        "roots": [_record(found, k, root) | bodies[k] for k, root in enumerate(listed)],
+        "roots": [_record(root) | bodies[k] for k, root in enumerate(listed)],
         **pictures,
     }
 
 
-def _record(found: RootSet, k: int, root: Root) -> dict[str, Any]:
+def _record(root: Root) -> dict[str, Any]:
     return {
         "index": root.index,
         "regular": root.regular,
         "margin": float(f"{root.margin:.3g}"),
-        "mirror": "" if found.mirror_images is None else found.mirror_images.words(k),
         "statuses": status_codes(root.statuses),
         "several": [i for i, holds in enumerate(root.active) if len(holds) > 1],
         "f": short_list(np.concatenate([root.lambda_n, root.lambda_t.ravel(order="F")])),

@@ -11,7 +11,7 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.roots.root import Enclosure, Root, RootFamily, summary
-from enumsol.support.arguments import positive_number, shown
+from enumsol.support.arguments import shown
 from enumsol.support.immutable import Immutable, Listed, Sealed
 from enumsol.support.messages import counted, found_of, html_lines, html_table
 from enumsol.support.plotting import checked_units, kept
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
 
     from enumsol.model.statuses import ContactStatus
     from enumsol.proof.proof_file import Proof
-    from enumsol.roots.mirrored import MirrorImages
     from enumsol.search.certifiers.protocol import Escalations
     from enumsol.support.array_types import Alpha, Floats
 
@@ -208,8 +207,6 @@ class RootSet(Sequence[Root], Immutable):
         What completeness is about: "problem" (A, Bn, Bt, f as given) or "condensed" (S and g as computed).
     proof : Proof or None
         In verified arithmetic: the proof that ``enumsol.verify`` checks; None when the search was interrupted.
-    mirror_images : MirrorImages or None
-        Which roots are mirror images of one another; None unless `mirrored` made it.
     rigid_bound : RigidBound or None
         Of a body that nothing holds: the bound of the rigid displacement within which all solutions are listed.
 
@@ -236,7 +233,6 @@ class RootSet(Sequence[Root], Immutable):
         at_least: int | None = None,
         certified_data: str = "problem",
         proof: Proof | None = None,
-        mirror_images: MirrorImages | None = None,
         rigid_bound: RigidBound | None = None,
     ) -> None:
         self.alpha = alpha
@@ -251,7 +247,6 @@ class RootSet(Sequence[Root], Immutable):
         self.node_ids = node_ids
         self.certified_data = certified_data
         self.proof = proof
-        self.mirror_images = mirror_images
         self.rigid_bound = rigid_bound
         self._freeze()
 
@@ -331,68 +326,8 @@ class RootSet(Sequence[Root], Immutable):
             f"{counted(len(self), 'root')} (for topological indices, roots[0].index or roots.index_sum)"
         )
 
-    def mirrored(self, mirror: object, *, tolerance: float = 1e-6) -> RootSet:
-        """Roots with ``mirror_images``, which tells which are mirror images of one another.
-
-        Nothing is taken from the symmetry: the search has found all roots without it, and a root without a mirror image
-        is reported as such (theory, section 6.14). Families are not compared.
-
-        Parameters
-        ----------
-        mirror : Mirror, or "x", "y", "z" or a (d,) vector
-            A direction stands for the mirror of `Mirror.across` through the middle of the contact nodes.
-        tolerance : float
-            By how much S, g and F may change at most under the mirror, relative to their size. Meshes and stiffness
-            matrices are symmetric within rounding, which weak springs make larger, or not at all.
-
-        Raises
-        ------
-        InvalidArgumentError
-            The problem is not symmetric up to the tolerance, or there is no isolated root.
-
-        Examples
-        --------
-        A wedge that can come out of its notch at either end:
-
-        >>> import enumsol
-        >>> problem = enumsol.gallery.wedge3d(2, 2, 2)
-        >>> roots = enumsol.enumerate_roots(problem, alpha=1).mirrored("y")
-        >>> roots.mirror_images.missing
-        ()
-        """
-        from enumsol.model.mirrors import Mirror  # meshes and shapes: for symmetric problems only
-        from enumsol.roots.mirrored import paired_roots, problem_asymmetry
-
-        if not self._roots:
-            raise InvalidArgumentError("there are no isolated roots to compare; expected at least one")
-        problem, limit = self._roots[0].problem, positive_number(tolerance, "tolerance")
-        plane = mirror if isinstance(mirror, Mirror) else Mirror.across(problem, mirror)
-        asymmetry = problem_asymmetry(problem, self.alpha, plane, limit)
-        return self._with(paired_roots(self._roots, plane, asymmetry))
-
-    def _with(self, images: MirrorImages) -> RootSet:
-        return RootSet(
-            alpha=self.alpha,
-            roots=self._roots,
-            families=self.families,
-            undecided=self.undecided,
-            arithmetic=self.arithmetic,
-            method=self.method,
-            stopped=self.stopped,
-            stats=self.stats,
-            node_ids=self.node_ids,
-            at_least=self.at_least,
-            certified_data=self.certified_data,
-            proof=self.proof,
-            mirror_images=images,
-            rigid_bound=self.rigid_bound,
-        )
-
     def to_frame(self) -> pd.DataFrame:
-        """Table with a row per root and node: alpha, root, node, status, lambda_n, lambda_t, u_n, u_t, index, regular.
-
-        After `mirrored` also mirror_image, the number of the root that is the mirror image, None where there is none.
-        """
+        """Table with a row per root and node: alpha, root, node, status, forces, displacements, index, regular."""
         import pandas as pd  # slow to import, used here only
 
         count, p = len(self), len(self.node_ids)
@@ -409,14 +344,8 @@ class RootSet(Sequence[Root], Immutable):
                 },
                 "index": np.repeat(np.array([root.index for root in self], dtype=object), p),
                 "regular": np.repeat(np.array([root.regular for root in self], dtype=bool), p),
-                **self._mirror_column(p),
             }
         )
-
-    def _mirror_column(self, p: int) -> dict[str, Any]:
-        if self.mirror_images is None:
-            return {}
-        return {"mirror_image": np.repeat(np.array(self.mirror_images.images, dtype=object), p)}
 
     def plot_bodies(
         self, *, scale: float | None = None, units: tuple[str, str] | None = None, file: str | Path | None = None
@@ -478,13 +407,10 @@ class RootSet(Sequence[Root], Immutable):
                 "yes" if root.regular else "no",
                 f"{root.margin:.2e}",
                 f"{np.max(root.lambda_n):.5g}",
-                summary(root.statuses) + self._mirror_words(k),
+                summary(root.statuses),
             )
             for k, root in enumerate(self._roots[:_PRINTED_ROOTS])
         ]
-
-    def _mirror_words(self, k: int) -> str:
-        return "" if self.mirror_images is None else f"; {self.mirror_images.words(k)}"
 
     def _notes(self) -> list[str]:
         """The lines below the table of roots."""
@@ -512,8 +438,6 @@ class RootSet(Sequence[Root], Immutable):
         if self.stats.fallback_qps:
             of = counted(self.stats.qps, "relaxation")
             lines.append(f"stalled: {self.stats.fallback_qps} of {of}, solved by a slower solver or not at all")
-        if self.mirror_images is not None:
-            lines += self.mirror_images.notes(complete=self.complete)
         lines += [f"note: {note}" for note in self.notes]
         total = self.index_sum
         if self.rigid_bound is not None:

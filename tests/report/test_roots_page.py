@@ -34,7 +34,7 @@ def found():
         two, *(np.kron(np.eye(2), part.toarray()) for part in rows[1:4]), np.tile(node.f, 2), friction=5.0, **places
     )
     return {
-        "wedge": enumerate_roots(wedge, 3).mirrored("x"),
+        "wedge": enumerate_roots(wedge, 3),
         "turned": enumerate_roots(gallery.get("wedge3d-2-3").build(), 1),
         "many": enumerate_roots(gallery.chain(2), 5),
         "plane": enumerate_roots(gallery.get("wedge-8-5").build(), 3),
@@ -110,8 +110,6 @@ def test_words_and_tables(found, pages):
     assert "The problem has 9 isolated solutions at this alpha, and no other." in reader.text
     assert reader.text.count("complete: yes (proven)") == 2
     assert "Sum of the indices: +1." in reader.text
-    assert "0 pairs, 9 symmetric roots" in reader.text
-    assert reader.text.count("its own mirror image") == 9
     assert found["wedge"][0].problem.fingerprint in reader.text
     assert sum("data-root" in attributes for tag, attributes in reader.tags if tag == "tr") == 9
     assert "Undecided" not in reader.text
