@@ -30,9 +30,6 @@ from enumsol.support.messages import listed
 #: Raised on options that typer cannot make sense of; it comes with click or with typer, by the version of typer.
 _UsageError: type[Exception] = typer.BadParameter.__bases__[0]
 
-#: Likeness from which an option counts as misspelt: --alpha is no --graph.
-_CLOSE = 0.65
-
 app = typer.Typer(
     name="enumsol",
     help="Every equilibrium of a discrete contact problem with Coulomb friction.",
@@ -105,7 +102,8 @@ def _in_a_sentence(error: Any) -> str:
         # several sentences: "No such command 'rots'. Did you mean 'roots'?"
         return str(error.format_message()).replace(". Did", "; did")
     options = [name for parameter in error.ctx.command.params for name in parameter.opts if name.startswith("--")]
-    close = difflib.get_close_matches(option.lstrip("-"), [name[2:] for name in options], n=1, cutoff=_CLOSE)
+    # likeness from which an option counts as misspelt: --alpha is no --graph
+    close = difflib.get_close_matches(option.lstrip("-"), [name[2:] for name in options], n=1, cutoff=0.65)
     return f"no such option: {option}; " + (
         f"did you mean --{close[0]}?" if close else f"expected some of {listed(options)}"
     )

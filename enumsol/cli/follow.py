@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 
 #: Options of the steps of a continuation.
 Step = Annotated[float, typer.Option(metavar="LENGTH", rich_help_panel=options.STEPS)]
-#: In 3D, forces that are as near to each other, relative to the largest, belong to one root.
-_SAME_ROOT = 1e-7
 #: Ends of a path at which nothing is left to follow.
 _ARRIVED = ("interval left", "closed")
 
@@ -279,7 +277,8 @@ def _leads_to(path: Path, k: int, root: Root, problem: AnyProblem) -> bool:
         found = newton(problem, root.alpha, (1 - share) * forces[0] + share * forces[1])
     except NotConverged:
         return False
-    near = _SAME_ROOT * max(float(np.max(np.abs(forces))), float(np.max(np.abs(root.lambda_n))))
+    # forces that are as near to each other belong to one root
+    near = 1e-7 * max(float(np.max(np.abs(forces))), float(np.max(np.abs(root.lambda_n))))
     return all(
         np.max(np.abs(one - other)) <= near
         for one, other in ((found.lambda_n, root.lambda_n), (found.lambda_t, root.lambda_t))

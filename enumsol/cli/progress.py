@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 #: Work shorter than this shows no progress [seconds].
 _PROGRESS_DELAY = 1.0
-#: A smaller part of the work says nothing about the rest.
-_LEAST_SHARE = 0.02
 
 
 class Display:
@@ -116,7 +114,7 @@ def remaining(seconds: float, share: float, since: float = 0.0) -> str:
 
     Nothing before enough is done to tell, nor once that time has passed.
     """
-    if not _LEAST_SHARE <= share < 1.0:
+    if not 0.02 <= share < 1.0:  # a smaller part of the work says nothing about the rest
         return ""
     left = seconds * (1.0 - share) / share - since
     if left < 0.5:

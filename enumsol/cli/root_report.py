@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from enumsol.roots.root_set import RootSet, Undecided
     from enumsol.support.array_types import Floats
 
-#: The table over contact nodes is printed when it has at most so many rows.
-_ROWS = 24
 _STATS = ("nodes", "pruned", "selections", "qps", "fallback_qps", "closed", "seconds", "resumed", "held", "held_open")
 _VALUES = ("lambda_n", "lambda_t", "u_n", "u_t")
 
@@ -25,7 +23,7 @@ _VALUES = ("lambda_n", "lambda_t", "u_n", "u_t")
 def roots_as_text(found: RootSet) -> str:
     """The printed RootSet, and before its closing lines nothing else; small ones with a table over contact nodes."""
     rows = (len(found) + sum(len(family.vertices) for family in found.families)) * len(found.node_ids)
-    if not 0 < rows <= _ROWS:
+    if not 0 < rows <= 24:
         return repr(found)
     from enumsol.roots.root import node_heading  # numpy: not for --help
 

@@ -30,8 +30,6 @@ _NAMES = {
 #: Columns that count solutions; a row whose search was cut short shows what it found as a lower bound.
 _COUNTS = ("roots", "families", "open", "stick", "slip+", "slip-", "slip")
 _CAPTION = "{}: how many of the roots have a node in that status"
-#: Longer tables are printed as runs of equal counts.
-_ROWS = 40
 _FIRST, _LAST = "first alpha", "last alpha"
 _RUNS_CAPTION = "each row stands for all alphas tried from the first to the last, which have equal counts"
 
@@ -141,7 +139,7 @@ def _as_text(frame: pd.DataFrame, asked: int, ended: EnumsolError | None) -> str
             shown[name] = shown[name].astype(str).where(~_gaps(frame), ">=" + shown[name].astype(str))
     shown["complete"] = ["yes" if value else "no" for value in shown["complete"]]
     captions = [_CAPTION.format(", ".join(name for name in _COUNTS[2:] if name in shown))]
-    if len(shown) > _ROWS:
+    if len(shown) > 40:  # printed as runs of equal counts
         shown = _runs(shown)
         captions.append(_RUNS_CAPTION)
     for name in ("alpha", _FIRST, _LAST):

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
     from enumsol.trusted.quadratic_forms import EnclosedForm
 
 
-#: A tree is slow where one dual step closes less of the gap at its root than this share, in the mean over the nodes.
-_SLOW = 0.04
 #: Rows that become equations when a node is open, or in contact.
 _APART = (int(RowKind.NORMAL_FORCE), int(RowKind.PENETRATION))
 
@@ -142,14 +140,14 @@ class ActiveSetEngine(CompiledEngine):
         return other
 
     def _is_slow(self, F: NDArray[np.float64]) -> bool:
-        """True if one dual step closes little of the gap at the root of the tree."""
+        """True if one dual step closes little of the gap at the root of the tree, in the mean over the nodes."""
         p, rows, modes = len(F), list[int](), list[int]()
         for node, friction in enumerate((F > 0).tolist()):
             for kind, mode in status_rows(UNDECIDED, friction=friction):
                 rows.append(kind * p + node)
                 modes.append(mode)
         root = self.root(rows, modes)
-        return not (root.stalled or root.pruned) and root.gap_closed((UNDECIDED,) * p) < _SLOW
+        return not (root.stalled or root.pruned) and root.gap_closed((UNDECIDED,) * p) < 0.04
 
 
 class ActiveSetRelaxation:

@@ -19,9 +19,6 @@ if TYPE_CHECKING:
 
 #: Most numbers of displacements, about ten characters each; a mesh with more is drawn by its boundary, or not at all.
 _MOST_NUMBERS = 150_000
-#: Boundary facets of a solid whose edges are all drawn; of more only those at which the surface bends.
-_MOST_EDGES = 2_000
-_DIGITS = 7
 #: Squares of directions below this are rounding, and directions.
 _ROUNDING = 1e-9
 
@@ -146,7 +143,8 @@ def _surface(shape: BodyShape, faces: Integers, new: Integers) -> dict[str, Any]
     fan = [faces[:, [0, k, k + 1]] for k in range(1, faces.shape[1] - 1)]
     return {
         "triangles": new[np.concatenate(fan)].T.tolist(),
-        "edges": new[_edges(faces) if len(faces) <= _MOST_EDGES else outline].tolist(),
+        # of many facets only the edges at which the surface bends
+        "edges": new[_edges(faces) if len(faces) <= 2_000 else outline].tolist(),
         "outline": new[outline].tolist(),
     }
 
@@ -266,4 +264,4 @@ def short_list(values: Any) -> Any:
     array = np.asarray(values)
     if array.ndim > 1:
         return [short_list(row) for row in array]
-    return [int(x) if x == int(x) and abs(x) < 1e15 else float(f"{x:.{_DIGITS}g}") for x in array.tolist()]
+    return [int(x) if x == int(x) and abs(x) < 1e15 else float(f"{x:.7g}") for x in array.tolist()]

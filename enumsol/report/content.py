@@ -21,17 +21,6 @@ if TYPE_CHECKING:
     from enumsol.branches import BranchGraph
     from enumsol.fem import Scene
 
-#: Distance of drawn curves from the arcs, relative to the picture; coarser until the page is small enough.
-_TOLERANCE, _COARSEST = 1e-3, 2e-2
-#: Most numbers of forces and displacements along the arcs, about ten characters each.
-_MOST_NUMBERS = 250_000
-#: Positions of the slider over the whole interval, and at least so many between neighbouring critical alphas.
-_POSITIONS, _BETWEEN = 160, 3
-#: Digits of values; critical alphas are kept to the last one.
-_DIGITS = 9
-#: Beyond so many arcs, only those of overviews are compared for coinciding.
-_COMPARED = 300
-
 
 def report_content(graph: BranchGraph, scene: Scene | None = None) -> dict[str, Any]:
     """Everything that the script needs: nodes, quantities, arcs with points along them, vertices, steps, the body.
@@ -75,19 +64,20 @@ def rounded_list(values: Any) -> Any:
     array = np.asarray(values, dtype=np.float64)
     if array.ndim:
         return [rounded_list(row) for row in array]
-    number = float(f"{float(array):.{_DIGITS}g}")
+    number = float(f"{float(array):.9g}")
     return int(number) if number.is_integer() and abs(number) < 1e15 else number
 
 
 def slider_alphas(critical: Sequence[float], interval: tuple[float, float]) -> list[float]:
     """Positions of the slider: all critical alphas, and between neighbours enough to see what happens there."""
     marks = sorted({*critical, *interval})
+    positions = 160  # over the whole interval
     # narrow steps have positions inside, however narrow they are
-    few = 1 if len(marks) > _POSITIONS else _BETWEEN
+    few = 1 if len(marks) > positions else 3
     width = interval[1] - interval[0]
     found = [marks[0]]
     for low, high in pairwise(marks):
-        count = max(few, round(_POSITIONS * (high - low) / width))
+        count = max(few, round(positions * (high - low) / width))
         inside = [low + (high - low) * k / (count + 1) for k in range(1, count + 1)]
         found += [alpha for alpha in inside if low < alpha < high] + [high]
     return found
@@ -98,13 +88,16 @@ def _in_space(graph: BranchGraph) -> bool:
 
 
 def _sampled(graph: BranchGraph) -> tuple[dict[int, Curve], float]:
-    """Points along all arcs that are no sheets, and the tolerance to which they are near."""
+    """Points along all arcs that are no sheets, and the tolerance to which they are near, relative to the picture.
+
+    It is coarser until the page is small enough: a number takes about ten characters.
+    """
     arcs = [arc for arc in graph.arcs if not arc.dimension]
-    width, tolerance = graph.interval[1] - graph.interval[0], _TOLERANCE
+    width, tolerance = graph.interval[1] - graph.interval[0], 1e-3
     while True:
         drawn = curves(arcs, tuple(QUANTITIES), width, tolerance, components=_in_space(graph))
         numbers = sum(curve.forces.size + curve.moves.size for curve in drawn.values())
-        if numbers <= _MOST_NUMBERS or tolerance >= _COARSEST:
+        if numbers <= 250_000 or tolerance >= 2e-2:
             return drawn, tolerance
         tolerance *= 2
 
@@ -152,7 +145,7 @@ def _beside(graph: BranchGraph, drawn: Mapping[int, Curve]) -> dict[str, dict[st
     overviews = sum(not item.by_node for item in QUANTITIES.values())
     columns = overviews + graph.problem.p * (len(QUANTITIES) - overviews)
     found = {}
-    for column in range(columns if len(drawn) <= _COMPARED else overviews):
+    for column in range(columns if len(drawn) <= 300 else overviews):  # of more arcs, all columns take too long
         places = side_by_side(drawn, graph.branch_of, column)
         several = {str(arc): [place.rank, place.among] for arc, place in places.items() if place.among > 1}
         if several:

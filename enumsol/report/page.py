@@ -41,9 +41,6 @@ if TYPE_CHECKING:
     from enumsol.fem import Scene
     from enumsol.model.problem3d import ContactProblem3D
 
-#: Powers that are written out, and that floats can hold.
-_EXACTLY, _AS_FLOAT = 10, 500
-
 
 def write_report(
     solutions: BranchGraph | RootSet | History,
@@ -172,9 +169,9 @@ def _facts(graph: BranchGraph, units: tuple[str, str] | None) -> list[tuple[str,
 
 
 def _combinations(problem: ContactProblem | ContactProblem3D) -> str:
-    """4^p and its value, rounded where it is long; in 3D 3^p, and what they do not tell."""
+    """4^p and its value, rounded where it is long, as far as a float holds it; in 3D 3^p, and what they do not tell."""
     base, p = (4 if isinstance(problem, ContactProblem) else 3), problem.p
-    value = f" = {base**p:,}" if p <= _EXACTLY else f", about {base**p:.3g}" if p < _AS_FLOAT else ""
+    value = f" = {base**p:,}" if p <= 10 else f", about {base**p:.3g}" if p < 500 else ""
     return f"{base}^{p}{value}" + ("" if base == 4 else ", and a direction for every node that slips")
 
 

@@ -32,15 +32,11 @@ from enumsol.support.array_types import Alpha, NDArray
 
 #: Most binary digits of a numerator or denominator: four times those of any float64, which bounds the cost.
 MAX_BITS = 4096
-#: Most characters of a text: enough for every fraction within MAX_BITS.
-MAX_TEXT = 2600
 _DECIMAL = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 _FRACTION = re.compile(r"([+-]?\d+)(?:\s*/\s*(\d+))?", re.ASCII)
 _EXPECTED = "expected a finite real number such as 2.5 or a fraction such as 8/3"
 _RANGE = "expected a finite real number in the range of float64: 0, or 5e-324 to 1.8e308 in size"
 _SHOWN = 60
-#: Names that a refused one is answered with.
-_MOST_NAMES = 40
 
 T = TypeVar("T")
 N = TypeVar("N", float, "Alpha")
@@ -169,7 +165,7 @@ def _from_decimal(value: Decimal) -> float | Fraction:
 
 
 def _from_text(text: str, name: str) -> float | Fraction | None:
-    stripped = text.strip() if len(text) <= MAX_TEXT else ""
+    stripped = text.strip() if len(text) <= 2600 else ""  # enough for every fraction within MAX_BITS
     fraction = _FRACTION.fullmatch(stripped)
     if fraction is not None:
         denominator = int(fraction[2] or 1)
@@ -377,7 +373,7 @@ def entry_named(name: object, entries: Mapping[str, T], where: str, example: str
     if name in entries:
         return entries[name]
     close = close_names(name, entries)
-    some = list(entries)[:_MOST_NAMES]
+    some = list(entries)[:40]
     more = f" and {len(entries) - len(some)} more" if len(entries) > len(some) else ""
     known = f"did you mean {', '.join(close)}?" if close else f"expected one of {', '.join(some)}{more}"
     raise InvalidArgumentError(f"{where} has no problem named {shown(name)}; {known}")

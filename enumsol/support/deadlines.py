@@ -22,14 +22,6 @@ if TYPE_CHECKING:
 
 _Result = TypeVar("_Result")
 
-#: Of the time limit, and seconds besides: what may be used after it to put together what was found. A fifth and two
-#: seconds are promised; what does not look at the clock needs the rest.
-_SHARE, _SECONDS = 0.15, 1.2
-#: How often a call in a thread of its own is asked for, in seconds.
-_POLL = 0.05
-#: Sparse matrices with fewer entries are factorized in some hundredths of a second.
-_SHORT = 50_000
-
 
 class TimeOverError(Exception):
     """The time is over; whoever set the limit catches this and keeps what was found."""
@@ -61,7 +53,8 @@ class Deadline:
         """Until when what was found may be put together: somewhat more time than the limit."""
         if self.deadline is None:
             return self
-        return Deadline(self.deadline + _SHARE * (self.deadline - started) + _SECONDS)
+        # a fifth and two seconds are promised; what does not look at the clock needs the rest
+        return Deadline(self.deadline + 0.15 * (self.deadline - started) + 1.2)
 
     def part(self, share: float) -> Deadline:
         """The end of a share of the time that is left."""
@@ -125,7 +118,7 @@ def attended(work: Callable[[], _Result], size: int, name: str, given_up: thread
     TimeOverError
         The deadline that holds here has passed.
     """
-    if size < _SHORT:
+    if size < 50_000:  # sparse matrices with fewer entries are factorized in some hundredths of a second
         return work()
     tell(name)
     done: Future[_Result] = Future()
@@ -139,7 +132,7 @@ def attended(work: Callable[[], _Result], size: int, name: str, given_up: thread
 
     try:
         threading.Thread(target=run, daemon=True).start()
-        while not wait([done], _POLL).done:
+        while not wait([done], 0.05).done:
             look()
         return done.result()
     finally:

@@ -17,12 +17,6 @@ if TYPE_CHECKING:
 
 _Result = TypeVar("_Result")
 
-#: Seconds in which a result is put together once somebody waits for it: what takes longer is left out.
-_MOMENT = 1.0
-#: Number of times that this begins again if Ctrl-C comes meanwhile: somebody may press it twice, and `timeout` sends it
-#: twice.
-_TIMES = 8
-
 
 def keeping(
     name: str, work: Callable[[], _Result], rest: Callable[[Ending], _Result], said: Callable[[_Result], str]
@@ -56,8 +50,10 @@ def keeping(
     except MemoryError:
         ending = OutOfMemoryError
     # here the error is gone, and with it what the frames of the work held
-    end = Deadline(time.perf_counter() + _MOMENT)
-    for _ in range(_TIMES):
+    # somebody waits for the result: what takes longer to be put together is left out
+    end = Deadline(time.perf_counter() + 1.0)
+    # it begins again if Ctrl-C comes meanwhile: somebody may press it twice, and `timeout` sends it twice
+    for _ in range(8):
         try:
             partial = copy_context().run(_within, end, rest, ending)
             message = f"{name} {ending.happened}{said(partial)}"

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 #: A task tells what it is at once it has taken so long, and no more often than this [seconds].
 _QUIET, _PAUSE = 2.0, 1.0
-#: Characters of what a task tells: a message is written to the pipe in one piece.
-_LONGEST = 200
 
 
 class RenewedPool(Executor):
@@ -126,7 +124,8 @@ def _telling(function: Callable[..., Any], *arguments: Any, **named: Any) -> Any
         if time.monotonic() >= due[0]:
             due[0] = time.monotonic() + _PAUSE
             with suppress(OSError):  # the process that listened has ended
-                _to_parent[0].send((f"{work[:_LONGEST]} in a worker", done, of))
+                # short: a message is written to the pipe in one piece
+                _to_parent[0].send((f"{work[:200]} in a worker", done, of))
 
     with heard_by(told if _to_parent else None):
         return function(*arguments, **named)

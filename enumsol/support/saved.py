@@ -24,15 +24,8 @@ from enumsol.support.arguments import shown
 #: Most bytes of a JSON file, which become some twenty times as many in memory, and of a TOML file, which has a
 #: thousandth of that where it describes a problem.
 LARGEST_JSON, LARGEST_TOML = 1 << 30, 1_000_000
-#: Most digits of a whole number in a JSON file; float64 goes to 309.
-_MOST_DIGITS = 300
 #: Most columns of a table; with two a contact node enough for any body.
 MOST_COLUMNS = 100_000
-#: Most times that a byte of a compressed file may stand for: the limit of deflate.
-_DEFLATE = 1032
-#: Beyond so many bytes an archive may not be more than _DENSE times as large as its file: what compresses further is
-#: made to be expanded, or is better kept in sparse parts.
-_LARGE, _DENSE = 1 << 31, 200
 #: A key of TOML of so many parts, for which Python's parser takes a time that grows with the cube of their number.
 _LONG_KEY = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){64}""", re.ASCII)
 
@@ -76,7 +69,7 @@ def table_text(source: Any) -> IO[str]:
 
 
 def _whole(text: str) -> int:
-    if len(text) > _MOST_DIGITS:
+    if len(text) > 300:  # float64 goes to 309
         raise ValueError(f"a whole number in it has {len(text)} digits")
     return int(text)
 
@@ -137,8 +130,12 @@ def _is_pickled(member: zipfile.ZipInfo, content: IO[bytes]) -> bool:
 
 
 def check_size(name: str, size: int, stored: int) -> None:
-    """Refuse what claims to be so many bytes, and cannot be, or should not, by those that are stored of it."""
-    if size > _DEFLATE * stored + (1 << 12) or (size > _LARGE and size > _DENSE * stored):
+    """Refuse what claims to be so many bytes, and cannot be, or should not, by those that are stored of it.
+
+    A byte of deflate stands for 1032 at most. What is large and compresses further than 200 times is made to be
+    expanded, or is better kept in sparse parts.
+    """
+    if size > 1032 * stored + (1 << 12) or (size > 1 << 31 and size > 200 * stored):
         raise ValueError(f"{name} stands for {size} bytes, of which {stored} are stored")
 
 

@@ -25,10 +25,6 @@ if TYPE_CHECKING:
 Key = TypeVar("Key")
 #: Characters of an executor's own message that are passed on.
 _LONGEST = 160
-#: How often a task is handed to workers before it is done by the calling process, and a pool made anew.
-_TRIES, _RENEWALS = 3, 20
-#: Tasks handed out at a time, for each worker; where their number is not known, for all.
-_AHEAD, _MANY = 4, 64
 #: Seconds that a broken pool has to end the tasks that it was handed; it forgets one that comes while it breaks.
 _PATIENCE = 1.0
 
@@ -72,7 +68,7 @@ class Crew:
     def room(self) -> int:
         """Number of further tasks that should be handed out: enough to keep all workers busy."""
         workers = getattr(self._executor, "_max_workers", None)
-        most = _AHEAD * workers if isinstance(workers, int) else _MANY
+        most = 4 * workers if isinstance(workers, int) else 64
         return most - len(self._out) - len(self._here)
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Job:
@@ -130,7 +126,7 @@ class Crew:
         self._hand_out(job)
 
     def _hand_out(self, job: Job) -> None:
-        while self._executor is not None and job.tries < _TRIES:
+        while self._executor is not None and job.tries < 3:  # then it is done by the calling process
             try:
                 future = _submitted(self._executor, job)
             except _Lost as loss:
@@ -158,7 +154,7 @@ class Crew:
         """True if there are new workers in the place of a broken pool."""
         renew = getattr(self._executor, "renew", None)
         self._renewals += 1
-        if renew is None or self._renewals > _RENEWALS:
+        if renew is None or self._renewals > 20:
             return False
         try:
             renew()

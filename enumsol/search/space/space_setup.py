@@ -32,10 +32,10 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Alpha, Codes, Floats
     from enumsol.trusted.space.slip_forms import SlipForm
 
+#: A form is used where it leaves no more than this share of the gap to the pruning bound at the root of the tree.
+_SHARE = 0.25
 #: Nodes examined with the energy before a form that knows where the body slides is tried (theory, section 12.2).
 NODES = 256
-#: It is used where it leaves no more than this share of the gap to the pruning bound at the root of the tree.
-_SHARE = 0.25
 
 
 class SpaceSolvers(SearchSetup):
