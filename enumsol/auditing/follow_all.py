@@ -11,8 +11,7 @@ from enumsol.auditing.audit_report import AuditReport
 from enumsol.auditing.auditor import DETOUR, POINT_TOLERANCE, audit_on
 from enumsol.auditing.graph_map import GraphMap, GraphPlaceKind, checked_graph
 from enumsol.auditing.points import read_points
-from enumsol.continuation.follow import AmbiguousStart, follow, start_tangents
-from enumsol.continuation.path import Path
+from enumsol.continuation.path import AmbiguousStart, Path, follow, start_tangents
 from enumsol.continuation.path_data import PathStats, PathStatus
 from enumsol.errors import InvalidArgumentError, TooLargeError
 from enumsol.model.problem import check_is_problem

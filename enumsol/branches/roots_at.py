@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from fractions import Fraction
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from enumsol.arithmetic.rationals import rational
@@ -13,7 +12,6 @@ from enumsol.model.statuses import FRICTIONLESS, OPEN
 from enumsol.roots.builder import RootBuilder, in_order, root_family
 from enumsol.roots.components import connected_components
 from enumsol.roots.enumerate import roots_of_selections
-from enumsol.roots.local_degree import local_degree
 from enumsol.roots.root_set import RootSet, SearchStats
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.selections.float_selections import FloatSelections
@@ -71,11 +69,7 @@ def _roots_of(data: GraphData, alpha: Alpha, selections: Sequence[Codes]) -> Roo
     if exact:
         solver = ExactSelections(data.exact.system(rational(alpha)))
         solutions = [solver.solve(codes) for codes in _codes_at(selections, solver.F_positive)]
-    components = connected_components(
-        [solution for solution in solutions if solution is not None],
-        solver,
-        partial(local_degree, floats),
-    )
+    components = connected_components([s for s in solutions if s is not None], solver, floats)
     builder = RootBuilder(problem, alpha, solver, floats, {})
     roots = [builder.root(c) for c in components if c.dimension == 0]
     families = [root_family(alpha, c, solver, proven=exact) for c in components if c.dimension > 0]

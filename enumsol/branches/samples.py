@@ -17,7 +17,7 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.model.problem import ContactProblem, check_is_problem
 from enumsol.model.statuses import STATUSES, ContactStatus
 from enumsol.roots.enumerate import enumerate_roots
-from enumsol.roots.slips import ratios
+from enumsol.roots.local_branch import ratios
 from enumsol.support.arguments import alpha_list, even_alphas, optional_callable, optional_executor
 from enumsol.support.keeping import keeping
 from enumsol.support.messages import counted

@@ -11,7 +11,7 @@ from enumsol.collection.entries import COLLECTION, CertifiedSolutions, Collectio
 from enumsol.collection.reports import CollectionReport, JudgedSolution, ProblemReport
 from enumsol.collection.submissions import Submission, read_submissions
 from enumsol.errors import InvalidArgumentError
-from enumsol.fixed_points.state import TrescaState
+from enumsol.fixed_points.tresca import TrescaState
 from enumsol.support.arguments import file_path, positive_number
 
 if TYPE_CHECKING:

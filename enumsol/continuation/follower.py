@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Generic, TypeVar
 import numpy as np
 
 from enumsol.continuation.corrector import Correction, moore_penrose, smooth_newton
-from enumsol.continuation.landmarks import SAME_POINT, Landmarks
 from enumsol.continuation.path_data import PathData, PathStatus, PointKind
-from enumsol.continuation.recorder import PathRecorder
+from enumsol.continuation.recorder import SAME_POINT, Landmarks, PathRecorder
 from enumsol.continuation.scaled_equation import STATUS_TOLERANCE
 from enumsol.continuation.tangents import RATE_TOLERANCE, Tangent, curve_tangent, orientation
 from enumsol.continuation.transitions import (

@@ -1,7 +1,8 @@
-"""Collects the points of a continuation, with the transitions between them and the counts of its steps."""
+"""The points of a continuation as they are collected, with transitions and counts; and points that end a path."""
 
 from __future__ import annotations
 
+import math
 import time
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -9,14 +10,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.continuation.path_data import RIGID, PathStats, PointKind, Transition
+from enumsol.continuation.corrector import smooth_newton
+from enumsol.continuation.path_data import RIGID, PathStats, PathStatus, PointKind, Transition
+from enumsol.continuation.tangents import curve_tangent
+from enumsol.continuation.transitions import FORWARD_TOLERANCE, Kink, TangentPoint, same_curve
 from enumsol.errors import TooLargeError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from enumsol.continuation.path_data import PathData
     from enumsol.continuation.scaled_equation import ScaledEquation
-    from enumsol.continuation.transitions import Kink, TangentPoint
     from enumsol.roots.local_branch import LocalBranchTest
-    from enumsol.support.array_types import Floats
+    from enumsol.support.array_types import Codes, Floats
+
 
 #: Slip along a tangent, for the name of a frictionless node that starts to slip: any small step serves.
 _AHEAD = 1e-6
@@ -104,3 +111,103 @@ class PathRecorder:
             return self.equation.local_test(x)
         except TooLargeError:
             return None
+
+
+#: Two points closer than this are the same point of the solution set: located points agree to about 1e-10.
+SAME_POINT = 1e-7
+
+
+@dataclass(frozen=True)
+class Landmarks:
+    """Points at which a path closes, or has been before.
+
+    Attributes
+    ----------
+    equation : ScaledEquation
+    origin : TangentPoint
+        The start of the path.
+    tolerance : float
+        Accuracy to which points are located.
+    points : list of (x, codes, foreign)
+        ``foreign``: of another path.
+    """
+
+    equation: ScaledEquation
+    origin: TangentPoint
+    tolerance: float
+    points: list[tuple[Floats, Codes, bool]]
+
+    @classmethod
+    def of(
+        cls, equation: ScaledEquation, origin: TangentPoint, tolerance: float, visited: Sequence[PathData]
+    ) -> Landmarks:
+        """Landmarks of a path that begins at ``origin`` where others have been followed."""
+        return cls(equation, origin, tolerance, list(_of_others(equation, visited)))
+
+    def add(self, point: TangentPoint) -> None:
+        """Add a transition point of the path itself."""
+        self.points.append((point.x, point.codes, False))
+
+    def between(self, start: TangentPoint, end: TangentPoint, sign: int) -> tuple[TangentPoint, PathStatus] | None:
+        """The start, or a point of another path, that lies on a piece of one curve, and how the path ends there."""
+        if self._passed(start, end, self.origin.x, self.origin.codes, sign) is not None:
+            return self.origin, PathStatus.CLOSED
+        for x, codes, foreign in self.points:
+            if foreign and (point := self._passed(start, end, x, codes, sign)) is not None:
+                return point, PathStatus.VISITED
+        return None
+
+    def status_of(self, kink: Kink, *, moved: bool) -> PathStatus | None:
+        """Status with which a path that has ``moved`` ends at a transition point; None if that is no landmark."""
+        equation, x, origin = self.equation, kink.before.x, self.origin
+        at_origin = equation.norm(x - origin.x) <= SAME_POINT and kink.after.codes == origin.codes
+        if moved and at_origin and equation.dot(kink.after.tangent, origin.tangent) > 0:
+            return PathStatus.CLOSED
+        for known, codes, foreign in self.points:
+            same = codes == kink.after.codes or (foreign and codes == kink.before.codes)
+            if same and equation.norm(x - known) <= SAME_POINT:
+                return PathStatus.VISITED
+        return None
+
+    def _passed(
+        self, start: TangentPoint, end: TangentPoint, x: Floats, codes: Codes, sign: int
+    ) -> TangentPoint | None:
+        """A known point with its tangent, if the piece from start to end of one curve goes through it."""
+        equation = self.equation
+        if codes != start.codes or equation.dot(x - start.x, start.tangent) <= FORWARD_TOLERANCE:
+            return None
+        if equation.dot(end.x - x, end.tangent) < -FORWARD_TOLERANCE:
+            return None
+        tangent = curve_tangent(equation, codes, x, sign)
+        if tangent is None:
+            return None
+        middle = TangentPoint(x, codes, tangent)
+        if not equation.single_valued and not self._on_piece(start, end, middle):
+            return None
+        on = same_curve(equation, start, middle, sharp=True) and same_curve(equation, middle, end, sharp=True)
+        return middle if on else None
+
+    def _on_piece(self, start: TangentPoint, end: TangentPoint, point: TangentPoint) -> bool:
+        """True if the curve between two points runs through a third one, and not beside it on another curve."""
+        equation, row = self.equation, self.equation.metric @ point.tangent
+        chord = end.x - start.x
+        along = float(row @ chord)
+        share = float(row @ (point.x - start.x)) / along if along > 0 else 0.5
+        near = start.x + min(max(share, 0.0), 1.0) * chord
+        x = smooth_newton(equation, point.codes, near, row, float(row @ point.x), self.tolerance)
+        return x is not None and equation.norm(x - point.x) <= SAME_POINT
+
+
+def _of_others(equation: ScaledEquation, visited: Sequence[PathData]) -> Iterator[tuple[Floats, Codes, bool]]:
+    """Starts, transition points and ends of other paths, with the statuses on both sides."""
+    for path in visited:
+        for k, kind in enumerate(path.kinds):
+            if kind is PointKind.STEP:
+                continue
+            forces = np.concatenate([path.lambda_n[k], path.lambda_t[k].ravel(order="F")])
+            rigid = None if path.rigid_coordinates is None else path.rigid_coordinates[k]
+            x = equation.point(float(path.alpha[k]), forces, rigid)
+            if not math.isfinite(float(np.sum(x))):
+                continue
+            for codes in {tuple(map(int, path.codes[at])) for at in (k, max(k - 1, 0))}:
+                yield x, codes, True

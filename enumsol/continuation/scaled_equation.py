@@ -29,8 +29,7 @@ import numpy as np
 
 from enumsol.condensation.condensed import solved
 from enumsol.model.statuses import FRICTIONLESS, OPEN
-from enumsol.roots.local_branch import LocalBranchTest, coherent_orientation
-from enumsol.roots.slips import NodeSlips
+from enumsol.roots.local_branch import LocalBranchTest, NodeSlips, coherent_orientation
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

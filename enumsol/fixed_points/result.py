@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fixed_points.state import TrescaState
 from enumsol.fixed_points.system import checked_problem, driven
+from enumsol.fixed_points.tresca import TrescaState
 from enumsol.model.rigid_modes import modes_of
 from enumsol.support.arguments import alpha_value, file_path, optional_count, positive_integer, positive_number
 from enumsol.support.array_arguments import real_array

@@ -15,9 +15,8 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.fixed_points.result import FixedPoint, Outcome
-from enumsol.fixed_points.state import scaled_unknowns, slips_of
 from enumsol.fixed_points.system import ContactSystem, checked_problem
-from enumsol.fixed_points.tresca import node_values, solve_scaled
+from enumsol.fixed_points.tresca import node_values, scaled_unknowns, slips_of, solve_scaled
 from enumsol.fixed_points.tresca_newton import TrescaData, TrescaNotFeasible, TrescaNotSolved
 from enumsol.model.friction import warn_of_jumps
 from enumsol.model.problem3d import ContactProblem3D

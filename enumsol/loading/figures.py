@@ -1,8 +1,7 @@
-"""Figures of histories, one quantity of the roots against another, and of maps, over alpha and a second parameter."""
+"""Figures of histories: one quantity of the roots against another."""
 
 from __future__ import annotations
 
-from itertools import pairwise
 from textwrap import fill, shorten
 from typing import TYPE_CHECKING, Any
 
@@ -12,12 +11,11 @@ from enumsol.errors import InvalidArgumentError
 from enumsol.loading.history_data import START, HistoryData, Node
 from enumsol.roots.root import summary
 from enumsol.support.arguments import shown
-from enumsol.support.plotting import area_entry, axes_of, figure_of, in_units, line_entry
+from enumsol.support.plotting import axes_of, figure_of, in_units, line_entry
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
 
-    from enumsol.loading.map_rows import MapRow
     from enumsol.roots.root import Root
 
 
@@ -183,56 +181,3 @@ _OF_ROOTS: dict[str, Callable[[Root], float]] = {
     "lambda_n": lambda root: float(np.sum(root.lambda_n)),
     "lambda_t": lambda root: float(np.sum(root.lambda_t if root.lambda_t.ndim == 1 else root.lambda_t[:, 0])),
 }
-
-
-#: Colours of one solution, two, and so on; the last one is for more.
-_COLOURS = ("#ffffff", "#c9b7dd", "#f2b56b", "#d97b5a", "#c04d6b", "#8a3b82", "#5b3b96", "#333a80", "#1c2c58")
-_UNIQUE, _PALE, _FOLD = "#2a8a4a", 0.45, "#222222"
-
-
-def draw_map(name: str, rows: Sequence[MapRow], curves: Sequence[Any], title: str, ax: Any) -> Any:
-    """A figure; see MultiplicityMap.plot."""
-    from matplotlib.patches import Rectangle
-
-    ax = axes_of(ax, (7.0, 4.8))
-    order = sorted(range(len(rows)), key=lambda k: rows[k].value)
-    edges = _edges([rows[k].value for k in order])
-    seen: dict[int, bool] = {}
-    for k, (low, high) in zip(order, edges, strict=True):
-        row = rows[k]
-        for number, (first, last) in enumerate(pairwise(row.alphas)):
-            count, a, b = row.between[number], float(first), float(last)
-            colour = _COLOURS[min(max(count, 1), len(_COLOURS)) - 1]
-            seen[count] = seen.get(count, True) and row.exact
-            ax.add_patch(Rectangle((a, low), b - a, high - low, facecolor=colour, alpha=_PALE, linewidth=0, zorder=1))
-            line = _UNIQUE if count == 1 and row.exact else colour if count > 1 else "#999999"
-            ax.plot([a, b], [row.value] * 2, color=line, linewidth=2.2, solid_capstyle="butt", zorder=3)
-    for curve in curves:
-        places = [(alpha, rows[k].value) for k, alpha in curve]
-        ax.plot(*zip(*places, strict=True), "--", color=_FOLD, linewidth=0.9, marker=".", markersize=5, zorder=4)
-    ax.autoscale_view()
-    ax.set_xlabel("alpha")
-    ax.set_ylabel(name)
-    ax.set_title(fill(title, 80), fontsize=9)
-    handles: list[Any] = []
-    for count, exact in sorted(seen.items()):
-        words = f"{'' if exact else 'at least '}{count} solution{'' if count == 1 else 's'}"
-        if count == 1 and exact:
-            handles.append(line_entry("one solution, proven at these values", color=_UNIQUE, linewidth=2.2))
-        else:
-            handles.append(area_entry(words, facecolor=_COLOURS[min(max(count, 1), len(_COLOURS)) - 1]))
-    if curves:
-        handles.append(line_entry("folds, linked by statuses", linestyle="--", color=_FOLD, marker="."))
-    handles.append(area_entry("between the values: not proven", facecolor="none"))
-    ax.legend(handles=handles, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2, frameon=False)
-    return figure_of(ax)
-
-
-def _edges(values: Sequence[float]) -> list[tuple[float, float]]:
-    """Ends of the space that is filled around every value: half way to its neighbours."""
-    if len(values) == 1:
-        return [(values[0] - 0.5, values[0] + 0.5)]
-    middles = [0.5 * (a + b) for a, b in pairwise(values)]
-    first, last = values[0] - (middles[0] - values[0]), values[-1] + (values[-1] - middles[-1])
-    bounds = [first, *middles, last]
-    return list(pairwise(bounds))

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import cached_property, partial
+from itertools import pairwise
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.branches.construction import branch_graph
 from enumsol.errors import InvalidArgumentError
-from enumsol.loading.map_rows import MapRow, map_row
 from enumsol.model.problem import ContactProblem
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.support import arguments
@@ -20,17 +22,19 @@ from enumsol.support.array_arguments import vector_of
 from enumsol.support.immutable import Immutable, Listed
 from enumsol.support.keeping import keeping
 from enumsol.support.messages import counted
-from enumsol.support.plotting import checked_units, in_units, kept
+from enumsol.support.plotting import area_entry, axes_of, checked_units, figure_of, in_units, kept, line_entry
 from enumsol.support.workers import spread, workers_of
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor
+    from fractions import Fraction
     from pathlib import Path
 
     import pandas as pd
 
     from enumsol.support.array_types import Alpha, AlphaLike
     from enumsol.support.workers import Call
+
 
 _EXPECTED = (
     'expected {"friction": values}, {"gap": values}, {"load": (direction, values)}, or a pair of a function of a value '
@@ -285,8 +289,6 @@ class MultiplicityMap(Immutable):
         MissingDependencyError
             matplotlib is not installed.
         """
-        from enumsol.loading.figures import draw_map  # matplotlib comes with the first picture
-
         name = in_units(self.name, "length" if self.name == "gap" else None, checked_units(units))
         return kept(draw_map(name, self.rows, self.curves, self.closing_line, ax), file)
 
@@ -381,3 +383,151 @@ def _numbers(values: object) -> list[float]:
     if not found or len(set(found)) < len(found):
         raise InvalidArgumentError("the values of over are none, or one occurs twice; expected different numbers")
     return found
+
+
+@dataclass(frozen=True)
+class MapFold:
+    """A fold on one row of a map.
+
+    Attributes
+    ----------
+    alpha : float
+    statuses : tuple of tuples of str
+        Of the arcs that meet there, in order: by them folds of neighbouring rows are matched.
+    """
+
+    alpha: float
+    statuses: tuple[tuple[str, ...], ...]
+
+
+@dataclass(frozen=True)
+class MapRow:
+    """What is proven at one value of the second parameter: a branch graph over alpha, in numbers.
+
+    Attributes
+    ----------
+    value : float
+    alphas : tuple of Fraction
+        Where the number of solutions changes.
+    at_alphas, between : tuples of int
+        Numbers of solutions at these alphas, and between them.
+    exact : bool
+        These are the numbers and not lower bounds.
+    folds : tuple of MapFold
+    complete : bool
+    reasons : tuple of str
+    limit : float or None
+        Up to which alpha the solution is unique, from the first one; None: throughout, or not known.
+    unique : bool or None
+        Whether there is one solution at every alpha; None: not known.
+    seconds : float
+    within : float or None
+        Of a body that nothing holds: the numbers are those of solutions whose rigid displacement is within this bound
+        [length].
+    """
+
+    value: float
+    alphas: tuple[Fraction, ...]
+    at_alphas: tuple[int, ...]
+    between: tuple[int, ...]
+    exact: bool
+    folds: tuple[MapFold, ...]
+    complete: bool
+    reasons: tuple[str, ...]
+    limit: float | None
+    unique: bool | None
+    seconds: float
+    within: float | None = None
+
+    def count_at(self, alpha: Alpha) -> int:
+        """Number of solutions at an alpha of the interval; a lower bound where the row is not exact."""
+        for k, critical in enumerate(self.alphas):
+            if alpha == critical:
+                return self.at_alphas[k]
+            if alpha < critical:
+                return self.between[k - 1]
+        return self.between[-1]
+
+
+def map_row(
+    make: Callable[[float], ContactProblem], value: float, interval: tuple[Alpha, Alpha], options: dict[str, Any]
+) -> MapRow:
+    """Row of a map (a module-level function, so that other processes can import it)."""
+    started = time.perf_counter()
+    problem = arguments.instance_of(make(value), ContactProblem, "the problem that over makes")
+    graph = branch_graph(problem, interval, **options)
+    steps, uniqueness = graph.claims.steps(), graph.claims.uniqueness()
+    arcs = {vertex.number: [] for vertex in graph.folds}  # type: dict[int, list[tuple[str, ...]]]
+    for arc in graph.arcs:
+        for end in {arc.tail, arc.head} & arcs.keys():
+            arcs[end].append(tuple(status.value for status in arc.statuses))
+    folds = tuple(MapFold(fold.alpha, tuple(sorted(arcs[fold.number]))) for fold in graph.folds)
+    return MapRow(
+        value=value,
+        alphas=steps.alphas,
+        at_alphas=steps.at,
+        between=steps.between,
+        exact=steps.exact,
+        folds=folds,
+        complete=graph.complete,
+        reasons=tuple(graph.reasons),
+        limit=uniqueness.limit,
+        unique=uniqueness.throughout,
+        seconds=time.perf_counter() - started,
+        within=None if problem.held else problem.rigid_reach,
+    )
+
+
+# -- figures -----------------------------------------------------------------------------------------------------------
+
+#: Colours of one solution, two, and so on; the last one is for more.
+_COLOURS = ("#ffffff", "#c9b7dd", "#f2b56b", "#d97b5a", "#c04d6b", "#8a3b82", "#5b3b96", "#333a80", "#1c2c58")
+_UNIQUE, _PALE, _FOLD = "#2a8a4a", 0.45, "#222222"
+
+
+def draw_map(name: str, rows: Sequence[MapRow], curves: Sequence[Any], title: str, ax: Any) -> Any:
+    """A figure; see MultiplicityMap.plot."""
+    from matplotlib.patches import Rectangle
+
+    ax = axes_of(ax, (7.0, 4.8))
+    order = sorted(range(len(rows)), key=lambda k: rows[k].value)
+    edges = _edges([rows[k].value for k in order])
+    seen: dict[int, bool] = {}
+    for k, (low, high) in zip(order, edges, strict=True):
+        row = rows[k]
+        for number, (first, last) in enumerate(pairwise(row.alphas)):
+            count, a, b = row.between[number], float(first), float(last)
+            colour = _COLOURS[min(max(count, 1), len(_COLOURS)) - 1]
+            seen[count] = seen.get(count, True) and row.exact
+            ax.add_patch(Rectangle((a, low), b - a, high - low, facecolor=colour, alpha=_PALE, linewidth=0, zorder=1))
+            line = _UNIQUE if count == 1 and row.exact else colour if count > 1 else "#999999"
+            ax.plot([a, b], [row.value] * 2, color=line, linewidth=2.2, solid_capstyle="butt", zorder=3)
+    for curve in curves:
+        places = [(alpha, rows[k].value) for k, alpha in curve]
+        ax.plot(*zip(*places, strict=True), "--", color=_FOLD, linewidth=0.9, marker=".", markersize=5, zorder=4)
+    ax.autoscale_view()
+    ax.set_xlabel("alpha")
+    ax.set_ylabel(name)
+    ax.set_title(fill(title, 80), fontsize=9)
+    handles: list[Any] = []
+    for count, exact in sorted(seen.items()):
+        words = f"{'' if exact else 'at least '}{count} solution{'' if count == 1 else 's'}"
+        if count == 1 and exact:
+            handles.append(line_entry("one solution, proven at these values", color=_UNIQUE, linewidth=2.2))
+        else:
+            handles.append(area_entry(words, facecolor=_COLOURS[min(max(count, 1), len(_COLOURS)) - 1]))
+    if curves:
+        handles.append(line_entry("folds, linked by statuses", linestyle="--", color=_FOLD, marker="."))
+    handles.append(area_entry("between the values: not proven", facecolor="none"))
+    ax.legend(handles=handles, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=2, frameon=False)
+    return figure_of(ax)
+
+
+def _edges(values: Sequence[float]) -> list[tuple[float, float]]:
+    """Ends of the space that is filled around every value: half way to its neighbours."""
+    if len(values) == 1:
+        return [(values[0] - 0.5, values[0] + 0.5)]
+    middles = [0.5 * (a + b) for a, b in pairwise(values)]
+    first, last = values[0] - (middles[0] - values[0]), values[-1] + (values[-1] - middles[-1])
+    bounds = [first, *middles, last]
+    return list(pairwise(bounds))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from fractions import Fraction
-from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -17,7 +16,6 @@ from enumsol.model.statuses import FINAL, OPEN
 from enumsol.roots.builder import RootBuilder, in_order, named, root_family
 from enumsol.roots.components import RootComponent, apart, closed_component, connected_components
 from enumsol.roots.enumeration import Enumeration, not_begun
-from enumsol.roots.local_degree import local_degree
 from enumsol.roots.root_set import RootSet
 from enumsol.search.certifiers.protocol import UndecidedPart
 from enumsol.search.exhaustive import BLOCK, exhaustive_exact, exhaustive_float
@@ -366,13 +364,13 @@ class _Enumeration(Enumeration[Solvers]):
         """Components of the root set with the solver whose points they hold."""
         solutions, closed, self.doubtful = apart(self.outcome.solutions)
         exact, floats = [s for s in solutions if s.exact], [s for s in solutions if not s.exact]
-        degree = partial(local_degree, self.solvers.floats) if self.problem.held else None
+        perturbed = self.solvers.floats if self.problem.held else None
         parts: list[tuple[list[RootComponent], SelectionSolver]] = []
         if floats or closed:
-            components = connected_components(floats, self.solvers.floats, degree)
+            components = connected_components(floats, self.solvers.floats, perturbed)
             parts.append(([*components, *map(closed_component, closed)], self.solvers.floats))
         if exact and self.solvers.exact is not None:
-            parts.append((connected_components(exact, self.solvers.exact, degree), self.solvers.exact))
+            parts.append((connected_components(exact, self.solvers.exact, perturbed), self.solvers.exact))
         return parts
 
     def _root(self, component: RootComponent, values: PointValues) -> Root:

@@ -16,7 +16,7 @@ import enumsol
 from enumsol import enumerate_roots, gallery
 from enumsol.cli import root_report
 from enumsol.model.sectors import SECTORS
-from enumsol.roots.space_regions import _hull, regions_of
+from enumsol.roots.space_roots import _hull, regions_of
 from enumsol.search.space.open_leaves import Cause
 from enumsol.search.space.space_setup import SpaceSolvers
 

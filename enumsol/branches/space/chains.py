@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from enumsol.continuation.continuation_options import ContinuationOptions
-from enumsol.continuation.follow import follow
+from enumsol.continuation.path import follow
 from enumsol.continuation.path_data import PathStatus
 from enumsol.errors import EnumsolError, Interrupted, OutOfMemoryError
 from enumsol.support.deadlines import TimeOverError, look, tell
