@@ -100,9 +100,9 @@ class MissingDependencyError(EnumsolError, ImportError):
 class _PartialResultError(EnumsolError):
     """Base of the errors that hold what was found before they were raised."""
 
-    def __init__(self, message: str, partial: Any) -> None:
+    def __init__(self, message: str, partial: object) -> None:
         super().__init__(message)
-        self.partial = partial
+        self.partial: Any = partial
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (str(self), self.partial)  # a worker process may send it back
@@ -154,7 +154,7 @@ class OutputError(_PartialResultError):
         For enumerate_roots with a ``proof_path``: the result of the search, which went on without a proof.
     """
 
-    def __init__(self, message: str, partial: Any = None) -> None:
+    def __init__(self, message: str, partial: object = None) -> None:
         super().__init__(message, partial)
 
 

@@ -7,7 +7,7 @@ import re
 import sys
 import warnings
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Annotated, cast
 
 import typer
 
@@ -88,17 +88,14 @@ def run(arguments: Sequence[str] | None = None) -> int:
         except EnumsolError as error:
             return _refuse(str(error))
         except _UsageError as error:
-            return _refuse(_in_a_sentence(error))
+            return _refuse(_in_a_sentence(cast("typer.BadParameter", error)))
     return int(status or 0)
 
 
-def _in_a_sentence(error: Any) -> str:
+def _in_a_sentence(error: typer.BadParameter) -> str:
     """Sentence on what typer could not make sense of, and what it would accept."""
-    if (
-        (option := getattr(error, "option_name", None)) is None
-        or error.ctx is None
-        or not hasattr(error, "possibilities")
-    ):
+    option = getattr(error, "option_name", None)
+    if option is None or error.ctx is None or not hasattr(error, "possibilities"):
         # several sentences: "No such command 'rots'. Did you mean 'roots'?"
         return str(error.format_message()).replace(". Did", "; did")
     options = [name for parameter in error.ctx.command.params for name in parameter.opts if name.startswith("--")]

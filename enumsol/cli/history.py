@@ -99,7 +99,7 @@ def history(
     common.finish(ended, common.ExitStatus.INCOMPLETE if found.reasons else common.ExitStatus.DONE)
 
 
-def _search(problem: AnyProblem, steps: Any, jobs: int, options: dict[str, Any]) -> History:
+def _search(problem: AnyProblem, steps: object, jobs: int, options: dict[str, Any]) -> History:
     from enumsol.loading.growing import histories  # numpy and scipy: not for --help
 
     with common.workers(jobs) as executor, _HistoryDisplay() as display:

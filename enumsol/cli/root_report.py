@@ -121,8 +121,8 @@ def _undecided(item: Undecided) -> dict[str, Any]:
     return {**content, "leaves": item.leaves, "slip_angle": _angles(item.slip_angle), "bounds": bounds}
 
 
-def _angles(angles: Any) -> list[list[float] | None]:
-    return [None if math.isnan(low) else [low, high] for low, high in angles.tolist()]
+def _angles(angles: Floats | None) -> list[list[float] | None]:
+    return [] if angles is None else [None if math.isnan(low) else [low, high] for low, high in angles.tolist()]
 
 
 def _family(family: RootFamily) -> dict[str, Any]:

@@ -38,9 +38,9 @@ class Given(NamedTuple):
     read: Callable[[str, str], Any]
     repeated: bool = True
 
-    def value(self, given: Any, option: str) -> Any:
+    def value(self, given: str | list[str], option: str) -> Any:
         """The option's value, of its text or, if it may be repeated, of its texts."""
-        if not self.repeated:
+        if isinstance(given, str):
             return self.read(given, option)
         if self.metavar.startswith("NAME=") or (self.metavar.startswith("[NAME=]") and "=" in "".join(given)):
             return _by_part(given, option, self.read)

@@ -254,7 +254,7 @@ class PlaneFormAscent(FormAscent[EnclosedForm, ActiveSetRelaxation]):
         for weight in weights:
             trial = self._form(multipliers, weight) if weight else form
             if factor_above(trial.H, 1e-9 * mean) is not None:
-                return trial, self._engine.bounding(self._scaled, trial).root(*self._rows)
+                return trial, self._engine.bounding(trial).root(*self._rows)
         return None
 
     def _barrier(self, multipliers: Floats) -> float:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from enumsol.fem import Scene
     from enumsol.model.problem3d import AnyProblem
-    from enumsol.support.array_types import Floats, Integers
+    from enumsol.support.array_types import ArrayLike, Floats, Integers
 
 #: Most numbers of displacements, about ten characters each; a mesh with more is drawn by its boundary, or not at all.
 _MOST_NUMBERS = 150_000
@@ -259,7 +259,7 @@ def boundary_edges(outlines: Integers) -> Integers:
     return np.asarray(edges[first[count == 1]])
 
 
-def short_list(values: Any) -> Any:
+def short_list(values: ArrayLike) -> Any:
     """Numbers to seven digits, as lists; zeros lose their sign and integers their point."""
     array = np.asarray(values)
     if array.ndim > 1:

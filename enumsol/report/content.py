@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from enumsol.branches import BranchGraph
     from enumsol.fem import Scene
+    from enumsol.support.array_types import ArrayLike
 
 
 def report_content(graph: BranchGraph, scene: Scene | None = None) -> dict[str, Any]:
@@ -59,7 +60,7 @@ def report_content(graph: BranchGraph, scene: Scene | None = None) -> dict[str, 
     }
 
 
-def rounded_list(values: Any) -> Any:
+def rounded_list(values: ArrayLike) -> Any:
     """Numbers of an array to nine digits, as lists."""
     array = np.asarray(values, dtype=np.float64)
     if array.ndim:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 from html import escape
 from io import BytesIO
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from enumsol.report.parts import Heading, Statement, filled_page, proof_commands
 from enumsol.support.messages import counted, html_table
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from enumsol.loading.history import History
 
 
@@ -91,7 +93,7 @@ def _last(number: int, shown: list[int]) -> str:
     return " selected" if number == shown[-1] else ""
 
 
-def _image(figure: Any, words: str) -> str:
+def _image(figure: Figure, words: str) -> str:
     drawn = BytesIO()
     figure.savefig(drawn, format="png", dpi=96)
     text = base64.b64encode(drawn.getvalue()).decode()

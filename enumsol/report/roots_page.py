@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 #: Rows of the tables of roots, continua and undecided parts.
 _MOST_ROWS = 500
+#: Most numbers of forces and displacements of contact nodes in tables, about ten characters each.
+_MOST_VALUES = 150_000
 
 
 def roots_page(found: RootSet, heading: Heading) -> str:
@@ -192,8 +194,7 @@ def roots_content(found: RootSet, scene: Scene | None = None) -> dict[str, Any]:
     the contact nodes: all normal ones, then those along each tangent.
     """
     p = len(found.node_ids)
-    # at most 150,000 numbers of forces and displacements in tables, about ten characters each
-    listed = found[: max(1, 150_000 // (8 * p))]
+    listed = found[: max(1, _MOST_VALUES // (8 * p))]
     pictures, bodies = _pictures(listed, scene) if listed else (_picture(None, ""), [])
     bodies += [{}] * (len(listed) - len(bodies))
     return {

@@ -24,8 +24,7 @@ from enumsol.search.solvers import Arithmetic, Solvers
 from enumsol.selections.float_selections import SIGN_TOLERANCE
 from enumsol.selections.solution import PointValues, SelectionSolution, SelectionSolver
 from enumsol.support import arguments
-from enumsol.support.deadlines import Deadline, TimeOverError, within
-from enumsol.support.keeping import keeping
+from enumsol.support.deadlines import Deadline, TimeOverError, keeping, within
 from enumsol.support.messages import counted
 from enumsol.support.workers import workers_of
 
@@ -39,7 +38,7 @@ if TYPE_CHECKING:
     from enumsol.model.problem3d import AnyProblem, ContactProblem3D
     from enumsol.roots.root import Root, RootFamily
     from enumsol.support.array_types import Alpha, AlphaLike, Codes, Floats
-    from enumsol.support.keeping import Ending
+    from enumsol.support.deadlines import Ending
 
 
 class AtRest:

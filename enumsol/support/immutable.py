@@ -80,7 +80,7 @@ class Listed(tuple[Item, ...]):
     def __getitem__(self, item: SupportsIndex) -> Item: ...
     @overload
     def __getitem__(self, item: slice) -> tuple[Item, ...]: ...
-    def __getitem__(self, item: Any) -> Any:
+    def __getitem__(self, item: SupportsIndex | slice) -> Any:
         try:
             return super().__getitem__(item)
         except IndexError:

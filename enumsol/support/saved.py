@@ -9,10 +9,11 @@ from __future__ import annotations
 import io
 import json
 import math
+import os
 import re
 import tomllib
 import zipfile
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
@@ -58,9 +59,9 @@ def toml_from(content: bytes) -> dict[str, Any]:
         raise ValueError("it is nested too deeply") from None
 
 
-def table_text(source: Any) -> IO[str]:
+def table_text(source: str | os.PathLike[str] | IO[Any]) -> IO[str]:
     """The text of a table, from the name of a CSV file or from an open one; very many columns are refused."""
-    content = source.read() if hasattr(source, "read") else Path(source).read_bytes()
+    content = Path(source).read_bytes() if isinstance(source, (str, os.PathLike)) else source.read()
     text = content.decode("utf-8-sig") if isinstance(content, bytes) else content
     columns = 1 + max((line.count(",") for line in text.splitlines()), default=0)
     if columns > MOST_COLUMNS:
@@ -153,7 +154,7 @@ def check_shape(name: str, shape: Iterable[int], room: int) -> None:
 class Maybe:
     """A value of this kind, or none."""
 
-    kind: Any
+    kind: Kind
 
 
 class Array:
@@ -175,6 +176,8 @@ class Array:
         return False
 
 
+#: Kinds of values, see `check_kind`.
+Kind = type | set[str] | range | Maybe | Array | list[Any] | tuple[Any, ...] | dict[str, Any] | Callable[[Any], bool]
 _FRACTION = re.compile(r"-?[0-9]{1,4300}(/0*[1-9][0-9]{0,4299})?", re.ASCII)
 
 
@@ -193,7 +196,7 @@ def is_label(value: object) -> bool:
     return type(value) in (int, float, str)
 
 
-def check_kind(value: Any, kind: Any, where: str) -> None:
+def check_kind(value: Any, kind: Kind, where: str) -> None:
     """Refuse a value of a saved structure that is of another kind than what is written there.
 
     Parameters
