@@ -11,7 +11,7 @@ from typing import Annotated, cast
 
 import typer
 
-from enumsol.cli.audit import audit
+from enumsol.cli.audit import audit, verify
 from enumsol.cli.common import ExitStatus
 from enumsol.cli.fixed_point import fixed_point
 from enumsol.cli.follow import follow
@@ -23,7 +23,6 @@ from enumsol.cli.roots import roots
 from enumsol.cli.solve import solve
 from enumsol.cli.streams import guarded_streams, loud_again, say
 from enumsol.cli.table import table
-from enumsol.cli.verify import verify
 from enumsol.errors import EnumsolError, OutputError
 from enumsol.support.messages import listed
 

@@ -93,12 +93,11 @@ def _alpha(text: str | None, name: str, body: AnyProblem) -> Alpha:
 def _approximate(body: AnyProblem, alpha: Alpha, start: float | None, options: dict[str, Any]) -> FixedPoint:
     from enumsol.fixed_points import successive_approximations  # numpy and scipy: not for --help
 
-    with Display("iterating") as display:
+    def told(state: FixedPointProgress) -> tuple[float, str]:
+        return min(1.0, 1.0 / max(state.increment, 1e-300)), f"iteration {state.iteration}"
 
-        def show(state: FixedPointProgress) -> None:
-            display.show(min(1.0, 1.0 / max(state.increment, 1e-300)), f"iteration {state.iteration}")
-
-        return successive_approximations(body, alpha, start, progress=show, **options)
+    with Display("iterating", told=told) as display:
+        return successive_approximations(body, alpha, start, progress=display, **options)
 
 
 def _content(found: FixedPoint, name: str) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from enumsol.cli import options
 from enumsol.cli.common import ExitStatus, finish, load_problem, node_row, parse_alpha, parse_interval, units_of
 from enumsol.cli.graph import read_graph
 from enumsol.cli.output import deliver, taken, write_figure
-from enumsol.cli.progress import Display, SearchDisplay
+from enumsol.cli.progress import Display, search_display
 from enumsol.errors import Interrupted, InvalidArgumentError, OutOfMemoryError
 from enumsol.support.messages import counted
 
@@ -141,7 +141,7 @@ def _starts(
         raise InvalidArgumentError(f"--start is {float(alpha):g}; expected an alpha between {low:g} and {high:g}")
     from enumsol.roots.enumerate import enumerate_roots  # numpy and scipy: not for --help
 
-    with SearchDisplay() as display:
+    with search_display() as display:
         found = enumerate_roots(problem, alpha, arithmetic, progress=display)
     count = len(found)
     if not count:

@@ -178,12 +178,9 @@ def build(
     """
     from enumsol.branches import branch_graph
 
-    with common.workers(jobs) as executor, Display("branch graph") as display:
-
-        def progress(stage: str, share: float) -> None:
-            display.show(share, *_STEPS[stage])
-
-        return branch_graph(problem, interval, arithmetic, progress=progress, executor=executor, **limits)
+    told = lambda stage, share: (share, *_STEPS[stage])  # noqa: E731
+    with common.workers(jobs) as executor, Display("branch graph", told=told) as display:
+        return branch_graph(problem, interval, arithmetic, progress=display, executor=executor, **limits)
 
 
 def read_graph(file: str, problem: AnyProblem) -> BranchGraph:

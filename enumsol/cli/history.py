@@ -102,22 +102,16 @@ def history(
 def _search(problem: AnyProblem, steps: object, jobs: int, options: dict[str, Any]) -> History:
     from enumsol.loading.growing import histories  # numpy and scipy: not for --help
 
-    with common.workers(jobs) as executor, _HistoryDisplay() as display:
+    with common.workers(jobs) as executor, Display("stepping", told=_told) as display:
         return histories(problem, steps, executor=executor, progress=display, **options)
 
 
-class _HistoryDisplay(Display):
-    """Progress of a history."""
-
-    def __init__(self) -> None:
-        super().__init__("stepping")
-
-    def __call__(self, state: HistoryProgress) -> None:
-        """Show where the history is."""
-        of_step = state.stages / (state.stages + state.waiting)
-        share = (state.step - 1 + of_step) / state.steps
-        left, roots = counted(state.waiting, "start"), counted(state.roots, "root")
-        self.show(share, f"step {state.step} of {state.steps}, {left} left, {roots}")
+def _told(state: HistoryProgress) -> tuple[float, str]:
+    """Share of the history that is done, and where it is."""
+    of_step = state.stages / (state.stages + state.waiting)
+    share = (state.step - 1 + of_step) / state.steps
+    left, roots = counted(state.waiting, "start"), counted(state.roots, "root")
+    return share, f"step {state.step} of {state.steps}, {left} left, {roots}"
 
 
 def _steps(problem: str, steps: str | None) -> Any:

@@ -37,7 +37,7 @@ from enumsol.relaxation.imposed_rows import EQUALITY, INEQUALITY, row_terms, sta
 from enumsol.support.array_types import Alpha, Codes, Floats, Indices, NDArray
 
 if TYPE_CHECKING:
-    from enumsol.relaxation._active_set import BranchingRule, QPData, QPState
+    from enumsol.relaxation._active_set import BranchingRule, QPState
     from enumsol.trusted.quadratic_forms import EnclosedForm
 
 #: Part of the secant's slope that makes the form in (lambda, tau) definite: what it costs vanishes with the interval.
@@ -183,16 +183,6 @@ class PieceForm:
         return np.block([[self.H, across], [across.T, np.array([[curvature]])]])
 
 
-def _feasibility_tolerance(data: QPData) -> float:
-    """Largest violation that the QP ignores, where its data are larger than those of a body that is held.
-
-    On weak springs the load gives a body an energy that is as large as the springs are weak.
-    """
-    from enumsol.relaxation._active_set import QPState  # compiled: whoever made the data has it
-
-    return FEASIBILITY_TOLERANCE * max(1.0, math.sqrt(-QPState(data).bound))
-
-
 class ActiveSetEngine:
     """A quadratic program whose rows are switched on and off, and the compiled method that solves it.
 
@@ -234,8 +224,9 @@ class ActiveSetEngine:
         candidates: int = BRANCHING_CANDIDATES,
         slow: bool | None = None,
     ) -> None:
-        from enumsol.relaxation._active_set import QPData  # compiled; its absence is handled by make_engine
+        from enumsol.relaxation import _active_set  # compiled; its absence is handled by make_engine
 
+        self._compiled = _active_set
         over = system if isinstance(system, IntervalSystem) else IntervalSystem.at_alpha(system)
         self._system, self._candidates, self._slow = over, candidates, slow
         #: The first unknowns, so many of them, are lambda.
@@ -254,17 +245,19 @@ class ActiveSetEngine:
         rhs = np.append(np.zeros(rows), [-1.0, -1.0])
         W, convex = np.column_stack([-over.S, over.half]), form.convex()
         terms = start, index, np.append(value, [1.0, -1.0])
-        self.data = QPData(convex, np.append(form.h, 0.0), W, over.g, *terms, rhs)
+        self._take(convex, np.append(form.h, 0.0), W, over.g, *terms, rhs)
         self.offset, self.always = float(convex[-1, -1]), (rows, rows + 1)
-        self.tolerance = _feasibility_tolerance(self.data)
 
     def _minimise(self, H: Floats, h: Floats) -> None:
         """Take the program that minimises lambda' H lambda - h' lambda."""
-        from enumsol.relaxation._active_set import QPData
-
         system = self._system
-        self.data = QPData(H, h, -system.S, system.g, *self._rows, np.zeros(len(self._rows[0]) - 1))
-        self.tolerance = _feasibility_tolerance(self.data)
+        self._take(H, h, -system.S, system.g, *self._rows, np.zeros(len(self._rows[0]) - 1))
+
+    def _take(self, *program: Floats | Indices) -> None:
+        self.data = self._compiled.QPData(*program)
+        #: Largest violation that the QP ignores. On weak springs the load gives a body an energy that is as large as
+        #: the springs are weak, and its data are larger than those of a body that is held.
+        self.tolerance = FEASIBILITY_TOLERANCE * max(1.0, math.sqrt(-self._compiled.QPState(self.data).bound))
 
     @classmethod
     def over(cls, system: IntervalSystem, form: PieceForm | None = None) -> ActiveSetEngine:
@@ -290,13 +283,11 @@ class ActiveSetEngine:
     @cached_property
     def rule(self) -> BranchingRule:
         """Which contact node a partial assignment is branched on."""
-        from enumsol.relaxation._active_set import BranchingRule
-
         if self._energy is not None:
             return self._energy.rule
         F = self._system.F
         slow = self._is_slow(F) if self._slow is None else self._slow
-        return BranchingRule(F, *_slip_rows(self._system), self._candidates, slow)
+        return self._compiled.BranchingRule(F, *_slip_rows(self._system), self._candidates, slow)
 
     def bounding(self, form: EnclosedForm) -> ActiveSetEngine:
         """An engine with the same rows whose relaxations bound a form, which is convex, in place of the energy."""
@@ -307,10 +298,8 @@ class ActiveSetEngine:
 
     def root(self, rows: list[int], modes: list[int]) -> ActiveSetRelaxation:
         """The relaxation with the given rows on."""
-        from enumsol.relaxation._active_set import QPState
-
         rows, modes = [*rows, *self.always], modes + [INEQUALITY] * len(self.always)
-        return ActiveSetRelaxation(self, QPState(self.data), rows, modes, last=True)
+        return ActiveSetRelaxation(self, self._compiled.QPState(self.data), rows, modes, last=True)
 
     def _is_slow(self, F: Floats) -> bool:
         """True if one dual step closes little of the gap at the root of the tree, in the mean over the nodes."""
