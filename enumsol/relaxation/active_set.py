@@ -245,19 +245,20 @@ class ActiveSetEngine:
         rhs = np.append(np.zeros(rows), [-1.0, -1.0])
         W, convex = np.column_stack([-over.S, over.half]), form.convex()
         terms = start, index, np.append(value, [1.0, -1.0])
-        self._take(convex, np.append(form.h, 0.0), W, over.g, *terms, rhs)
+        self._take(_active_set.QPData(convex, np.append(form.h, 0.0), W, over.g, *terms, rhs))
         self.offset, self.always = float(convex[-1, -1]), (rows, rows + 1)
 
     def _minimise(self, H: Floats, h: Floats) -> None:
         """Take the program that minimises lambda' H lambda - h' lambda."""
         system = self._system
-        self._take(H, h, -system.S, system.g, *self._rows, np.zeros(len(self._rows[0]) - 1))
+        zeros = np.zeros(len(self._rows[0]) - 1)
+        self._take(self._compiled.QPData(H, h, -system.S, system.g, *self._rows, zeros))
 
-    def _take(self, *program: Floats | Indices) -> None:
-        self.data = self._compiled.QPData(*program)
+    def _take(self, data: QPData) -> None:
+        self.data = data
         #: Largest violation that the QP ignores. On weak springs the load gives a body an energy that is as large as
         #: the springs are weak, and its data are larger than those of a body that is held.
-        self.tolerance = FEASIBILITY_TOLERANCE * max(1.0, math.sqrt(-self._compiled.QPState(self.data).bound))
+        self.tolerance = FEASIBILITY_TOLERANCE * max(1.0, math.sqrt(-self._compiled.QPState(data).bound))
 
     @classmethod
     def over(cls, system: IntervalSystem, form: PieceForm | None = None) -> ActiveSetEngine:
