@@ -37,7 +37,7 @@ from enumsol.relaxation.imposed_rows import EQUALITY, INEQUALITY, row_terms, sta
 from enumsol.support.array_types import Alpha, Codes, Floats, Indices, NDArray
 
 if TYPE_CHECKING:
-    from enumsol.relaxation._active_set import BranchingRule, QPState
+    from enumsol.relaxation._active_set import BranchingRule, QPData, QPState
     from enumsol.trusted.quadratic_forms import EnclosedForm
 
 #: Part of the secant's slope that makes the form in (lambda, tau) definite: what it costs vanishes with the interval.

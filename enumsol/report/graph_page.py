@@ -1,133 +1,44 @@
-"""The page of a report: words and tables in HTML, the graph's numbers, and the script that draws them."""
+"""The page of a graph: words and tables in HTML, and what its script draws, as plain values that JSON can hold."""
 
 from __future__ import annotations
 
 from html import escape
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.branches import BranchGraph
 from enumsol.branches.claims import ranges_text
-from enumsol.errors import InvalidArgumentError
-from enumsol.loading.history import History
+from enumsol.branches.elements import Arc, Vertex, VertexKind
+from enumsol.branches.figures.curves import QUANTITIES, Curve, curves, side_by_side
+from enumsol.branches.figures.marks import colour_of
+from enumsol.branches.figures.panels import family_states
 from enumsol.model.problem import ContactProblem
-from enumsol.report.content import listed, report_content
-from enumsol.report.history_page import history_page
+from enumsol.report.body import body_record
 from enumsol.report.parts import (
     CERTIFIED_DATA,
     DRAWING,
+    STATUS_NAMES,
     Heading,
     Statement,
     filled_page,
     packed_plotly,
     proof_commands,
     span_words,
+    status_codes,
     table_text,
     with_unit,
 )
-from enumsol.report.roots_page import roots_page
-from enumsol.roots.root_set import RootSet
-from enumsol.support.arguments import file_path, instance_of
-from enumsol.support.files import write_file
 from enumsol.support.messages import counted
-from enumsol.support.plotting import checked_units
 
 if TYPE_CHECKING:
-    import os
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
-    from enumsol.branches.elements import Branch, Vertex
+    from enumsol.branches import BranchGraph
+    from enumsol.branches.elements import Branch
     from enumsol.fem import Scene
     from enumsol.model.problem3d import ContactProblem3D
-
-
-def write_report(
-    solutions: BranchGraph | RootSet | History,
-    file: str | os.PathLike[str],
-    *,
-    title: str = "Contact problem with Coulomb friction",
-    units: tuple[str, str] | None = None,
-    commands: Sequence[str] = (),
-    scene: Scene | None = None,
-) -> None:
-    """Write all solutions over an interval of alpha, at one alpha, or after every load step, as one HTML page.
-
-    It needs no network.
-
-    The page of a graph, in 2D or 3D, has the branches against alpha (pointing shows values and statuses, a click on a
-    branch its arcs), the number of solutions, a slider over alpha with the deformed bodies of all solutions, tables of
-    branches, transitions and folds, and what is certified. It says "complete" only where ``graph.complete`` does; of a
-    graph that was cut short it says what is missing.
-
-    Bodies can be enlarged in their displacements one by one or all at once, and coloured by displacement or stress.
-    Load, supports, springs and contact forces are drawn, the latter with a scale. In the plane bodies can be zoomed;
-    the foundation is drawn, and the statuses along the boundary in a strip. In 3D they can be turned; directions of
-    slip are drawn. Without a mesh there are bars of the forces and displacements of the contact nodes, and in 3D these
-    nodes at their coordinates. Pages follow the light or dark setting of the browser and print on A4.
-
-    The page of a RootSet, in 2D or 3D, has a card for each root with the deformed body, contact forces, statuses,
-    directions of slip and a table over the contact nodes; tables of roots, continua and undecided parts; and what is
-    certified.
-
-    The page of a History has a table of the steps, the tree of the roots, figures of load, displacement and work of
-    friction, the deformed bodies of all roots of a step that is chosen (with a mesh), and what is certified.
-
-    Parameters
-    ----------
-    solutions : BranchGraph, RootSet or History
-    file : str or path-like
-        An existing file is replaced.
-    title : str
-        What the problem is.
-    units : (str, str), optional
-        Of forces and of lengths; the figures of a History have none.
-    commands : sequence of str
-        Lines of a shell by which a reader can check the proof.
-    scene : fem.Scene, optional
-        What the problem was made of, from `fem.mesh_scene` or `fem.read_mesh_scene`: material, supports, springs, loads
-        and gaps are then told as they were given, with their units.
-
-    Raises
-    ------
-    InvalidArgumentError
-        There can be no such file, or an argument is not of that form.
-    MissingDependencyError
-        plotly is not installed, whose script draws diagrams and bodies in 3D in the page; for a History matplotlib.
-    OutputError
-        There is no room for the file.
-
-    Examples
-    --------
-    >>> import enumsol, pathlib, tempfile
-    >>> graph = enumsol.branch_graph(enumsol.gallery.two_node_square(), (0, 10))
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     enumsol.write_report(graph, f"{folder}/square.html", title="Square in a corner")
-    ...     "complete: yes (proven)" in pathlib.Path(folder, "square.html").read_text()
-    True
-    """
-    given: object = solutions
-    if not isinstance(given, (BranchGraph, RootSet, History)):
-        raise InvalidArgumentError(
-            f"solutions is a {type(given).__name__}; expected a BranchGraph, a RootSet or a History"
-        )
-    place = file_path(file, "file")
-    heading = Heading(instance_of(title, str, "title"), checked_units(units), tuple(commands), _checked_scene(scene))
-    if isinstance(solutions, BranchGraph):
-        page = graph_page(solutions, heading)
-    elif isinstance(solutions, RootSet):
-        page = roots_page(solutions, heading)
-    else:
-        page = history_page(solutions, heading)
-    write_file(place, page, "file")
-
-
-def _checked_scene(scene: object) -> Scene | None:
-    if scene is None:
-        return None
-    from enumsol.fem import Scene  # scikit-fem takes a while
-
-    return instance_of(scene, Scene, "scene")
+    from enumsol.support.array_types import ArrayLike
 
 
 def graph_page(graph: BranchGraph, heading: Heading) -> str:
@@ -205,7 +116,7 @@ def _branches(graph: BranchGraph) -> str:
 
 
 def _vertices(graph: BranchGraph) -> str:
-    found = listed(graph)
+    found = [v for v in graph.vertices if v.kind is not VertexKind.END]
     if not found:
         return f"<p>None{': no status changes inside the interval' if graph.complete else ' was found'}.</p>"
     meeting: dict[int, list[Any]] = {v.number: [] for v in found}
@@ -260,3 +171,137 @@ def _certified(graph: BranchGraph) -> list[str]:
         "critical alphas are known stands in their table."
     )
     return [known, picture]
+
+
+# -- what the script draws ---------------------------------------------------------------------------------------------
+
+
+def report_content(graph: BranchGraph, scene: Scene | None = None) -> dict[str, Any]:
+    """Everything that the script needs: nodes, quantities, arcs with points along them, vertices, steps, the body.
+
+    Statuses are texts of one digit per node, places in ``statuses``. ``f`` and ``w`` are forces and displacements of
+    the contact nodes, all normal ones, then those along each tangent; of an arc at its points ``a``.
+    """
+    drawn, tolerance = _sampled(graph)
+    steps, (body, missing) = graph.claims.steps(), body_record(graph.problem, scene)
+    return {
+        "interval": list(graph.interval),
+        "complete": graph.complete,
+        "exact_counts": steps.exact,
+        "open_ranges": [[float(end) for end in ends] for ends in graph.open_ranges] if graph.claims.partly else [],
+        "nodes": [str(label) for label in graph.problem.node_ids],
+        "statuses": STATUS_NAMES,
+        "tangents": 2 if _in_space(graph) else 1,
+        "quantities": [item._asdict() for item in QUANTITIES.values()],
+        "tolerance": tolerance,
+        "arcs": [_arc(arc, graph.branch_of[arc.number], drawn.get(arc.number)) for arc in graph.arcs],
+        "branches": [
+            {"number": branch.number, "colour": colour_of(branch.number), "arcs": [arc.number for arc in branch.arcs]}
+            for branch in graph.branches
+        ],
+        "vertices": [_vertex(v, graph) for v in graph.vertices],
+        "steps": {
+            "alphas": [float(alpha) for alpha in steps.alphas],
+            "at": list(steps.at),
+            "between": list(steps.between),
+        },
+        "beside": _beside(graph, drawn),
+        "start": steps.busiest() if steps.alphas else graph.interval[0],
+        "slider": slider_alphas([v.alpha for v in graph.vertices], graph.interval),
+        "body": body,
+        "no_body": missing,
+    }
+
+
+def rounded_list(values: ArrayLike) -> Any:
+    """Numbers of an array to nine digits, as lists."""
+    array = np.asarray(values, dtype=np.float64)
+    if array.ndim:
+        return [rounded_list(row) for row in array]
+    number = float(f"{float(array):.9g}")
+    return int(number) if number.is_integer() and abs(number) < 1e15 else number
+
+
+def slider_alphas(critical: Sequence[float], interval: tuple[float, float]) -> list[float]:
+    """Positions of the slider: all critical alphas, and between neighbours enough to see what happens there."""
+    marks = sorted({*critical, *interval})
+    positions = 160  # over the whole interval
+    # narrow steps have positions inside, however narrow they are
+    few = 1 if len(marks) > positions else 3
+    width = interval[1] - interval[0]
+    found = [marks[0]]
+    for low, high in pairwise(marks):
+        count = max(few, round(positions * (high - low) / width))
+        inside = [low + (high - low) * k / (count + 1) for k in range(1, count + 1)]
+        found += [alpha for alpha in inside if low < alpha < high] + [high]
+    return found
+
+
+def _in_space(graph: BranchGraph) -> bool:
+    return not isinstance(graph.problem, ContactProblem)
+
+
+def _sampled(graph: BranchGraph) -> tuple[dict[int, Curve], float]:
+    """Points along all arcs that are no sheets, and the tolerance to which they are near, relative to the picture.
+
+    It is coarser until the page is small enough: a number takes about ten characters.
+    """
+    arcs = [arc for arc in graph.arcs if not arc.dimension]
+    width, tolerance = graph.interval[1] - graph.interval[0], 1e-3
+    while True:
+        drawn = curves(arcs, tuple(QUANTITIES), width, tolerance, components=_in_space(graph))
+        numbers = sum(curve.forces.size + curve.moves.size for curve in drawn.values())
+        if numbers <= 250_000 or tolerance >= 2e-2:
+            return drawn, tolerance
+        tolerance *= 2
+
+
+def _arc(arc: Arc, branch: int, curve: Curve | None) -> dict[str, Any]:
+    record = {
+        "number": arc.number,
+        "branch": branch,
+        "tail": arc.tail,
+        "head": arc.head,
+        "index": arc.index,
+        "statuses": status_codes(arc.statuses),
+        "dimension": arc.dimension,
+        "grazing": arc.grazing,
+        "lo": arc.lo,
+        "hi": arc.hi,
+    }
+    if curve is not None:
+        record |= {"a": curve.alphas.tolist(), "f": rounded_list(curve.forces), "w": rounded_list(curve.moves)}
+    return record
+
+
+def _vertex(v: Vertex, graph: BranchGraph) -> dict[str, Any]:
+    record: dict[str, Any] = {
+        "number": v.number,
+        "alpha": v.alpha,
+        "kind": v.kind.value,
+        "border": v.border,
+        "statuses": status_codes(v.statuses),
+        "several": [k for k, holds in enumerate(v.active) if len(holds) > 1],
+        "f": rounded_list(np.concatenate([v.lambda_n, v.lambda_t.ravel(order="F")])),
+        "w": rounded_list(np.concatenate([v.u_n, v.u_t.ravel(order="F")])),
+        "family": None,
+    }
+    if v.family is not None:
+        forces, moves = family_states(graph.problem, v.alpha, v.family)
+        record["family"] = {"f": rounded_list(forces), "w": rounded_list(moves), "dimension": v.family.dimension}
+    return record
+
+
+def _beside(graph: BranchGraph, drawn: Mapping[int, Curve]) -> dict[str, dict[str, list[int]]]:
+    """Arcs that coincide with others, by columns of the quantities: rank among them, and how many they are."""
+    if not drawn:
+        return {}
+    overviews = sum(not item.by_node for item in QUANTITIES.values())
+    columns = overviews + graph.problem.p * (len(QUANTITIES) - overviews)
+    found = {}
+    for column in range(columns if len(drawn) <= 300 else overviews):  # of more arcs, all columns take too long
+        places = side_by_side(drawn, graph.branch_of, column)
+        several = {str(arc): [place.rank, place.among] for arc, place in places.items() if place.among > 1}
+        if several:
+            found[str(column)] = several
+    return found
