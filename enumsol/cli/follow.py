@@ -226,12 +226,10 @@ class _Followed:
         """Points of all paths, with the columns path, root and direction."""
         import pandas as pd
 
-        frames = []
-        for k, (root, sign, path) in enumerate(self.found):
-            one = path.to_frame()
-            for at, (name, value) in enumerate((("path", k), ("root", root), ("direction", sign))):
-                one.insert(at, name, value)
-            frames.append(one)
+        frames = [
+            pd.DataFrame({"path": k, "root": root, "direction": sign, **path.to_frame()})
+            for k, (root, sign, path) in enumerate(self.found)
+        ]
         return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame(columns=["path", "alpha"])
 
     def content(self) -> dict[str, Any]:

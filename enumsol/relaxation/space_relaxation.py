@@ -18,7 +18,7 @@ from enumsol.relaxation.imposed_rows import EQUALITY, INEQUALITY
 from enumsol.trusted.space import sector_rows
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from enumsol.condensation.space_condensed import SpaceSystem
     from enumsol.relaxation._active_set import QPData, QPState
@@ -224,10 +224,8 @@ def imposed(tau: Indices, node: int, code: int) -> list[tuple[sector_rows.Row, i
     equations: list[sector_rows.Row] = []
     (inequalities if code in (OPEN, UNDECIDED) else equations).append((sector_rows.GAP, node, 0))
     if code == OPEN:
-        return [
-            *_with(inequalities[1:], INEQUALITY),
-            *_with([(sector_rows.FORCE, node, 0), *((sector_rows.TAU, node, k) for k in axes)], EQUALITY),
-        ]
+        equations = [(sector_rows.FORCE, node, 0), *((sector_rows.TAU, node, k) for k in axes)]
+        return [(inequalities[1], INEQUALITY), *((row, EQUALITY) for row in equations)]
     if len(axes) == 2:
         inequalities += [(sector_rows.TANGENT, node, (1 << COARSE) + k) for k in range(1 << COARSE)]
     elif axes:
@@ -244,11 +242,7 @@ def imposed(tau: Indices, node: int, code: int) -> list[tuple[sector_rows.Row, i
             (sector_rows.TANGENT, node, n) for n in (start_number(number), middle_number(number), end_number(number))
         ]
         inequalities += [(kind, node, number) for kind in (sector_rows.CHORD, sector_rows.LEFT, sector_rows.RIGHT)]
-    return [*_with(inequalities, INEQUALITY), *_with(equations, EQUALITY)]
-
-
-def _with(rows: Iterable[sector_rows.Row], mode: int) -> list[tuple[sector_rows.Row, int]]:
-    return [(row, mode) for row in rows]
+    return [(row, mode) for rows, mode in ((inequalities, INEQUALITY), (equations, EQUALITY)) for row in rows]
 
 
 class SpaceRelaxation:

@@ -163,7 +163,7 @@ class Array:
     def __init__(self, *shape: int | None) -> None:
         self.shape = shape
 
-    def fits(self, value: object) -> bool:
+    def __call__(self, value: object) -> bool:
         """True if a value is such an array."""
         if isinstance(value, (list, np.ndarray)):
             array = np.asarray(value)  # ValueError where lists have different lengths
@@ -236,8 +236,6 @@ def check_kind(value: Any, kind: Kind, where: str) -> None:
             fits = type(value) is str and value in kind
         case range():
             fits = type(value) is int and value in kind
-        case Array():
-            fits = kind.fits(value)
         case type():
             fits = is_number(value) and -math.inf < value < math.inf if kind is float else type(value) is kind
         case _:
