@@ -1,4 +1,4 @@
-"""Pieces of graph proofs closed by their arcs (docs/proof_format.md, under Pieces without a tree), in both checkers."""
+"""Pieces of graph proofs closed by their arcs (docs/proof_format.md, under Tests of a piece), in both checkers."""
 
 import functools
 from contextlib import nullcontext

@@ -13,7 +13,7 @@ from rational_forms import Forms, decimal_fraction, exact, integer, need
 from rational_zeros import cells, count, interpolated, one_sign, sign
 
 MOST_SYSTEMS = 2000
-#: Partners at an event: code and kind of row [4.3] of one, of the other.
+#: Partners at an event: code and kind of row [4.4] of one, of the other.
 PARTNERS = [((0, 4), (2, 0)), ((0, 4), (3, 0)), ((0, 4), (4, 0)), ((1, 2), (2, 5)), ((1, 3), (3, 6))]
 PARTNERS += [(other, one) for one, other in PARTNERS]
 #: Conditions of a body that nothing holds: both bounds of q_j, as those of a node p + j.
@@ -58,7 +58,7 @@ class Selection:
     def __init__(self, data, codes, side):
         self._data, self.codes, self.side, self._p = data, codes, side, len(codes)
         groups = [{0: 4}, {2: 5, 3: 6}, dict.fromkeys((1, 2, 3, 4), 0), {1: 2}, {1: 3}]
-        #: [6.5, conditions] Kind of row and node, by number.
+        #: [7.3, conditions] Kind of row and node, by number.
         self.conditions = [(group[code], i) for group in groups for i, code in enumerate(codes) if code in group]
         modes = range(self._p, self._p + len(data.reach))
         self.conditions += [(kind, i) for kind in BOUNDS for i in modes]
@@ -102,13 +102,13 @@ class Selection:
         return one_sign(self.own.determinant, x, y)
 
     def holds(self, x, y, index):
-        """[6.5] A part "h"."""
+        """[7.3] A part "h"."""
         need(self._index(x, y) == index, "the index of a part is another, or its selection is singular")
         for value in self._values:
             need(one_sign(value, x, y) == index, "a condition is not positive")
 
     def event(self, x, y, index, condition, rising, first, last):
-        """[6.5] A part "e"."""
+        """[7.3] A part "e"."""
         need(self._index(x, y) == index, "the index of an event is another, or its selection is singular")
         values = list(self._values)
         named = index * values.pop(condition)
@@ -121,7 +121,7 @@ class Selection:
         need(count(named.gcd(named.derivative()), x, y) == 0, "the zero of an event is multiple")
 
     def empty(self, x, y):
-        """[6.5] A part "n"."""
+        """[7.3] A part "n"."""
         if self._data.reach and self._data.unbalanced(self.codes, (x, y)):
             return
         if self._index(x, y) and any(one_sign(value, x, y) == -self._index(x, y) for value in self._values):
@@ -168,7 +168,7 @@ class Selection:
 
 
 class Trace:
-    """[6.5, arcs] The arcs of one trace, from left to right."""
+    """[7.3, arcs] The arcs of one trace, from left to right."""
 
     def __init__(self, data, codes, side):
         self.selection, self.codes, self.side = Selection(data, codes, side), codes, side
@@ -231,7 +231,7 @@ class Trace:
 
 
 class Arcs:
-    """[6.5] All arcs of a proof on [a, b]; alpha_0 or None; by codes where selections survive; closed pieces."""
+    """[7.3] All arcs of a proof on [a, b]; alpha_0 or None; by codes where selections survive; closed pieces."""
 
     def __init__(self, data, interval, origin, handed_on, closed):
         self._data, (self._a, self._b), self._closed = data, interval, closed
@@ -240,7 +240,7 @@ class Arcs:
         self._traces = []
 
     def _spans(self, pieces):
-        """[6.5, traces] Ends and side."""
+        """[7.3, traces] Ends and side."""
         joined = []
         for x, y in sorted(pieces):
             if joined and joined[-1][1] == x and x != self._origin:
@@ -300,7 +300,7 @@ class Arcs:
         return trace
 
     def _paired(self):
-        """[6.5, events] Events without a partner, and pairs."""
+        """[7.3, events] Events without a partner, and pairs."""
         events = [(trace, *event) for trace in self._traces for event in trace.events if event[0][0] not in BOUNDS]
         partners = [[other for other in events if _partners(event, other)] for event in events]
         for event, found in zip(events, partners, strict=True):

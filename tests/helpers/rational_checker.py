@@ -37,7 +37,7 @@ from rational_references import References
 MAGIC = b"enumsol-proof 2\n"
 DIGEST = 32
 LARGEST_TEXT = 1 << 24
-#: [4.3] What a multiplier may be, by code and kind of row: E any number, + nonnegative, . none.
+#: [4.4] What a multiplier may be, by code and kind of row: E any number, + nonnegative, . none.
 ALLOWED = {
     0: "EEEE+..",
     1: "+.++EEE",
@@ -49,7 +49,7 @@ ALLOWED = {
     7: "+.E++..",
     8: "+.+E+..",
     "undecided, F = 0": "+E+++..",
-    # [6.3] slip where friction is not constant
+    # [7.2] slip where friction is not constant
     "slip+": "+.++E+.+.",
     "slip-": "+.++E.+.+",
 }
@@ -120,7 +120,7 @@ def are(found, expected):
     return json.dumps(found, sort_keys=True) == json.dumps(expected, sort_keys=True)
 
 
-# -- [5] and [6]: what both kinds share --------------------------------------------------------------------------------
+# -- [5] and [7]: what both kinds share --------------------------------------------------------------------------------
 
 
 class Proof:
@@ -133,12 +133,12 @@ class Proof:
         self.data, self.p = data_of(problem), problem.p
 
     def same_bound(self, header):
-        """[5.6], [6.6]"""
+        """[5.1]"""
         bound = header["max_rigid_displacement"]
         need(type(bound) is float and bound == self.data.bound, "another bound of the rigid displacement")
 
     def units(self, record):
-        """[4.4] Factors of multipliers: on rows of forces, and of displacements."""
+        """[4.6] Factors of multipliers: on rows of forces, and of displacements."""
         force, length = ([integer(value) for value in record[key]] for key in ("force", "length"))
         p = self.p
         need(len(force) == len(length) == 2 * p and force[:p] == force[p:], "units are no lists of 2p integers")
@@ -147,7 +147,7 @@ class Proof:
         return [[fmpq(2) ** value for value in values[:p]] for values in (length, force)]
 
     def terms(self, codes, packed, units, friction, varying=()):
-        """[4.3], [4.4] Rows and multipliers in the problem's units, if they are allowed."""
+        """[4.4], [4.6] Rows and multipliers in the problem's units, if they are allowed."""
         found = []
         for number, value in multipliers(*packed):
             kind, i = divmod(number, self.p)
@@ -218,7 +218,7 @@ class Point(Proof):
         return [(*codes[:node], code, *codes[node + 1 :]) for code in children]
 
     def leaf(self, codes, kind, *rest):
-        """[5.3]"""
+        """[5.3], [6]"""
         if kind == "x" and (len(rest) == 2 or rest[2] == "rational"):
             terms = self.terms(codes, rest[:2], self.scale, self.friction)
             need(len(rest) < 4 and self.forms.excludes(terms), "multipliers do not exclude a leaf")
@@ -249,7 +249,7 @@ class Point(Proof):
             {"n": self.empty, "r": self.root, "D": self.polytope}[kind](codes, *rest)
 
     def declare(self, codes, numbers, more):
-        """[5.5]"""
+        """[6.2]"""
         need(len(codes) == self.p and all(0 <= integer(code) <= 6 for code in codes), "codes of a form are none")
         need(len(numbers) == 4 * self.p, "a form has other multipliers")
         numbers, (weight,) = [exact(value) for value in numbers], more
@@ -258,7 +258,7 @@ class Point(Proof):
         self.declared.append((codes, multipliers))
 
     def excluded_by(self, codes, back, *packed):
-        """[5.5]"""
+        """[6.2]"""
         need(1 <= integer(back) <= len(self.declared), "a form was not declared")
         base, multipliers = self.declared[-back]
         for mine, code in zip(base, codes, strict=True):
@@ -310,7 +310,7 @@ class Point(Proof):
 
 
 class FloatingPoint(Point):
-    """[5.6]"""
+    """[3.2]"""
 
     def __init__(self, problem, header):
         super().__init__(problem, header)
@@ -339,7 +339,7 @@ class FloatingPoint(Point):
 
 
 class Graph(Proof):
-    """[6]"""
+    """[7]"""
 
     def __init__(self, problem, header):
         super().__init__(problem, header)
@@ -352,7 +352,7 @@ class Graph(Proof):
         self.handed_on, self.closed = {}, []
 
     def run(self, records):
-        """[6.2]"""
+        """[7.1]"""
         ends = [self.a, self.b]
         if self.origin is not None and self.a < self.origin < self.b:
             ends.insert(1, self.origin)
@@ -383,7 +383,7 @@ class Graph(Proof):
         return set(self.handed_on)
 
     def piece(self, x, y, roots, units, leaves):
-        """[6.3] Check a piece; the codes that are left to its halves."""
+        """[7.2] Check a piece; the codes that are left to its halves."""
         ends = list(zip(self.data.friction(x), self.data.friction(y), strict=True))
         F_lo, F_hi = [min(pair) for pair in ends], [max(pair) for pair in ends]
         friction = [value > 0 for value in F_hi]
@@ -434,7 +434,7 @@ class Graph(Proof):
         return cut
 
     def starts(self):
-        """[6.2] alpha_0."""
+        """[7.1] alpha_0."""
         return self.data.origin()
 
     def forms_of(self, ends, loads, F_hi, F_lo):
@@ -454,7 +454,7 @@ class Graph(Proof):
 
 
 class FloatingGraph(Graph):
-    """[6.6]"""
+    """[7], [3.2]"""
 
     def __init__(self, problem, header):
         super().__init__(problem, header)

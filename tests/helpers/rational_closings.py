@@ -1,4 +1,4 @@
-"""[5.3, a and m] Leaves that close a subtree by its only possible solution, for rational_checker, in rationals.
+"""[6.5] Leaves that close a subtree by its only possible solution, for rational_checker, in rationals.
 
 Nothing of enumsol is imported. That a solution is the only one is not believed because a form is definite: all
 selections of the free nodes are tried as well. Numbers in brackets are sections of docs/proof_format.md.

@@ -1,4 +1,4 @@
-"""[5.6] Bodies that nothing holds: condensed data, rows and exclusions in rational arithmetic, for rational_checker.
+"""[3.2] Bodies that nothing holds: condensed data, rows and exclusions in rational arithmetic, for rational_checker.
 
 Nothing of enumsol is imported. Points are (lambda, -q). Numbers in brackets are sections of docs/proof_format.md.
 """
@@ -38,7 +38,7 @@ class FloatingData(Data):
         return A
 
     def unbalanced(self, codes, ends):
-        """[6.6] Whether one z shows that no forces of a selection are in balance with the load between two alphas."""
+        """[7.3] Whether one z shows that no forces of a selection are in balance with the load between two alphas."""
         sides = {1: (1, -1), 2: (1,), 3: (-1,), 4: (0,)}
         loads, rays = [], []
         for alpha in ends:
@@ -107,7 +107,7 @@ class FloatingForms(Forms):
         return super().conditions(codes) + self.bounds()
 
     def bounds(self):
-        """[6.6] rho - q of all modes, then rho + q."""
+        """[7.3] rho - q of all modes, then rho + q."""
         found = []
         for side in (1, -1):
             for j, most in enumerate(self.reach, start=2 * self.p):
@@ -116,7 +116,7 @@ class FloatingForms(Forms):
         return found
 
     def excludes(self, terms):
-        """(5.6), with the multipliers as they are or changed until G y = h."""
+        """(6.1), with the multipliers as they are or changed until G y = h."""
         return self._excludes(terms) or self._excludes(self._balanced(terms))
 
     def _excludes(self, terms):
@@ -149,7 +149,7 @@ class FloatingForms(Forms):
         return _solution(flat, [2 * x - y for x, y in zip(self.h, slope, strict=True)])
 
     def margin(self, terms, z):
-        """By how much (5.6) holds."""
+        """By how much (6.1) holds."""
         v, constant, turn = self._gathered(terms)
         right = column_of(v) + fmpq_mat(self.G).transpose() * column_of(z)
         value = -constant - (right.transpose() * self.own.solve(right))[0, 0] / 4 + _dot(z, self.h)
@@ -186,7 +186,7 @@ class FloatingForms(Forms):
         return found
 
     def beside(self, other, terms):
-        """[6.6] Whether the multipliers exclude a leaf for all alpha between this one and another."""
+        """[7.2] Whether the multipliers exclude a leaf for all alpha between this one and another."""
         little = fmpq(1, 2**40)
         z = [form.best(terms) or form.best(terms, little) for form in (self, other)]
         # multipliers far along z may help at one end and do harm at the other: others that are nearer

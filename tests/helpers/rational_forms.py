@@ -76,7 +76,7 @@ def multipliers(rows, values):
 
 @lru_cache(maxsize=16)
 def fingerprint(problem):
-    """[3.3], [5.6]"""
+    """[3.4]"""
     free = problem.rigid_modes is not None
     digest = hashlib.sha256(b"enumsol problem 1" + (b", held by nothing" if free else b""))
 
@@ -110,7 +110,7 @@ def column_of(values):
 class Data:
     """[3.1] S, g0, g1, F0 and F1 in rationals."""
 
-    #: [5.6] Bounds of q, of a body that nothing holds.
+    #: [3.2] Bounds of q, of a body that nothing holds.
     reach = ()
 
     def __init__(self, problem):
@@ -143,7 +143,7 @@ class Data:
         return [a + alpha * b for a, b in zip(self.F0, self.F1, strict=True)]
 
     def origin(self):
-        """[6.2] The one alpha at which g vanishes, or None."""
+        """[7.1] The one alpha at which g vanishes, or None."""
         moving = [k for k, slope in enumerate(self.g1) if slope != 0]
         if not moving:
             return None
@@ -171,7 +171,7 @@ class Forms:
         return [-sign * value for value in self.rows[k]] + [sign * self.g[k]]
 
     def row(self, kind, i):
-        """[4.3], [6.3]"""
+        """[4.4], [7.2]"""
         p, F, F_lo = self.p, self.F[i], self.F_lo[i]
         return [
             lambda: self.force(1, 0, i),
@@ -186,7 +186,7 @@ class Forms:
         ][kind]()
 
     def equations(self, codes):
-        """[4.1], [4.2] The rows N lambda - c, those of w with the sign of S lambda - g."""
+        """[4.1], [4.7] The rows N lambda - c, those of w with the sign of S lambda - g."""
         normal, tangential = [], []
         for i, code in enumerate(codes):
             normal.append(self.force(1, 0, i) if code == 0 else self.move(-1, i))
@@ -204,7 +204,7 @@ class Forms:
         return [self.row(kind, i) for i, code in enumerate(codes) for kind in kinds[code]]
 
     def excludes(self, terms):
-        """[4.5] for (number of a row, multiplier in the problem's units)."""
+        """[6.1] for (number of a row, multiplier in the problem's units)."""
         v, constant = list(self.g), fmpq(0)
         for number, u in terms:
             *a, a0 = self.row(*divmod(number, self.p))
@@ -214,7 +214,7 @@ class Forms:
         return -constant - (column.transpose() * self.S.solve(column))[0, 0] / 4 > 0
 
     def own_form(self, multipliers):
-        """[5.5], [6.3] lambda'H lambda - h'lambda of multipliers mu, nu, alpha, beta."""
+        """[6.2], [7.2] lambda'H lambda - h'lambda of multipliers mu, nu, alpha, beta."""
         p, mixed = self.p, []
         for i, (mu, nu, alpha, beta) in enumerate(zip(*multipliers, strict=True)):
             mixed.append((i, mu, self.F_lo[i] * (beta - alpha)))
@@ -230,7 +230,7 @@ class Forms:
         return fmpq_mat(table), h
 
     def excludes_by(self, form, equations, terms):
-        """[5.5] Whether a form less multiples of rows is positive wherever some equations hold."""
+        """[6.2] Whether a form less multiples of rows is positive wherever some equations hold."""
         H, h = form
         affine = _affine(equations) if equations else ([fmpq(0)] * (2 * self.p), fmpq_mat(_unit(2 * self.p)).tolist())
         if affine is None:

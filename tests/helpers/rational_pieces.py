@@ -1,4 +1,4 @@
-"""[6.3, pieces without a tree] Pieces of graph proofs that are closed by their arcs, for rational_checker.
+"""[7.2, m] Pieces of graph proofs that are closed by their arcs, for rational_checker.
 
 Nothing of enumsol is imported. That a solution is the only one is not believed because a form is definite: at some
 alphas of every piece all selections are tried as well. Numbers in brackets are sections of docs/proof_format.md.
@@ -84,7 +84,7 @@ class ClosedPiece:
         return self._alone(along, x, middle, halvings - 1) and self._alone(along, middle, y, halvings - 1)
 
     def _tried(self, codes, side):
-        """[6.4] Whether there is one solution at some alphas, and one of these selections has it."""
+        """[7.4] Whether there is one solution at some alphas, and one of these selections has it."""
         for share in TRIED:
             alpha = self.x + share * (self.y - self.x)
             g = self.data.load(alpha) if not side else [side * value for value in self.data.g1]

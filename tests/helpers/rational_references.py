@@ -1,4 +1,4 @@
-"""[5.6] Roots that are declared, and leaves that leave no other root, for rational_checker, in rationals.
+"""[6.7] Roots that are declared, and leaves that leave no other root, for rational_checker, in rationals.
 
 Nothing of enumsol is imported. That a root is the only one is not believed because a form is definite: of small
 problems all selections are tried as well. Numbers in brackets are sections of docs/proof_format.md.
@@ -12,7 +12,7 @@ from flint import fmpq, fmpq_mat
 from rational_forms import _affine, _value, column_of, exact, integer, need
 
 FINAL = {True: (0, 1, 2, 3), False: (0, 4)}
-#: [4.3] By codes, what rows of the kinds 4, 5 and 6 are.
+#: [4.4] By codes, what rows of the kinds 4, 5 and 6 are.
 MOVES = {0: "+..", 1: "EEE", 2: "E+.", 3: "E.+", 4: "E..", 5: "E..", 6: "+..", 7: "+..", 8: "+.."}
 OPPOSITE = {5: 6, 6: 5}
 SPLITS = {5: (1, 2, 3), 6: (0, 1, 2, 3, 4), 7: (0, 2), 8: (0, 3)}
@@ -108,7 +108,7 @@ class Reference:
 
     @cached_property
     def form(self):
-        """(5.7) as a matrix in (d, e), if it is definite where e = 0."""
+        """(6.5) as a matrix in (d, e), if it is definite where e = 0."""
         mu, kappa, nu, theta = self.numbers
         size, r = len(self.places), len(self.reach)
         D = fmpq_mat(size, size)

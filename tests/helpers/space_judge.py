@@ -72,7 +72,7 @@ def floats(values, count):
 
 
 def units(record, p):
-    """[7.5] Factors of multipliers on rows of forces and of displacements, and the units of forces."""
+    """[4.6] Factors of multipliers on rows of forces and of displacements, and the units of forces."""
     force, length = ([integer(value) for value in record[key]] for key in ("force", "length"))
     need(len(force) == len(length) == p, "units are no lists of p integers")
     need(all(-900 <= value <= 900 for value in force + length), "units are out of range")
@@ -81,7 +81,7 @@ def units(record, p):
 
 
 class Point:
-    """[7.5] A set of roots at one alpha."""
+    """[5] A set of roots at one alpha."""
 
     def __init__(self, problem, header, data):
         self.data, self.p = data, problem.p
@@ -114,7 +114,7 @@ class Point:
         return counts
 
     def split(self, codes, node, children):
-        """[5.2], [7.3]"""
+        """[5.2]"""
         need(type(node) is int and 0 <= node < self.p and all(type(child) is int for child in children), "no branching")
         need(is_split(codes[node], children, self.tangents[node]), "a branching does not cover its assignment")
         return [(*codes[:node], child, *codes[node + 1 :]) for child in children]
@@ -125,7 +125,7 @@ class Point:
         return Terms(self.system, self.scale, codes, rows, text)
 
     def leaf_x(self, codes, rows, text, back=None):
-        """[4.5], [7.5] By the energy, or by a form."""
+        """[6.1], [6.2] By the energy, or by a form."""
         terms = self.terms(codes, rows, text)
         if back is not None:
             form = self.form_about(codes, back)
@@ -137,7 +137,7 @@ class Point:
         self.excluded(*(floating_margin(terms) if self.system.rigid else margin(terms)))
 
     def leaf_i(self, codes, z):
-        """[5.6], [7.7] No forces that the assignment allows are in balance with the load."""
+        """[6.3] No forces that the assignment allows are in balance with the load."""
         need(self.system.rigid, "a body that is held")
         G, h, _ = self.system.rigid
         z = floats(z, len(h))
@@ -157,7 +157,7 @@ class Point:
         )
 
     def declare(self, codes, numbers, more, *claim):
-        """[7.5] Forms, and forms of products; [7.7] roots."""
+        """[6.2] Forms, and forms of products; [6.7] roots."""
         if self.system.rigid:
             self.declared.append(self.declared_root(codes, numbers, more, *claim))
             return
@@ -169,14 +169,14 @@ class Point:
             self.declared.append(self.product_form(codes, more, numbers))
 
     def form_about(self, codes, back):
-        """[5.5], [7.5] The form declared so many before, which has to be about the assignment."""
+        """[6.2] The form declared so many before, which has to be about the assignment."""
         need(not self.system.rigid and 1 <= integer(back) <= len(self.declared), "no form is declared")
         form = self.declared[-back]
         need(not isinstance(form, ProductForm) or form.serves(codes), "no form is about the assignment")
         return form
 
     def declared_root(self, leaf, numbers, more, mid, rad, index):
-        """[7.7] The root of a leaf, which counts, and its form."""
+        """[6.7] The root of a leaf, which counts, and its form."""
         numbers = floats(numbers, self.p + 2 * self.system.m)
         balance, share = floats(more, 2)
         need(balance >= 0, "a factor of a square is negative")
@@ -188,7 +188,7 @@ class Point:
         return RootForm(self.system, Weights(self.system, numbers), root, leaf, balance, share)
 
     def leaf_o(self, codes, back, rows, products):
-        """[7.7] No other root than the one that was declared so many before."""
+        """[6.7] No other root than the one that was declared so many before."""
         need(1 <= integer(back) <= len(self.declared), "no root is declared")
         form, (length, force) = self.declared[-back], self.scale
         need(isinstance(rows, list) and isinstance(products, list), "no lists of rows and products")
@@ -210,7 +210,7 @@ class Point:
         return kind, node, number
 
     def plain_form(self, numbers):
-        """H and h of (7.4)."""
+        """H and b of [6.2]."""
         system, p, m = self.system, self.p, self.system.m
         mu, kappa, c = numbers[:p], numbers[p : 2 * p], numbers[2 * p :]
         W = arb_mat(m, m)
@@ -226,7 +226,7 @@ class Point:
         return H, (W * column(system.g0)).entries()
 
     def product_form(self, codes, point, multipliers):
-        """[7.5] A form of products."""
+        """[6.2] A form of products."""
         need(isinstance(codes, list) and len(codes) == self.p and all(map(is_code, codes, self.tangents)), "no codes")
         need(6 not in codes, "a form about an undecided node")
         point = self.ball(point, [0.0] * self.system.m)[0]
@@ -234,7 +234,7 @@ class Point:
         return ProductForm(self.system, codes, point, floats(multipliers, len(multipliers)), force, length)
 
     def in_ellipsoid(self, codes, back, box):
-        """[7.5] All solutions of an assignment in a box that holds one, by their ellipsoid."""
+        """[6.2], [6.6] All solutions of an assignment in a box that holds one, by their ellipsoid."""
         form = self.form_about(codes, back)
         need(isinstance(form, ProductForm), "the form is none of products")
         rows, unit = self.system.S.tolist(), box.steps
@@ -294,14 +294,14 @@ class Point:
                 need(near.upper() <= b + arb(2) ** -200, "the root is not in its ball")
 
     def count(self, root):
-        """[7.6]"""
+        """[5.4]"""
         if not any(same(root, other) for other in self.roots):
             self.roots.append(root)
 
     # -- certificates and boxes ----------------------------------------------------------------------------------------
 
     def leaf_a(self, codes, leaf, numbers, mid, rad, index):
-        """[7.5] One solution by one certificate."""
+        """[6.5] One solution by one certificate."""
         numbers = floats(numbers, self.p + 2 * self.system.m)
         for i, (force, length) in enumerate(zip(*reversed(self.scale), strict=True), 2 * self.p):
             numbers[i] *= arb(2) ** (length - force)
@@ -325,7 +325,7 @@ class Point:
             self.roots.append(None)
 
     def leaf_l(self, codes, centre, radius, rho, mid, rad, index, back=None):
-        """[7.5] All solutions of a complete assignment, or of an ellipsoid, in a box that holds one."""
+        """[6.6] All solutions of a complete assignment, or of an ellipsoid, in a box that holds one."""
         box = Boxed(self, centre, radius, rho, mid, rad, index)
         if back is not None:
             self.in_ellipsoid(codes, back, box)

@@ -15,7 +15,7 @@ _ZERO = arb(2) ** -110
 
 
 class Weights:
-    """[7.5] The numbers of an "m" leaf, by nodes."""
+    """[6.5] The numbers of an "a" leaf, by nodes."""
 
     def __init__(self, system, numbers):
         p, tau = len(system.tau), system.tau
@@ -118,7 +118,7 @@ def natural_map(system, steps=None):
 
 
 def only_solution(weights, start):
-    """[7.5] y and w of the only solution, near a point, where its statuses are not said (theory, (12.9))."""
+    """[6.5] y and w of the only solution, near a point, where its statuses are not said (theory, (12.9))."""
     system = weights.system
     natural = natural_map(system)
     try:
@@ -158,7 +158,7 @@ def only_solution(weights, start):
 
 
 def boxed_solution(system, centre, radius, rho):
-    """[7.5] The map, the box's centre and the only solution in the box of an "l" leaf, with its index."""
+    """[6.6] The map, the box's centre and the only solution in the box of an "l" leaf, with its index."""
     natural = natural_map(system, rho)
     middle = natural.place_of(centre, arb(0))
     try:

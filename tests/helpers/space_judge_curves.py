@@ -27,7 +27,7 @@ def dot(a, b):
 
 
 class GraphProblem:
-    """[7.8] The problem over an interval: in lambda for curves, and in tau with one F0 for the tree."""
+    """[8] The problem over an interval: in lambda for curves, and in tau with one F0 for the tree."""
 
     def __init__(self, data, low, high, steps):
         self.low, self.high, self.p = low, high, data.p
@@ -297,7 +297,7 @@ class Place:
 
 
 def place_of(problem, record):
-    """[7.8] A record "w"."""
+    """[8.1] A record "w"."""
     need(isinstance(record, list) and record[0] == "w" and len(record) == 7, "no box")
     size = 3 * problem.p + 1
 

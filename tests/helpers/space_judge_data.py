@@ -53,11 +53,11 @@ def length_of(values):
     return square.sqrt() if square > 0 else arb(0).union(square.upper().sqrt())
 
 
-# -- [7.1] the problem -------------------------------------------------------------------------------------------------
+# -- [3.1] the problem -------------------------------------------------------------------------------------------------
 
 
 def fingerprint(problem):
-    """[7.1], [7.7]"""
+    """[3.4]"""
     free = problem.rigid_modes is not None
     digest = hashlib.sha256(b"enumsol problem in 3D, 1" + (b", held by nothing" if free else b""))
 
@@ -86,7 +86,7 @@ def balls(array):
 
 
 class SpaceData:
-    """[7.1] S, g0, g1 in the order of all normals, all of the first tangent, all of the second; F exactly."""
+    """[3.1] S, g0, g1 in the order of all normals, all of the first tangent, all of the second; F exactly."""
 
     def __init__(self, problem):
         self.p = problem.p
@@ -114,7 +114,7 @@ class SpaceData:
         )
 
     def bounds_of(self, problem, held):
-        """[5.6] rho."""
+        """[3.2] rho."""
         inverse = balls(problem.rigid_modes[held]).inv().tolist()
         self.rho = [arb(problem.rigid_reach) * sum((abs(x) for x in row), arb(0)) for row in inverse]
 
@@ -125,7 +125,7 @@ class SpaceData:
         ]
 
     def at(self, alpha):
-        """[7.1] The problem at one alpha."""
+        """[3.1] The problem at one alpha."""
         F = self.friction(alpha)
         need(min(map(min, F)) >= 0, "friction is negative")
         system = System.scaled(self, F, [(arb(1), arb(0))] * self.p)
@@ -141,7 +141,7 @@ class SpaceData:
 
 
 def _independent(N):
-    """[5.6] Rows of N where they are independent: elimination with complete pivoting."""
+    """[3.2] Rows of N where they are independent: elimination with complete pivoting."""
     left, rows = N / np.max(np.abs(N), axis=0), []
     for _ in range(N.shape[1]):
         i, j = np.unravel_index(np.argmax(np.abs(left)), left.shape)
@@ -160,7 +160,7 @@ class System:
     discs: list
     tau: list
     axes: list
-    #: [7.7] G~, h and rho of a body that nothing holds
+    #: [3.2] G~, h and rho of a body that nothing holds
     rigid: tuple = ()
 
     @classmethod
@@ -217,7 +217,7 @@ class System:
         return self.discs[i][0] + alpha * self.discs[i][1]
 
 
-# -- [7.2] sectors -----------------------------------------------------------------------------------------------------
+# -- [4.2] sectors -----------------------------------------------------------------------------------------------------
 
 
 def is_sector(number):
@@ -263,7 +263,7 @@ def holds(outer, inner):
     return a <= c and d <= b
 
 
-# -- [7.3] codes -------------------------------------------------------------------------------------------------------
+# -- [4.3] codes -------------------------------------------------------------------------------------------------------
 
 
 def sector_of(code):
@@ -271,7 +271,7 @@ def sector_of(code):
 
 
 def is_split(code, children, tangents):
-    """[7.3] Whether the codes are those into which one may be split at a node with so many tau."""
+    """[5.2] Whether the codes are those into which one may be split at a node with so many tau."""
     if code == 6:
         return sorted(children) == ([0, 5] if tangents else [0, 4])
     if code == 5:
@@ -305,7 +305,7 @@ def is_code(code, tangents):
     return tangents == 2 and 12 <= code < 8 + (1 << 60) and is_sector(code - 8) and level(code - 8) <= DEEPEST
 
 
-# -- [7.4] rows --------------------------------------------------------------------------------------------------------
+# -- [4.5] rows --------------------------------------------------------------------------------------------------------
 
 #: Kinds 0 to 3 by code: E any multiplier, + a nonnegative one, . none.
 ALLOWED = {0: "+EE.", 1: "E+.E", 2: "E+..", 3: "E+..", 4: "E+..", 5: "E+..", 6: "++..", 8: "E+.."}
@@ -396,7 +396,7 @@ class Terms:
 
 
 def margin(terms, H=None, h=None):
-    """[4.5], [7.5] The left-hand side of (4.2), or of (7.4), at one alpha, and a number of its size."""
+    """[6.1], [6.2] The left-hand side of (6.1), perhaps by a form, at one alpha, and a number of its size."""
     system = terms.system
     inverse, load = (system.inverse, system.g0) if H is None else (H.inv(), h)
     plain, radial, moves = terms.sums()
@@ -408,7 +408,7 @@ def margin(terms, H=None, h=None):
 
 
 def floating_margin(terms):
-    """[5.6], [7.7] What (5.6) has on the left less what it has on the right, and a number of its size."""
+    """[6.1] What (6.1) has on the left less what it has on the right, and a number of its size."""
     system = terms.system
     G, h, rho = system.rigid
     best = None

@@ -25,7 +25,7 @@ def between(low, high):
 
 
 class Curve:
-    """[7.8] Points and boxes in turn, tested as a curve."""
+    """[8.1] Points and boxes in turn, tested as a curve."""
 
     def __init__(self, problem, records, first):
         self.problem, self.first = problem, first
@@ -91,7 +91,7 @@ class Curve:
 
 
 class Graph:
-    """[7.8]"""
+    """[8]"""
 
     def __init__(self, problem, header, data, scale):
         self.p, self.scale = problem.p, scale
@@ -175,7 +175,7 @@ class Graph:
     # -- exclusions ----------------------------------------------------------------------------------------------------
 
     def leaf_x(self, low, high, codes, rows, text):
-        """[7.8] (4.2) at every alpha of the piece: a polynomial of degree four."""
+        """[8.3] (6.1) at every alpha of the piece: a polynomial of degree four."""
         system, m = self.system, self.system.m
         terms = Terms(system, self.scale, codes, rows, text, ends=2)
         sums = [terms.sums(end) for end in (0, 1)]
@@ -351,7 +351,7 @@ _BINOMIAL = [[1, 0, 0, 0, 0], [1, 1, 0, 0, 0], [1, 2, 1, 0, 0], [1, 3, 3, 1, 0],
 
 
 class PieceForm:
-    """[7.8] The numbers of a certificate over a piece."""
+    """[8.3] The numbers of a certificate over a piece."""
 
     def __init__(self, graph, low, high, codes, numbers):
         self.graph, self.system, self.codes, p = graph, graph.system, codes, graph.p

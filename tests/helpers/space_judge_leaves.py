@@ -2,7 +2,7 @@
 
 For given directions the equations are linear: y = E x, P (g - S E x) = 0 (docs/proof_format.md). What
 changes with the directions is split off from the middle of a box (theory, section 12.3), and zeros of
-(7.3) are told by Krawczyk's operator, in balls of many digits.
+(4.2) are told by Krawczyk's operator, in balls of many digits.
 """
 
 from functools import cached_property
@@ -130,7 +130,7 @@ class Leaf:
         return found
 
     def index(self, view):
-        """[7.5] sign det M sign det dG/dpsi."""
+        """[4.7] sign det M sign det dG/dpsi."""
         det = self.M.det() * (-1) ** len(self.rigid) if self.picked else arb(1)
         both = det * (arb_mat(view.slopes).det() if view.angles else arb(1))
         both = both if self.free is None else -both
@@ -276,7 +276,7 @@ class View:
     # -- conditions ----------------------------------------------------------------------------------------------------
 
     def conditions(self):
-        """[7.3] What is to be at least zero, node by node."""
+        """[4.3] What is to be at least zero, node by node."""
         for i, code in enumerate(self.codes):
             places, r = self.system.tau[i], self.system.radius(i, self.alpha)
             if code == 0:

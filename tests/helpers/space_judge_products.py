@@ -11,7 +11,7 @@ _HEAVY = arb(2) ** 80
 
 
 class ProductForm:
-    """[7.5] u' K u - 2 h' u + k, y = point + u, which is not positive at any solution in an assignment."""
+    """[6.2] u' K u - 2 h' u + k, y = point + u, which is not positive at any solution in an assignment."""
 
     def __init__(self, system, codes, point, multipliers, force, length):
         self.system, self.codes, self.point = system, codes, point
@@ -138,7 +138,7 @@ class ProductForm:
         return True
 
     def excludes(self, codes):
-        """[7.5] "e": no solution of an assignment lies in the ellipsoid."""
+        """[6.2] No solution of an assignment lies in the ellipsoid."""
         if self.is_empty:
             return True
         for i, (mine, code) in enumerate(zip(self.codes, codes, strict=True)):

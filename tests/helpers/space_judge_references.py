@@ -17,7 +17,7 @@ _EQUATIONS, _TIGHT = (0, 3), (0, 5, 8, 9)
 
 
 class RootForm:
-    """[7.7] A root of a leaf, and the form of its numbers."""
+    """[6.7] A root of a leaf, and the form of its numbers."""
 
     def __init__(self, system, weights, root, leaf, balance, share):
         self.system, self.leaf, self.root = system, leaf, root

@@ -76,7 +76,7 @@ def with_values(record, values, at=2):
 
 
 def arc_of_sector(number):
-    """Where a sector begins and ends, as shares of the circle (docs/proof_format.md, under space proofs)."""
+    """Where a sector begins and ends, as shares of the circle (docs/proof_format.md, under Sectors)."""
     length, first = divmod(number, 2**31)
     count = 2 ** (len(f"{first:b}") - 1)
     return Fraction(first - count, count), Fraction(first - count + length + 1, count)
