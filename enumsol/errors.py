@@ -46,7 +46,7 @@ class NoSuchItemError(EnumsolError, IndexError):
 
 
 class NotHeldError(EnumsolError, ValueError):
-    """What was asked is not available for a body that nothing holds (one with ``rigid_modes``).
+    """A call is not available for a body that nothing holds (one with ``rigid_modes``).
 
     Examples
     --------

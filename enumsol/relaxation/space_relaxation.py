@@ -37,7 +37,7 @@ NARROW = 8
 
 @dataclass
 class Shaving:
-    """What is known at a node of the tree about its sectors, from it and from those above it.
+    """Knowledge about the sectors at a node of the tree, from it and from those above it.
 
     Attributes
     ----------

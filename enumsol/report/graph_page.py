@@ -40,6 +40,9 @@ if TYPE_CHECKING:
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.support.array_types import ArrayLike
 
+#: Most numbers of forces and displacements along the arcs, about ten characters each.
+_MOST_NUMBERS = 250_000
+
 
 def graph_page(graph: BranchGraph, heading: Heading) -> str:
     """The text of the page."""
@@ -244,14 +247,14 @@ def _in_space(graph: BranchGraph) -> bool:
 def _sampled(graph: BranchGraph) -> tuple[dict[int, Curve], float]:
     """Points along all arcs that are no sheets, and the tolerance to which they are near, relative to the picture.
 
-    It is coarser until the page is small enough: a number takes about ten characters.
+    It is coarser until the page is small enough.
     """
     arcs = [arc for arc in graph.arcs if not arc.dimension]
     width, tolerance = graph.interval[1] - graph.interval[0], 1e-3
     while True:
         drawn = curves(arcs, tuple(QUANTITIES), width, tolerance, components=_in_space(graph))
         numbers = sum(curve.forces.size + curve.moves.size for curve in drawn.values())
-        if numbers <= 250_000 or tolerance >= 2e-2:
+        if numbers <= _MOST_NUMBERS or tolerance >= 2e-2:
             return drawn, tolerance
         tolerance *= 2
 

@@ -1,4 +1,4 @@
-"""What stands in files, within bounds: JSON, TOML, tables, archives of arrays, and the kinds of what was saved.
+"""Contents of files, within bounds: JSON, TOML, tables, archives of arrays, and the kinds of what was saved.
 
 A file may hold anything. What it says of its size is compared with its bytes before memory is asked for. All functions
 raise ValueError, which those who read a file turn into a sentence about it (``support.files.reading``).
