@@ -7,10 +7,8 @@ from typing import TYPE_CHECKING
 from enumsol.branches import BranchGraph
 from enumsol.errors import InvalidArgumentError
 from enumsol.loading.history import History
-from enumsol.report.graph_page import graph_page
-from enumsol.report.history_page import history_page
+from enumsol.report import graph_page, history_page, roots_page
 from enumsol.report.parts import Heading
-from enumsol.report.roots_page import roots_page
 from enumsol.roots.root_set import RootSet
 from enumsol.support.arguments import file_path, instance_of
 from enumsol.support.files import write_file
@@ -97,11 +95,11 @@ def write_report(
     place = file_path(file, "file")
     heading = Heading(instance_of(title, str, "title"), checked_units(units), tuple(commands), _checked_scene(scene))
     if isinstance(solutions, BranchGraph):
-        page = graph_page(solutions, heading)
+        page = graph_page.graph_page(solutions, heading)
     elif isinstance(solutions, RootSet):
-        page = roots_page(solutions, heading)
+        page = roots_page.roots_page(solutions, heading)
     else:
-        page = history_page(solutions, heading)
+        page = history_page.history_page(solutions, heading)
     write_file(place, page, "file")
 
 
