@@ -16,7 +16,7 @@ from enumsol.support.plotting import checked_units
 
 if TYPE_CHECKING:
     import os
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from enumsol.fem import Scene
 
@@ -87,20 +87,19 @@ def write_report(
     ...     "complete: yes (proven)" in pathlib.Path(folder, "square.html").read_text()
     True
     """
-    given: object = solutions
-    if not isinstance(given, (BranchGraph, RootSet, History)):
+    pages: dict[type, Callable[..., str]] = {
+        BranchGraph: graph_page.graph_page,
+        RootSet: roots_page.roots_page,
+        History: history_page.history_page,
+    }
+    page = next((page for kind, page in pages.items() if isinstance(solutions, kind)), None)
+    if page is None:
         raise InvalidArgumentError(
-            f"solutions is a {type(given).__name__}; expected a BranchGraph, a RootSet or a History"
+            f"solutions is a {type(solutions).__name__}; expected a BranchGraph, a RootSet or a History"
         )
     place = file_path(file, "file")
     heading = Heading(instance_of(title, str, "title"), checked_units(units), tuple(commands), _checked_scene(scene))
-    if isinstance(solutions, BranchGraph):
-        page = graph_page.graph_page(solutions, heading)
-    elif isinstance(solutions, RootSet):
-        page = roots_page.roots_page(solutions, heading)
-    else:
-        page = history_page.history_page(solutions, heading)
-    write_file(place, page, "file")
+    write_file(place, page(solutions, heading), "file")
 
 
 def _checked_scene(scene: object) -> Scene | None:
