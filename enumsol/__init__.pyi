@@ -69,10 +69,13 @@ from .loading.growing import HistoryProgress as HistoryProgress, histories as hi
 from .loading.history import History as History
 from .loading.maps import MultiplicityMap as MultiplicityMap, multiplicity_map as multiplicity_map
 from .loading.steps import LoadStep as LoadStep
-from .model.friction import FrictionTable as FrictionTable
 from .model.mesh import BodyMesh as BodyMesh
 from .model.problem import ContactProblem as ContactProblem
-from .model.problem3d import ContactProblem3D as ContactProblem3D, SlipMean as SlipMean
+from .model.problem3d import (
+    ContactProblem3D as ContactProblem3D,
+    FrictionTable as FrictionTable,
+    SlipMean as SlipMean,
+)
 from .model.statuses import ContactStatus as ContactStatus, sign_array as sign_array
 from .proof.proof_file import Proof as Proof, ProofFormatError as ProofFormatError
 from .report import write_report as write_report

@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from fractions import Fraction
 from functools import cmp_to_key
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from flint import fmpq, fmpq_poly, fmpz_poly
+from flint import fmpq, fmpq_poly, fmpz, fmpz_poly
 
 from enumsol.arithmetic.rationals import to_fraction
 
@@ -23,24 +23,24 @@ _NARROW = fmpq(1, 2**64)
 _STEPS = 16
 
 
-def sign(value: Any) -> int:
+def sign(value: Number) -> int:
     """-1, 0 or 1."""
     return int(value > 0) - int(value < 0)
 
 
-def integer_polynomial(poly: Any) -> Any:
+def integer_polynomial(poly: fmpq_poly | fmpz_poly) -> fmpz_poly:
     """The primitive integer polynomial that is a positive multiple of a rational or integer polynomial."""
     numerator = poly.numer() if isinstance(poly, fmpq_poly) else poly
     content = numerator.content()
     return numerator if content in (0, 1) else fmpz_poly([c // content for c in numerator.coeffs()])
 
 
-def variations(poly: Any, lo: Any, hi: Any) -> int:
+def variations(poly: fmpz_poly, lo: fmpq, hi: fmpq) -> int:
     """Sign variations of ``poly`` over (lo, hi): no fewer than its roots there, and of equal parity."""
     moved = poly(fmpq_poly([lo, hi - lo])).numer()
     degree = poly.degree()
     coefficients = moved.coeffs()
-    coefficients += [0] * (degree + 1 - len(coefficients))
+    coefficients += [fmpz(0)] * (degree + 1 - len(coefficients))
     count = last = 0
     for c in fmpz_poly(coefficients[::-1])(fmpz_poly([1, 1])).coeffs():
         if c != 0:
@@ -64,18 +64,19 @@ class CriticalAlpha:
 
     __slots__ = ("_sign_hi", "hi", "lo", "poly")
 
-    def __init__(self, poly: Any, lo: Any, hi: Any) -> None:
-        self.poly, self.lo, self.hi = poly, lo, hi
+    def __init__(self, poly: fmpz_poly | None, lo: fmpq, hi: fmpq) -> None:
+        self.poly: Any = poly
+        self.lo, self.hi = lo, hi
         self._sign_hi = 0 if poly is None else sign(poly(hi))
         if poly is not None and poly.degree() == 1:
             self._settle(fmpq(-poly[0], poly[1]))
 
     @classmethod
-    def rational(cls, value: Any) -> CriticalAlpha:
+    def rational(cls, value: fmpq) -> CriticalAlpha:
         """A rational number."""
         return cls(None, value, value)
 
-    def _settle(self, value: Any) -> None:
+    def _settle(self, value: fmpq) -> None:
         self.poly, self.lo, self.hi = None, value, value
 
     @property
@@ -112,12 +113,12 @@ class CriticalAlpha:
             else:
                 self.lo = middle
 
-    def narrow(self, width: Any = _NARROW) -> None:
+    def narrow(self, width: fmpq = _NARROW) -> None:
         """Refine until the isolating interval is no wider than ``width``."""
         while self.hi - self.lo > width:
             self.refine()
 
-    def _shares_root(self, other: Any) -> bool:
+    def _shares_root(self, other: fmpz_poly) -> bool:
         """True if ``other``, a polynomial, vanishes here; then the representation is simplified."""
         common = self.poly.gcd(other)
         # lo and hi are no roots of poly, hence none of the divisor, which has at most one root between them
@@ -130,7 +131,7 @@ class CriticalAlpha:
                 self._settle(fmpq(-common[0], common[1]))
         return True
 
-    def sign_of(self, poly: Any) -> int:
+    def sign_of(self, poly: fmpz_poly) -> int:
         """Exact sign of an integer polynomial at this number."""
         if poly.degree() <= 0:
             return sign(poly[0])
@@ -182,10 +183,11 @@ class CriticalAlpha:
                 number._settle(fmpq(-common[0], common[1]))
         return True
 
-    def minimal_polynomial(self) -> Any:
+    def minimal_polynomial(self) -> fmpz_poly:
         """The irreducible integer polynomial of the number; a number found to be rational is settled as such."""
         if self.poly is None:
             return fmpz_poly([-self.lo.p, self.lo.q])
+        factor: fmpz_poly
         for factor, _ in self.poly.factor()[1]:
             if sign(factor(self.lo)) != sign(factor(self.hi)):
                 self.poly, self._sign_hi = factor, sign(factor(self.hi))
@@ -205,7 +207,7 @@ class EnclosedAlpha(CriticalAlpha):
 
     __slots__ = ()
 
-    def __init__(self, lo: Any, hi: Any) -> None:
+    def __init__(self, lo: fmpq, hi: fmpq) -> None:
         super().__init__(None, lo, hi)
 
     @property
@@ -224,11 +226,11 @@ class EnclosedAlpha(CriticalAlpha):
         return int(other.hi < self.lo)
 
 
-def real_roots(poly: Any, a: Any, b: Any) -> list[CriticalAlpha]:
+def real_roots(poly: fmpz_poly, a: fmpq, b: fmpq) -> list[CriticalAlpha]:
     """The distinct roots of a nonzero integer polynomial in the closed interval [a, b], in no particular order."""
     found: list[CriticalAlpha] = []
 
-    def take_out(q: Any, value: Any) -> Any:
+    def take_out(q: fmpz_poly, value: fmpq) -> fmpz_poly:
         linear = fmpz_poly([-value.p, value.q])
         found.append(CriticalAlpha.rational(value))
         while q(value) == 0:
@@ -268,7 +270,7 @@ def merge(numbers: Iterable[CriticalAlpha]) -> list[list[CriticalAlpha]]:
     return groups
 
 
-def rational_between(a: CriticalAlpha, b: CriticalAlpha) -> Any:
+def rational_between(a: CriticalAlpha, b: CriticalAlpha) -> fmpq:
     """A rational number of few digits strictly between two different numbers a < b."""
     while not (
         a.hi < b.lo or (a.hi == b.lo and not (a.is_rational and b.is_rational) and a.hi != a.lo and b.hi != b.lo)
@@ -298,31 +300,31 @@ class NumberFieldElement:
     __slots__ = ("field", "poly")
     __hash__ = None  # type: ignore[assignment]
 
-    def __init__(self, poly: Any, field: NumberField) -> None:
+    def __init__(self, poly: fmpq_poly, field: NumberField) -> None:
         self.poly, self.field = poly, field
 
-    def _of(self, value: Any) -> Any:
+    def _of(self, value: Number) -> fmpq_poly:
         return value.poly if isinstance(value, NumberFieldElement) else fmpq_poly([value])
 
-    def _new(self, poly: Any) -> NumberFieldElement:
+    def _new(self, poly: fmpq_poly) -> NumberFieldElement:
         return NumberFieldElement(poly, self.field)
 
-    def __add__(self, other: Any) -> NumberFieldElement:
+    def __add__(self, other: Number) -> NumberFieldElement:
         return self._new(self.poly + self._of(other))
 
-    def __sub__(self, other: Any) -> NumberFieldElement:
+    def __sub__(self, other: Number) -> NumberFieldElement:
         return self._new(self.poly - self._of(other))
 
-    def __rsub__(self, other: Any) -> NumberFieldElement:
+    def __rsub__(self, other: Number) -> NumberFieldElement:
         return self._new(self._of(other) - self.poly)
 
-    def __mul__(self, other: Any) -> NumberFieldElement:
+    def __mul__(self, other: Number) -> NumberFieldElement:
         return self._new(self.poly * self._of(other) % self.field.modulus)
 
-    def __truediv__(self, other: Any) -> NumberFieldElement:
+    def __truediv__(self, other: Number) -> NumberFieldElement:
         return self._new(self.poly * self.field.inverse(self._of(other)) % self.field.modulus)
 
-    def __rtruediv__(self, other: Any) -> NumberFieldElement:
+    def __rtruediv__(self, other: Number) -> NumberFieldElement:
         return self._new(self._of(other) * self.field.inverse(self.poly) % self.field.modulus)
 
     __radd__, __rmul__ = __add__, __mul__
@@ -334,25 +336,25 @@ class NumberFieldElement:
         """Sign of the real number."""
         return 0 if self.poly.is_zero() else self.field.alpha.sign_of(integer_polynomial(self.poly))
 
-    def _minus(self, other: Any) -> NumberFieldElement:
+    def _minus(self, other: Number) -> NumberFieldElement:
         return self._new(self.poly - self._of(other))
 
     def __bool__(self) -> bool:
         return not self.poly.is_zero()
 
-    def __eq__(self, other: object) -> bool:
+    def __eq__(self, other: Number) -> bool:  # type: ignore[override]
         return bool(self._minus(other).poly.is_zero())
 
-    def __lt__(self, other: Any) -> bool:
+    def __lt__(self, other: Number) -> bool:
         return self._minus(other).sign() < 0
 
-    def __le__(self, other: Any) -> bool:
+    def __le__(self, other: Number) -> bool:
         return self._minus(other).sign() <= 0
 
-    def __gt__(self, other: Any) -> bool:
+    def __gt__(self, other: Number) -> bool:
         return self._minus(other).sign() > 0
 
-    def __ge__(self, other: Any) -> bool:
+    def __ge__(self, other: Number) -> bool:
         return self._minus(other).sign() >= 0
 
     def __float__(self) -> float:
@@ -378,7 +380,7 @@ class NumberField:
         """Alpha itself."""
         return NumberFieldElement(fmpq_poly([0, 1]) % self.modulus, self)
 
-    def inverse(self, poly: Any) -> Any:
+    def inverse(self, poly: fmpq_poly) -> fmpq_poly:
         """The inverse of a polynomial modulo the minimal polynomial.
 
         Raises
@@ -399,3 +401,8 @@ def exact_value(alpha: CriticalAlpha) -> Any:
         if not alpha.is_rational:
             return field.generator
     return alpha.lo
+
+
+if TYPE_CHECKING:
+    #: Elements of exact ordered fields, and integers.
+    Number = NumberFieldElement | fmpq | fmpz | int

@@ -7,7 +7,7 @@ be used. A ball is a pair of arrays (midpoint, radius), and `Ball` has both, wit
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, SupportsIndex
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,11 +17,13 @@ from scipy.linalg.lapack import dgetrf, dtrtri
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
     from enumsol.arithmetic._balls import Pair
 
     Array = NDArray[np.float64]
+    Places = SupportsIndex | slice | list[int] | NDArray[Any]
+    Index = Places | tuple[Places | None, ...]
 else:
     try:
         from enumsol.arithmetic._balls import Pair
@@ -268,10 +270,10 @@ class Ball(Pair):
         rad = np.abs(self.mid) * other.rad + self.rad * (np.abs(other.mid) + other.rad) + 2 * UNIT * np.abs(mid)
         return Ball(mid, rad * SAFE + TINY)
 
-    def __setitem__(self, item: Any, value: Any) -> None:
+    def __setitem__(self, item: Index, value: Ball | ArrayLike) -> None:
         """Put in a ball, or what is exact."""
-        exact = not isinstance(value, Ball)
-        self.mid[item], self.rad[item] = (value, 0.0) if exact else (value.mid, value.rad)
+        mid, rad = (value.mid, value.rad) if isinstance(value, Ball) else (value, 0.0)
+        self.mid[item], self.rad[item] = mid, rad
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, SupportsIndex
 
 import numpy as np
 
@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
+    Places = SupportsIndex | slice | list[int] | NDArray[Any]
+    Index = Places | tuple[Places | None, ...]
 
 
 class Pair:
@@ -40,7 +42,7 @@ class Pair:
     def __matmul__(self, other: Self) -> Self:
         return self._matrix_multiplied(other)
 
-    def __getitem__(self, item: Any) -> Self:
+    def __getitem__(self, item: Index) -> Self:
         return type(self)(self.mid[item], self.rad[item])
 
     @property

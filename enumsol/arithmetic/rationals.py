@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 
-def rational(value: float | Fraction) -> Any:
+def rational(value: float | Fraction) -> fmpq:
     """The exact value of a float or Fraction as fmpq."""
     return fmpq(*Fraction(value).as_integer_ratio())
 
 
-def to_fraction(value: Any) -> Fraction:
+def to_fraction(value: fmpq) -> Fraction:
     """An fmpq as a Fraction."""
     return Fraction(int(value.p), int(value.q))
 
@@ -34,7 +34,7 @@ def simplest(low: Fraction, high: Fraction) -> Fraction:
     return number
 
 
-def rational_matrix(array: NDArray[np.float64]) -> Any:
+def rational_matrix(array: NDArray[np.float64]) -> fmpq_mat:
     """The exact values of a matrix of floats as fmpq_mat."""
     rows, columns = array.shape
     return fmpq_mat(rows, columns, [fmpq(*float(v).as_integer_ratio()) for v in array.ravel()])
@@ -47,7 +47,7 @@ def as_objects(values: Sequence[Any]) -> NDArray[Any]:
     return np.fromiter(values, object, len(values))  # polynomials are sequences, which np.array would unpack
 
 
-def is_positive_definite(matrix: Any, tell: Callable[[int, int], object] | None = None) -> bool:
+def is_positive_definite(matrix: fmpq_mat, tell: Callable[[int, int], object] | None = None) -> bool:
     """True if all pivots of a symmetric rational matrix, eliminated in order, are positive.
 
     ``tell`` is called with the number of pivots found so far, and of all.

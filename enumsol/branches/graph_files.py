@@ -17,8 +17,7 @@ from flint import fmpq, fmpz, fmpz_poly
 
 from enumsol.arithmetic.algebraic import CriticalAlpha, EnclosedAlpha
 from enumsol.branches.elements import Arc, ArcValues, Vertex, VertexKind
-from enumsol.branches.enclosed.following import TracedProblem
-from enumsol.branches.enclosed.make_traced import TracedArcValues
+from enumsol.branches.enclosed.following import TracedArcValues, TracedProblem
 from enumsol.branches.exact.gluing import ExactArcValues
 from enumsol.branches.graph_data import GraphData, GraphStats
 from enumsol.condensation.enclosure import enclosure_of
@@ -124,7 +123,7 @@ def _from_record(kind: type[_Graph], record: dict[str, Any], size: int) -> _Grap
     return kind(problem, exact, (first, last), named, vertices, arcs, reasons, stats, left_open=left_open)
 
 
-def _graph_kind(problem: AnyProblem, vertices: Any) -> dict[str, Any]:
+def _graph_kind(problem: AnyProblem, vertices: object) -> dict[str, Any]:
     """Kinds of what the file holds beside the problem."""
     plane, p = isinstance(problem, ContactProblem), problem.p
     statuses, vector = ({*_STATUS},) * p, Array(p)
@@ -242,7 +241,7 @@ def _mesh_record(mesh: BodyMesh | None) -> dict[str, Any] | None:
     return record if mesh.lame is None else record | {"lame": mesh.lame.tolist()}
 
 
-def _matrix_record(matrix: Any) -> dict[str, Any]:
+def _matrix_record(matrix: sp.sparray) -> dict[str, Any]:
     coo = sp.coo_array(matrix)
     rows, columns = coo.coords
     return {"shape": list(coo.shape), "row": rows.tolist(), "col": columns.tolist(), "value": coo.data.tolist()}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import enum
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
 
@@ -18,18 +17,23 @@ if TYPE_CHECKING:
 
     from enumsol.branches.enclosed.following import Followed
     from enumsol.model.problem import ContactProblem
+    from enumsol.model.problem3d import AnyProblem
     from enumsol.search.interval.subintervals import SearchedPiece
     from enumsol.support.array_types import Codes
 
 
-class GraphLeaf(enum.StrEnum):
-    """Kinds of leaves in the proof of a graph (docs/proof_format.md); the checker keeps its own list."""
-
-    EXCLUDED = "x"
-    EXCLUDED_BY_FORM = "f"
-    SELECTION = "s"
-    CUT = "c"
-    CLOSED = "m"
+def graph_header(problem: AnyProblem, interval: tuple[Fraction, Fraction], data: str) -> dict[str, Any]:
+    """The record with which the proof of a graph begins."""
+    return {
+        "format": "enumsol-proof",
+        "version": PROOF_VERSION,
+        "kind": "graph",
+        "problem": problem.fingerprint,
+        "interval": [str(end) for end in interval],
+        "p": problem.p,
+        "data": data,
+        **({} if problem.held else {"max_rigid_displacement": problem.rigid_reach}),
+    }
 
 
 def write_graph_proof(
@@ -46,19 +50,7 @@ def write_graph_proof(
     if not all(fits(end) for found in pieces for end in (found.piece.a, found.piece.b)):
         return None
     writer = ProofWriter()
-    ends = [str(end) for end in interval]
-    writer.write(
-        {
-            "format": "enumsol-proof",
-            "version": PROOF_VERSION,
-            "kind": "graph",
-            "problem": problem.fingerprint,
-            "interval": ends,
-            "p": problem.p,
-            "data": data,
-        }
-        | ({} if problem.held else {"max_rigid_displacement": problem.rigid_reach})
-    )
+    writer.write(graph_header(problem, interval, data))
     selections = set()
     leaves = 0
     for found in pieces:
@@ -74,7 +66,7 @@ def write_graph_proof(
         )
         declared = None
         for leaf in found.empty:
-            kind = GraphLeaf.EXCLUDED if leaf.form is None else GraphLeaf.EXCLUDED_BY_FORM
+            kind = "x" if leaf.form is None else "f"
             # the same form is another object when it comes from a worker
             if leaf.form is not None and not (declared is not None and np.array_equal(declared, leaf.form)):
                 declared = leaf.form
@@ -83,8 +75,8 @@ def write_graph_proof(
             writer.write([kind, _text(leaf.codes), *packed(leaf.rows, leaf.values)])
         if found.numbers is not None:
             numbers = found.numbers
-            writer.write([GraphLeaf.CLOSED, *(part.tolist() for part in (numbers.mu, numbers.kappa, numbers.nu))])
-        for kind, kept in ((GraphLeaf.SELECTION, found.selections), (GraphLeaf.CUT, found.cut)):
+            writer.write(["m", *(part.tolist() for part in (numbers.mu, numbers.kappa, numbers.nu))])
+        for kind, kept in (("s", found.selections), ("c", found.cut)):
             for codes in kept:
                 writer.write([kind, _text(codes)])
         leaves += len(found.empty)

@@ -43,7 +43,7 @@ def roots_on(
 ) -> RootSet:
     """Solutions on arcs, at vertices at ``alpha``, and at vertices of which only bounds are known that hold it."""
     if not isinstance(data.problem, ContactProblem):
-        from enumsol.branches.space.roots_on_arcs import roots_on_arcs  # for problems in 3D only
+        from enumsol.branches.space.space_graph import roots_on_arcs  # for problems in 3D only
 
         return roots_on_arcs(data, alpha, arcs, vertices, near)
     beside = {v.number for v in near}

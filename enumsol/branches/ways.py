@@ -14,8 +14,7 @@ import numpy as np
 from flint import fmpq_mat
 
 from enumsol.arithmetic.rationals import rational
-from enumsol.branches.enclosed.following import Followed, TracedProblem, follow_selections
-from enumsol.branches.enclosed.make_traced import make_traced
+from enumsol.branches.enclosed.following import Followed, TracedProblem, follow_selections, make_traced
 from enumsol.branches.enclosed.single_branches import ClosedPieces
 from enumsol.branches.exact.gluing import glue, make_vertices
 from enumsol.branches.exact.known_selections import KnownSelections
@@ -30,7 +29,7 @@ from enumsol.errors import TooLargeError
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.search.certifiers.interval_certifiers import ExactIntervalCertifier, VerifiedIntervalCertifier
 from enumsol.search.interval.subintervals import (
-    FastIntervalCertifier,
+    IntervalCertifier,
     IntervalSearch,
     on_weak_springs,
     run_parallel,
@@ -48,7 +47,7 @@ if TYPE_CHECKING:
     from enumsol.branches.unfinished import Tick
     from enumsol.model.problem import ContactProblem
     from enumsol.proof.proof_file import Proof
-    from enumsol.search.interval.subintervals import IntervalCertifier, SearchedPiece
+    from enumsol.search.interval.subintervals import SearchedPiece
     from enumsol.support.array_types import Codes
 
 Arithmetic = Literal["fast", "verified", "exact"]
@@ -245,7 +244,7 @@ class ByAlgebra(PlaneWay):
         arithmetic: Arithmetic,
     ) -> ByAlgebra:
         """With the certifier of an arithmetic."""
-        certifier: IntervalCertifier = FastIntervalCertifier()
+        certifier: IntervalCertifier = IntervalCertifier()
         if not problem.held:
             certifier = VerifiedIntervalCertifier(problem, None)
             certifier.checkable = arithmetic == "verified"

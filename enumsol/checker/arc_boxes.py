@@ -59,7 +59,7 @@ class BoxSelection:
             if isinstance(bound, float):
                 signs.append(self.plain.sign_at(bound, condition))
             else:
-                found = self.precise.signs_at(alpha_number(bound))
+                found = self.precise.functions.signs_at(alpha_number(bound))
                 signs.append(0 if found is None else int(found[condition]))
         return signs == _expected(part)
 

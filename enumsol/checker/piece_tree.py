@@ -1,7 +1,7 @@
 """Checker of trees over alpha in 3D: all solutions over an interval lie on curves in boxes (theory, section 12.9).
 
 A tree is given by its records in the order of a walk: ``["p", alpha]`` (the piece is cut there), ``["b", node, codes]``
-(a status is split), and the leaves of ``proof.records.leaves_of`` over a piece: no solution; all of them on a curve, in
+(a status is split), and the leaves of ``proof.leaves.leaves_of`` over a piece: no solution; all of them on a curve, in
 boxes of it or by one certificate; all of them on one arc, through a box; or nothing, which is a gap.
 """
 
@@ -15,19 +15,9 @@ import numpy as np
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.proof.curve_records import CutPiece, OnCurve, ThroughCurveBox
-from enumsol.proof.leaves import kind_of
-from enumsol.proof.reading import RefusedError, quoted
-from enumsol.proof.records import (
-    Branching,
-    Excluded,
-    Limits,
-    NoRoot,
-    RecordError,
-    Tree,
-    Unbalanced,
-    UndecidedRecord,
-)
-from enumsol.trusted.space.curve_runs import Run
+from enumsol.proof.leaves import Excluded, NoRoot, Unbalanced, UndecidedRecord, kind_of
+from enumsol.proof.reading import RecordError, RefusedError, quoted
+from enumsol.proof.records import Branching, Limits, Tree
 from enumsol.trusted.space.pieces import AlphaPiece
 from enumsol.trusted.space.sector_rows import UNDECIDED, is_sector_covering
 from enumsol.trusted.space.space_uniqueness import is_complete
@@ -41,7 +31,6 @@ if TYPE_CHECKING:
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.proof.records import Record
     from enumsol.trusted.space.curve_runs import KnownCurve
-    from enumsol.trusted.space.solution_curve import AlphaProblem
 
     Array = NDArray[np.float64]
     Codes = tuple[int, ...]
@@ -55,8 +44,6 @@ class PieceTreeChecker:
     ----------
     enclosure : CondensedEnclosure
     units : force and length, (p,) arrays of powers of two
-    given : AlphaProblem
-        By which boxes are given.
     curves : sequence of KnownCurve
         Each is proven to be one. Their boxes are numbered in this order.
     fail : called with what a leaf does not prove
@@ -67,7 +54,6 @@ class PieceTreeChecker:
 
     enclosure: CondensedEnclosure
     units: tuple[Array, Array]
-    given: AlphaProblem
     curves: Sequence[KnownCurve]
     fail: Callable[[str], object]
     leaves: int = 0
@@ -131,34 +117,19 @@ class PieceTreeChecker:
     def _wrong(self, piece: AlphaPiece, codes: Codes, leaf: Record) -> str | None:
         """Sentence on what a leaf does not prove; None if all is proven."""
         if isinstance(leaf, Excluded):
-            excluded = piece.margin(codes, leaf.lines, (leaf.values[0], leaf.values[1])) > 0
-            return None if excluded else "its multipliers do not exclude it"
+            return None if leaf.holds(piece, codes) else "its multipliers do not exclude it"
         if isinstance(leaf, Unbalanced):
-            return None if piece.is_unbalanced(codes, leaf.direction) else "forces may be in balance"
-        if isinstance(leaf, OnCurve):
-            (known, first), (other, last) = (self._boxes[box] for box in (leaf.first, leaf.last))
-            if leaf.numbers is not None:
-                alone = known is other and piece.lies_on(known, Run(first, last), codes, leaf.numbers)
-                return None if alone else "it is not proven that all its solutions lie on its curve"
-        if not is_complete(piece.whole, codes):
+            return None if leaf.holds(piece, codes) else "forces may be in balance"
+        by_form = isinstance(leaf, OnCurve) and leaf.numbers is not None
+        if not by_form and not is_complete(piece.whole, codes):
             return "its statuses are not final"
         if isinstance(leaf, NoRoot):
             return None if piece.narrowed(codes)[1] is None else "it is not proven to hold no root"
         if isinstance(leaf, OnCurve):
-            curves = [link.curve for link in known.chain.links[first : last + 1]] if known is other else []
-            inside = piece.holds_all(codes, self.given, curves)
-            return None if inside else "its roots are not proven to lie in its boxes"
+            where = "it is not proven that all its solutions lie on its curve"
+            where = where if by_form else "its roots are not proven to lie in its boxes"
+            return None if leaf.holds(piece, codes, self._boxes) else where
         if isinstance(leaf, ThroughCurveBox):
-            met = self._is_arc(piece.narrowed(codes)[0], codes, leaf)
+            met = leaf.holds(piece, codes, self._boxes, self._interval)
             return None if met else "its roots are not proven to be an arc through its box"
         raise AssertionError(leaf)
-
-    def _is_arc(self, narrowed: AlphaPiece, codes: Codes, leaf: ThroughCurveBox) -> bool:
-        """True if the roots of a leaf are on an arc, which is over a longer piece than they, through a box."""
-        (a, b), (low, high) = self._interval, leaf.piece
-        if not a <= low <= narrowed.low <= narrowed.high <= high <= b:
-            return False
-        whole, (known, number) = AlphaPiece(narrowed.space, low, high), self._boxes[leaf.box]
-        arc, chain = whole.arc(codes), known.chain
-        through = arc is not None and whole.meets(arc, leaf.point, self.given, chain.links[number].curve)
-        return through and chain.runs_through(low, high)

@@ -14,21 +14,25 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
+from enumsol.arithmetic.balls import TINY, UNIT, Ball
 from enumsol.checker.walk import Located, TreeChecker
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
-from enumsol.proof import records
-from enumsol.proof.declared_forms import plane_form
+from enumsol.proof import leaves as kinds
 from enumsol.proof.proof_file import fraction_text
 from enumsol.proof.reading import RefusedError, data_of, friction_at, rational_from, same, units_from
-from enumsol.trusted.at_alpha import VerifiedSelection, holds_no_root, solve_selection
+from enumsol.proof.records import DeclaredForm, Limits, Tree
+from enumsol.trusted.at_alpha import VerifiedSelection, settled_selection
 from enumsol.trusted.confinement import without_bound
 from enumsol.trusted.exclusion import Leaves, Terms, exclusion_margins
-from enumsol.trusted.floating_bounds import is_unbalanced
-from enumsol.trusted.joint_roots import JointRoot, joint_root
+from enumsol.trusted.joint_roots import JointRoot
 from enumsol.trusted.positions import certain_statuses
-from enumsol.trusted.status_rows import ROW_KINDS, is_covering, row_signs
-from enumsol.trusted.uniqueness import ClosedSolution, lone_root
+from enumsol.trusted.same_roots import told_apart
+from enumsol.trusted.status_rows import (
+    ROW_KINDS,
+    is_covering,
+    row_signs,
+)
+from enumsol.trusted.uniqueness import ClosedSolution, same_solution
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -37,30 +41,27 @@ if TYPE_CHECKING:
     from enumsol.checker.walk import Test
     from enumsol.proof.records import EnclosureRecord, Record
     from enumsol.support.array_types import Codes, Mask
+    from enumsol.trusted.at_alpha import Unsettled
     from enumsol.trusted.positions import Among
     from enumsol.trusted.precise_at_alpha import PreciseAtAlpha
-    from enumsol.trusted.quadratic_forms import EnclosedForm
-    from enumsol.trusted.reference import Reference
 
     #: codes of a selection, the vertices of its root set, and its dimension
     Polytope = tuple[tuple[int, ...], list[Any], int]
+    #: The core of a solution, and per node the codes that may hold there.
+    Known = tuple[Codes, Sequence[frozenset[int]]]
 
 #: Exclusion leaves checked together.
 _BATCH = 256
-#: Covers underflow of one product.
-_SUBNORMAL = 2.0**-1070
 
 
 @dataclass
-class Checker(TreeChecker):
+class Checker(TreeChecker[EnclosedSystem, "VerifiedSelection | ClosedSolution | JointRoot"]):
     """Checks one proof of a problem in 2D."""
 
-    trees = records.Tree.PLANE, records.Tree.FLOATING_PLANE
+    trees = Tree.PLANE, Tree.FLOATING_PLANE
 
     polytopes: list[Polytope] = field(default_factory=list)
     closed: dict[tuple[int, ...], ClosedSolution | JointRoot] = field(default_factory=dict)
-    #: Codes of the strict roots of complete selections.
-    strict: list[tuple[int, ...]] = field(default_factory=list)
     #: Leaves to be tested together, by the places of their forms: numbers, codes and multipliers.
     _waiting: dict[int | None, list[tuple[int, Codes, Terms]]] = field(default_factory=dict)
     #: Roots that selections share, by the one in which all their nodes stick, and by how these slip.
@@ -157,53 +158,48 @@ class Checker(TreeChecker):
             proven |= exclusion_margins(self.system, leaves) > 0
         return np.asarray(proven)
 
-    def _limits(self, codes: Codes, kind: type[Record]) -> records.Limits:
+    def _limits(self, codes: Codes, kind: type[Record]) -> Limits:
         friction = self.friction
-        if kind is records.Closed or (kind is records.DeclaredForm and not self.problem.held):
+        if kind is kinds.Closed or (kind is DeclaredForm and not self.problem.held):
             friction = (self.system.F > 0).tolist()  # as the kernel has it
-        return records.Limits(codes, self.tree, friction, self.declared, modes=self.problem.modes.r)
-
-    def _made(self, said: records.DeclaredForm) -> EnclosedForm | Reference | None:
-        return plane_form(self.system, said)
+        return Limits(codes, self.tree, friction, self.declared, modes=self.problem.modes.r)
 
     def _covers(self, node: int, code: int, children: list[int]) -> bool:
         return is_covering(code, children, friction=self.friction[node])
 
     def _claim(self, isolated: int, families: int) -> dict[str, int]:
-        roots = self.regular + isolated
-        return {"roots": roots, "families": families, "undecided": self.undecided, "leaves": self.leaves}
+        return {"roots": isolated, "families": families, "undecided": self.undecided, "leaves": self.leaves}
 
     # -- leaves ----------------------------------------------------------------------------------------------------
 
-    def _tests(self) -> dict[type[Record], Test]:
-        return {
-            records.Excluded: self._excluded,
-            records.NoRoot: self._no_root,
-            records.RegularRoot: self._regular_root,
-            records.RootSetRecord: self._root_set,
-            records.Closed: self._closed,
-            records.Alone: self._alone,
-            records.Unbalanced: self._unbalanced,
-            records.OnlyReference: self._only_reference,
-            records.SharedRoot: self._shared,
+    @cached_property
+    def tests(self) -> dict[type[Record], Test]:
+        """Tests of leaves, by their kinds."""
+        return super().tests | {
+            kinds.Excluded: self._excluded,
+            kinds.RootSetRecord: self._root_set,
+            kinds.Closed: self._closed,
+            kinds.SharedRoot: self._shared,
         }
 
     def _at_rest(self) -> None:
         self.polytopes.append(((0,) * self.problem.p, [tuple([Fraction(0)] * (2 * self.problem.p))], 0))
 
-    def _excluded(self, codes: Codes, said: records.Excluded) -> str | None:
-        if said.by == records.RATIONAL:
+    def _excluded(self, codes: Codes, said: kinds.Excluded) -> str | None:
+        if said.by == kinds.RATIONAL:
             return self._excluded_in_rationals(codes, said)
         place = len(self.declared) - said.by if isinstance(said.by, int) else None
         self._waiting.setdefault(place, []).append((self.leaves, codes, said.terms))
         return None
 
-    def _solved(self, codes: Codes) -> VerifiedSelection | None:
-        """The verified solution of a complete selection, in many digits where double arithmetic leaves it open."""
-        ball = solve_selection(self.system, codes)
-        if ball is not None and (ball.is_root or ball.is_excluded):
-            return ball
-        return (None if self._precise is None else self._precise.solve(codes)) or ball
+    def _settled(self, system: EnclosedSystem, codes: Codes) -> VerifiedSelection | Unsettled | None:
+        return settled_selection(system, codes, self._in_many_digits)
+
+    def _in_many_digits(self, codes: Sequence[int]) -> VerifiedSelection | None:
+        return None if self._precise is None else self._precise.solve(codes)
+
+    def _is_root(self, found: object) -> bool:
+        return isinstance(found, VerifiedSelection)
 
     @cached_property
     def _precise(self) -> PreciseAtAlpha | None:
@@ -214,83 +210,60 @@ class Checker(TreeChecker):
 
         return PreciseAtAlpha.of(self.problem, self.alpha, self.force, self.length)
 
-    def _no_root(self, codes: Codes, said: records.NoRoot) -> str | None:
-        if said.by == records.RATIONAL:
-            self.bounded |= self._rests_on_reach(codes, [])
-            return "it holds a root" if self._hull(codes).points else None
-        if self._either(lambda system: holds_no_root(system, codes, solve_selection(system, codes))):
-            return None
-        ball = self._solved(codes)
-        if ball is not None and ball.is_excluded:
-            return None
-        return "its candidate does not break a condition strictly, nor do its equations contradict each other"
+    def _no_root(self, codes: Codes, said: kinds.NoRoot) -> str | None:
+        if said.by != kinds.RATIONAL:
+            return super()._no_root(codes, said)
+        self.bounded |= self._rests_on_reach(codes, [])
+        return "it holds a root" if self._hull(codes).points else None
 
-    def _regular_root(self, codes: Codes, said: records.RegularRoot) -> str | None:
-        ball = self._solved(codes)
-        if ball is None:
-            return "its selection is not proven regular"
-        if not ball.is_root:
-            return "its candidate is not proven to be a root"
-        return self._regular(codes, ball, said.enclosure)
+    def _wrongly_said(self, found: VerifiedSelection | ClosedSolution | JointRoot, said: EnclosureRecord) -> str | None:
+        return said.refusal(found.force, self.force, found.index)
 
-    def _regular(self, codes: Codes, ball: VerifiedSelection, said: EnclosureRecord) -> str | None:
-        """Count a regular root, and look at what is said of it."""
-        self.regular += 1
-        self.strict.append(codes)
-        self._locate(codes, ball)
-        return self._placed(ball, said)
-
-    def _placed(self, ball: VerifiedSelection | JointRoot, said: EnclosureRecord) -> str | None:
-        """Why the ball and the index that are said to be those of a root are not, or None."""
-        centre, radius = said.numbers(2 * self.problem.p)
-        with np.errstate(over="ignore", invalid="ignore"):
-            reach = np.abs(centre - ball.force.mid * self.force) + ball.force.rad * self.force
-            inside = reach * SAFE + np.where(ball.force.rad > 0, _SUBNORMAL, 0.0) <= radius
-        return said.refusal(ball.det_sign, inside=bool(np.all(inside)))
-
-    def _unbalanced(self, codes: Codes, said: records.Unbalanced) -> str | None:
-        if is_unbalanced(self.system, codes, said.direction):
-            return None
-        return "forces below it may be in balance with the load"
-
-    def _only_reference(self, codes: Codes, said: records.OnlyReference) -> str | None:
+    def _only_reference(self, codes: Codes, said: kinds.OnlyReference) -> str | None:
+        if (reason := super()._only_reference(codes, said)) is not None:
+            return reason
         known = self._form(said.back)
-        if known is None:
-            return "the form of its root is not proven definite"
-        if not self._either(lambda system: known.is_only_root(codes, said.rows, said.products, system.reach)):
-            return "its root is not proven to be the only one"
         if not known.lies_below(codes):
             return None if said.enclosure is None else "its root does not lie below its assignment"
         if said.enclosure is None:
             return "it has no enclosure of the root that lies below its assignment"
         return self._regular(known.selection, known.root, said.enclosure)
 
-    def _shared(self, codes: Codes, said: records.SharedRoot) -> str | None:
+    def _shared(self, codes: Codes, said: kinds.SharedRoot) -> str | None:
         core = said.core(codes)
         if (core, said.slips) not in self.shared:
-            self.shared[core, said.slips] = joint_root(self.system, core, dict(said.slips))
+            self.shared[core, said.slips] = said.holds(self.system, codes)
         found = self.shared[core, said.slips]
         if found is None:
             return "its selections are not proven to share one root"
         if self.closed.setdefault(core, found) is not found:
             return "its selections overlap with others that share a root"
-        self._locate(core, found)
-        return self._placed(found, said.enclosure)
+        return self._only_below(found, said.enclosure)
 
-    def _closed(self, codes: Codes, said: records.Closed) -> str | None:
-        from enumsol.checker.fathomed_subtrees import closed_by_balls, closed_in_rationals
-
+    def _closed(self, codes: Codes, said: kinds.Closed) -> str | None:
         if isinstance(said.at, int):
-            reason, points = closed_in_rationals(self.system, self._body, codes, said)
-            self.polytopes += [(said.selection, points, 0)] if points else []
-            return reason
-        reason, ball = closed_by_balls(self.system, said, self.force)
-        if ball is not None:
-            self._locate(ball.core, ball)
-            self.closed[ball.core] = ball
-        return reason
+            from enumsol.checker.rational import closed_in_rationals  # python-flint, not always needed
 
-    def _locate(self, name: Codes, ball: VerifiedSelection | ClosedSolution | JointRoot) -> None:
+            reason, point = closed_in_rationals(self.system, self._body, codes, said)
+            self.polytopes += [(said.selection, [point], 0)] if point else []
+            return reason
+        ball = said.holds(self.system, self.force)
+        if ball is None:
+            return "its reduced problem is not proven to have one solution"
+        if said.enclosure is None:
+            return None if ball.is_excluded else "its only solution does not break a condition strictly"
+        if not ball.is_root:
+            return "its only solution is not proven to be a root"
+        self.closed[ball.core] = ball
+        return self._only_below(ball, said.enclosure)
+
+    def _only_below(self, found: ClosedSolution | JointRoot, said: EnclosureRecord) -> str | None:
+        """Look at what is said of a root that closes a subtree, or that selections share."""
+        self._locate(found.core, found)
+        return self._wrongly_said(found, said)
+
+    def _locate(self, name: Codes, ball: VerifiedSelection | ClosedSolution | JointRoot, codes: Codes = ()) -> None:
+        del codes  # those that are certain follow from the balls
         if self.located is not None:
             p = self.problem.p
             mid, rad = ball.force.mid, ball.force.rad
@@ -336,17 +309,7 @@ class Checker(TreeChecker):
         """Whether what a selection holds may be other without the bounds of the rigid displacement."""
         return not self.problem.held and self.rational.rests_on_reach(codes, points)  # type: ignore[attr-defined]
 
-    def _alone(self, codes: Codes, said: records.Alone) -> str | None:
-        if said.strengths is None or said.terms is None:
-            raise AssertionError("read without what it has in 2D")
-        root = lone_root(self.system, codes, said.selection, said.numbers, said.strengths, *said.terms)
-        return (
-            "its root is not proven to be alone"
-            if root is None
-            else self._regular(said.selection, root, said.enclosure)
-        )
-
-    def _excluded_in_rationals(self, codes: Codes, said: records.Excluded) -> str | None:
+    def _excluded_in_rationals(self, codes: Codes, said: kinds.Excluded) -> str | None:
         p = self.problem.p
         signs = row_signs(np.array(codes), np.array(self.friction, dtype=float))
         units = [Fraction(self.length[r % p] if r // p < 4 else self.force[r % p]) for r in range(ROW_KINDS * p)]
@@ -356,7 +319,7 @@ class Checker(TreeChecker):
 
     def _hull(self, codes: Codes) -> Hull:
         """All that a selection holds; S is computed only where its equations are singular."""
-        from enumsol.arithmetic.rationals import to_fraction
+        from enumsol.arithmetic.rationals import to_fraction  # python-flint, not always needed
         from enumsol.checker.rational import Hull, hull_of_selections
 
         regular = self.problem.held and self._definite
@@ -366,7 +329,7 @@ class Checker(TreeChecker):
         holds = all(self._body.least(code, i, point) >= 0 for i, code in enumerate(codes))
         return Hull([tuple(map(to_fraction, point))] if holds else [], 0)
 
-    def _root_set(self, codes: Codes, said: records.RootSetRecord) -> str | None:
+    def _root_set(self, codes: Codes, said: kinds.RootSetRecord) -> str | None:
         hull = self._hull(codes)
         # in lowest terms a number has one text: the texts in a file need no conversion
         found = [[fraction_text(x.numerator, x.denominator) for x in point] for point in hull.points]
@@ -379,7 +342,7 @@ class Checker(TreeChecker):
     # -- counting --------------------------------------------------------------------------------------------------
 
     def _count(self) -> tuple[int, int]:
-        """Isolated degenerate roots and families: rational solutions joined where they have a point in common.
+        """Isolated roots and families: rational solutions are joined where they have a point in common.
 
         A strict root solves no second selection: it is not among these, and strict roots of two leaves are different.
         """
@@ -403,12 +366,14 @@ class Checker(TreeChecker):
         families = {group_of(k) for k, polytope in enumerate(self.polytopes) if polytope[2] > 0}
         apart = 0
         if self.closed:
-            from enumsol.checker.fathomed_subtrees import closed_apart
-
-            others = closed_apart(self.closed, self.strict + [codes for codes, _, _ in self.polytopes])
+            # without those that are roots of complete selections
+            complete = [codes for codes, _ in self.roots] + [codes for codes, *_ in self.polytopes]
+            known: list[Known] = [(codes, tuple(frozenset((code,)) for code in codes)) for codes in complete]
+            closed: list[Known] = [(core, ball.possible) for core, ball in sorted(self.closed.items())]
+            others = told_apart(closed, lambda other, one: same_solution(*one, *other), known)
             apart, self.doubtful = len(others.kept), len(others.doubtful)
             self.same = {core: other for (core, _), (other, _) in others.same}
-        return len(found) - len(families) + apart, len(families)
+        return len(self.roots) + len(found) - len(families) + apart, len(families)
 
     def _meet(self, k: int, m: int) -> bool:
         """True if two root sets have a point in common."""

@@ -12,20 +12,23 @@ from itertools import combinations
 from math import comb
 from typing import TYPE_CHECKING, Any, Protocol
 
+import numpy as np
 from flint import fmpq, fmpq_mat
 
 from enumsol.arithmetic.rationals import is_positive_definite, rational
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.enclosure import NotEnclosedError
-from enumsol.condensation.free_displacements import exact_matrices, free_displacements, solved
-from enumsol.trusted.status_rows import CONDITIONS, FORBIDDEN, NONNEGATIVE
+from enumsol.condensation.unloaded import exact_matrices, free_displacements, solved
+from enumsol.proof.reading import same
+from enumsol.trusted.status_rows import BACKWARD, CONDITIONS, CONTACT, FORBIDDEN, FORWARD, NONNEGATIVE, OPEN
+from enumsol.trusted.uniqueness import only_solution
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
-    import numpy as np
-
+    from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.model.problem import ContactProblem
+    from enumsol.proof.leaves import Closed
     from enumsol.support.array_types import NDArray
 
 
@@ -199,6 +202,30 @@ class RationalBody:
 
 
 Point = tuple[Fraction, ...]
+
+
+def closed_in_rationals(
+    system: EnclosedSystem, body: RationalBody, codes: Sequence[int], said: Closed
+) -> tuple[str | None, Point | None]:
+    """Why a record of a closed subtree proves nothing, or None; and the root that it holds, or None."""
+    selection, free = said.selection, said.free
+    slides = {i: code for i, code in enumerate(codes) if code in (FORWARD, BACKWARD)}
+    named = tuple(slides.get(i, code) for i, code in enumerate(selection))
+    point = body.point(selection)
+    if point is None:
+        return "its selection is singular", None
+    w = body.moved(point)
+    least = {i: body.least(selection[i], i, point) for i in range(body.p)}
+    if any(least[i] < 0 for i in free) or any(w[i] > 0 if selection[i] == OPEN else point[i] < 0 for i in slides):
+        return "the point of its selection does not solve the reduced problem", None
+    if not only_solution(system, named, free, np.asarray(said.weights), point, w):
+        return "its solution is not proven to be the only one", None
+    touching = all(w[i] == 0 for i, code in enumerate(codes) if code == CONTACT)
+    holds = touching and all(least[i] >= 0 for i in range(body.p) if i not in free)
+    if not same(said.at, int(holds)):
+        return "it holds another number of roots than it claims", None
+    return None, _as_point(point) if holds else None
+
 
 #: Candidate vertices beyond which a root set is not enumerated: a leaf that needs more is refused.
 MAX_CANDIDATES = 200_000

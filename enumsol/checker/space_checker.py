@@ -8,52 +8,34 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, Ball
-from enumsol.checker.walk import Located, TreeChecker
+from enumsol.arithmetic.balls import TINY, Ball
+from enumsol.checker.walk import NO_FORM, Located, TreeChecker
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.space_condensed import EnclosedSpace
-from enumsol.proof.declared_forms import space_form
+from enumsol.proof.leaves import Alone, BoxedRoot, Excluded
 from enumsol.proof.reading import RefusedError, data_of, exponents_from, rational_from, shown_alpha
-from enumsol.proof.records import (
-    Alone,
-    BoxedRoot,
-    DeclaredForm,
-    EnclosureRecord,
-    Excluded,
-    Limits,
-    NoRoot,
-    OnlyReference,
-    RegularRoot,
-    Tree,
-    Unbalanced,
-)
+from enumsol.proof.records import DeclaredForm, Limits, Tree
 from enumsol.trusted.space.boxed_solution import Box, BoxedSolution, apart_in_boxes, is_inside, solution_in_box
 from enumsol.trusted.space.leaves import Open, SpaceRoot, distinct_roots, settle
 from enumsol.trusted.space.product_forms import Ellipsoid
-from enumsol.trusted.space.resultants import floating_margin, is_unbalanced_in_space, unbounded
-from enumsol.trusted.space.sector_rows import OPEN, STICK, UNDECIDED, is_sector_covering, sector_margin
-from enumsol.trusted.space.slip_forms import SlipForm
-from enumsol.trusted.space.space_uniqueness import LooseSolution, lone_root, only_root, only_solution_in_space
+from enumsol.trusted.space.resultants import unbounded
+from enumsol.trusted.space.sector_rows import OPEN, STICK, is_sector_covering
+from enumsol.trusted.space.space_uniqueness import LooseSolution
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from enumsol.checker.walk import Test
-    from enumsol.proof.records import Record
+    from enumsol.proof.records import EnclosureRecord, Record
     from enumsol.support.array_types import Codes, Floats
-    from enumsol.trusted.space.space_reference import SpaceReference
-
-_OPEN = "what it holds is not proven"
-_NO_FORM = "no form that is convex was declared over it"
 
 
 @dataclass
-class SpaceChecker(TreeChecker):
+class SpaceChecker(TreeChecker[EnclosedSpace, "SpaceRoot | LooseSolution"]):
     """Checks one proof of a problem in 3D."""
 
     trees = Tree.SPACE, Tree.FLOATING_SPACE
 
-    roots: list[tuple[tuple[int, ...], SpaceRoot]] = field(default_factory=list)
     boxed: list[tuple[tuple[int, ...], BoxedSolution]] = field(default_factory=list)
     #: What boxes hold that were tested.
     known: dict[bytes, BoxedSolution | None] = field(default_factory=dict)
@@ -95,19 +77,19 @@ class SpaceChecker(TreeChecker):
     def _without_bound(self) -> EnclosedSpace:
         return unbounded(self.system)
 
-    def _made(self, said: DeclaredForm) -> SlipForm | Ellipsoid | SpaceReference | None:
-        return space_form(self.system, said)
+    @cached_property
+    def tests(self) -> dict[type[Record], Test]:
+        """Tests of leaves, by their kinds."""
+        return super().tests | {Excluded: self._excluded, BoxedRoot: self._in_box}
 
-    def _tests(self) -> dict[type[Record], Test]:
-        return {
-            Excluded: self._excluded,
-            NoRoot: self._no_root,
-            RegularRoot: self._regular_root,
-            BoxedRoot: self._in_box,
-            Alone: self._only,
-            Unbalanced: self._unbalanced,
-            OnlyReference: self._only_reference,
-        }
+    def _settled(self, system: EnclosedSpace, codes: Codes) -> SpaceRoot | Open | None:
+        return settle(system, codes)
+
+    def _is_root(self, found: object) -> bool:
+        return isinstance(found, SpaceRoot)
+
+    def _wrongly_said(self, found: SpaceRoot | LooseSolution, said: EnclosureRecord) -> str | None:
+        return said.refusal(found.y, self.system.unit, found.index)
 
     def _at_rest(self) -> None:
         self.regular += 1
@@ -115,33 +97,14 @@ class SpaceChecker(TreeChecker):
         self.locate(None, Located(Ball.exact(np.zeros(3 * self.problem.p)), still))
 
     def _excluded(self, codes: Codes, said: Excluded) -> str | None:
-        rows, values = said.lines, said.values
-        if isinstance(said.by, int):
-            form = self._form(said.by)
-            if isinstance(form, SlipForm):
-                positive = sector_margin(self.system, codes, rows, values, form=form) > 0
-                return None if positive else "its multipliers and its form do not exclude it"
-            if form is None or len(rows):
-                return _NO_FORM if form is None else "it has multipliers beside those of a form of products"
-            return None if form.misses(codes) else "its ellipsoid does not exclude it"
-        margin = sector_margin if self.problem.held else floating_margin
-        positive = self._either(lambda system: margin(system, codes, rows, values) > 0)
-        return None if positive else "its multipliers do not exclude it"
-
-    def _unbalanced(self, codes: Codes, said: Unbalanced) -> str | None:
-        if is_unbalanced_in_space(self.system, codes, said.direction):
-            return None
-        return "forces below it may be in balance with the load"
-
-    def _only_reference(self, codes: Codes, said: OnlyReference) -> str | None:
-        known = self._form(said.back)
-        if known is None:
-            return "the root that was declared is not proven"
-        proven = self._either(lambda system: known.is_only_root(codes, said.rows, said.products, system.reach))
-        return None if proven else "the root that was declared is not proven to be the only one in it"
-
-    def _flush(self, *, last: bool) -> None:
-        """Nothing waits: every leaf is checked as it is read."""
+        if not isinstance(said.by, int):
+            excluded = self._either(lambda system: said.holds(system, codes))
+            return None if excluded else "its multipliers do not exclude it"
+        form = self._form(said.by)
+        if form is None:
+            return NO_FORM
+        what = "ellipsoid does" if isinstance(form, Ellipsoid) else "multipliers and its form do"
+        return None if said.holds(form, codes) else f"its {what} not exclude it"
 
     def _declare(self, record: list[Any]) -> None:
         super()._declare(record)
@@ -157,40 +120,21 @@ class SpaceChecker(TreeChecker):
         if known is None or said.enclosure is None:
             self.fail("the root that is declared is not proven to be one whose form is definite")
             return
-        root = known.root
-        if (reason := self._placed(root, said.enclosure)) is not None:
+        if (reason := self._regular(said.codes, known.root, said.enclosure)) is not None:
             self.fail(f"the root that is declared: {reason}")
-        self._ask_without_bound(said.codes)
-        self.roots.append((said.codes, root))
-        self._locate(said.codes, root, said.codes)
 
-    def _no_root(self, codes: Codes, said: NoRoot) -> str | None:
-        del said
-        if self._either(lambda system: settle(system, codes) is None):
-            return None
-        return _OPEN if isinstance(settle(self.system, codes), Open) else "it holds a root"
-
-    def _ask_without_bound(self, leaf: Codes) -> None:
-        """Take note of a root that is not proven without the bound of the rigid displacement."""
-        if not self.problem.held:
-            self.bounded |= not isinstance(settle(self.free, leaf), SpaceRoot)
-
-    def _regular_root(self, codes: Codes, said: RegularRoot) -> str | None:
-        self._ask_without_bound(codes)
-        found = settle(self.system, codes)
-        if isinstance(found, Open):
-            return _OPEN
-        if found is None:
-            return "it holds no root"
-        self.roots.append((codes, found))
+    def _regular(self, codes: Codes, found: SpaceRoot | LooseSolution, said: EnclosureRecord) -> str | None:
+        if isinstance(found, SpaceRoot):
+            return super()._regular(codes, found, said)
+        self.regular += 1
         self._locate(codes, found, codes)
-        return self._placed(found, said.enclosure)
+        return self._wrongly_said(found, said)
 
     def _in_box(self, codes: Codes, said: BoxedRoot) -> str | None:
         """The only solution of a box, in which all roots of a leaf lie, or the ellipsoid of an assignment."""
         if said.by is not None:
             form = self._form(said.by)
-            return self._of_box(codes, said, form.is_in) if isinstance(form, Ellipsoid) else _NO_FORM
+            return self._of_box(codes, said, form.is_in) if isinstance(form, Ellipsoid) else NO_FORM
         leaf = settle(self.system, codes)
         bounds = None if leaf is None else (leaf.y, leaf.w)
 
@@ -217,36 +161,7 @@ class SpaceChecker(TreeChecker):
             return "its roots are not proven to lie in its box"
         self.boxed.append((codes, found))
         self._locate(codes, found)
-        return self._placed(found, said.enclosure)
-
-    def _only(self, codes: Codes, said: Alone) -> str | None:
-        """The only solution of all, or of an assignment."""
-        found: LooseSolution | SpaceRoot | None
-        if any(code != UNDECIDED for code in codes):
-            found = lone_root(self.system, codes, said.numbers, said.selection)
-            if found is None:
-                return "its root is not proven to be the only one in it"
-            self.roots.append((said.selection, found))
-            self._locate(said.selection, found, said.selection)
-            return self._placed(found, said.enclosure)
-        if said.selection:
-            found = only_root(self.system, said.numbers, said.selection)
-        else:
-            force, _ = said.enclosure.numbers(len(self.system.g))
-            found = only_solution_in_space(self.system, said.numbers, force[: self.problem.p])
-        if found is None:
-            return "its solution is not proven to be the only one"
-        self.regular += 1
-        self._locate(said.selection, found, said.selection)
-        return self._placed(found, said.enclosure)
-
-    def _placed(self, found: SpaceRoot | LooseSolution, said: EnclosureRecord) -> str | None:
-        """Why the ball and the index that are said to be those of a root are not, or None."""
-        centre, radius = said.numbers(len(found.y.mid))
-        with np.errstate(over="ignore", invalid="ignore"):
-            unit = self.system.unit
-            inside = (np.abs(centre - found.y.mid * unit) + found.y.rad * unit) * SAFE <= radius
-        return said.refusal(found.index, inside=bool(np.all(inside)))
+        return self._wrongly_said(found, said.enclosure)
 
     # -- counting --------------------------------------------------------------------------------------------------
 

@@ -33,8 +33,8 @@ from enumsol.checker.reports import GraphVerificationReport
 from enumsol.condensation.data import exactly_at
 from enumsol.condensation.enclosure import CondensedEnclosure
 from enumsol.proof.curve_records import CurvePart, box_from
-from enumsol.proof.reading import RefusedError, data_of, exponents_from, numbers_from, quoted, same
-from enumsol.proof.records import Limits, RecordError
+from enumsol.proof.reading import RecordError, RefusedError, data_of, exponents_from, numbers_from, quoted, same
+from enumsol.proof.records import Limits
 from enumsol.trusted.space.curve_chains import apart, chain_of
 from enumsol.trusted.space.curve_events import CurveMotion
 from enumsol.trusted.space.curve_parts import LinkParts, arcs_over, in_order, up_to_bound
@@ -89,7 +89,7 @@ class SpaceGraphChecker(GraphChecker):
             raise RefusedError("the tree over alpha is missing")
         assert self.interval is not None
         curves = [KnownCurve(given, chain) for chain in self.curves]
-        tree = PieceTreeChecker(enclosure, units, given, curves, self._fail)
+        tree = PieceTreeChecker(enclosure, units, curves, self._fail)
         tree.run(*self.interval, records)
         self.leaves = tree.leaves
         self.gaps += [gap for chain in self.curves for gap in chain.gaps] + tree.gaps

@@ -5,7 +5,7 @@ Which checker reads it depends on the problem and on the header; ``enumsol.check
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any
 
 from enumsol.checker.graph_checker import GraphChecker
 from enumsol.checker.plane_checker import Checker
@@ -17,8 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from enumsol.checker.reports import GraphVerificationReport, HistoryVerificationReport, VerificationReport
-    from enumsol.checker.walk import TreeChecker
-    from enumsol.model.problem3d import AnyProblem, ContactProblem3D
+    from enumsol.model.problem3d import AnyProblem
 
 
 def verify(
@@ -57,36 +56,38 @@ def verify(
       certified data: A, Bn, Bt, f as given
       complete: yes
     """
-    in_space = _is_in_space(problem)
-    if not in_space:
-        instance_of(problem, ContactProblem, "problem")
+    checker, graph_checker = _checkers(problem)
     instance_of(proof, Proof, "proof")
     optional_callable(progress, "progress")
     proof.check_integrity()
-    checker: type[TreeChecker] = Checker
-    if in_space:
-        # with its trusted core, for problems in 3D only
-        from enumsol.checker.space_checker import SpaceChecker
-
-        checker = SpaceChecker
     lines = proof.records()
     header = next(lines, None)
-    if isinstance(header, dict) and header.get("kind") == "history":
+    kind = header.get("kind") if isinstance(header, dict) else None
+    if kind == "history":
         from enumsol.checker.history_checker import HistoryChecker  # not for other proofs
 
         return HistoryChecker(problem, header, checker, progress).run(lines)
-    if isinstance(header, dict) and header.get("kind") == "graph" and not in_space:
-        return GraphChecker(cast("ContactProblem", problem), header, progress).run(lines)
-    if isinstance(header, dict) and header.get("kind") == "graph":
-        from enumsol.checker.space_graph import SpaceGraphChecker  # for graphs in 3D only
+    report: VerificationReport | GraphVerificationReport
+    if kind == "graph":
+        report = graph_checker()(problem, header, progress).run(lines)
+    else:
+        report = checker(problem, progress).run(proof)
+    return report
 
-        return SpaceGraphChecker(cast("ContactProblem3D", problem), header, progress).run(lines)
-    return checker(problem, progress).run(proof)
 
-
-def _is_in_space(problem: object) -> bool:
+def _checkers(problem: object) -> tuple[Any, Callable[[], Any]]:
+    """The checker of root sets of a problem, and what gives that of its graphs; those in 3D come with their tests."""
     if isinstance(problem, ContactProblem):
-        return False
+        return Checker, lambda: GraphChecker
     from enumsol.model.problem3d import ContactProblem3D
 
-    return isinstance(problem, ContactProblem3D)
+    if not isinstance(problem, ContactProblem3D):
+        instance_of(problem, ContactProblem, "problem")
+    from enumsol.checker.space_checker import SpaceChecker
+
+    def of_graphs() -> Any:
+        from enumsol.checker.space_graph import SpaceGraphChecker
+
+        return SpaceGraphChecker
+
+    return SpaceChecker, of_graphs

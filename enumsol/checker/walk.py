@@ -5,14 +5,14 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypeVar
 
 from enumsol.checker.reports import MAX_FAILURES, VerificationReport
-from enumsol.condensation.enclosure import CondensedEnclosure, NotEnclosedError
+from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.proof.leaves import kind_of
-from enumsol.proof.reading import RefusedError, quoted, same
-from enumsol.proof.records import Branching, DeclaredForm, Limits, RecordError, Tree, UndecidedRecord, Unloaded
+from enumsol.proof import leaves as kinds
+from enumsol.proof.reading import RecordError, RefusedError, quoted, same
+from enumsol.proof.records import Branching, DeclaredForm, Limits, Tree
 from enumsol.support.deadlines import tell
 from enumsol.trusted.status_rows import UNDECIDED
 
@@ -23,17 +23,23 @@ if TYPE_CHECKING:
     from enumsol.arithmetic.balls import Ball
     from enumsol.condensation.data import Data
     from enumsol.proof.proof_file import Proof
-    from enumsol.proof.records import Record
+    from enumsol.proof.records import EnclosureRecord, Record
     from enumsol.support.array_types import Codes, Mask
     from enumsol.trusted.positions import Among
 
     #: Checks what a leaf of one kind says; the reason when it proves nothing.
     Test = Callable[[Codes, Any], str | None]
 
+#: Balls of a problem, and roots of its leaves.
+System = TypeVar("System", bound=EnclosedSystem)
+Root = TypeVar("Root")
 _REPORT_EVERY = 256
 #: Forms that are kept as they were made: a file that alternates between more has each of them made again.
 _KEPT = 16
 _END = object()
+#: Reasons why leaves of both dimensions prove nothing.
+_OPEN = "what it holds is not proven"
+NO_FORM = "no form that is convex was declared over it"
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +68,7 @@ class Located:
 
 
 @dataclass
-class TreeChecker(ABC):
+class TreeChecker(ABC, Generic[System, Root]):
     """Checks one proof: its header, then the tree alone, then every leaf.
 
     Whatever does not fit together is found before anything is computed, which may take long.
@@ -92,6 +98,9 @@ class TreeChecker(ABC):
     #: What later leaves may refer to, and what was made of the last of these by their places.
     declared: list[DeclaredForm] = field(default_factory=list)
     _forms: dict[int, Any] = field(default_factory=dict)
+
+    #: Regular roots of leaves, with the codes of these.
+    roots: list[tuple[Codes, Any]] = field(default_factory=list)
 
     #: Trees of bodies that are held, and of others.
     trees: ClassVar[tuple[Tree, Tree]]
@@ -143,11 +152,11 @@ class TreeChecker(ABC):
         return self.trees[0 if self.problem.held else 1]
 
     @cached_property
-    def free(self) -> Any:
+    def free(self) -> System:
         """The system with bounds of the rigid displacement beyond which there are no solutions."""
         return self.system if self.problem.held else self._without_bound()
 
-    def _either(self, holds: Callable[[Any], bool]) -> bool:
+    def _either(self, holds: Callable[[System], bool]) -> bool:
         """Whether something holds of the system, if possible without the bound of the rigid displacement."""
         if holds(self.free):
             return True
@@ -167,11 +176,11 @@ class TreeChecker(ABC):
 
     @property
     @abstractmethod
-    def system(self) -> Any:
+    def system(self) -> System:
         """Balls for the data in the proof's units."""
 
     @abstractmethod
-    def _without_bound(self) -> Any:
+    def _without_bound(self) -> System:
         """See ``free``, for a body that nothing holds."""
 
     @abstractmethod
@@ -183,18 +192,25 @@ class TreeChecker(ABC):
         """Limits of what a record of this kind may say at this assignment."""
 
     @abstractmethod
-    def _tests(self) -> dict[type[Record], Test]:
-        """Tests of the other leaves, by their kinds."""
+    def _settled(self, system: System, codes: Codes) -> Any:
+        """The root of a complete assignment, None where it has none, or that this is open."""
+
+    @abstractmethod
+    def _is_root(self, found: object) -> bool:
+        """True if what a complete assignment holds is a root."""
+
+    @abstractmethod
+    def _wrongly_said(self, found: Root, said: EnclosureRecord) -> str | None:
+        """Why the ball and the index that are said to be those of a root are not, or None."""
+
+    @abstractmethod
+    def _locate(self, name: Codes, found: Root, codes: Codes = ()) -> None:
+        """Take note of where a root is, by its name and, if they are known, its codes."""
 
     @abstractmethod
     def _at_rest(self) -> None:
         """Count the root of the unloaded body."""
 
-    @abstractmethod
-    def _made(self, said: DeclaredForm) -> Any:
-        """What leaves that refer to a declared form are tested by; None where that is not proven."""
-
-    @abstractmethod
     def _flush(self, *, last: bool) -> None:
         """Check what waits, at the end or when it has become much."""
 
@@ -256,7 +272,7 @@ class TreeChecker(ABC):
 
     def _leaf(self, codes: Codes, record: list[Any]) -> str | None:
         """Check one leaf; the reason when it proves nothing."""
-        kind = kind_of(record, self.tree)
+        kind = kinds.kind_of(record, self.tree)
         if kind is None:
             return f"unknown kind of record {quoted(record[0])}"
         try:
@@ -268,18 +284,65 @@ class TreeChecker(ABC):
 
     @cached_property
     def tests(self) -> dict[type[Record], Test]:
-        """Tests of this checker, one for each kind of record."""
-        return {**self._tests(), UndecidedRecord: self._undecided, Unloaded: self._unloaded}
+        """Tests of leaves, by their kinds."""
+        return {
+            kinds.UndecidedRecord: self._undecided,
+            kinds.Unloaded: self._unloaded,
+            kinds.Unbalanced: self._unbalanced,
+            kinds.NoRoot: self._no_root,
+            kinds.RegularRoot: self._regular_root,
+            kinds.Alone: self._alone,
+            kinds.OnlyReference: self._only_reference,
+        }
 
-    def _undecided(self, codes: Codes, said: UndecidedRecord) -> str | None:
+    def _undecided(self, codes: Codes, said: kinds.UndecidedRecord) -> str | None:
         self.undecided += 1
         return None if isinstance(said.reason, str) else "its reason is not a text"
 
-    def _unloaded(self, codes: Codes, said: Unloaded) -> str | None:
+    def _unloaded(self, codes: Codes, said: kinds.Unloaded) -> str | None:
         unloaded = all(code == UNDECIDED for code in codes) and self.problem.is_unloaded(self.alpha)
         # g = 0: by the energy bound nothing but lambda = 0 solves
         self._at_rest()
         return None if unloaded else "the problem is not unloaded"
+
+    def _unbalanced(self, codes: Codes, said: kinds.Unbalanced) -> str | None:
+        return None if said.holds(self.system, codes) else "forces below it may be in balance with the load"
+
+    def _no_root(self, codes: Codes, said: kinds.NoRoot) -> str | None:
+        del said
+        if self._either(lambda system: self._settled(system, codes) is None):
+            return None
+        return "it holds a root" if self._is_root(self._settled(self.system, codes)) else _OPEN
+
+    def _regular_root(self, codes: Codes, said: kinds.RegularRoot) -> str | None:
+        found = self._settled(self.system, codes)
+        if not self._is_root(found):
+            return "it holds no root" if found is None else _OPEN
+        return self._regular(codes, found, said.enclosure)
+
+    def _alone(self, codes: Codes, said: kinds.Alone) -> str | None:
+        found = said.holds(self.system, codes)
+        if found is None:
+            if all(code == UNDECIDED for code in codes):
+                return "its solution is not proven to be the only one"
+            return "its root is not proven to be the only one in it"
+        return self._regular(said.selection, found, said.enclosure)
+
+    def _only_reference(self, codes: Codes, said: kinds.OnlyReference) -> str | None:
+        """The declared root is the only one below a leaf, if any is."""
+        known = self._form(said.back)
+        if known is None:
+            return "the root that was declared is not proven"
+        proven = self._either(lambda system: said.holds(known, codes, system.reach))
+        return None if proven else "the root that was declared is not proven to be the only one in it"
+
+    def _regular(self, codes: Codes, found: Root, said: EnclosureRecord) -> str | None:
+        """Count a regular root of a leaf, and look at what is said of it."""
+        self.roots.append((codes, found))
+        if not self.problem.held and not self.bounded:
+            self.bounded = not self._is_root(self._settled(self.free, codes))
+        self._locate(codes, found, codes)
+        return self._wrongly_said(found, said)
 
     def _declare(self, record: list[Any]) -> None:
         """Take note of what later leaves refer to."""
@@ -295,7 +358,7 @@ class TreeChecker(ABC):
         if place not in self._forms:
             if len(self._forms) == _KEPT:
                 del self._forms[next(iter(self._forms))]
-            self._forms[place] = self._made(self.declared[place])
+            self._forms[place] = self.declared[place].form(self.system)
         return self._forms[place]
 
     def locate(self, name: Hashable, found: Located) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from enumsol.support.array_types import Floats
 from enumsol.support.files import reading, unreadable
 from enumsol.support.messages import shortened
 from enumsol.support.saved import archive_arrays, json_from, table_text
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: Arrays that give solutions, the first ones that are there count: forces, those in the order of fclib, displacements.
 _GIVEN = (("lambda_n", "lambda_t"), ("r",), ("u",))
@@ -186,7 +189,7 @@ def _csv(file: Path) -> dict[str, Any]:
     }
 
 
-def _has_all_nodes(nodes: Any, file: Path) -> bool:
+def _has_all_nodes(nodes: pd.Series, file: Path) -> bool:
     if sorted(nodes) != list(range(len(nodes))):
         raise InvalidArgumentError(
             f"{file}: a solution has the nodes {sorted(nodes)}; expected the rows of Bn from 0, each of them once"

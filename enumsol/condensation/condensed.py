@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 
@@ -14,8 +14,7 @@ from enumsol.support.arguments import alpha_value
 from enumsol.support.immutable import Sealed, sealed
 
 if TYPE_CHECKING:
-    from enumsol.condensation.data import CondensableData, ProblemData
-    from enumsol.condensation.products import WithProducts
+    from enumsol.condensation.data import ProblemData
     from enumsol.support.array_types import Alpha, AlphaLike, Floats
 
 #: Units of force and length lie between 2^-900 and 2^900; products and quotients of two of them and proofs need that.
@@ -174,8 +173,8 @@ def _rounding(S: Floats) -> float:
 
 
 @dataclass(frozen=True)
-class Condensation(Sealed):
-    """A problem condensed to its contact forces for all alpha: S, and g(alpha) = g0 + alpha g1.
+class CondensedProblem(Sealed):
+    """A problem in 2D or 3D condensed to its contact forces for all alpha: S, and g(alpha) = g0 + alpha g1.
 
     Of a body that nothing holds S and g are those of the body on springs, with its equilibrium as a whole: with q the
     coordinates of the rigid displacement, w = g - S lambda + G'q and G lambda = h (theory, (14.2)).
@@ -191,10 +190,10 @@ class Condensation(Sealed):
     S: Floats
     g0: Floats
     g1: Floats
-    problem: CondensableData = field(repr=False)
+    problem: ProblemData = field(repr=False)
 
     @classmethod
-    def from_problem(cls, problem: WithProducts) -> Self:
+    def from_problem(cls, problem: ProblemData) -> Self:
         """Condense with one sparse factorization; dense columns of length n are made a block at a time."""
         offset = np.concatenate([problem.gap, problem.slip_offset.ravel(order="F")])
         products = problem.products
@@ -296,25 +295,18 @@ class Condensation(Sealed):
         rhs = problem.load_at(alpha) - problem.contact_rows.T @ forces
         return np.asarray(problem.factorization.solve(np.asarray(rhs)))
 
-
-@dataclass(frozen=True)
-class CondensedProblem(Condensation):
-    """A 2D problem condensed, with F(alpha) = F0 + alpha F1."""
-
-    problem: ProblemData = field(repr=False)
-
     @property
-    def F0(self) -> Floats:  # noqa: N802 (the field's letter)
-        """Friction coefficients at alpha = 0, shape (p,) [-]."""
-        return self.problem.friction
+    def F0(self) -> Floats:  # noqa: N802 (as above)
+        """Friction coefficients at alpha = 0, shape (p,), in 3D (p, 2) [-]."""
+        return self.problem.affine_friction[0]
 
     @property
     def F1(self) -> Floats:  # noqa: N802 (as above)
-        """Derivatives of the friction coefficients with respect to alpha, shape (p,) [-]."""
-        return self.problem.friction_slope
+        """Derivatives of the friction coefficients with respect to alpha, shape (p,), in 3D (p, 2) [-]."""
+        return self.problem.affine_friction[1]
 
     def at(self, alpha: Alpha) -> CondensedSystem:
-        """The condensed system at one alpha.
+        """The condensed system at one alpha, in 2D.
 
         Raises
         ------
@@ -333,6 +325,7 @@ def solved(S: Floats, right: Floats) -> Floats:
         return np.asarray(np.linalg.lstsq(S, right, rcond=None)[0])
 
 
-def condensation_of(problem: Any) -> Any:
+def condensation_of(problem: ProblemData) -> CondensedProblem:
     """``problem.condensed``, or that of a body that nothing holds."""
-    return problem.condensed if problem.held else replace(problem.on_springs.condensed, problem=problem)
+    condensed: CondensedProblem = problem.on_springs.condensed
+    return condensed if problem.held else replace(condensed, problem=problem)

@@ -23,8 +23,8 @@ Data = Literal["problem", "condensed"]
 EXACT_DOF_LIMIT = 250
 
 
-class CondensableData(Protocol):
-    """What condensing asks of a problem in 2D or 3D.
+class ProblemData(Protocol):
+    """A contact problem in 2D or 3D as condensing sees it.
 
     Attributes
     ----------
@@ -35,6 +35,7 @@ class CondensableData(Protocol):
         How far the slip offset may be from ``slip_offset``; None: not at all.
     exact_offset : tuple of Fraction, or None
         The slip offset where no floats hold it.
+    node_ids : tuple of p labels
     """
 
     f: Floats
@@ -43,6 +44,7 @@ class CondensableData(Protocol):
     slip_offset: Floats
     offset_radius: Floats | None
     exact_offset: tuple[Fraction, ...] | None
+    node_ids: tuple[Any, ...]
 
     @property
     def A(self) -> sp.csc_array:  # noqa: N802 (the field's letter)
@@ -57,8 +59,24 @@ class CondensableData(Protocol):
         """Number of degrees of freedom."""
 
     @property
+    def p(self) -> int:
+        """Number of contact nodes."""
+
+    @property
     def factorization(self) -> Factorization:
         """Factors of A."""
+
+    @property
+    def products(self) -> Any:
+        """B A^{-1} [B', f, load_slope], as `Products`."""
+
+    @property
+    def condensed(self) -> Any:
+        """S, g0 and g1 as computed, as `CondensedProblem`."""
+
+    @property
+    def enclosure(self) -> Any:
+        """S, g0 and g1 in balls, as `CondensedEnclosure`."""
 
     @property
     def held(self) -> bool:
@@ -76,33 +94,15 @@ class CondensableData(Protocol):
     def rigid_reach(self) -> float:
         """Bound of the rigid displacement [length]."""
 
+    @property
+    def affine_friction(self) -> tuple[Floats, Floats]:
+        """Coefficients of friction at alpha = 0, and their derivatives, (p,) or (p, 2)."""
+
     def load_at(self, alpha: AlphaLike) -> Floats:
         """f(alpha), shape (n,)."""
 
-
-class ProblemData(CondensableData, Protocol):
-    """Matrices and vectors of a 2D problem, and the paths of friction and load over alpha.
-
-    Attributes
-    ----------
-    friction, friction_slope : (p,) arrays, F(alpha) = friction + alpha friction_slope
-    node_ids : tuple of p labels
-    """
-
-    friction: Floats
-    friction_slope: Floats
-    node_ids: tuple[Any, ...]
-
-    @property
-    def affine_friction(self) -> tuple[Floats, Floats]:
-        """Coefficients of friction at alpha = 0, and their derivatives."""
-
-    @property
-    def p(self) -> int:
-        """Number of contact nodes."""
-
     def friction_at(self, alpha: AlphaLike) -> Floats:
-        """F(alpha), shape (p,)."""
+        """F(alpha), shape (p,) or (p, 2)."""
 
 
 def exactly_at(alpha: Fraction, first: Floats, slope: Floats) -> list[Fraction]:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import scipy.sparse as sp
@@ -24,7 +24,7 @@ from enumsol.arithmetic.balls import (
     sparse_eigenvalue_bound,
     upper_norm,
 )
-from enumsol.condensation.data import CondensableData, exactly_at
+from enumsol.condensation.data import ProblemData, exactly_at
 from enumsol.condensation.products import Products, scaled
 from enumsol.errors import EnumsolError
 from enumsol.support.arguments import alpha_value
@@ -63,7 +63,7 @@ class CondensedEnclosure(Sealed):
     free: tuple[Floats, Floats] | None = field(default=None, repr=False)
 
     @classmethod
-    def from_problem(cls, problem: CondensableData, products: Products | None = None) -> CondensedEnclosure:
+    def from_problem(cls, problem: ProblemData, products: Products | None = None) -> CondensedEnclosure:
         """Enclose S and g from the problem's own matrices; ``products`` of it are taken if they are known.
 
         Of a body that nothing holds these are those of the body on springs.
@@ -79,7 +79,7 @@ class CondensedEnclosure(Sealed):
             enclosed = cls._from_problem(problem, products)
         return enclosed._finite()
 
-    def restarted(self, problem: CondensableData, products: Products) -> CondensedEnclosure:
+    def restarted(self, problem: ProblemData, products: Products) -> CondensedEnclosure:
         """The enclosure of a problem of the same body with another load or slip offset: S is what it is here.
 
         Raises
@@ -128,7 +128,7 @@ class CondensedEnclosure(Sealed):
         return self
 
     @classmethod
-    def _from_problem(cls, problem: CondensableData, products: Products | None) -> CondensedEnclosure:
+    def _from_problem(cls, problem: ProblemData, products: Products | None) -> CondensedEnclosure:
         products = Products.of(problem) if products is None else products
         if not products.bounded:
             raise NotEnclosedError(_OVERFLOW)
@@ -206,7 +206,7 @@ class CondensedEnclosure(Sealed):
         return arrays
 
 
-def enclosure_of(problem: Any) -> CondensedEnclosure:
+def enclosure_of(problem: ProblemData) -> CondensedEnclosure:
     """``problem.enclosure``, or that of a body that nothing holds: S and g are those of the body on springs."""
     enclosure: CondensedEnclosure = problem.on_springs.enclosure
     return enclosure if problem.held else replace(enclosure, problem=problem)
@@ -252,7 +252,7 @@ def float_at(alpha: Fraction) -> tuple[float, float]:
     return value, 0.0 if Fraction(value) == alpha else 2 * UNIT * abs(value) + TINY
 
 
-def _displaced(problem: CondensableData, products: Products, rad: Floats) -> tuple[Floats, ...]:
+def _displaced(problem: ProblemData, products: Products, rad: Floats) -> tuple[Floats, ...]:
     """g0, g1 and B A^-1 f, each with its radius, from products with the radii ``rad``."""
     size, offset = len(products.mid), np.concatenate([problem.gap, problem.slip_offset.ravel(order="F")])
     free, free_rad = products.mid[:, size:] * products.lift, rad[:, size:] * products.lift + TINY
@@ -266,7 +266,7 @@ def _displaced(problem: CondensableData, products: Products, rad: Floats) -> tup
     return g0, g0_rad, free[:, 1], free_rad[:, 1], free[:, 0], free_rad[:, 0]
 
 
-def _smallest_eigenvalue(problem: CondensableData, scale: Floats) -> float:
+def _smallest_eigenvalue(problem: ProblemData, scale: Floats) -> float:
     """Estimate of the smallest eigenvalue of the scaled A by inverse iteration."""
     vector = np.random.default_rng(1).normal(size=problem.n)
     value = 1.0
@@ -278,7 +278,7 @@ def _smallest_eigenvalue(problem: CondensableData, scale: Floats) -> float:
     return value
 
 
-def moved_by_modes(problem: Any) -> Ball:
+def moved_by_modes(problem: ProblemData) -> Ball:
     """B N, by what each rigid mode moves the contact nodes, (2p, r) or (3p, r)."""
     return _product(problem.contact_rows, problem.modes.N)
 
@@ -291,7 +291,7 @@ def _in_units(value: Ball, unit: Floats) -> Ball:
     return Ball(value.mid * unit, np.where(value.rad > 0, value.rad * unit + TINY, 0.0))
 
 
-def _product(left: Any, right: Floats) -> Ball:
+def _product(left: Floats | sp.csr_array, right: Floats) -> Ball:
     """The product of two matrices, the first of which may be sparse, with the error of its sums; zeros are exact."""
     mid = np.asarray(left @ right)
     size = np.asarray(abs(left) @ np.abs(right))
@@ -335,7 +335,7 @@ class RigidRows:
         return cls(Ball.exact(np.zeros((0, size))), Ball.exact(nothing), Ball.exact(nothing), nothing, nothing)
 
     @classmethod
-    def of(cls, problem: object, alpha: Fraction, force: Floats, length: Floats) -> RigidRows:
+    def of(cls, problem: ProblemData, alpha: Fraction, force: Floats, length: Floats) -> RigidRows:
         """Rows of a problem at one alpha, enclosed; errors as ``along``."""
         rows = cls.along(problem, force, length)
         if not np.any(rows.slope.size):
@@ -348,7 +348,7 @@ class RigidRows:
         return replace(rows, h=h)
 
     @classmethod
-    def along(cls, problem: Any, force: Floats, length: Floats) -> RigidRows:
+    def along(cls, problem: ProblemData, force: Floats, length: Floats) -> RigidRows:
         """Rows of a problem at alpha = 0, enclosed.
 
         Raises
@@ -392,7 +392,11 @@ class EnclosedSystem:
     g, g_rad : (2p,) arrays
     F, F_rad : (p,) arrays
     rows : RigidRows, by default none
+    tangents : int
+        Tangential directions of a contact node: 1 in 2D, 2 in 3D.
     """
+
+    tangents: ClassVar[int] = 1
 
     S: Floats
     S_rad: Floats

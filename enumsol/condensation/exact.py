@@ -14,17 +14,16 @@ from flint import fmpq, fmpq_mat
 
 from enumsol.arithmetic.rationals import is_positive_definite, rational, rational_matrix
 from enumsol.condensation.data import EXACT_DOF_LIMIT, ProblemData
-from enumsol.condensation.free_displacements import solved
-from enumsol.condensation.unloaded import CondensedData, vanishing_alpha
+from enumsol.condensation.unloaded import solved, vanishing_alpha
 from enumsol.errors import InvalidProblemError, TooLargeError
-from enumsol.support.array_types import Alpha
+from enumsol.support.array_types import Alpha, Indices, NDArray
 from enumsol.support.deadlines import look, tell
 
 #: Most degrees of freedom for which "fast" condenses without rounding; beyond, S and g as computed in floats are used.
 FAST_EXACT_DOF = 24
 
 
-def check_definite(S: object) -> None:
+def check_definite(S: fmpq_mat) -> None:
     """Nothing; refuses an S, an fmpq_mat, that is not positive definite: no bound on the energy holds.
 
     Raises
@@ -162,7 +161,9 @@ class UncondensedSystem:
         given, alpha = _Given.of(self._problem), rational(self._alpha)
         return given.A.tolist(), given.B.tolist(), [x + alpha * y for x, y in given.loads.tolist()], given.offset
 
-    def solved(self, turned: Any, unknown: Any, sign: int) -> tuple[list[Any], list[Any], int] | None:
+    def solved(
+        self, turned: Callable[[NDArray[Any]], NDArray[Any]], unknown: Indices, sign: int
+    ) -> tuple[list[Any], list[Any], int] | None:
         """The unknowns y of a selection, u, and the sign of det M; None where M is singular.
 
         With u the displacements, M y = g_R is what remains when u is eliminated from
@@ -238,7 +239,7 @@ class ExactCondensed:
     reach: tuple[Any, ...] = ()
 
     @classmethod
-    def from_problem(cls, problem: CondensedData) -> ExactCondensed:
+    def from_problem(cls, problem: ProblemData) -> ExactCondensed:
         """Condense A, Bn, Bt, f, load_slope, gap, slip_offset and friction without any rounding; on springs, with G, h.
 
         Raises
@@ -268,7 +269,7 @@ class ExactCondensed:
         return fmpq_mat([list(row) for row in self.rows])
 
     @classmethod
-    def from_condensed(cls, problem: CondensedData) -> ExactCondensed:
+    def from_condensed(cls, problem: ProblemData) -> ExactCondensed:
         """The exact values of S, g and F as computed in floats."""
         condensed = problem.condensed
         vectors = (condensed.g0, condensed.g1, condensed.F0, condensed.F1)
@@ -346,7 +347,7 @@ class _Integers:
 _Parts = tuple[tuple[Any, ...], tuple[Any, ...], tuple[Any, ...], tuple[Any, ...], tuple[Any, ...]]
 
 
-def _times(value: Any, factor: int) -> Any:
+def _times(value: fmpq, factor: int) -> Any:
     return value.p * (factor // value.q)
 
 

@@ -3,27 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, SlicedMatrix, gamma, upper_norm
-from enumsol.condensation.data import CondensableData
+from enumsol.condensation.data import ProblemData
 from enumsol.support.array_types import Floats, Mask
 from enumsol.support.deadlines import look, tell
 from enumsol.support.immutable import Sealed
 
 #: Columns that are made dense together.
 _COLUMNS = 16
-
-
-class WithProducts(CondensableData, Protocol):
-    """A problem that keeps its products."""
-
-    @property
-    def products(self) -> Products:
-        """B A^{-1} [B', f, load_slope]."""
 
 
 @dataclass(frozen=True)
@@ -64,11 +55,11 @@ class Products(Sealed):
     bounded: bool
 
     @classmethod
-    def of(cls, problem: CondensableData) -> Products:
+    def of(cls, problem: ProblemData) -> Products:
         """Products of a problem."""
         return cls._of(problem, problem.contact_rows.shape[0])
 
-    def with_loads_of(self, problem: CondensableData) -> Products:
+    def with_loads_of(self, problem: ProblemData) -> Products:
         """Products for another load on the same matrices: only the columns of the load are solved for."""
         loads, rows = self._of(problem, 0), len(self.mid)
         columns = {
@@ -78,7 +69,7 @@ class Products(Sealed):
         return replace(loads, **columns, bounded=self.bounded and loads.bounded)
 
     @classmethod
-    def _of(cls, problem: CondensableData, columns: int) -> Products:
+    def _of(cls, problem: ProblemData, columns: int) -> Products:
         """Products with the first columns of B' and with the loads."""
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             # np.ldexp, and not a power function, gives powers of two by definition

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from enumsol.errors import InvalidProblemError
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from enumsol.condensation.data import ProblemData
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.support.array_types import Floats, Indices, Mask
 
@@ -201,6 +202,8 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
         As in SpaceSystem.
     """
 
+    tangents = 2
+
     tau: Indices
     unit: Floats
 
@@ -257,7 +260,7 @@ class EnclosedSpace(EnclosedSystem, FrictionUnits):
         """
         problem = enclosure.problem
         p = problem.p
-        exact = [exactly_at(alpha, *pair) for pair in zip(problem.friction, problem.friction_slope, strict=True)]
+        exact = [exactly_at(alpha, *pair) for pair in zip(*(part.T for part in problem.affine_friction), strict=True)]
         F, inexact = (np.array(part).T for part in zip(*map(nearest_floats, exact), strict=True))
         if (why := _out_of_range(F)) is not None:
             raise NotEnclosedError(why)
@@ -433,7 +436,7 @@ class AlphaSpace:
     def _nodes(self) -> list[tuple[list[float], tuple[Fraction, Fraction], tuple[Fraction, Fraction]]]:
         """F of every node, and both its coefficients as affine functions of alpha."""
         problem, F = self.enclosure.problem, self._friction[0]
-        given = zip(*(part.tolist() for part in (*problem.friction, *problem.friction_slope)), strict=True)
+        given = np.hstack(problem.affine_friction).tolist()
         return [
             (by, _affine(one, one_slope), _affine(other, other_slope))
             for by, (one, other, one_slope, other_slope) in zip(F.tolist(), given, strict=True)
@@ -514,7 +517,7 @@ def _nearest(exact: Sequence[Fraction]) -> Ball:
     return Ball(mid, np.where(same, 0.0, UNIT * np.abs(mid) * SAFE + TINY))
 
 
-def _references(problem: Any, alpha: Fraction) -> tuple[Floats, Floats]:
+def _references(problem: ProblemData, alpha: Fraction) -> tuple[Floats, Floats]:
     """Coefficients at alpha, (p, 2), with radii: the first of a node that occurs is a float, the other one follows.
 
     Raises
@@ -523,8 +526,7 @@ def _references(problem: Any, alpha: Fraction) -> tuple[Floats, Floats]:
         The ratio of both changes with alpha, or there is only one, which changes.
     """
     found = np.zeros((2, problem.p, 2))
-    pairs = zip(*(part.tolist() for part in (*problem.friction, *problem.friction_slope)), strict=True)
-    for i, (one, other, one_slope, other_slope) in enumerate(pairs):
+    for i, (one, other, one_slope, other_slope) in enumerate(np.hstack(problem.affine_friction).tolist()):
         first, second = (_affine(one, one_slope), _affine(other, other_slope))
         if first[0] * second[1] != second[0] * first[1]:
             raise NotEnclosedError(_RATIO.format(problem.node_ids[i]))

@@ -1,22 +1,15 @@
 """Where the names are at home."""
 
 from .assembly import (
+    basis_contact_problem as basis_contact_problem,
     body_forces as body_forces,
     contact_problem as contact_problem,
     edge_forces as edge_forces,
     stiffness as stiffness,
     triangle_stiffness as triangle_stiffness,
 )
-from .bases import cell_stresses as cell_stresses
-from .basis_problems import basis_contact_problem as basis_contact_problem
-from .mesh_checks import lame as lame
+from .bases import MeshNorms as MeshNorms, cell_stresses as cell_stresses, h1_norms as h1_norms
 from .mesh_files import read_mesh as read_mesh, read_solid as read_solid
-from .mesh_problems import (
-    mesh_problem as mesh_problem,
-    mesh_scene as mesh_scene,
-    read_mesh_problem as read_mesh_problem,
-    read_mesh_scene as read_mesh_scene,
-)
 from .meshes import (
     Mesh as Mesh,
     PartedMesh as PartedMesh,
@@ -24,11 +17,17 @@ from .meshes import (
     blocks as blocks,
     box as box,
     edges_along as edges_along,
+    lame as lame,
     rectangle as rectangle,
     trapezoid as trapezoid,
 )
-from .norms import MeshNorms as MeshNorms, h1_norms as h1_norms
-from .scenes import Scene as Scene
+from .scenes import (
+    Scene as Scene,
+    mesh_problem as mesh_problem,
+    mesh_scene as mesh_scene,
+    read_mesh_problem as read_mesh_problem,
+    read_mesh_scene as read_mesh_scene,
+)
 from .solid_problems import (
     facet_forces as facet_forces,
     solid_body_forces as solid_body_forces,

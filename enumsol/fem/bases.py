@@ -1,4 +1,4 @@
-"""Displacements on a mesh: scikit-fem's basis of the cells of each kind, degrees of freedom by nodes, and stresses."""
+"""Displacements on a mesh: scikit-fem's basis of the cells of each kind, by nodes; stresses, and norms."""
 
 from __future__ import annotations
 
@@ -10,14 +10,19 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.mesh_checks import cell_name, check_every_node_is_used
-from enumsol.fem.tangles import refuse_wrong_sides
+from enumsol.fem.meshes import cell_name, check_every_node_is_used, check_facets
 from enumsol.model.cells import KINDS, by_kind
+from enumsol.support.arguments import instance_of
+from enumsol.support.array_arguments import vector_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from enumsol.model.problem3d import AnyProblem
+    from skfem import BilinearForm, CellBasis, DiscreteField, FacetBasis
+    from skfem.assembly.form.form import FormExtraParams
+    from skfem.element import Element
+
+    from enumsol.model.problem3d import AnyProblem, ContactProblem3D
     from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
 
 
@@ -29,6 +34,14 @@ FACET_DEGREE = 5
 _FEW = 24
 #: Quadrature of degree two on triangles, at the nodes between corners: the nodes that can be in contact.
 _BETWEEN = (np.array([[0.5, 0.5, 0.0], [0.0, 0.5, 0.5]]), np.full(3, 1 / 6))
+
+#: Simplices that a cell of so many corners consists of, by dimension.
+SIMPLICES = {
+    (2, 3): [[0, 1, 2]],
+    (2, 4): [[0, 1, 2], [0, 2, 3]],
+    (3, 4): [[0, 1, 2, 3]],
+    (3, 8): [[0, 1, 2, 6], [0, 2, 3, 6], [0, 3, 7, 6], [0, 7, 4, 6], [0, 4, 5, 6], [0, 5, 1, 6]],
+}
 
 
 @dataclass(frozen=True)
@@ -49,7 +62,7 @@ class Block:
         The nodes that are corners of cells, in order: scikit-fem's vertices.
     """
 
-    basis: Any
+    basis: CellBasis
     dofs: Integers
     nodes: Integers
     rows: Integers
@@ -100,7 +113,7 @@ class NodalBasis:
     shape: tuple[int, int]
     thickness: Floats | None = None
 
-    def matrix(self, form: Any) -> sp.csc_array:
+    def matrix(self, form: BilinearForm) -> sp.csc_array:
         """The matrix of a bilinear form of scikit-fem, made exactly symmetric."""
         return self._gathered(lambda block: form.assemble(block.basis))
 
@@ -157,15 +170,9 @@ class NodalBasis:
                 f"{name} has facets of {facets.shape[1]} nodes; expected {count}, as the cells have"
             )
         keys = [tuple(key) for key in np.sort(facets[:, :corners], axis=1).tolist()]
-        numbers = np.array([self._outer.get(key, (-1, -1)) for key in keys], dtype=np.int64)
-        if np.any(numbers < 0):
-            k = int(np.argmin(numbers[:, 0]))
-            raise InvalidArgumentError(
-                f"{name} row {k}, nodes {facets[k].tolist()}, is not a facet on the boundary of the body; "
-                "expected facets of one cell each"
-            )
-        if len(set(keys)) != len(keys):
-            raise InvalidArgumentError(f"{name} names a facet twice; expected distinct facets")
+        found = [self._outer.get(key, -1) for key in keys]
+        check_facets(found, facets, name)
+        numbers = np.array(found, dtype=np.int64).reshape(-1, 2)
         return [numbers[numbers[:, 0] == k, 1] for k in range(len(self.blocks))]
 
     @cached_property
@@ -184,7 +191,7 @@ class NodalBasis:
         from skfem.helpers import ddot, div, sym_grad
         from skfem.models.elasticity import linear_elasticity
 
-        def energy(u: Any, v: Any, w: Any) -> Any:
+        def energy(u: DiscreteField, v: DiscreteField, w: FormExtraParams) -> Any:
             # as linear_elasticity has it, which makes an identity of every quadrature point and is slow in 3D
             return w.lam * div(u) * div(v) + 2.0 * w.mu * ddot(sym_grad(u), sym_grad(v))
 
@@ -269,7 +276,7 @@ def _block(points: Floats, rows: Integers, cells: Integers, degree: int, labels:
     return Block(basis, dofs, nodes, rows, np.unique(cells[:, : kind.corners]))
 
 
-def facet_basis(basis: Any, facets: Integers, *, lumped: bool = False) -> Any:
+def facet_basis(basis: CellBasis, facets: Integers, *, lumped: bool = False) -> FacetBasis:
     """scikit-fem's basis on facets; see `NodalBasis.on_part`."""
     from skfem import FacetBasis  # as above
 
@@ -285,7 +292,7 @@ def between_corners(element: object) -> bool:
     return isinstance(getattr(element, "elem", element), ElementTetP2)
 
 
-def _solid_stiffness(basis: Any, lam: Floats, mu: Floats) -> sp.coo_array:
+def _solid_stiffness(basis: CellBasis, lam: Floats, mu: Floats) -> sp.coo_array:
     """The stiffness in 3D that the form of the energy gives, for all pairs of functions of a cell at once."""
     # degrees of freedom of a cell are node by node, and a gradient is that of one component
     slopes = np.stack([basis.basis[j][0].grad[0] for j in range(0, basis.Nbfun, 3)])
@@ -313,7 +320,7 @@ def _serendipity() -> Any:
     return dataclass(repr=False)(type("MeshQuadS2", (skfem.MeshQuad2,), names))
 
 
-def _folded(corners: Floats, element: Any, quadrature: Floats) -> Mask:
+def _folded(corners: Floats, element: Element, quadrature: Floats) -> Mask:
     """Cells whose area or volume vanishes or changes its sign at a corner or a quadrature point."""
     places = np.concatenate([element.refdom.init_refdom()[0], quadrature], axis=1)
     slopes = [np.broadcast_to(element.lbasis(places, i)[1], places.shape) for i in range(corners.shape[1])]
@@ -322,6 +329,57 @@ def _folded(corners: Floats, element: Any, quadrature: Floats) -> Mask:
     extents = np.max(np.ptp(corners, axis=1), axis=1) ** corners.shape[2]
     flat = np.min(np.abs(values), axis=1) <= FLAT * extents
     return np.asarray(flat | (np.abs(np.sum(np.sign(values), axis=1)) < values.shape[1]))
+
+
+def corners_of(dimension: int, cells: Integers) -> list[tuple[Integers, Integers]]:
+    """The rows of the cells of each kind, and their corners."""
+    kinds = by_kind(dimension, cells)
+    return [(rows, nodes[:, : KINDS[dimension, nodes.shape[1]].corners]) for rows, nodes in kinds]
+
+
+def refuse_wrong_sides(points: Floats, cells: Integers, labels: Integers | None) -> None:
+    """Refuse cells that are on the same side of a facet that they share: duplicates, folds, cells inside out.
+
+    Raises
+    ------
+    InvalidArgumentError
+        There are such; it names two of them.
+    """
+    dimension, sides, owners = points.shape[1], [], []
+    for rows, corners in corners_of(dimension, cells):
+        kind = KINDS[dimension, corners.shape[1]]
+        facets = corners[:, kind.facets]
+        simplex = points[corners[:, SIMPLICES[dimension, kind.corners][0]]]
+        turned = np.linalg.det(simplex[:, 1:] - simplex[:, :1]) < 0
+        facets[turned] = facets[turned][:, :, ::-1]
+        sides.append(facets.reshape(-1, facets.shape[2]))
+        owners.append(np.repeat(rows, facets.shape[1]))
+    every, owner = np.concatenate(sides), np.concatenate(owners)
+    # two cells on either side of a facet go around it in opposite directions, the least node first; edges have two ends
+    first = np.argmin(every, axis=1)[:, None]
+    along = np.take_along_axis(every, (first + 1) % every.shape[1], axis=1)[:, 0] if dimension == 3 else every[:, 0]
+    order = np.lexsort(np.sort(every, axis=1).T)
+    keys, along, owner = np.sort(every, axis=1)[order], along[order], owner[order]
+    same = np.flatnonzero(np.all(keys[1:] == keys[:-1], axis=1) & (along[1:] == along[:-1]))
+    third = np.flatnonzero(np.all(keys[2:] == keys[:-2], axis=1))
+    wrong = np.union1d(same, third)
+    if not len(wrong):
+        return
+    # a cell that is inside out is so with all its neighbours
+    beside = np.concatenate([owner[wrong], owner[wrong + 1]])
+    cell = int(np.argmax(np.bincount(beside)))
+    k = int(wrong[np.flatnonzero((owner[wrong] == cell) | (owner[wrong + 1] == cell))[0]])
+    other = int(owner[k] if owner[k] != cell else owner[k + 1])
+    raise InvalidArgumentError(
+        f"{cell_name(cell, labels)} overlaps {cell_name(other, labels)}, for both are on the same side of "
+        f"what they share at {place_of(points[keys[k]].mean(axis=0))}, or one of them is inside out; expected cells "
+        "that cover the body once"
+    )
+
+
+def place_of(at: Floats) -> str:
+    """A position in words."""
+    return f"({', '.join(f'{float(value) + 0.0:.6g}' for value in at)})"
 
 
 def cell_stresses(problem: AnyProblem, u: ArrayLike) -> Floats:
@@ -381,3 +439,88 @@ def von_mises(stresses: Floats) -> Floats:
     """The equivalent stress of von Mises of stresses (M, 3, 3), (M,)."""
     deviator = stresses - np.trace(stresses, axis1=1, axis2=2)[:, None, None] * np.eye(3) / 3.0
     return np.asarray(np.sqrt(1.5 * np.sum(deviator**2, axis=(1, 2))))
+
+
+@dataclass(frozen=True, eq=False)
+class MeshNorms:
+    """Norms of a problem in 3D whose mesh is known.
+
+    Attributes
+    ----------
+    G : (n, n) csc_array
+        Gram matrix of H^1 on the free degrees of freedom: mass and gradients [length^3, length].
+    Bn : (p, n) csr_array
+        Normal contact rows of the problem.
+    areas : (p,) array
+        Area of each contact row [length^2].
+    """
+
+    G: sp.csc_array
+    Bn: sp.csr_array
+    areas: Floats
+
+    @cached_property
+    def dual(self) -> Floats:
+        """Bn G^-1 Bn', (p, p)."""
+        from enumsol.condensation.factorization import Factorization  # scipy's solvers come with the first use
+
+        factorization, p = Factorization(self.G), self.Bn.shape[0]
+        columns = [  # some at a time: the dense blocks stay small
+            self.Bn @ factorization.solve(self.Bn[start : start + 64].T.toarray()) for start in range(0, p, 64)
+        ]
+        matrix = np.hstack(columns)
+        return np.asarray(0.5 * (matrix + matrix.T))
+
+    def of_displacement(self, u: ArrayLike) -> float:
+        """||u||_1 for u of shape (n,)."""
+        v = vector_of(u, "u", self.G.shape[0])
+        return float(np.sqrt(v @ (self.G @ v)))
+
+    def of_force(self, mu: ArrayLike) -> float:
+        """||mu||_(-1/2,h) for normal forces mu of shape (p,): the supremum of mu' Bn v over ||v||_1 = 1."""
+        v = vector_of(mu, "mu", len(self.areas))
+        return float(np.sqrt(v @ self.dual @ v))
+
+    def of_slip(self, phi: ArrayLike) -> float:
+        """||phi||_0 for slips of shape (p,), the root of sum_i m_i phi_i^2 (theory, (11.4))."""
+        v = vector_of(phi, "phi", len(self.areas))
+        return float(np.sqrt(self.areas @ v**2))
+
+
+def h1_norms(problem: ContactProblem3D) -> MeshNorms:
+    """Norms on the mesh of a problem, such as `solid_contact_problem` makes.
+
+    Parameters
+    ----------
+    problem : ContactProblem3D
+        With ``mesh`` and ``areas``.
+
+    Raises
+    ------
+    InvalidArgumentError
+        It has no mesh or no areas.
+
+    Examples
+    --------
+    >>> import enumsol
+    >>> norms = enumsol.fem.h1_norms(enumsol.gallery.block3d(2, 2, 2))
+    >>> norms.dual.shape
+    (6, 6)
+    """
+    from skfem import BilinearForm  # as above
+    from skfem.helpers import ddot, dot, grad
+
+    from enumsol.model.problem3d import ContactProblem3D  # not for problems in 2D
+
+    instance_of(problem, ContactProblem3D, "problem")
+    if problem.mesh is None or problem.areas is None:
+        raise InvalidArgumentError("problem has no mesh or no areas; expected one made of a mesh")
+
+    def product(u: object, v: object, _: object) -> Any:
+        return dot(u, v) + ddot(grad(u), grad(v))
+
+    # products of linear functions have degree two: exact on tetrahedra and parallelepipeds
+    body = nodal_basis(problem.mesh.points, problem.mesh.cells, degree=2)
+    motion = problem.mesh.motion
+    G = sp.csc_array(motion.T @ body.matrix(BilinearForm(product)) @ motion)
+    return MeshNorms(G, problem.Bn, problem.areas)

@@ -1,12 +1,13 @@
-"""What acts on the named parts of a mesh: supports, loads, springs and obstacles.
+"""Options that describe what a mesh stands for, and what acts on its named parts: supports, loads, springs, obstacles.
 
 Each function checks its argument, names it in messages, and gives plain arrays by nodes.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,18 +15,137 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
+from enumsol.fem.mesh_files import read_mesh
+from enumsol.fem.meshes import SAME
 from enumsol.fem.restrained import Supports
+from enumsol.model.problem import given_friction, old_friction
 from enumsol.support.arguments import finite_number, one_of, shown
 from enumsol.support.array_arguments import real_array, short_vector
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from typing import Literal
+
+    from skfem import DiscreteField
+    from skfem.assembly.form.form import FormExtraParams
+
     from enumsol.fem.bases import NodalBasis
     from enumsol.fem.meshes import PartedMesh
-    from enumsol.fem.options import Options
-    from enumsol.support.array_types import Floats, Integers, Mask
+    from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
 
-#: Positions in a plane of symmetry may differ from it by this share of the extent of the body.
-_SAME = 1e-9
+    Names = str | Sequence[str]
+    Vectors = Mapping[str, ArrayLike] | None
+    Plane = Literal["strain", "stress"]
+    Coefficients = float | Mapping[str, float] | None
+    Written = Callable[[str, str, str], str]
+
+
+#: Options that are coefficients of friction along the first axis and along the second.
+FRICTION = "friction", "friction_slope", "friction2", "friction2_slope"
+
+
+@dataclass(frozen=True)
+class Options:
+    """Options of `mesh_problem`, which says what each stands for."""
+
+    young: float | Mapping[str, float]
+    poisson: float | Mapping[str, float]
+    contact: Names
+    pairs: Sequence[Sequence[Any]]
+    plane: Plane | Mapping[str, Plane] | None
+    thickness: float | Mapping[str, float]
+    friction: Coefficients
+    friction_slope: Coefficients
+    friction2: Coefficients
+    friction2_slope: Coefficients
+    axis: ArrayLike | None
+    clamp: Names
+    symmetry: Names
+    displacement: Mapping[str, Sequence[Any]] | None
+    spring: Vectors
+    load: Vectors
+    load_slope: Vectors
+    pressure: Mapping[str, float] | None
+    pressure_slope: Mapping[str, float] | None
+    body_force: ArrayLike | Mapping[str, ArrayLike] | None
+    gap: float | Mapping[str, float]
+    obstacle: Mapping[str, Sequence[float]] | None
+    max_rigid_displacement: float | Literal["auto"] | None
+    groups: str | None
+
+    def with_friction_along_axes(self, dimension: int) -> Options:
+        """Options without pairs of coefficients, which are those along two axes in 3D, and with a coefficient.
+
+        Raises
+        ------
+        InvalidArgumentError
+            A pair is given where one coefficient is expected.
+        """
+        F, slope = self.friction, self.friction_slope
+        if F is slope is None:
+            F, slope = given_friction(None, None)
+        given = dict(zip(FRICTION, (F, slope, self.friction2, self.friction2_slope), strict=True))
+        return replace(self, **along_axes(dimension, given, _in_python))
+
+
+def refuse_old_friction(source: object, options: Mapping[str, Any], written: Written) -> Any:
+    """Mesh, read only if an option is a pair; pairs in 2D are refused in the words of a file or a command.
+
+    ``written`` is how a number is given for an option and a part, "" for all parts.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The sentence says what to write.
+    """
+    if not any(map(_is_pair, (own for name in FRICTION for _, own in _by_part(options.get(name))))):
+        return source
+    mesh = read_mesh(source, options.get("groups"))
+    along_axes(mesh.points.shape[1], options, written)
+    return mesh
+
+
+def along_axes(dimension: int, options: Mapping[str, Any], written: Written) -> dict[str, Any]:
+    """Options without pairs, which are coefficients along two axes in 3D, and are refused in 2D."""
+    found = dict(options)
+    for name in FRICTION:
+        for part, own in _by_part(options.get(name)):
+            if not _is_pair(own) or (dimension == 3 and not name.startswith("friction2")):
+                continue
+            instead = old_friction(own, *(partial(written, option, str(part)) for option in (name, f"{name}_slope")))
+            more = "" if dimension == 3 or name.endswith("_slope") else f": {instead}"
+            raise InvalidArgumentError(
+                f"{name}{part and f' of {part}'} is the pair {shown(own)}; expected one coefficient{more}"
+            )
+    pairs = [name for name in FRICTION if any(_is_pair(own) for _, own in _by_part(options.get(name)))]
+    if not pairs:
+        return found
+    second = [name for name in ("friction2", "friction2_slope") if options.get(name) is not None]
+    if second:
+        raise InvalidArgumentError(f"{pairs[0]} is a pair, and {second[0]} is given; expected one of the two")
+    for name in ("friction", "friction_slope"):
+        other, value = name.replace("friction", "friction2"), options.get(name)
+        if isinstance(value, Mapping):
+            both = {part: own if _is_pair(own) else (own, own) for part, own in value.items()}
+            found[name], found[other] = ({part: own[k] for part, own in both.items()} for k in (0, 1))
+        elif value is not None:
+            found[name], found[other] = value if _is_pair(value) else (value, value)
+    return found
+
+
+def _is_pair(value: object) -> bool:
+    return isinstance(value, (tuple, list)) and len(value) == 2
+
+
+def _by_part(value: object) -> list[tuple[Any, Any]]:
+    """Values by part, "" for all parts."""
+    return list(value.items()) if isinstance(value, Mapping) else [("", value)]
+
+
+def _in_python(option: str, part: str, number: str) -> str:
+    return f'{option}={{"{part}": {number}}}' if part else f"{option}={number}"
+
+
 #: What is smaller in a combination of rigid motions is rounding.
 _ROUNDED = 1e-12
 #: Of the energies of rigid motions in the supports, the least as a share of the largest that holds a body.
@@ -154,7 +274,7 @@ class Held:
         """Axes to which a plane through all of these nodes is perpendicular."""
         points = self._mesh.points
         extent = float(np.max(np.ptp(points, axis=0)))
-        return np.flatnonzero(np.ptp(points[nodes], axis=0) <= _SAME * extent).tolist()
+        return np.flatnonzero(np.ptp(points[nodes], axis=0) <= SAME * extent).tolist()
 
     def _fix(self, part: str, nodes: Integers, component: int, value: float) -> None:
         differ = self._fixed[nodes, component] & (self._values[nodes, component] != value)
@@ -294,14 +414,14 @@ def part_forces(body: NodalBasis, mesh: PartedMesh, loads: object, pressures: ob
     for part, value in by_part(loads, f"load{slope}").items():
         traction = short_vector(value, f"load{slope} of {part}", dimension)
 
-        def along(v: object, _: object, t: Floats = traction[:, None, None]) -> Any:
+        def along(v: DiscreteField, _: FormExtraParams, t: Floats = traction[:, None, None]) -> DiscreteField:
             return dot(t, v)
 
         total += body.on_part(mesh.part(part), part, along)
     for part, value in by_part(pressures, f"pressure{slope}").items():
         pressure = finite_number(value, f"pressure{slope} of {part}")
 
-        def inward(v: Any, w: Any, p: float = pressure) -> Any:
+        def inward(v: DiscreteField, w: FormExtraParams, p: float = pressure) -> DiscreteField:
             return -p * dot(w.n, v)
 
         total += body.on_part(mesh.part(part), part, inward)
@@ -321,11 +441,12 @@ def part_springs(body: NodalBasis, mesh: PartedMesh, springs: object) -> sp.csc_
                 f"spring of {part} is {shown(value)}; expected stiffnesses >= 0 along the normal and across it"
             )
         for k, axis in enumerate(np.eye(dimension)):
+            across = tangential * axis[:, None, None]
 
             def density(
-                v: Any, w: Any, k: int = k, e: Floats = axis, kn: float = normal, kt: float = tangential
-            ) -> Any:
-                return dot(kt * e[:, None, None] + (kn - kt) * w.n[k] * w.n, v)
+                v: DiscreteField, w: FormExtraParams, k: int = k, a: Floats = across, b: float = normal - tangential
+            ) -> DiscreteField:
+                return dot(a + b * w.n[k] * w.n, v)
 
             blocks[:, :, k] += body.on_part(mesh.part(part), part, density, lumped=True)
     shape = (count * dimension, count * dimension)

@@ -3,27 +3,104 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.basis_problems import outward_normal, pressed
+from enumsol.fem.assembly import outward_normal, pressed
 from enumsol.fem.conditions import Held, Obstacle, names_of
-from enumsol.fem.mesh_checks import unit_vectors
-from enumsol.fem.pairs import Pair, faced
-from enumsol.fem.restrained import ContactNodes, means_of_nodes, movable
-from enumsol.model.cells import boundary_facets, contact_nodes, facet_rows
+from enumsol.fem.meshes import unit_vectors
+from enumsol.fem.restrained import ContactRows, means_of_nodes, movable
+from enumsol.model.cells import KINDS, boundary_facets, contact_nodes, facet_rows
+from enumsol.support.arguments import finite_number, shown
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from enumsol.fem.bases import NodalBasis
+    from enumsol.fem.conditions import Options
     from enumsol.fem.meshes import PartedMesh
-    from enumsol.fem.options import Options
-    from enumsol.support.array_types import Floats, Integers
+    from enumsol.support.array_types import Floats, Integers, Mask
 
 #: Cosine of the angle from which on a normal of the boundary points away from an obstacle, but for rounding.
 _BEHIND = -1e-6
+#: A point may lie beyond the edge of a facet by this share of the facet: at ends that meet, but for rounding.
+_BEYOND = 1e-6
+#: Shape functions below this are rounding at a node.
+_AT_NODE = 1e-10
+#: A gap below this share of the extent of the mesh is rounding, and none; so is what is left of Newton's equation.
+_TOUCHING = 1e-9
+#: Newton's steps at most to a point of a facet; of plane triangles and straight edges the first is the last.
+_STEPS = 30
+#: Steps in places of the reference below this have converged.
+_CONVERGED = 1e-13
+#: How much farther than its farthest node a curved facet may reach from its centre.
+_BULGE = 1.5
+#: Elements of edges, by their number of nodes.
+_LINES = {2: "ElementLineP1", 3: "ElementLineP2"}
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two parts of the boundary that may touch.
+
+    Attributes
+    ----------
+    slave : name of the part whose nodes are contact nodes
+    master : name of the part whose facets these nodes face
+    gap : float or None
+        Replaces the gap of the geometry [length].
+    """
+
+    slave: str
+    master: str
+    gap: float | None = None
+
+    @classmethod
+    def of(cls, value: Sequence[Any]) -> Pair:
+        """The pair given by two names, or by two names and a gap.
+
+        Raises
+        ------
+        InvalidArgumentError
+            The value is neither.
+        """
+        names = value[:2] if isinstance(value, (list, tuple)) and len(value) in (2, 3) else ()
+        if not names or not all(isinstance(name, str) for name in names):
+            raise InvalidArgumentError(
+                f"pairs has the entry {shown(value)}; expected two names of parts, and a gap if it is not that of the "
+                "mesh"
+            )
+        if names[0] == names[1]:
+            raise InvalidArgumentError(f"pairs has {names[0]} with itself; expected two different parts")
+        gap = finite_number(value[2], f"gap of the pair {names[0]}:{names[1]}") if len(value) > 2 else None
+        return cls(names[0], names[1], gap)
+
+    @classmethod
+    def all_of(cls, value: object) -> list[Pair]:
+        """Every pair of a list.
+
+        Raises
+        ------
+        InvalidArgumentError
+            The value is not a list of pairs, or one is given twice.
+        """
+        if not isinstance(value, (list, tuple)) or (value and all(isinstance(entry, str) for entry in value)):
+            raise InvalidArgumentError(
+                f"pairs is {shown(value)}; expected a list of pairs such as [['upper', 'lower']]"
+            )
+        pairs = [cls.of(entry) for entry in value]
+        seen: set[frozenset[str]] = set()
+        for pair in pairs:
+            if (names := frozenset((pair.slave, pair.master))) in seen:
+                raise InvalidArgumentError(f"pairs has {pair} twice; expected each pair of parts once")
+            seen.add(names)
+        return pairs
+
+    def __str__(self) -> str:
+        return f"{self.slave}:{self.master}"
 
 
 @dataclass(frozen=True)
@@ -58,7 +135,7 @@ class Contacts:
 
     Attributes
     ----------
-    rows : ContactNodes
+    rows : ContactRows
         The p of them.
     gaps : (p,) array
         Distances to the obstacle or to the other body, 0 for a foundation of the shape of the body [length].
@@ -72,7 +149,7 @@ class Contacts:
         One for all contact parts, then one for each pair; the nodes come in this order.
     """
 
-    rows: ContactNodes
+    rows: ContactRows
     gaps: Floats
     parts: list[str]
     facets: Integers
@@ -94,7 +171,7 @@ def contacts_of(body: NodalBasis, mesh: PartedMesh, options: Options, held: Held
     parts, pairs = names_of(options.contact, "contact"), Pair.all_of(options.pairs)
     if not parts and not pairs:
         raise InvalidArgumentError("contact names no part; expected the contact boundary, or pairs")
-    found: list[tuple[ContactNodes, Floats, Group]] = []
+    found: list[tuple[ContactRows, Floats, Group]] = []
     groups: list[tuple[list[str], Pair | None]] = [(parts, None)] if parts else []
     groups += [([pair.slave], pair) for pair in pairs]
     on, areas, taken = [], [], np.zeros(0, dtype=np.int64)
@@ -107,7 +184,7 @@ def contacts_of(body: NodalBasis, mesh: PartedMesh, options: Options, held: Held
         on.append(facets)
         areas.append(body.on_part(facets, names[0], lambda v, _: v[0], lumped=True)[rows.nodes, 0])
         taken = np.concatenate([taken, rows.nodes])
-    rows = ContactNodes(
+    rows = ContactRows(
         sp.csr_array(sp.vstack([rows.means for rows, _, _ in found])),
         np.concatenate([rows.normals for rows, _, _ in found]),
         np.any([rows.apart for rows, _, _ in found], axis=0),
@@ -150,7 +227,7 @@ def _group(
     obstacle: object,
     pair: Pair | None,
     taken: Integers,
-) -> tuple[ContactNodes, Floats, Group]:
+) -> tuple[ContactRows, Floats, Group]:
     """Contact nodes with their normals on some facets, and the distances to what they face."""
     dimension = mesh.points.shape[1]
     touching = along(facets) if dimension == 2 else np.unique(contact_nodes(dimension, facets))
@@ -187,7 +264,7 @@ def _group(
 
 def _paired(
     body: NodalBasis, mesh: PartedMesh, touching: Integers, normals: Floats, held: Held, pair: Pair
-) -> tuple[ContactNodes, Floats, Group]:
+) -> tuple[ContactRows, Floats, Group]:
     """Nodes that face the other part of a pair, relative to it."""
     facets = _facets(body, mesh, [pair.master])
     apart = ~np.isin(touching, facets)  # a node of both, as at the tip of a crack, is in contact with itself
@@ -223,3 +300,170 @@ def along(edges: Integers) -> Integers:
             ordered[node] = None
             node = next((after for after in beside[node] if after not in ordered), None)
     return np.array(list(ordered), dtype=np.int64)
+
+
+# -- what the nodes of one part of a pair face on the other (theory, section 11.8) -------------------------------------
+
+
+@dataclass(frozen=True)
+class Faced:
+    """What nodes face along their normals.
+
+    Attributes
+    ----------
+    found : (k,) bool array
+        Which of the nodes face a facet at all; the p of them are the rows of what follows.
+    weights : (p, N) csr_array
+        Shape functions of the facet at the point that is faced.
+    gaps : (p,) array
+        Signed distances along the normals, negative where a node is inside the other body [length].
+    """
+
+    found: Mask
+    weights: sp.csr_array
+    gaps: Floats
+
+
+def faced(
+    points: Floats, nodes: Integers, normals: Floats, facets: Integers, outward: Floats, others: Integers
+) -> Faced:
+    """The nearest points of facets on the lines along the normals of nodes.
+
+    Parameters
+    ----------
+    points : (N, d) array
+    nodes : (k,) int array
+    normals : (k, d) array
+        Of length one, out of their body.
+    facets : (m, c) int array
+        Of the other body.
+    outward : (N, d) array
+        Vectors out of the other body at the nodes of its facets, of any length.
+    others : (l, c) int array
+        All other facets on the boundary of bodies: a node is inside the other body where none of them is between.
+    """
+    tolerance = _TOUCHING * float(np.max(np.ptp(points, axis=0)))
+    targets, between = (_Facets.of(points, rows) for rows in (facets, others))
+    away = outward[facets].sum(axis=1)
+    found = np.zeros(len(nodes), dtype=bool)
+    gaps: list[float] = []
+    rows, columns, data = [], [], []
+    for k, (node, normal) in enumerate(zip(nodes, normals, strict=True)):
+        at, gap, row = targets.on_line(points[node], normal, tolerance)
+        for hit in np.argsort(np.abs(gap), kind="stable"):
+            if away[row[hit]] @ normal >= 0:
+                continue
+            if gap[hit] < -tolerance:
+                _, crossed, _ = between.on_line(points[node], normal, tolerance)
+                if np.any((crossed < -tolerance) & (crossed > gap[hit] + tolerance)):
+                    continue
+            values = targets.shape.values(at[hit][None])[:, 0]
+            values[np.abs(values) < _AT_NODE] = 0.0
+            kept = np.flatnonzero(values)
+            rows.append(np.full(len(kept), len(gaps)))
+            columns.append(facets[row[hit], kept])
+            data.append(values[kept] / values.sum())
+            gaps.append(0.0 if abs(gap[hit]) <= tolerance else float(gap[hit]))
+            found[k] = True
+            break
+    if not gaps:
+        return Faced(found, sp.csr_array((0, len(points))), np.zeros(0))
+    entries = (np.concatenate(data), (np.concatenate(rows), np.concatenate(columns)))
+    return Faced(found, sp.csr_array(entries, shape=(len(gaps), len(points))), np.array(gaps))
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """The reference of a kind of facets.
+
+    Attributes
+    ----------
+    element : of scikit-fem
+    centre : (d - 1,) array
+    triangle : whether coordinates add up to at most one, as on an edge
+    """
+
+    element: Any
+    centre: Floats
+    triangle: bool
+
+    @classmethod
+    def of(cls, dimension: int, nodes: int) -> _Shape:
+        """Facing of edges, or of facets of solids."""
+        import skfem  # as in nodal_basis
+
+        if dimension == 2:
+            return cls(getattr(skfem, _LINES[nodes])(), np.array([0.5]), triangle=True)
+        kind = KINDS[2, nodes]
+        triangle = kind.corners == 3
+        return cls(getattr(skfem, kind.element)(), np.full(2, 1 / 3 if triangle else 0.5), triangle)
+
+    def values(self, places: Floats) -> Floats:
+        """Shape functions (m, q) at places (q, d - 1)."""
+        count = len(self.element.doflocs)
+        return np.stack([np.broadcast_to(self.element.lbasis(places.T, i)[0], len(places)) for i in range(count)])
+
+    def slopes(self, places: Floats) -> Floats:
+        """Their derivatives (m, d - 1, q)."""
+        count = len(self.element.doflocs)
+        return np.stack([np.broadcast_to(self.element.lbasis(places.T, i)[1], places.T.shape) for i in range(count)])
+
+    def inside(self, places: Floats) -> Mask:
+        """Which places belong to the facet, but for rounding."""
+        sums = places.sum(axis=1) if self.triangle else np.max(places, axis=1)
+        return np.asarray(np.all(places >= -_BEYOND, axis=1) & (sums <= 1 + _BEYOND))
+
+
+@dataclass(frozen=True)
+class _Facets:
+    """Facets to be met by lines.
+
+    Attributes
+    ----------
+    shape : _Shape
+    places : (m, c, d) array
+        Of their nodes.
+    centres : (m, d) array
+    reach : (m,) array
+        No point of a facet is farther from its centre.
+    """
+
+    shape: _Shape
+    places: Floats
+    centres: Floats
+    reach: Floats
+
+    @classmethod
+    def of(cls, points: Floats, facets: Integers) -> _Facets:
+        """Facing of these nodes."""
+        shape, places = _Shape.of(points.shape[1], facets.shape[1]), points[facets]
+        centres = np.einsum("m,fmd->fd", shape.values(shape.centre[None])[:, 0], places)
+        far = np.max(np.linalg.norm(places - centres[:, None], axis=2), axis=1, initial=0.0)
+        return cls(shape, places, centres, _BULGE * far)
+
+    def on_line(self, point: Floats, normal: Floats, tolerance: float) -> tuple[Floats, Floats, Integers]:
+        """Places in facets where a line meets them, by Newton's method, distances along it, and which facets."""
+        offset = self.centres - point
+        ahead = offset @ normal
+        across = np.linalg.norm(offset - ahead[:, None] * normal, axis=1)
+        near = np.flatnonzero(across <= self.reach)
+        at, gap, facets = np.tile(self.shape.centre, (len(near), 1)), ahead[near], self.places[near]
+        direction = np.broadcast_to(-normal[:, None], (len(near), len(normal), 1))
+
+        def left() -> Floats:
+            reached = np.einsum("mq,qmd->qd", self.shape.values(at), facets)
+            return np.asarray(reached - point - gap[:, None] * normal)
+
+        with np.errstate(all="ignore"):  # what diverges is not taken
+            for _ in range(_STEPS if len(near) else 0):
+                tangents = np.einsum("mkq,qmd->qdk", self.shape.slopes(at), facets)
+                J, off = np.concatenate([tangents, direction], axis=2), left()
+                # where the line is parallel to the facet, or nearly, it goes astray
+                flat = ~(np.abs(np.linalg.det(J)) > _AT_NODE * np.prod(np.linalg.norm(J, axis=1), axis=1))
+                J[flat], off[flat] = np.eye(len(normal)), 1.0
+                step = np.linalg.solve(J, -off[:, :, None])[:, :, 0]
+                at, gap = np.clip(at + step[:, :-1], -2.0, 3.0), gap + step[:, -1]
+                if np.max(np.abs(step[:, :-1])) < _CONVERGED:
+                    break
+            met = np.flatnonzero(self.shape.inside(at) & (np.linalg.norm(left(), axis=1) <= tolerance))
+        return at[met], gap[met], near[met]

@@ -9,12 +9,15 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.support.array_types import Integers
+
+if TYPE_CHECKING:
+    import meshio
 
 #: Files may include others to this depth.
 _DEEPEST = 20
@@ -186,7 +189,7 @@ class Deck:
             found |= self.members(kind, other, places, (*above, name))
         return found
 
-    def types(self, kinds: Sequence[str], mesh: Any) -> tuple[str, ...]:
+    def types(self, kinds: Sequence[str], mesh: meshio.Mesh) -> tuple[str, ...]:
         """Types of the elements of the body, which are of these kinds of meshio.
 
         Raises
@@ -207,7 +210,7 @@ class Deck:
                 )
         return tuple(dict.fromkeys(types))
 
-    def labels(self, kinds: Sequence[str], mesh: Any) -> Integers:
+    def labels(self, kinds: Sequence[str], mesh: meshio.Mesh) -> Integers:
         """Numbers (M,) of the elements of the body, which are of these kinds of meshio."""
         blocks = zip(self.blocks, mesh.cells, strict=True)
         return np.array([number for own, read in blocks if read.type in kinds for number in own.numbers])
@@ -262,7 +265,7 @@ def _lines(place: Path, first: Path, depth: int) -> Iterator[tuple[str, str]]:
                 yield f"line {number}{of}", text
 
 
-def deck_of(place: Path, mesh: Any | None) -> Deck:
+def deck_of(place: Path, mesh: meshio.Mesh | None) -> Deck:
     """Contents of a deck, if meshio has read all of it.
 
     Parameters
@@ -306,7 +309,7 @@ def deck_of(place: Path, mesh: Any | None) -> Deck:
     return deck
 
 
-def _check_sets(deck: Deck, mesh: Any) -> None:
+def _check_sets(deck: Deck, mesh: meshio.Mesh) -> None:
     """Compare the members of all sets that were read with those in the deck."""
     nodes = {number: place for place, number in enumerate(deck.nodes)}
     cells = {number: place for place, number in enumerate(n for block in deck.blocks for n in block.numbers)}
@@ -332,7 +335,7 @@ def _compare(deck: Deck, kind: str, name: str, places: Mapping[int, int], read: 
     )
 
 
-def refuse_partial(place: Path, mesh: Any, said: str) -> None:
+def refuse_partial(place: Path, mesh: meshio.Mesh, said: str) -> None:
     """Refuse an incomplete mesh that meshio read from a file of another format than decks.
 
     Parameters

@@ -11,23 +11,23 @@ import os
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any, cast
+from types import MappingProxyType, ModuleType
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.fem.file_counts import Deck, deck_of, refuse_partial
-from enumsol.fem.mesh_checks import positions
-from enumsol.fem.meshes import ALL, PartedMesh, SolidMesh
+from enumsol.fem.meshes import ALL, SAME, PartedMesh, SolidMesh, positions
 from enumsol.model.cells import KINDS, TRIANGLES, as_quadrilaterals, boundary_facets, facet_rows, numbers_of_nodes
 from enumsol.support.arguments import file_path, shown
 from enumsol.support.array_types import Floats, Integers, NDArray
 from enumsol.support.files import DAMAGE, unreadable
 from enumsol.support.messages import shortened
 
-#: Third coordinates of a plane mesh may differ by this share of its extent.
-_PLANE = 1e-9
+if TYPE_CHECKING:
+    import meshio
+
 _PHYSICAL = "gmsh:physical"
 #: What meshio calls the families of a MED file, of cells and of points; numbers of groups in formats without names.
 _FAMILIES = ("cell_tags", "point_tags")
@@ -119,7 +119,7 @@ def _read(source: object, groups: str | None, dimension: int | None) -> PartedMe
         raise InvalidArgumentError(f"{place}: {error}") from error
 
 
-def _by_meshio(meshio: Any, place: Path) -> tuple[Any, str]:
+def _by_meshio(meshio: ModuleType, place: Path) -> tuple[meshio.Mesh, str]:
     """Mesh that meshio reads, and the text that it prints meanwhile."""
     said = io.StringIO()
     try:
@@ -168,7 +168,7 @@ def _checked(mesh: object, groups: str | None, dimension: int | None, place: Pat
         raise InvalidArgumentError(f"the arrays of the mesh do not fit together ({reason})") from error
 
 
-def _parted(mesh: Any, groups: str | None, dimension: int | None, deck: Deck | None) -> PartedMesh:
+def _parted(mesh: meshio.Mesh, groups: str | None, dimension: int | None, deck: Deck | None) -> PartedMesh:
     kinds = list(dict.fromkeys(block.type for block in mesh.cells))
     if dimension is None:
         spatial = any(kind.startswith(("tetra", "hexa", "wedge", "pyramid", "polyhedron")) for kind in kinds)
@@ -215,7 +215,7 @@ def _plane(points: NDArray[Any]) -> Floats:
     if points.ndim == 2 and points.shape[1] == 3:
         nodes = positions(points, 3)
         extents = np.ptp(nodes, axis=0)
-        if extents[2] > _PLANE * np.max(extents):
+        if extents[2] > SAME * np.max(extents):
             raise InvalidArgumentError(
                 f"the mesh has plane cells and z from {nodes[:, 2].min():g} to {nodes[:, 2].max():g}; "
                 "expected a plane mesh with the same z everywhere, or cells of a body in 3D"
@@ -233,7 +233,7 @@ def _inside(number: Integers, rows: Integers, name: str) -> Integers:
     return np.asarray(number[rows])
 
 
-def _node_sets(mesh: Any) -> dict[str, Integers]:
+def _node_sets(mesh: meshio.Mesh) -> dict[str, Integers]:
     """Nodes by the name of their point set or of the group of their points, in the numbers of the file."""
     sets = {str(name): np.asarray(rows, dtype=np.int64).ravel() for name, rows in mesh.point_sets.items()}
     for tag, names in _families(mesh, _FAMILIES[1]).items():
@@ -244,7 +244,7 @@ def _node_sets(mesh: Any) -> dict[str, Integers]:
     return sets | points
 
 
-def _named(mesh: Any, facet: str, groups: str | None, dimension: int) -> dict[str, Integers]:
+def _named(mesh: meshio.Mesh, facet: str, groups: str | None, dimension: int) -> dict[str, Integers]:
     """Facets by the name of their group, in the numbers of the file."""
     if groups is not None and groups not in mesh.cell_data:
         known = ", ".join(mesh.cell_data) or "none"
@@ -254,7 +254,7 @@ def _named(mesh: Any, facet: str, groups: str | None, dimension: int) -> dict[st
     return named if named or not len(every) or _node_sets(mesh) else {ALL: every}
 
 
-def _grouped(mesh: Any, kinds: Sequence[str], groups: str | None, dimension: int) -> dict[str, Integers]:
+def _grouped(mesh: meshio.Mesh, kinds: Sequence[str], groups: str | None, dimension: int) -> dict[str, Integers]:
     """Rows of the cells of some kinds, counted through all their blocks, by the name of their cell set or group."""
     rows: dict[int, Integers] = {}
     count = 0
@@ -277,14 +277,14 @@ def _grouped(mesh: Any, kinds: Sequence[str], groups: str | None, dimension: int
     return {name: np.concatenate(parts) for name, parts in named.items()}
 
 
-def _rows(mesh: Any, kind: str) -> Integers:
+def _rows(mesh: meshio.Mesh, kind: str) -> Integers:
     """Nodes of all cells of a kind, in the numbers of the file."""
     parts = [np.asarray(block.data).astype(np.int64) for block in mesh.cells if block.type == kind]
     return np.concatenate(parts) if parts else np.zeros((0, 1), dtype=np.int64)
 
 
 def _tags(
-    mesh: Any, blocks: list[int], groups: str | None, dimension: int
+    mesh: meshio.Mesh, blocks: list[int], groups: str | None, dimension: int
 ) -> tuple[str | None, dict[int, list[str]], bool]:
     """Cell data whose numbers group cells, the names of numbers, and whether the others are names themselves."""
     if groups is not None:
@@ -367,7 +367,7 @@ def body_kinds(kinds: list[str], dimension: int) -> tuple[list[str], str]:
     return bodies, facet
 
 
-def body_cells(mesh: Any, bodies: list[str]) -> Integers:
+def body_cells(mesh: meshio.Mesh, bodies: list[str]) -> Integers:
     """The cells (M, k) of these kinds, as `PartedMesh` has them, by the numbers of the file."""
     blocks = [(block.type, np.asarray(block.data).astype(np.int64)) for block in mesh.cells if block.type in bodies]
     nodes = next((_NODES[kind] for kind in bodies if kind in _NODES), None)
@@ -385,7 +385,7 @@ def solid_cells(points: Floats, cells: Integers, labels: Integers | None = None)
     InvalidArgumentError
         As `solid_mesh` does.
     """
-    from enumsol.fem.solid_geometry import solid_mesh  # not for plane meshes
+    from enumsol.fem.solid_problems import solid_mesh  # not for plane meshes
 
     if cells.shape[1] == 20:
         points, cells = completed(points, cells)

@@ -8,14 +8,14 @@ zero in every solution, and so is the tangential force along it. All builders of
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.mesh_checks import nodal_vectors, spring_stiffnesses, unit_vectors, vectors_of_all
+from enumsol.fem.meshes import nodal_vectors, spring_stiffnesses, unit_vectors, vectors_of_all
 from enumsol.model.problem import ContactProblem
 from enumsol.support.arguments import shown
 
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from enumsol.model.mesh import BodyMesh
     from enumsol.model.problem3d import AnyProblem
     from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
+
+    Tangents = ArrayLike | tuple[ArrayLike, ArrayLike] | None
 
 #: Components of unit normals below this are rounding of a right angle.
 RIGHT_ANGLE = 1e-9
@@ -44,11 +46,6 @@ class Supports:
     fixed: Mask
     values: Floats
 
-    @classmethod
-    def held(cls, mask: Mask) -> Supports:
-        """Held at zero."""
-        return cls(mask, np.zeros(mask.shape))
-
 
 @dataclass(frozen=True)
 class ContactRows:
@@ -62,29 +59,20 @@ class ContactRows:
         Of length one.
     apart : (N, dimension) bool array
         Fixed components that stay in the problem.
+    nodes : (p,) int array
+        The node that each row stands for; none where rows stand for patches.
+    kept : (p,) int array
+        Which of the nodes that were asked for these are.
     """
 
     means: sp.csr_array
     normals: Floats
     apart: Mask
+    nodes: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    kept: Integers = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
-@dataclass(frozen=True)
-class ContactNodes(ContactRows):
-    """Contact nodes that can move: each row stands for one.
-
-    Attributes
-    ----------
-    nodes : (p,) int array
-    kept : (p,) int array
-        Which of the nodes that were asked for these are.
-    """
-
-    nodes: Integers
-    kept: Integers
-
-
-def movable(nodes: Integers, normals: Floats, supports: Supports, means: sp.csr_array | None = None) -> ContactNodes:
+def movable(nodes: Integers, normals: Floats, supports: Supports, means: sp.csr_array | None = None) -> ContactRows:
     """Contact nodes without those that are held entirely.
 
     ``means`` (p, N) are the displacements of the rows, relative to what each faces, by nodes; without them those of the
@@ -114,7 +102,7 @@ def movable(nodes: Integers, normals: Floats, supports: Supports, means: sp.csr_
     normals[touched] /= np.linalg.norm(normals[touched], axis=1)[:, None]
     apart = np.zeros_like(supports.fixed)
     apart[nodes] = fixed
-    return ContactNodes(means, normals, apart, nodes, kept)
+    return ContactRows(means, normals, apart, nodes, kept)
 
 
 def means_of_nodes(nodes: Integers, count: int) -> sp.csr_array:
@@ -124,10 +112,9 @@ def means_of_nodes(nodes: Integers, count: int) -> sp.csr_array:
 
 def check_axes(contact: ContactRows, tangents: tuple[Floats, ...]) -> None:
     """Refuse tangential axes at planes of symmetry that are neither along nor across them."""
-    if not isinstance(contact, ContactNodes):
-        return  # of rows that stand for patches nothing is held in some components only
     apart = contact.apart[contact.nodes]
-    for tangent in tangents:
+    # of rows that stand for patches nothing is held in some components only
+    for tangent in tangents if len(apart) else ():
         across = np.linalg.norm(np.where(apart, tangent, 0.0), axis=1)
         oblique = (across > RIGHT_ANGLE) & (np.linalg.norm(np.where(apart, 0.0, tangent), axis=1) > RIGHT_ANGLE)
         if np.any(oblique):
@@ -139,11 +126,12 @@ def check_axes(contact: ContactRows, tangents: tuple[Floats, ...]) -> None:
 
 @dataclass(frozen=True)
 class Body:
-    """A body before its supports, by degrees of freedom.
+    """A body before its supports, by degrees of freedom, and the supports by nodes.
 
     Attributes
     ----------
     A, f, load_slope : as in `ContactProblem`
+    supports : Supports
     dofs : (N, dimension) int array or None
         The rows of A that the components of the nodes are; None: ``dimension node + component``.
     """
@@ -151,20 +139,30 @@ class Body:
     A: sp.csc_array
     f: Floats
     load_slope: Floats | None
+    supports: Supports
     dofs: Integers | None = None
 
+    @classmethod
+    def of_nodes(
+        cls,
+        A: sp.csc_array,
+        held: Mask,
+        springs: ArrayLike | None,
+        forces: ArrayLike | None,
+        slope: ArrayLike | None,
+    ) -> Body:
+        """Body whose components ``held`` (N, dimension) are at rest, with springs and forces on its nodes.
 
-def with_springs(stiffness: sp.csc_array, springs: ArrayLike | None, shape: tuple[int, ...]) -> sp.csc_array:
-    """Stiffness with springs from every node to the ground."""
-    if springs is None:
-        return stiffness
-    return sp.csc_array(stiffness + sp.diags_array(spring_stiffnesses(springs, shape).ravel()))
-
-
-def loaded(A: sp.csc_array, forces: ArrayLike | None, slope: ArrayLike | None, shape: tuple[int, ...]) -> Body:
-    """Body under forces on its nodes, and their derivative with respect to alpha."""
-    f = nodal_vectors(forces, "forces", shape)
-    return Body(A, f, None if slope is None else nodal_vectors(slope, "forces_slope", shape))
+        Raises
+        ------
+        InvalidArgumentError
+            Springs or forces are not of the form of the nodes.
+        """
+        if springs is not None:
+            A = sp.csc_array(A + sp.diags_array(spring_stiffnesses(springs, held.shape).ravel()))
+        f = nodal_vectors(forces, "forces", held.shape)
+        load_slope = None if slope is None else nodal_vectors(slope, "forces_slope", held.shape)
+        return cls(A, f, load_slope, Supports(held, np.zeros(held.shape)))
 
 
 def displacements_along(means: sp.csr_array, directions: Floats, dofs: Integers, left: Integers) -> sp.csr_array:
@@ -202,7 +200,6 @@ def problem_of(
     body: Body,
     contact: ContactRows,
     axes: tuple[Floats, ...],
-    supports: Supports,
     mesh: Callable[[Integers], BodyMesh] | None = None,
     modes: Floats | None = None,
     **more: Any,
@@ -215,7 +212,6 @@ def problem_of(
     contact : ContactRows
     axes : tuple of one or two (p, dimension) arrays
         Tangents of the contact rows, see `axes_of`.
-    supports : Supports
     mesh : callable or None
         What the problem keeps of its mesh, from the degrees of freedom that are left.
     modes : (d N, r) array or None
@@ -235,6 +231,7 @@ def problem_of(
         The body is free to move as a rigid body, or the data are not admissible.
     """
     check_axes(contact, axes)
+    supports = body.supports
     dofs, load = plain_dofs(supports.fixed.shape) if body.dofs is None else body.dofs, body.f
     fixed, uncoupled, moved = np.zeros(len(load), bool), np.zeros(len(load), bool), np.zeros(len(load))
     fixed[dofs], uncoupled[dofs] = supports.fixed, contact.apart
@@ -259,7 +256,7 @@ def problem_of(
     return ContactProblem3D(*arrays, **more)
 
 
-def axes_of(tangents: object, normals: Floats) -> tuple[Floats, ...]:
+def axes_of(tangents: Tangents, normals: Floats) -> tuple[Floats, ...]:
     """Tangents for normals (p, 2) or (p, 3): one (p, 2), or two (p, 3).
 
     Parameters
@@ -283,7 +280,7 @@ def default_axes(normal: Floats) -> tuple[Floats, Floats]:
     return first, np.cross(normal, first)
 
 
-def _plane_axes(tangents: Any, normal: Floats) -> tuple[Floats]:
+def _plane_axes(tangents: Tangents, normal: Floats) -> tuple[Floats]:
     if tangents is None:
         return (np.stack([-normal[:, 1], normal[:, 0]], axis=1),)
     tangent = unit_vectors(vectors_of_all(tangents, "tangents", normal.shape), "tangents")
@@ -294,7 +291,7 @@ def _plane_axes(tangents: Any, normal: Floats) -> tuple[Floats]:
     return (tangent,)
 
 
-def _space_axes(tangents: object, normal: Floats) -> tuple[Floats, Floats]:
+def _space_axes(tangents: Tangents, normal: Floats) -> tuple[Floats, Floats]:
     if tangents is None:
         return default_axes(normal)
     if not (isinstance(tangents, (tuple, list)) and len(tangents) == 2):

@@ -8,19 +8,20 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.basis_problems import outward_normal
+from enumsol.fem.assembly import outward_normal
+from enumsol.fem.bases import SIMPLICES, corners_of, place_of
 from enumsol.fem.conditions import holding
-from enumsol.fem.contacts import Group
+from enumsol.fem.contacts import Group, faced
 from enumsol.fem.file_counts import taken_as
-from enumsol.fem.mesh_checks import unit_vectors
-from enumsol.fem.meshes import PartedMesh
-from enumsol.fem.pairs import faced
+from enumsol.fem.meshes import SAME, PartedMesh, cell_name, unit_vectors
 from enumsol.fem.scene_data import SceneData
-from enumsol.fem.tangles import SAME, refuse_tangles, unjoined
 from enumsol.model.cells import boundary_facets
 from enumsol.support.array_types import Floats, Integers, Mask
 from enumsol.support.messages import counted
 
+#: A point is inside a cell where all its coordinates there are larger than this: not where cells only touch, nor where
+#: they are taken as plane although they are curved, or bend out of their plane.
+_INSIDE = 1e-3
 #: Share of the contact nodes of a part that may touch another body before that is refused as a wall between both.
 _WALL = 0.5
 #: Press fits, and given displacements, above these parts of the extent of the largest body are not small.
@@ -47,15 +48,55 @@ def _bodies(scene: SceneData) -> Integers:
 
 
 def refuse_overlaps(scene: SceneData) -> None:
-    """Refuse meshes whose cells overlap, but for parts of bodies that are a pair.
+    """Refuse meshes in which cells of one connected body overlap, but for parts of bodies that are a pair.
+
+    As cells that share a facet are on different sides of it (`fem.bases.refuse_wrong_sides`), a body can overlap itself
+    only where a facet of its boundary is inside of a cell. Faces of a crack may touch. At a pair a body may overlap
+    itself or another, as by a press fit.
 
     Raises
     ------
     InvalidArgumentError
         It names cells.
     """
-    pairs = [_nodes_of(scene.mesh, group) for group in scene.contacts.groups if group.pair is not None]
-    refuse_tangles(scene.mesh, _bodies(scene), np.any([np.zeros(len(scene.mesh.points), dtype=bool), *pairs], axis=0))
+    mesh, facets = scene.mesh, boundary_facets(scene.dimension, scene.mesh.cells)
+    pairs = [_nodes_of(mesh, group) for group in scene.contacts.groups if group.pair is not None]
+    paired = np.any([np.zeros(len(mesh.points), dtype=bool), *pairs], axis=0)
+    facets = facets[~np.all(paired[facets], axis=1)]
+    for own in corners_of(scene.dimension, mesh.cells):
+        _refuse_covered(mesh, own, facets, _bodies(scene))
+
+
+def _refuse_covered(mesh: PartedMesh, own: tuple[Integers, Integers], facets: Integers, body: Integers) -> None:
+    """Refuse cells of one kind that have a corner or the middle of a facet of the boundary inside."""
+    from scipy.spatial import cKDTree  # not needed for problems without a mesh
+
+    rows, corners = own
+    dimension = mesh.points.shape[1]
+    # corners and middles of the facets, each with the nodes that a cell there may have in common with the facet
+    spread = [facets[:, k : k + 1] for k in range(dimension)] + [facets[:, :dimension]]
+    curved = facets.shape[1] > (2 if dimension == 2 else 4) or (dimension, mesh.cells.shape[1]) in ((3, 10), (2, 6))
+    places = np.concatenate([mesh.points[nodes].mean(axis=1) for nodes in spread])
+    shared = [nodes for part in spread for nodes in (facets if curved else part).tolist()]
+    centres = mesh.points[corners].mean(axis=1)
+    reach = np.max(np.linalg.norm(mesh.points[corners] - centres[:, None], axis=2), axis=1)
+    tree = cKDTree(places)
+    found = np.flatnonzero(tree.query_ball_point(centres, reach, return_length=True))
+    for row, near in zip(found, tree.query_ball_point(centres[found], reach[found]), strict=True):
+        nodes = set(mesh.cells[rows[row]].tolist())
+        apart = [k for k in near if body[shared[k][0]] == body[corners[row, 0]] and nodes.isdisjoint(shared[k])]
+        if not apart:
+            continue
+        for simplex in SIMPLICES[dimension, corners.shape[1]]:
+            ends = mesh.points[corners[row, simplex]]
+            inner = np.linalg.solve((ends[1:] - ends[0]).T, (places[apart] - ends[0]).T)
+            deep = np.min(np.vstack([inner, 1.0 - inner.sum(axis=0)]), axis=0) > _INSIDE
+            if np.any(deep):
+                raise InvalidArgumentError(
+                    f"{cell_name(int(rows[row]), mesh.labels)} overlaps other cells of its body, whose boundary is "
+                    f"inside of it at {place_of(places[apart[int(np.argmax(deep))]])}; expected cells that cover the "
+                    "body once"
+                )
 
 
 def refuse_walls(scene: SceneData) -> None:
@@ -165,9 +206,30 @@ def _formulations(scene: SceneData) -> list[str]:
 
 
 def _unjoined(scene: SceneData) -> list[str]:
-    """Notes on nodes that coincide, but for those of contacts."""
-    joined = [_nodes_of(scene.mesh, group) for group in scene.contacts.groups]
-    return unjoined(scene.mesh, _bodies(scene), [piece.name for piece in scene.pieces], joined)
+    """Notes on nodes of the boundary at one place, but for those of contacts: cracks, and bodies that seem joined."""
+    from scipy.spatial import cKDTree  # as above
+
+    mesh, body, names = scene.mesh, _bodies(scene), [piece.name for piece in scene.pieces]
+    boundary = np.unique(boundary_facets(scene.dimension, mesh.cells))
+    near = SAME * float(np.max(np.ptp(mesh.points, axis=0)))
+    twins = boundary[cKDTree(mesh.points[boundary]).query_pairs(near, output_type="ndarray")]
+    for mask in (_nodes_of(mesh, group) for group in scene.contacts.groups):
+        twins = twins[~np.all(mask[twins], axis=1)]
+    notes = []
+    for one in range(len(names)):
+        for two in range(one, len(names)):
+            found = twins[np.all(np.sort(body[twins], axis=1) == (one, two), axis=1)]
+            if not len(found):
+                continue
+            places = mesh.points[np.unique(found[:, 0])]
+            of = names[one] if one == two else f"{names[one]} and {names[two]}"
+            at = place_of(places[0]) if len(places) == 1 else f"{place_of(places[0])} and elsewhere"
+            does = "a crack that nothing closes" if one == two else "bodies that pass through each other there"
+            notes.append(
+                f"{counted(len(places), 'place')} of {of} {'have' if len(places) > 1 else 'has'} several nodes, at "
+                f"{at}, which neither the mesh joins nor a pair: {does}"
+            )
+    return notes
 
 
 def _nodes_of(mesh: PartedMesh, group: Group) -> Mask:

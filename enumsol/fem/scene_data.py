@@ -1,9 +1,9 @@
-"""What a mesh and its options describe: bodies, supports, loads and contacts, as arrays by nodes."""
+"""Data of a scene: what a mesh and its options describe, as arrays by nodes, in words and as a picture."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -13,15 +13,24 @@ import scipy.sparse as sp
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem import conditions
 from enumsol.fem.bases import NodalBasis
+from enumsol.fem.conditions import FRICTION, Options
 from enumsol.fem.contacts import Contacts, Group
 from enumsol.fem.meshes import PartedMesh
-from enumsol.fem.options import FRICTION, Options
+from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines
 from enumsol.model.problem import given_friction
+from enumsol.model.shapes import acting_nodes, signs
 from enumsol.support.arguments import finite_number
+from enumsol.support.array_types import Floats, Integers
+from enumsol.support.messages import counted
+from enumsol.support.plotting import in_units, new_figure
 
 if TYPE_CHECKING:
-    from enumsol.fem.options import Coefficients
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from enumsol.fem.conditions import Coefficients
     from enumsol.support.array_types import Floats
+
 
 #: Options that say what a part of the boundary is for.
 _USES = ("contact", "clamp", "symmetry", "displacement", "spring", "load", "load_slope", "pressure", "pressure_slope")
@@ -110,7 +119,7 @@ class SceneData:
         return found + [f"facets of the pair {pair}" for pair in pairs if part == pair.master]
 
 
-def _names(value: Any) -> Sequence[str]:
+def _names(value: str | Iterable[str] | None) -> Sequence[str]:
     """The parts that an option names."""
     return [value] if isinstance(value, str) else () if value is None else list(value)
 
@@ -140,3 +149,187 @@ def of_rows(
     if missing and other is None:
         raise InvalidArgumentError(f"{name} is not given for {', '.join(missing)}; expected it for all contact parts")
     return np.array([given.get(part, other) for part in parts])
+
+
+#: Width of the column of titles.
+_TITLES = 10
+#: Components of a resultant below this part of all nodal forces are rounding.
+_ROUNDING = 1e-12
+
+
+def sections_of(scene: SceneData, notes: list[str]) -> dict[str, list[str]]:
+    """The lines of a `Scene` by their titles."""
+    return {
+        "mesh": _mesh(scene),
+        "bodies": _bodies(scene),
+        "material": _material(scene),
+        "parts": _parts(scene),
+        "loads": _loads(scene),
+        "contact": _contact(scene),
+        "note": notes,
+    }
+
+
+def described(scene: SceneData, notes: list[str]) -> str:
+    """The lines of a `Scene`."""
+    return "\n".join(_titled(sections_of(scene, notes)))
+
+
+def _titled(sections: Mapping[str, Sequence[str]]) -> Iterable[str]:
+    for title, lines in sections.items():
+        for k, line in enumerate(lines):
+            yield f"{title if k == 0 or title == 'note' else '':{_TITLES}}{line}"
+
+
+def _mesh(scene: SceneData) -> list[str]:
+    mesh, d = scene.mesh, scene.dimension
+    cells = [f"{len(rows)} {KINDS[d, nodes.shape[1]].name}" for rows, nodes in by_kind(d, mesh.cells)]
+    extent = f"from {_vector(mesh.points.min(axis=0))} to {_vector(mesh.points.max(axis=0))}"
+    return [f"{len(mesh.points)} nodes, {', '.join(cells)}, {extent}"]
+
+
+def _bodies(scene: SceneData) -> list[str]:
+    mesh = scene.mesh
+    sizes = np.empty(len(mesh.cells))
+    for block in scene.body.blocks:
+        sizes[block.rows] = np.sum(block.basis.dx, axis=1)
+
+    def size(rows: Integers) -> str:
+        what = "area" if scene.dimension == 2 else "volume"
+        return f"{counted(len(rows), 'cell')}, {what} {np.sum(sizes[rows]):.6g}"
+
+    lines, said = [], set()
+    for piece in scene.pieces:
+        free = piece.free_motions(mesh.points, scene.hold)
+        modes = f"{counted(free, 'rigid mode')} that nothing but contact holds" if free else "held"
+        lines.append(f"{piece.name}: {size(np.flatnonzero(np.all(piece.nodes[mesh.cells], axis=1)))}, {modes}")
+        said.add(piece.name)
+    return [*lines, *(f"part {name}: {size(rows)}" for name, rows in mesh.bodies.items() if name not in said)]
+
+
+def _material(scene: SceneData) -> list[str]:
+    names = ("young", "poisson", *(("plane", "thickness") if scene.dimension == 2 else ()))
+    return [f"{name} {_said(getattr(scene.options, name))}" for name in names]
+
+
+def _parts(scene: SceneData) -> list[str]:
+    plain, what = replace(scene.body, thickness=None), "length" if scene.dimension == 2 else "area"
+    lines = []
+    for name, facets in scene.mesh.facets.items():
+        try:
+            size = f"{what} {np.sum(plain.on_part(facets, name, lambda v, _: v[0], lumped=True)):.6g}"
+        except InvalidArgumentError:
+            size = "not on the boundary"
+        lines.append(f"{name}: {counted(len(facets), 'facet')}, {size}; {', '.join(scene.uses(name)) or 'not used'}")
+    lines += [
+        f"{name}: {counted(len(nodes), 'node')}; {', '.join(scene.uses(name)) or 'not used'}"
+        for name, nodes in scene.mesh.node_sets.items()
+        if name not in scene.mesh.facets
+    ]
+    return lines
+
+
+def _loads(scene: SceneData) -> list[str]:
+    lines = [f"resultant {_resultant(scene.forces)}"]
+    if np.any(scene.slope):
+        lines.append(f"times alpha: resultant {_resultant(scene.slope)}")
+    return lines
+
+
+def _resultant(forces: Floats) -> str:
+    """The sum of nodal forces, without what rounding leaves of those that cancel."""
+    total = forces.sum(axis=0)
+    return _vector(np.where(np.abs(total) <= _ROUNDING * np.sum(np.abs(forces)), 0.0, total))
+
+
+def _contact(scene: SceneData) -> list[str]:
+    lines = []
+    for group, gaps in scene.gaps_of_groups:
+        gap = f"gap {gaps[0]:.6g}" if np.ptp(gaps) == 0 else f"gaps from {gaps.min():.6g} to {gaps.max():.6g}"
+        lines.append(f"{counted(group.count, 'contact node')} of {group}, {gap}")
+    coefficients = {name: getattr(scene.options, name) for name in FRICTION}
+    return [*lines, *(f"{name} {_said(value)}" for name, value in coefficients.items() if value is not None)]
+
+
+def _said(value: float | str | Mapping[str, float | str]) -> str:
+    """A number, a word, or one of these for each of several parts."""
+    if isinstance(value, Mapping):
+        return ", ".join(f"{_said(own)} ({part})" for part, own in value.items())
+    return value if isinstance(value, str) else f"{float(value):.6g}"
+
+
+def _vector(values: Floats) -> str:
+    return f"({', '.join(f'{float(value) + 0.0:.6g}' for value in values)})"
+
+
+#: Length of the longest force, and of a normal, as a part of the extent.
+_FORCE, _NORMAL = 0.16, 0.06
+_BODY, _EDGE, _LOAD, _SLOPE, _CONTACT = "#dfe6ee", "#aab6c3", "#b3202c", "#d9730d", "#1f5fa8"
+
+
+def draw_scene(scene: SceneData, units: tuple[str, str] | None = None) -> Figure:
+    """A figure of a `Scene`."""
+    from matplotlib.collections import LineCollection, PolyCollection  # with the first figure
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    mesh, d = scene.mesh, scene.dimension
+    figure: Figure = new_figure(figsize=(8.0, 5.6))
+    ax: Any = figure.add_subplot(**({"projection": "3d"} if d == 3 else {}))
+    if d == 2:
+        for _, cells in by_kind(2, mesh.cells):
+            outlines = mesh.points[cells[:, KINDS[2, cells.shape[1]].outline]]
+            ax.add_collection(PolyCollection(list(outlines), facecolor=_BODY, edgecolor=_EDGE, linewidth=0.5))
+    else:
+        faces = mesh.points[facet_outlines(boundary_facets(3, mesh.cells))]
+        ax.add_collection3d(Poly3DCollection(list(faces), facecolor=_BODY, edgecolor=_EDGE, linewidth=0.3, alpha=0.25))
+    for k, (name, facets) in enumerate(mesh.facets.items()):
+        label = f"{name}: {', '.join(scene.uses(name)) or 'not used'}"
+        if d == 2:
+            along = facets if facets.shape[1] == 2 else facets[:, [0, 2, 1]]
+            ax.add_collection(LineCollection(list(mesh.points[along]), color=f"C{k}", linewidth=3, label=label))
+        else:
+            sides = list(mesh.points[facet_outlines(facets)])
+            ax.add_collection3d(Poly3DCollection(sides, facecolor=f"C{k}", alpha=0.35, label=label))
+    places = mesh.points[scene.contacts.rows.nodes]
+    extent = float(np.max(np.ptp(mesh.points, axis=0)))
+    ax.plot(*places.T, "o", color=_CONTACT, markersize=4, label="contact nodes and their normals", zorder=5)
+    _arrows(ax, places, _NORMAL * extent * scene.contacts.rows.normals, _CONTACT)
+    for forces, colour, label in ((scene.forces, _LOAD, "loads"), (scene.slope, _SLOPE, "loads times alpha")):
+        shown = signs(mesh.points, acting_nodes(forces), _edges(d, mesh.cells))
+        if shown:
+            sums = np.array([forces[group].sum(axis=0) for _, group in shown])
+            long = _FORCE * extent / np.max(np.linalg.norm(sums, axis=1)) * sums
+            some = ", summed over nodes side by side" if any(len(group) > 1 for _, group in shown) else ""
+            _arrows(ax, mesh.points[[node for node, _ in shown]] - long, long, colour, label + some)
+    if d == 2:
+        ax.autoscale_view()
+        ax.set_aspect("equal", adjustable="datalim")
+        ax.margins(0.1)
+    else:
+        ax.auto_scale_xyz(*mesh.points.T)
+        ax.set_aspect("equal")
+    for direction in "xyz"[: d if units is not None else 0]:
+        getattr(ax, f"set_{direction}label")(in_units(direction, "length", units))
+    figure.legend(loc="outside right upper", fontsize=7)
+    return figure
+
+
+def _edges(dimension: int, cells: Integers) -> Integers:
+    """Edges of the boundary between neighbouring nodes, (k, 2)."""
+    facets = boundary_facets(dimension, cells)
+    if dimension == 3:
+        outlines = facet_outlines(facets)
+        return np.stack([outlines, np.roll(outlines, -1, axis=1)], axis=2).reshape(-1, 2)
+    along = facets if facets.shape[1] == 2 else facets[:, [0, 2, 1]]
+    return np.concatenate([along[:, k : k + 2] for k in range(along.shape[1] - 1)])
+
+
+def _arrows(ax: Axes, places: Floats, vectors: Floats, colour: str, label: str | None = None) -> None:
+    if places.shape[1] == 2:
+        ax.quiver(
+            *(*places.T, *vectors.T), color=colour, label=label, angles="xy", scale_units="xy", scale=1.0, width=0.004,
+            zorder=4,
+        )  # fmt: skip
+        ax.update_datalim(np.concatenate([places, places + vectors]))
+    else:
+        ax.quiver(*places.T, *vectors.T, color=colour, label=label, arrow_length_ratio=0.25)

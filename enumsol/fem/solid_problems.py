@@ -15,10 +15,10 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.fem import mesh_checks, restrained
-from enumsol.fem.bases import nodal_basis
+from enumsol.fem import meshes, restrained
+from enumsol.fem.bases import FLAT, nodal_basis
 from enumsol.fem.meshes import blocks
-from enumsol.fem.solid_geometry import facet_quadrature, facet_vectors, outward, shape_volumes, solid_mesh
+from enumsol.model.cells import HEXAHEDRON, KINDS, boundary_facets, facet_rows
 from enumsol.model.mesh import BodyMesh
 from enumsol.model.problem3d import ContactProblem3D, SlipMean
 from enumsol.support.arguments import one_of, positive_integer
@@ -33,6 +33,135 @@ if TYPE_CHECKING:
 
 #: How far axes may be from right angles and length one, for rounding.
 AXES_TOLERANCE = 1e-10
+_GAUSS_2 = (0.5 - np.sqrt(1 / 12), 0.5 + np.sqrt(1 / 12)), (0.5, 0.5)
+_GAUSS_3 = (0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15)), (5 / 18, 8 / 18, 5 / 18)
+
+
+def solid_mesh(
+    points: ArrayLike, cells: ArrayLike, kinds: tuple[int, ...] = (4, 8), labels: Integers | None = None
+) -> tuple[Floats, Integers]:
+    """Points (N, 3) and cells (M, k) of positive volume, k among ``kinds``; they may come in any orientation.
+
+    ``labels`` (M,) are the numbers by which messages name cells; by default their rows. What the nodes of second order
+    (10 or 27 in all) do to a cell is checked by `nodal_basis`.
+
+    Raises
+    ------
+    InvalidArgumentError
+        The mesh is not valid: shapes, node numbers, a node in no cell, a cell that is flat or inside out.
+    """
+    nodes = meshes.positions(points, 3)
+    bodies = meshes.elements(cells, "cells", kinds, len(nodes))
+    kind = KINDS[3, bodies.shape[1]]
+    corners = nodes[bodies[:, : kind.corners]]
+    size = np.max(np.ptp(corners, axis=1), axis=1) ** 3
+    volumes = _tetrahedron_volumes(corners)[:, None] if kind.corners == 4 else _corner_volumes(corners)
+    ordered = np.sort(bodies, axis=1)
+    _refuse(
+        np.any(ordered[:, 1:] == ordered[:, :-1], axis=1) & (kind.corners == 8),
+        "names a node twice, as one that is collapsed to a wedge or a pyramid does; expected distinct nodes: mesh all "
+        "of the body by tetrahedra, or by hexahedra",
+        labels,
+    )
+    turned = np.all(volumes < 0, axis=1)
+    bodies[turned] = bodies[turned][:, kind.turned]
+    volumes[turned] *= -1
+    _refuse(np.max(np.abs(volumes), axis=1) <= FLAT * size, "has no volume; expected proper cells", labels)
+    _refuse(
+        np.min(volumes, axis=1) <= FLAT * size,
+        "is turned inside out at a corner; expected hexahedra with corners in the order of VTK",
+        labels,
+    )
+    meshes.check_every_node_is_used(bodies, len(nodes), "cells", "cell")
+    return nodes, bodies
+
+
+def _refuse(wrong: Mask, found: str, labels: Integers | None) -> None:
+    if np.any(wrong):
+        raise InvalidArgumentError(f"{meshes.cell_name(int(np.argmax(wrong)), labels)} {found}")
+
+
+def _tetrahedron_volumes(corners: Floats) -> Floats:
+    edges = corners[:, 1:] - corners[:, :1]
+    return np.asarray(np.linalg.det(edges) / 6.0)
+
+
+def _corner_volumes(corners: Floats) -> Floats:
+    """Volumes (M, 8) of the parallelepipeds that the three edges at each corner of a hexahedron span."""
+    return np.stack([_jacobians(corners, corner)[1] for corner in HEXAHEDRON], axis=1)
+
+
+def _jacobians(corners: Floats, place: Floats) -> tuple[Floats, Floats]:
+    """Shape functions (8,) of the hexahedron at a place of the reference, and the determinants (M,) there."""
+    factors = np.where(HEXAHEDRON == 1, place, 1.0 - place)
+    slopes = np.where(HEXAHEDRON == 1, 1.0, -1.0)
+    gradients = np.stack([slopes[:, k] * np.prod(np.delete(factors, k, axis=1), axis=1) for k in range(3)])
+    return np.prod(factors, axis=1), np.asarray(np.linalg.det(np.einsum("ka,mai->mki", gradients, corners)))
+
+
+def shape_volumes(nodes: Floats, cells: Integers) -> Floats:
+    """Integral of every corner's shape function over its cell, (M, 4) or (M, 8) [length^3]."""
+    corners = nodes[cells]
+    if cells.shape[1] == 4:
+        return np.tile(_tetrahedron_volumes(corners)[:, None] / 4.0, (1, 4))
+    points, weights = _GAUSS_2
+    total = np.zeros(cells.shape)
+    for i, j, k in np.ndindex(2, 2, 2):
+        values, determinants = _jacobians(corners, np.array([points[i], points[j], points[k]]))
+        total += weights[i] * weights[j] * weights[k] * determinants[:, None] * values
+    return total
+
+
+def outward(facets: Integers, cells: Integers) -> Integers:
+    """Facets with their corners in the body's order: counterclockwise as seen from outside.
+
+    Raises
+    ------
+    InvalidArgumentError
+        One is not a facet on the boundary of the body, or comes twice; they have another number of corners.
+    """
+    boundary = boundary_facets(3, cells)
+    if facets.shape[1] != boundary.shape[1]:
+        name = KINDS[3, cells.shape[1]].name
+        raise InvalidArgumentError(
+            f"contact has facets of {facets.shape[1]} nodes; expected {boundary.shape[1]}, as {name} have"
+        )
+    rows = facet_rows(facets, boundary, facets.shape[1])
+    meshes.check_facets(rows, facets, "contact")
+    return boundary[rows]
+
+
+def facet_vectors(nodes: Floats, facets: Integers) -> Floats:
+    """Normals of facets times their areas (of the projection for quadrilaterals that are not plane), (k, 3)."""
+    corners = nodes[facets]
+    if facets.shape[1] == 3:
+        return np.asarray(0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    return np.asarray(0.5 * np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]))
+
+
+def facet_quadrature(nodes: Floats, facets: Integers) -> tuple[Floats, Floats]:
+    """Quadrature of degree 2 on triangles, 5 in each direction on quadrilaterals.
+
+    Returns
+    -------
+    values : (q, 3) or (q, 4) array
+        Shape functions of the corners at the q points of a facet [-].
+    weights : (k, q) array
+        Weights of the points of each facet, which add up to its area [length^2].
+    """
+    if facets.shape[1] == 3:
+        values = np.full((3, 3), 1.0 / 6.0) + 0.5 * np.eye(3)
+        areas = np.linalg.norm(facet_vectors(nodes, facets), axis=1)
+        return values, np.tile(areas[:, None] / 3.0, (1, 3))
+    corners, (points, gauss) = nodes[facets], _GAUSS_3
+    shapes, weights = [], []
+    for i, j in np.ndindex(3, 3):
+        x, y = points[i], points[j]
+        along_x = np.array([-(1 - y), 1 - y, y, -y]) @ corners
+        along_y = np.array([-(1 - x), -x, x, 1 - x]) @ corners
+        shapes.append([(1 - x) * (1 - y), x * (1 - y), x * y, (1 - x) * y])
+        weights.append(gauss[i] * gauss[j] * np.linalg.norm(np.cross(along_x, along_y), axis=1))
+    return np.array(shapes), np.stack(weights, axis=1)
 
 
 @dataclass(frozen=True)
@@ -222,9 +351,9 @@ def local_axes(multipliers: SurfaceRows, normals: ArrayLike | None, axes: object
     """
     shape = multipliers.places.shape
     if normals is None:
-        normal = mesh_checks.unit_vectors(multipliers.vectors, "normals of the contact surface")
+        normal = meshes.unit_vectors(multipliers.vectors, "normals of the contact surface")
     else:
-        normal = mesh_checks.unit_vectors(mesh_checks.vectors_of_all(normals, "normals", shape), "normals")
+        normal = meshes.unit_vectors(meshes.vectors_of_all(normals, "normals", shape), "normals")
         inward = np.sum(normal * multipliers.vectors, axis=1) <= 0
         if np.any(inward):
             k = int(np.argmax(inward))
@@ -246,7 +375,7 @@ def local_axes(multipliers: SurfaceRows, normals: ArrayLike | None, axes: object
 def _field(value: object, places: Floats) -> Floats:
     if callable(value):
         value = [value(place) for place in places]
-    return mesh_checks.vectors_of_all(real_array(value, "axes", error=InvalidArgumentError), "axes", places.shape)
+    return meshes.vectors_of_all(real_array(value, "axes", error=InvalidArgumentError), "axes", places.shape)
 
 
 def _not_orthonormal(i: int, j: int, row: int, one: Floats, two: Floats) -> InvalidArgumentError:
@@ -293,7 +422,7 @@ def solid_stiffness(points: ArrayLike, cells: ArrayLike, lame: tuple[float, floa
     >>> fem.solid_stiffness(mesh.points, mesh.cells, lame=(1, 1)).shape
     (36, 36)
     """
-    lam, mu = mesh_checks.lame_coefficients(lame, 3)
+    lam, mu = meshes.lame_coefficients(lame, 3)
     return nodal_basis(*solid_mesh(points, cells)).stiffness(lam, mu)
 
 
@@ -320,7 +449,7 @@ def solid_body_forces(points: ArrayLike, cells: ArrayLike, density: ArrayLike) -
     [0.0, 0.0, -8.0]
     """
     nodes, bodies = solid_mesh(points, cells)
-    values = mesh_checks.vectors_of_all(density, "density", (len(bodies), 3))
+    values = meshes.vectors_of_all(density, "density", (len(bodies), 3))
     return restrained.gathered(bodies, shape_volumes(nodes, bodies), values, len(nodes))
 
 
@@ -348,9 +477,9 @@ def facet_forces(points: ArrayLike, facets: ArrayLike, traction: ArrayLike) -> F
     >>> fem.facet_forces(corners, [[0, 1, 2]], traction=(0, 0, -1)).round(12)[:, 2].tolist()
     [-1.0, -1.0, -1.0]
     """
-    nodes = mesh_checks.positions(points, 3)
-    surface = mesh_checks.elements(facets, "facets", (3, 4), len(nodes))
-    density = mesh_checks.vectors_of_all(traction, "traction", (len(surface), 3))
+    nodes = meshes.positions(points, 3)
+    surface = meshes.elements(facets, "facets", (3, 4), len(nodes))
+    density = meshes.vectors_of_all(traction, "traction", (len(surface), 3))
     values, weights = facet_quadrature(nodes, surface)
     return restrained.gathered(surface, weights @ values, density, len(nodes))
 
@@ -442,10 +571,10 @@ def solid_contact_problem(
     """
     nodes, bodies = solid_mesh(points, cells)
     surface = ContactSurface(nodes, outward(_contact_facets(contact, len(nodes)), bodies))
-    mask = mesh_checks.held_mask(held, nodes.shape)
+    mask = meshes.held_mask(held, nodes.shape)
     rows = _rows(surface, mask, one_of(multipliers, "multipliers", ("nodes", "elements")), ratio, patches)
     normal, first, second = local_axes(rows, normals, axes)
-    A = restrained.with_springs(solid_stiffness(nodes, bodies, lame), springs, nodes.shape)
+    body = restrained.Body.of_nodes(solid_stiffness(nodes, bodies, lame), mask, springs, forces, forces_slope)
     dofs, free = restrained.plain_dofs(nodes.shape), np.flatnonzero(~mask.ravel())
     of_facets, mean = rows.rows_of_facets, None
     if of_facets is not None:
@@ -453,10 +582,9 @@ def solid_contact_problem(
         offset = real_array(slip_offset, "slip_offset")
         mean = SlipMean(*_slips(surface, of_facets, (first, second), offset, dofs, free), weights)
     problem = restrained.problem_of(
-        restrained.loaded(A, forces, forces_slope, nodes.shape),
+        body,
         restrained.ContactRows(rows.means, normal, np.zeros_like(mask)),
         (first, second),
-        restrained.Supports.held(mask),
         mesh=lambda left: BodyMesh.of_dofs(nodes, bodies, left, None, surface.facets, of_facets, lame),
         gap=gap,
         friction=friction,
@@ -473,10 +601,10 @@ def solid_contact_problem(
 def _contact_facets(contact: ArrayLike, count: int) -> Integers:
     if plain_array(contact, "contact", error=InvalidArgumentError).size == 0:
         raise InvalidArgumentError("contact has no facets; expected (k, 3) or (k, 4) node numbers of the surface")
-    return mesh_checks.elements(contact, "contact", (3, 4), count)
+    return meshes.elements(contact, "contact", (3, 4), count)
 
 
-def _rows(surface: ContactSurface, held: Mask, kind: str, ratio: int, patches: Any) -> SurfaceRows:
+def _rows(surface: ContactSurface, held: Mask, kind: str, ratio: int, patches: ArrayLike | None) -> SurfaceRows:
     width = positive_integer(ratio, "ratio")
     if kind == "nodes":
         if width != 1 or patches is not None:

@@ -13,8 +13,7 @@ from enumsol.condensation.condensed import RHS_BLOCK
 from enumsol.errors import InvalidArgumentError
 from enumsol.fixed_points.system import ContactSystem, checked_problem
 from enumsol.fixed_points.tresca import node_values
-from enumsol.model.friction import FrictionTable
-from enumsol.model.problem3d import ContactProblem3D, SlipMean
+from enumsol.model.problem3d import ContactProblem3D, FrictionTable, SlipMean
 from enumsol.support.arguments import nonnegative_number
 
 if TYPE_CHECKING:

@@ -166,7 +166,7 @@ class FixedPoint(TrescaState):
         last = f"last increment {forces:.2e} in forces" + (f", {slips:.2e} in slips" if depends else "")
         solved = counted(self.iterations, "iteration")
         body: Any = self.problem
-        motion = self.free_motion
+        motion: Any = self.free_motion  # of a body that is not held
         match self.outcome:
             case Outcome.CONVERGED:
                 text = f"converged after {solved} ({last})"

@@ -15,7 +15,7 @@ from scipy.linalg import block_diag, cho_solve, solve_triangular
 
 from enumsol.arithmetic.balls import UNIT
 from enumsol.condensation.condensed import (
-    Condensation,
+    CondensedProblem,
     cholesky_factor,
     condensation_of,
     load_unit,
@@ -63,7 +63,7 @@ class ContactSystem:
     ----------
     problem : ContactProblem or ContactProblem3D
     alpha : float or Fraction
-    condensed : Condensation
+    condensed : CondensedProblem
     S : (m, m) array, m = (1 + d) p, with d = 1 or 2 tangents
     g : (m,) array
     G : (r, m) array
@@ -80,7 +80,7 @@ class ContactSystem:
 
     problem: Problem
     alpha: Alpha
-    condensed: Condensation = field(repr=False)
+    condensed: CondensedProblem = field(repr=False)
     S: Floats = field(repr=False)
     g: Floats = field(repr=False)
     G: Floats = field(repr=False)
@@ -117,7 +117,7 @@ class ContactSystem:
         h = solve_triangular(L, still + float(value) * slope, lower=True, check_finite=False)
         size = load_unit(np.append(g, h), block_diag(cholesky, np.eye(len(L))))
         force, length = factor * size, size / factor
-        rigid = size * np.linalg.inv(L.T)
+        rigid = np.asarray(size * np.linalg.inv(L.T), dtype=np.float64)
         return cls(problem, value, condensed, S, g / size, G, h / size, force, length, rigid, cholesky)
 
     @property

@@ -23,24 +23,8 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Floats, Integers
 
 
+#: Young's modulus [MPa], and Poisson's ratio.
 _STEEL: dict[str, Any] = {"young": 210e3, "poisson": 0.3}
-
-#: Of the dovetail: widths below and above the flanks, heights of the land below them and of the shank above [mm].
-_FOOT, _NECK, _LAND, _SHANK = 30.0, 14.0, 6.0, 6.0
-#: Of the brake: radius of the drum, width, height and depth of the shoe, its overhang and its lining [mm].
-_DRUM, _SHOE, _HEIGHT, _DEPTH, _OVERHANG, _LINING = 300.0, 40.0, 120.0, 50.0, 10.0, 10.0
-#: Stiffness of its return spring [N / mm].
-_RETURN = 50.0
-#: Of the clip: radius of the bar, thickness and width of the strip [mm], half of the angle that it embraces [degrees].
-_BAR, _STRIP, _WIDTH, _EMBRACED = 10.0, 2.0, 10.0, 80.0
-#: Stiffness of what pulls at the clip [N / mm].
-_LINE = 10.0
-#: Of the rings: radii of the bore, of the joint and of the rim, and the width [mm].
-_BORE, _JOINT, _RIM, _RING = 10.0, 20.0, 30.0, 10.0
-#: Stiffness of the springs that hold the outer ring [N / mm^3]; without them it would be held by contact alone.
-_HELD = 1e-2
-#: Of the lap joint: length of a plate, of the overlap, thickness and width of the plates [mm].
-_PLATE, _LAP, _THICK, _BROAD = 60.0, 30.0, 4.0, 20.0
 
 
 def dovetail(
@@ -95,17 +79,20 @@ def dovetail(
     angle = positive_number(flank_angle, "flank_angle")
     if not 5.0 <= angle <= 85.0:
         raise InvalidArgumentError(f"flank_angle is {shown(flank_angle)}; expected degrees between 5 and 85")
-    flank = (_FOOT - _NECK) / 2.0 / math.tan(math.radians(angle))
-    levels = np.concatenate([[0.0], np.linspace(_LAND, _LAND + flank, rows + 1), [_LAND + flank + _SHANK]])
+    # widths below and above the flanks, height of the land below them and of the shank above
+    foot, neck, land, shank = 30.0, 14.0, 6.0, 6.0
+    flank = (foot - neck) / 2.0 / math.tan(math.radians(angle))
+    levels = np.concatenate([[0.0], np.linspace(land, land + flank, rows + 1), [land + flank + shank]])
 
     def place(x: Floats, y: Floats) -> tuple[Floats, Floats]:
         height = np.interp(y, np.linspace(0.0, 1.0, rows + 3), levels)
-        width = np.interp(height, [_LAND, _LAND + flank], [_FOOT, _NECK])
+        width = np.interp(height, [land, land + flank], [foot, neck])
         return (x - 0.5) * width, height
 
     grid = _Grid.of(nx, rows + 2, place)
+    bottom, top, left, right = grid.sides
     return _problem(
-        grid.mesh({"left": grid.left[1:-1], "right": grid.right[1:-1], "foot": grid.bottom, "shank": grid.top}),
+        grid.mesh({"left": left[1:-1], "right": right[1:-1], "foot": bottom, "shank": top}),
         **_STEEL,
         contact=["left", "right"],
         load={"shank": short_vector(pull, "pull", 2)},
@@ -163,26 +150,29 @@ def brake_shoe(
     [1, 1, 3]
     """
     columns, rows = (positive_integer(count, name, most=MOST_CELLS) for name, count in (("nx", nx), ("ny", ny)))
-    heights = np.concatenate([[0.0], np.linspace(_LINING / _HEIGHT, 1.0, rows + 1)])
+    # radius of the drum; width, height and depth of the shoe, its overhang and its lining
+    drum, width, height, depth, overhang, lining = 300.0, 40.0, 120.0, 50.0, 10.0, 10.0
+    heights = np.concatenate([[0.0], np.linspace(lining / height, 1.0, rows + 1)])
 
     def place(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-        across, share = (x - 0.5) * _SHOE, np.interp(y, np.linspace(0.0, 1.0, rows + 2), heights)
-        rim = np.sqrt(_DRUM**2 - across**2)
-        return across - _OVERHANG * share, rim + share * (_DRUM + _HEIGHT - rim)
+        across, share = (x - 0.5) * width, np.interp(y, np.linspace(0.0, 1.0, rows + 2), heights)
+        rim = np.sqrt(drum**2 - across**2)
+        return across - overhang * share, rim + share * (drum + height - rim)
 
     grid = _Grid.of(columns, rows + 1, place)
+    bottom, top, _, _ = grid.sides
     parts = {"lining": np.arange(columns), "body": np.arange(columns, len(grid.cells))}
-    area = _SHOE / columns * _DEPTH
+    area = width / columns * depth
     shoe = _problem(
-        grid.mesh({"rubbing": grid.bottom, "eye": grid.top[-1:]}, {"pin": grid.number[-1, :1]}, parts),
+        grid.mesh({"rubbing": bottom, "eye": top[-1:]}, {"pin": grid.number[-1, :1]}, parts),
         young={"lining": 500.0, "body": 210e3},
         poisson=0.3,
         plane="stress",
-        thickness=_DEPTH,
+        thickness=depth,
         contact="rubbing",
         clamp="pin",
         load={"eye": (0.0, finite_number(pull, "pull") / area)},
-        spring={"eye": (_RETURN / area, _RETURN / area)},
+        spring={"eye": (50.0 / area, 50.0 / area)},
         friction=friction,
         friction_slope=friction_slope,
     )
@@ -234,24 +224,26 @@ def clip(
     [1, 1, 3, 3]
     """
     columns = positive_integer(nx, "nx", least=2, most=MOST_CELLS)
-    half = math.radians(_EMBRACED)
+    # radius of the bar, thickness and width of the strip, and half of the angle that it embraces
+    bar, strip, width, half = 10.0, 2.0, 10.0, math.radians(80.0)
 
     def place(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-        angle, radius = math.pi / 2.0 + half * (1.0 - 2.0 * x), _BAR + _STRIP * y
+        angle, radius = math.pi / 2.0 + half * (1.0 - 2.0 * x), bar + strip * y
         return radius * np.cos(angle), radius * np.sin(angle)
 
     grid = _Grid.of(columns, ny, place)
     middle = columns // 2
-    crown = grid.top[middle - 1 + columns % 2 : middle + 1]
-    area = _WIDTH * float(np.sum(np.linalg.norm(grid.points[crown[:, 0]] - grid.points[crown[:, 1]], axis=1)))
+    bottom, top, _, _ = grid.sides
+    crown = top[middle - 1 + columns % 2 : middle + 1]
+    area = width * float(np.sum(np.linalg.norm(grid.points[crown[:, 0]] - grid.points[crown[:, 1]], axis=1)))
     unit = _problem(
-        grid.mesh({"inside": grid.bottom, "crown": crown}),
+        grid.mesh({"inside": bottom, "crown": crown}),
         **_STEEL,
         plane="stress",
-        thickness=_WIDTH,
+        thickness=width,
         contact="inside",
         load={"crown": (0.0, 1.0)},
-        spring={"crown": (_LINE / area, _LINE / area)},
+        spring={"crown": (10.0 / area, 10.0 / area)},
         gap=-finite_number(press, "press"),
         friction=friction,
         friction_slope=friction_slope,
@@ -307,20 +299,20 @@ def pressed_rings(
     if columns % 4:
         raise InvalidArgumentError(f"nx is {shown(nx)}; expected a multiple of 4, since there are four lugs")
     moment = finite_number(torque, "torque")
-    inner, outer = (_ring(columns, ny, *radii) for radii in ((_BORE, _JOINT), (_JOINT, _RIM)))
+    inner, outer = (_ring(columns, ny, *radii) for radii in ((10.0, 20.0), (20.0, 30.0)))
     both = inner.beside(outer)
     count = len(inner.points)
-    rim = count + outer.top
+    (bore, seat, _, _), (inside, rim, _, _) = inner.sides, (count + side for side in outer.sides)
     lugs = {f"lug{k}": rim[k * columns // 4 : k * columns // 4 + 1] for k in range(4)}
     unit = _problem(
-        both.mesh({"bore": inner.bottom, "seat": inner.top, "inside": count + outer.bottom, "rim": rim, **lugs}),
+        both.mesh({"bore": bore, "seat": seat, "inside": inside, "rim": rim, **lugs}),
         **_STEEL,
         plane="stress",
-        thickness=_RING,
+        thickness=10.0,
         pairs=[("inside", "seat", 0.0)],
         clamp="bore",
         load={name: both.points[lug[0, 2]] @ [[0.0, 1.0], [-1.0, 0.0]] for name, lug in lugs.items()},
-        spring={"rim": (_HELD, _HELD)},
+        spring={"rim": (0.01, 0.01)},
         gap=-finite_number(press, "press"),
         friction=friction,
         friction_slope=friction_slope,
@@ -376,25 +368,25 @@ def lap_joint(
     """
     columns = positive_integer(nx, "nx", most=MOST_CELLS)
     bolt = positive_number(clamping, "clamping")
+    # length of a plate and of the overlap, thickness and width of the plates
+    plate, lap, thick, broad = 60.0, 30.0, 4.0, 20.0
+
+    def from_corner(left: float, level: float) -> _Grid:
+        return _Grid.of(2 * columns, ny, lambda x, y: (left + plate * x, level + thick * y))
+
     # as many cells on the free part of a plate, which is as long as the overlap
-    lower, upper = (_plate(2 * columns, ny, *corner) for corner in ((0.0, 0.0), (_PLATE - _LAP, _THICK)))
+    lower, upper = from_corner(0.0, 0.0), from_corner(plate - lap, thick)
     both = lower.beside(upper)
-    count = len(lower.points)
-    pressure = bolt / (_LAP * _BROAD)
+    bottom, top, end, _ = lower.sides
+    lower_side, upper_side, _, grip = (len(lower.points) + side for side in upper.sides)
+    facets = {"end": end, "grip": grip, "lap": lower_side[:columns], "seat": top[columns:]}
+    facets |= {"nut": bottom[columns:], "head": upper_side[:columns]}
+    pressure = bolt / (lap * broad)
     return _problem(
-        both.mesh(
-            {
-                "end": lower.left,
-                "grip": count + upper.right,
-                "lap": count + upper.bottom[:columns],
-                "seat": lower.top[columns:],
-                "nut": lower.bottom[columns:],
-                "head": count + upper.top[:columns],
-            }
-        ),
+        both.mesh(facets),
         **_STEEL,
         plane="stress",
-        thickness=_BROAD,
+        thickness=broad,
         pairs=[("lap", "seat")],
         clamp="end",
         displacement={"grip": (finite_number(stretch, "stretch"), 0.0)},
@@ -439,20 +431,11 @@ class _Grid:
         return cls(points.reshape(-1, 2), cells.reshape(-1, 9), number)
 
     @property
-    def bottom(self) -> Integers:
-        return _edges(self.number[0])
-
-    @property
-    def top(self) -> Integers:
-        return _edges(self.number[-1])
-
-    @property
-    def left(self) -> Integers:
-        return _edges(self.number[:, 0])
-
-    @property
-    def right(self) -> Integers:
-        return _edges(self.number[:, -1])
+    def sides(self) -> tuple[Integers, Integers, Integers, Integers]:
+        """Edges with their middle nodes, (k, 3), along the bottom, the top, the left and the right."""
+        lines = self.number[0], self.number[-1], self.number[:, 0], self.number[:, -1]
+        bottom, top, left, right = (np.stack([line[:-1:2], line[2::2], line[1::2]], axis=1) for line in lines)
+        return bottom, top, left, right
 
     def beside(self, other: _Grid) -> _Grid:
         """Both in one mesh, without a common node: the numbers of the other's come after its own."""
@@ -472,15 +455,6 @@ class _Grid:
 def _problem(mesh: fem.PartedMesh, **options: Any) -> ContactProblem:
     problem: Any = fem.mesh_problem(mesh, **options)  # in 2D
     return problem  # type: ignore[no-any-return]
-
-
-def _edges(line: Integers) -> Integers:
-    """Edges with their middle nodes along a line of nodes, (k, 3)."""
-    return np.stack([line[:-1:2], line[2::2], line[1::2]], axis=1)
-
-
-def _plate(nx: int, ny: int, left: float, level: float) -> _Grid:
-    return _Grid.of(nx, ny, lambda x, y: (left + _PLATE * x, level + _THICK * y))
 
 
 def _ring(nx: int, ny: int, inside: float, outside: float) -> _Grid:

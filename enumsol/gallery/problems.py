@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
 
 from enumsol import fem
 from enumsol.errors import InvalidArgumentError
-from enumsol.fem.mesh_checks import lame_coefficients
+from enumsol.fem.meshes import lame_coefficients
+from enumsol.model.contact_body import ContactBody
 from enumsol.model.mesh import BodyMesh
 from enumsol.model.problem import ContactProblem
 from enumsol.support.arguments import finite_number, nonnegative_number, positive_integer, positive_number, shown
 from enumsol.support.array_arguments import short_vector
 
 if TYPE_CHECKING:
-    from enumsol.support.array_types import ArrayLike, Floats
+    from collections.abc import Callable
+
+    from enumsol.support.array_types import ArrayLike, Floats, Integers
 
 Pair = tuple[float, float]
+Problem = TypeVar("Problem", bound=ContactBody)
 #: Largest number of triangles in a chain.
 _MOST_TRIANGLES = 1_000_000
 
@@ -250,25 +254,36 @@ def block_on_table(
     load = positive_number(pressure, "pressure")
     mu, share = nonnegative_number(friction, "friction"), finite_number(push, "push")
     f = fem.edge_forces(mesh.points, fem.edges_along(mesh.top), (0.0, -load)).ravel()
-    nodes, n = mesh.bottom, 2 * len(mesh.points)
+    nodes = mesh.bottom
     f[2 * nodes] += share * mu * -np.sum(f[1::2]) / len(nodes)
-    rows = np.arange(len(nodes))
-    Bn = sp.csr_array((-np.ones(len(nodes)), (rows, 2 * nodes + 1)), shape=(len(nodes), n))
-    Bt = sp.csr_array((np.ones(len(nodes)), (rows, 2 * nodes)), shape=(len(nodes), n))
-    x, y = mesh.points.T
-    N = np.zeros((n, 3))
-    N[::2, 0], N[1::2, 1], N[::2, 2], N[1::2, 2] = 1.0, 1.0, -y, x
-    return ContactProblem(
-        fem.stiffness(mesh.points, mesh.triangles, lame),
-        Bn,
-        Bt,
-        f,
-        friction=mu,
-        coordinates=mesh.points[nodes],
-        mesh=BodyMesh.of_dofs(mesh.points, mesh.triangles, np.arange(n)),
-        rigid_modes=N,
-        max_rigid_displacement=max_rigid_displacement,
+    A = fem.stiffness(mesh.points, mesh.triangles, lame)
+    body = (mesh.points, mesh.triangles, nodes)
+    return on_table(ContactProblem, A, *body, f, friction=mu, max_rigid_displacement=max_rigid_displacement)
+
+
+def on_table(
+    kind: Callable[..., Problem],
+    A: sp.csc_array,
+    points: Floats,
+    cells: Integers,
+    nodes: Integers,
+    f: Floats,
+    **more: Any,
+) -> Problem:
+    """Problem of a body that lies with these nodes on a table and that nothing else holds; ``kind`` is 2D or 3D.
+
+    The tangents are x and, in 3D, -y; the normal is downward.
+    """
+    from enumsol.fem.conditions import rigid_motions  # what it needs is not for the list of problems
+
+    d, ones = points.shape[1], np.ones(len(nodes))
+    *tangents, normal = (
+        sp.csr_array((-ones if axis else ones, (np.arange(len(nodes)), d * nodes + axis)), shape=(len(nodes), len(f)))
+        for axis in range(d)
     )
+    mesh = BodyMesh.of_dofs(points, cells, np.arange(len(f)))
+    rigid = rigid_motions(points)
+    return kind(A, normal, *tangents, f, coordinates=points[nodes], mesh=mesh, rigid_modes=rigid, **more)
 
 
 def wedge(

@@ -6,17 +6,16 @@ import math
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
-from enumsol.gallery.problems import holding, inclination
+from enumsol.gallery.problems import holding, inclination, on_table
 from enumsol.model.problem import given_friction
 from enumsol.support.arguments import finite_number, nonnegative_number, positive_integer, positive_number
 from enumsol.support.array_arguments import real_array, short_vector
 
 if TYPE_CHECKING:
     from enumsol.fem.meshes import SolidMesh
-    from enumsol.model.problem3d import ContactProblem3D
+    from enumsol.model.problem3d import ContactProblem3D, Friction
     from enumsol.support.array_types import ArrayLike, Floats, Integers
 
 #: A public test of the contact community: one contact, with friction 0.1.
@@ -24,7 +23,9 @@ _COMPLIANCE = ((15.0, -1.0, -2.0), (-1.0, 14.0, 1.0), (-2.0, 1.0, 16.0))
 _FREE_DISPLACEMENT = (-1.0, 2.0, 3.0)
 
 
-def one_node_3d(W: ArrayLike = _COMPLIANCE, q: ArrayLike = _FREE_DISPLACEMENT, friction: Any = 0.1) -> ContactProblem3D:
+def one_node_3d(
+    W: ArrayLike = _COMPLIANCE, q: ArrayLike = _FREE_DISPLACEMENT, friction: Friction = 0.1
+) -> ContactProblem3D:
     """Contact node given by its compliance: u = W r + q with u_n >= 0, r_n >= 0, u_n r_n = 0, and friction against u_t.
 
     In (normal, first tangent, second tangent), with the signs of contact solvers: u_n is the opening, r_n the pressing
@@ -188,10 +189,8 @@ def block_on_table3d(
     >>> [len(enumsol.enumerate_roots(block, alpha=0)) for block in blocks]
     [1, 0]
     """
-    from enumsol.fem.conditions import rigid_motions  # as above
-    from enumsol.fem.meshes import box
+    from enumsol.fem.meshes import box  # as above
     from enumsol.fem.solid_problems import facet_forces, solid_stiffness
-    from enumsol.model.mesh import BodyMesh
     from enumsol.model.problem3d import ContactProblem3D
 
     mesh = box(nx, ny, nz, size, cells)
@@ -199,22 +198,10 @@ def block_on_table3d(
     load, mu = positive_number(pressure, "pressure"), nonnegative_number(friction, "friction")
     across = mu * load * np.append(short_vector(push, "push", 2), 0.0)
     forces = facet_forces(points, facets["top"], (0.0, 0.0, -load)) + facet_forces(points, facets["bottom"], across)
-    nodes, n = mesh.nodes("bottom"), points.size
-    rows, ones = np.arange(len(nodes)), np.ones(len(nodes))
-    first, second, normal = (
-        sp.csr_array((sign * ones, (rows, 3 * nodes + axis)), shape=(len(nodes), n))
-        for axis, sign in enumerate((1.0, -1.0, -1.0))
-    )
-    return ContactProblem3D(
-        solid_stiffness(points, mesh.cells, lame),
-        *(normal, first, second),
-        forces.ravel(),
-        friction=mu,
-        coordinates=points[nodes],
-        mesh=BodyMesh.of_dofs(points, mesh.cells, np.arange(n)),
-        rigid_modes=rigid_motions(points),
-        max_rigid_displacement=max_rigid_displacement,
-    )
+    A = solid_stiffness(points, mesh.cells, lame)
+    body = (points, mesh.cells, mesh.nodes("bottom"))
+    more: dict[str, Any] = {"friction": mu, "max_rigid_displacement": max_rigid_displacement}
+    return on_table(ContactProblem3D, A, *body, forces.ravel(), **more)
 
 
 def wedge3d(

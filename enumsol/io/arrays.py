@@ -273,7 +273,7 @@ def _space_friction(arrays: Mapping[str, Any]) -> dict[str, Any]:
     if given:
         return {"friction": (arrays["friction_1"], arrays["friction_2"])}
     if TABLE[0] in arrays:
-        from enumsol.model.friction import FrictionTable  # not for problems in 2D
+        from enumsol.model.problem3d import FrictionTable  # not for problems in 2D
 
         slip, *columns = (np.asarray(arrays[name]) for name in TABLE)
         # one column of a MatrixMarket file is the table of all nodes
@@ -295,7 +295,7 @@ def _constant(value: object, layout: Layout) -> Any:
 
 
 def _arrays_of_law(problem: ContactProblem3D) -> dict[str, Any]:
-    from enumsol.model.friction import ConstantFriction, FrictionTable  # not for problems in 2D
+    from enumsol.model.problem3d import ConstantFriction, FrictionTable  # not for problems in 2D
 
     law = problem.law
     if isinstance(law, ConstantFriction):

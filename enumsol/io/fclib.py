@@ -32,6 +32,8 @@ from enumsol.support.saved import check_shape, check_size
 if TYPE_CHECKING:
     from pathlib import Path
 
+    import h5py
+
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.support.array_types import Floats, NDArray
 
@@ -110,7 +112,7 @@ def _isotropic(problem: Problem) -> Floats:
     return np.asarray(F1)
 
 
-def _global(group: Any) -> Problem:
+def _global(group: h5py.Group) -> Problem:
     dimension = _dimension(group)
     if "G" in group:
         raise InvalidProblemError("it has equality constraints (G, b); expected a problem without them")
@@ -125,7 +127,7 @@ def _global(group: Any) -> Problem:
     return _problem(M, sp.csr_array(-H.T), _vector(vectors, "f", M.shape[0]), w, mu, dimension)
 
 
-def _local(group: Any) -> Problem:
+def _local(group: h5py.Group) -> Problem:
     dimension = _dimension(group)
     if "V" in group or "R" in group:
         raise InvalidProblemError("it has equality constraints (V, R, s); expected a problem without them")
@@ -156,14 +158,14 @@ def _problem(
     )
 
 
-def _dimension(group: object) -> int:
+def _dimension(group: h5py.Group) -> int:
     spacedim = _integer(group, "spacedim")
     if spacedim not in _NUMBERS:
         raise InvalidProblemError(f"it is a problem in {spacedim} dimensions; expected spacedim = 2 or 3")
     return spacedim
 
 
-def _matrix(group: object, name: str, room: int, *, symmetric: bool = False) -> sp.csc_array:
+def _matrix(group: h5py.Group, name: str, room: int, *, symmetric: bool = False) -> sp.csc_array:
     parts = child(group, name)
     m, n, nz = (_integer(parts, key) for key in ("m", "n", "nz"))
     p, i, x = (numbers(parts, key).ravel() for key in ("p", "i", "x"))
@@ -196,7 +198,7 @@ def _triplets(
     return fits[0]
 
 
-def _write_matrix(group: Any, matrix: sp.csc_array) -> None:
+def _write_matrix(group: h5py.Group, matrix: sp.csc_array) -> None:
     for key, value in (("nzmax", matrix.nnz), ("m", matrix.shape[0]), ("n", matrix.shape[1]), ("nz", -1)):
         group[key] = np.array([value], dtype=np.int32)
     group["p"] = matrix.indptr.astype(np.int32)
@@ -204,7 +206,7 @@ def _write_matrix(group: Any, matrix: sp.csc_array) -> None:
     group["x"] = matrix.data
 
 
-def child(group: Any, name: str) -> Any:
+def child(group: h5py.Group, name: str) -> Any:
     """A group or dataset of an HDF5 file that stands in the file itself.
 
     Raises
@@ -223,7 +225,7 @@ def child(group: Any, name: str) -> Any:
     return group[name]
 
 
-def numbers(group: Any, name: str) -> NDArray[Any]:
+def numbers(group: h5py.Group, name: str) -> NDArray[Any]:
     """The numbers of a dataset that stand in the file itself, of a size that its bytes can have.
 
     Raises
@@ -246,14 +248,14 @@ def numbers(group: Any, name: str) -> NDArray[Any]:
     return np.asarray(data[()])
 
 
-def _integer(group: Any, name: str) -> int:
+def _integer(group: h5py.Group, name: str) -> int:
     value = numbers(group, name)
     if value.size != 1 or value.dtype.kind not in "iu":
         raise InvalidProblemError(f"{group.name}/{name} is {value.tolist()}; expected one whole number")
     return int(value.ravel()[0])
 
 
-def _vector(group: Any, name: str, size: int) -> NDArray[Any]:
+def _vector(group: h5py.Group, name: str, size: int) -> NDArray[Any]:
     value = numbers(group, name)
     if value.shape != (size,):
         raise InvalidProblemError(f"{group.name}/{name} has shape {value.shape}; expected ({size},)")

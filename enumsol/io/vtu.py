@@ -23,6 +23,7 @@ from enumsol.support.messages import counted
 if TYPE_CHECKING:
     import os
     from pathlib import Path
+    from types import ModuleType
 
     from enumsol.model.mesh import BodyMesh
     from enumsol.model.problem3d import AnyProblem
@@ -147,7 +148,7 @@ def _empty(states: Sequence[SolvedState]) -> str:
     return f"a RootSet without isolated roots, whose {counted(len(families), 'family', 'families')} no file shows"
 
 
-def _picture(meshio: object, problem: AnyProblem, state: SolvedState) -> Any:
+def _picture(meshio: ModuleType, problem: AnyProblem, state: SolvedState) -> Any:
     return _plane(meshio, problem, state) if isinstance(problem, ContactProblem) else _space(meshio, problem, state)
 
 
@@ -172,7 +173,7 @@ def _stresses(problem: AnyProblem, u: Floats) -> dict[str, Floats]:
     return {"stress": np.pad(stress, ((0, 0), (0, 1), (0, 1))).reshape(-1, 9)}
 
 
-def _space(meshio: Any, problem: ContactProblem3D, state: SolvedState) -> Any:
+def _space(meshio: ModuleType, problem: ContactProblem3D, state: SolvedState) -> Any:
     data = _row_data(problem, state)
     if problem.mesh is None:
         if problem.coordinates is None:
@@ -184,7 +185,7 @@ def _space(meshio: Any, problem: ContactProblem3D, state: SolvedState) -> Any:
     return _body(meshio, problem, problem.mesh, u, data)
 
 
-def _plane(meshio: Any, problem: ContactProblem, state: SolvedState) -> Any:
+def _plane(meshio: ModuleType, problem: ContactProblem, state: SolvedState) -> Any:
     p = problem.p
     data = {name: _array(state, name, (p,)) for name in ("lambda_n", "lambda_t", "u_n", "u_t")}
     statuses = getattr(state, "statuses", None)
@@ -252,7 +253,7 @@ def _vectors(problem: ContactProblem3D, data: dict[str, Floats]) -> dict[str, Fl
     return {"contact_force": force, "friction_force": friction, "slip": along("u_t1", "u_t2")}
 
 
-def _body(meshio: Any, problem: ContactProblem3D, mesh: BodyMesh, u: Floats, data: dict[str, Floats]) -> Any:
+def _body(meshio: ModuleType, problem: ContactProblem3D, mesh: BodyMesh, u: Floats, data: dict[str, Floats]) -> Any:
     kind = KINDS[3, mesh.cells.shape[1]]
     cells = [(kind.file_name, mesh.cells)]
     if mesh.facets is not None:

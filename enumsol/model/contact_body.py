@@ -13,21 +13,21 @@ import numpy as np
 import scipy.sparse as sp
 
 from enumsol.condensation.data import exactly_at
-from enumsol.errors import InvalidArgumentError, InvalidProblemError, NotHeldError
+from enumsol.errors import EnumsolError, InvalidArgumentError, InvalidProblemError, NotHeldError
+from enumsol.model.mesh import BodyMesh
 from enumsol.model.rigid_modes import RigidModes, largest_displacement
-from enumsol.support.arguments import alpha_value, shown
+from enumsol.support.arguments import alpha_value, instance_of, shown
 from enumsol.support.array_arguments import real_array, real_matrix
 from enumsol.support.immutable import Immutable, SealedMatrix, sealed
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
-    from enumsol.condensation.condensed import Condensation
+    from enumsol.condensation.condensed import CondensedProblem
     from enumsol.condensation.enclosure import CondensedEnclosure
     from enumsol.condensation.factorization import Factorization
     from enumsol.condensation.products import Products
-    from enumsol.model.mesh import BodyMesh
     from enumsol.support.array_types import AlphaLike, ArrayLike, Floats, Indices
 
 #: An asymmetry of A up to this fraction of max|A| is rounding of the user's assembly and is averaged away.
@@ -78,7 +78,7 @@ class ContactBody(Immutable):
         f: ArrayLike,
         gap: ArrayLike,
         load_slope: ArrayLike | None,
-        node_ids: object,
+        node_ids: Iterable[object] | None,
         coordinates: ArrayLike | None,
     ) -> None:
         stiffness = real_matrix(A, "A")
@@ -126,11 +126,17 @@ class ContactBody(Immutable):
         """Number of contact nodes."""
         return self._rows["Bn"].shape[0]
 
-    def _hold(self, rigid_modes: ArrayLike | None, max_rigid_displacement: float | None) -> None:
-        """Take the arguments about a body that nothing holds."""
+    def _complete(
+        self, mesh: BodyMesh | None, rigid_modes: ArrayLike | None, max_rigid_displacement: float | None
+    ) -> None:
+        """Take the mesh and the arguments about a body that nothing holds; nothing changes from here on."""
+        if mesh is not None:
+            self.mesh = instance_of(mesh, BodyMesh, "mesh").check(self.n, self.p, len(self._rows))
         self.modes = RigidModes.of(rigid_modes, self.A)
         self.rigid_modes = None if self.held else self.modes.N
         self.max_rigid_displacement = largest_displacement(max_rigid_displacement, self.modes)
+        self._freeze()
+        self.on_springs.factorization.check_positive_definite()
 
     @property
     def held(self) -> bool:
@@ -179,10 +185,13 @@ class ContactBody(Immutable):
         # a power of two: the same wherever the problem is read, although what is computed may differ in its last bits
         return float(np.exp2(np.ceil(np.log2(1000.0 * largest)))) if largest > 0 else 1.0
 
-    @property
-    def condensed(self) -> Condensation:
-        """The problem condensed to its contact forces (theory, section 4.1)."""
-        raise NotImplementedError
+    @cached_property
+    def condensed(self) -> CondensedProblem:
+        """The problem condensed to its 2p or 3p contact forces (theory, section 4.1)."""
+        self.check_held("condensation")
+        from enumsol.condensation.condensed import CondensedProblem  # scipy's solvers come with the first use
+
+        return CondensedProblem.from_problem(self)
 
     def check_held(self, what: str, why: str = "", instead: str = "") -> None:
         """Refuse a body that neither supports nor springs hold; the arguments are words of the message.
@@ -322,6 +331,25 @@ class ContactBody(Immutable):
         """The attributes of a problem whose coefficients do not depend on alpha, for ``model.restart``."""
         raise NotImplementedError
 
+    def friction_at(self, alpha: AlphaLike) -> Floats:
+        """Coefficients F(alpha) = friction + alpha friction_slope, shape (p,), in 3D (p, 2).
+
+        Raises
+        ------
+        InvalidArgumentError
+            alpha is not finite, a coefficient is negative there (the node and its value are named), or the coefficients
+            depend on the solution.
+        """
+        a = Fraction(alpha_value(alpha))
+        F = friction_values(a, *self.affine_friction)
+        check_signs(F, self.node_ids, f" at alpha = {float(a):g}", error=InvalidArgumentError)
+        return F
+
+    @property
+    def depends_on_alpha(self) -> bool:
+        """True if friction or load change with alpha."""
+        return self.load_slope is not None or bool(np.any(self.friction_slope))
+
     def load_at(self, alpha: AlphaLike) -> Floats:
         """Load f(alpha) = f + alpha load_slope, shape (n,) [force].
 
@@ -385,11 +413,27 @@ def friction_values(alpha: Fraction, first: Floats, slope: Floats) -> Floats:
         One is too large for float64.
     """
     try:
-        return np.array([float(x) for x in exactly_at(alpha, first, slope)])
+        return np.array([float(x) for x in exactly_at(alpha, first.ravel(), slope.ravel())]).reshape(first.shape)
     except OverflowError:
         raise InvalidArgumentError(
             f"friction at alpha = {float(alpha):g} is too large for float64; expected a finite value"
         ) from None
+
+
+def check_signs(
+    F: Floats, labels: Sequence[Any], where: str = "", error: type[EnumsolError] = InvalidProblemError
+) -> None:
+    """Refuse negative coefficients of friction, (p,) or (p, 2), ``where`` they are found; the node is named.
+
+    Raises
+    ------
+    InvalidProblemError or ``error``
+        One is negative.
+    """
+    if np.any(F < 0):
+        node, *axis = map(int, np.unravel_index(int(np.argmin(F)), F.shape))
+        along = f" F{axis[0] + 1}" if axis else ""
+        raise error(f"friction{along}{where} is {np.min(F):g} at contact node {labels[node]}; expected F >= 0")
 
 
 def span(values: Floats) -> str:
@@ -479,7 +523,7 @@ def _dependent_rows(unit: sp.csr_array, gram: Floats) -> Indices:
     return np.flatnonzero(np.abs(vectors[:, 0]) > 0.1 * np.max(np.abs(vectors[:, 0])))
 
 
-def _node_ids(value: Any, p: int) -> tuple[Any, ...]:
+def _node_ids(value: Iterable[object] | None, p: int) -> tuple[Any, ...]:
     if value is None:
         return tuple(range(p))
     wanted = f"expected a sequence of {p} distinct labels"

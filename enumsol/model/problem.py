@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from enumsol.errors import InvalidArgumentError, InvalidProblemError
-from enumsol.model.contact_body import ContactBody, friction_values, span, vector
-from enumsol.model.mesh import BodyMesh
-from enumsol.support.arguments import alpha_value, exact_number, instance_of, shown
+from enumsol.errors import InvalidProblemError
+from enumsol.model.contact_body import ContactBody, check_signs, span, vector
+from enumsol.support.arguments import exact_number, instance_of, shown
 from enumsol.support.immutable import sealed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
 
-    from enumsol.condensation.condensed import CondensedProblem
-    from enumsol.support.array_types import AlphaLike, ArrayLike, Floats
+    from enumsol.model.mesh import BodyMesh
+    from enumsol.support.array_types import ArrayLike, Floats
 
 
 class ContactProblem(ContactBody):
@@ -101,7 +99,7 @@ class ContactProblem(ContactBody):
         friction_slope: ArrayLike | None = None,
         load_slope: ArrayLike | None = None,
         slip_offset: ArrayLike = 0.0,
-        node_ids: object = None,
+        node_ids: Iterable[object] | None = None,
         coordinates: ArrayLike | None = None,
         mesh: BodyMesh | None = None,
         rigid_modes: ArrayLike | None = None,
@@ -110,28 +108,12 @@ class ContactProblem(ContactBody):
         super().__init__(A, {"Bn": Bn, "Bt": Bt}, f, gap, load_slope, node_ids, coordinates)
         self.friction, self.friction_slope = _friction(*given_friction(friction, friction_slope), self.p)
         self.slip_offset = vector(slip_offset, "slip_offset", self.p, broadcast=True)
-        self.mesh = None if mesh is None else instance_of(mesh, BodyMesh, "mesh").check(self.n, self.p, 2)
-        self._hold(rigid_modes, max_rigid_displacement)
-        self._freeze()
-        self.on_springs.factorization.check_positive_definite()
+        self._complete(mesh, rigid_modes, max_rigid_displacement)
 
     @property
     def Bt(self) -> sp.csr_array:  # noqa: N802 (the field's letter)
         """Tangential displacement of the contact nodes, sparse (p, n); a new object as A is."""
         return self._rows["Bt"].matrix()
-
-    @property
-    def depends_on_alpha(self) -> bool:
-        """True if friction or load change with alpha."""
-        return self.load_slope is not None or bool(np.any(self.friction_slope))
-
-    @cached_property
-    def condensed(self) -> CondensedProblem:
-        """The problem condensed to its 2p contact forces (theory, section 4.1)."""
-        self.check_held("condensation")
-        from enumsol.condensation.condensed import CondensedProblem  # scipy's solvers come with the first use
-
-        return CondensedProblem.from_problem(self)
 
     def at_contact_nodes(self) -> ContactProblem:
         """Body with the displacements of its contact nodes as the only unknowns, n = 2p.
@@ -187,22 +169,6 @@ class ContactProblem(ContactBody):
         """Coefficients at alpha = 0 and their derivatives, (p,) both."""
         return self.friction, self.friction_slope
 
-    def friction_at(self, alpha: AlphaLike) -> Floats:
-        """Coefficients F(alpha) = friction + alpha friction_slope, shape (p,).
-
-        Raises
-        ------
-        InvalidArgumentError
-            alpha is not finite, or a coefficient is negative there (the node and its value are named).
-        """
-        a = Fraction(alpha_value(alpha))
-        F = friction_values(a, *self.affine_friction)
-        if np.any(F < 0):
-            node = int(np.argmin(F))
-            where = f"at alpha = {float(a):g} is {F[node]:g} at contact node {self.node_ids[node]}"
-            raise InvalidArgumentError(f"friction {where}; expected F >= 0")
-        return F
-
     @staticmethod
     def constant_friction(values: Floats) -> dict[str, Any]:
         """The attributes of a problem with coefficients that do not depend on alpha, for ``model.restart``."""
@@ -246,9 +212,8 @@ def _friction(friction: object, slope: object, p: int) -> tuple[Floats, Floats]:
         )
     F0 = vector(friction, "friction", p, broadcast=True)
     F1 = vector(slope, "friction_slope", p, broadcast=True)
-    if not np.any(F1) and np.any(F0 < 0):
-        node = int(np.argmin(F0))
-        raise InvalidProblemError(f"friction is {F0[node]:g} at contact node {node}; expected F >= 0")
+    if not np.any(F1):
+        check_signs(F0, range(p))
     return F0, F1
 
 

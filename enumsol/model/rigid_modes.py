@@ -112,7 +112,7 @@ def largest_displacement(value: float | None, modes: RigidModes) -> float | None
         raise InvalidProblemError(str(error)) from None
 
 
-def modes_of(N: Floats, coordinates: Any) -> str:
+def modes_of(N: Floats, coordinates: Floats) -> str:
     """The rigid modes that a rigid displacement consists of, in words: "rigid mode 0", "rigid modes 0 and 2"."""
     size = np.abs(coordinates) * np.max(np.abs(N), axis=0)
     names = np.flatnonzero(size > NAMED * np.max(size)).tolist()

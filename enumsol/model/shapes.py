@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.statuses import ContactStatus
-from enumsol.support.array_types import Floats, Integers
+from enumsol.support.array_types import AlphaLike, Floats, Integers
+
+if TYPE_CHECKING:
+    from enumsol.model.mesh import BodyMesh
+    from enumsol.model.problem3d import AnyProblem
 
 #: Displacements are drawn so that the largest takes this part of the body's size, and forces likewise.
 _MOVED, _LONGEST = 0.08, 0.16
@@ -66,19 +70,19 @@ class BodyShape:
         """Displacements of all nodes, (N, d) [length]."""
         return np.asarray(self.motion @ u).reshape(self.points.shape) + self.offset
 
-    def moves(self, root: Any) -> Floats:
+    def moves(self, problem: AnyProblem, u: Floats, alpha: AlphaLike) -> Floats:
         """Displacements of all nodes at a root, (N, d) [length]: zero for a body at rest, where only rounding is left.
 
         What rounding is is measured by the displacements without contact forces, or, if nothing holds the body, by its
         size.
         """
-        problem, found, free = root.problem, self.displacements(root.u), self.size
+        found, free = self.displacements(u), self.size
         if problem.held:
             none = np.zeros(problem.contact_rows.shape[0])
-            free = largest_length(self.displacements(problem.condensed.displacement(root.alpha, none)))
+            free = largest_length(self.displacements(problem.condensed.displacement(alpha, none)))
         return found if largest_length(found) > _LEAST_MOVED * free else np.zeros_like(found)
 
-    def contact_forces(self, problem: Any, lambda_n: Floats, lambda_t: Floats) -> Floats:
+    def contact_forces(self, problem: AnyProblem, lambda_n: Floats, lambda_t: Floats) -> Floats:
         """Contact forces on all nodes of the body in global axes, (N, d) [force]."""
         rows = np.concatenate([lambda_n, lambda_t.ravel(order="F")])
         forces = -np.asarray(self.motion @ (problem.contact_rows.T @ rows)).reshape(self.points.shape)
@@ -95,7 +99,7 @@ def largest_length(vectors: Floats) -> float:
     return float(np.max(np.linalg.norm(vectors, axis=1), initial=0.0))
 
 
-def body_shape(problem: Any) -> BodyShape:
+def body_shape(problem: AnyProblem) -> BodyShape:
     """The shape of a problem in 2D or 3D.
 
     Raises
@@ -103,9 +107,7 @@ def body_shape(problem: Any) -> BodyShape:
     InvalidArgumentError
         The problem has no mesh.
     """
-    mesh = problem.mesh
-    if mesh is None:
-        raise InvalidArgumentError("the problem has no mesh; expected one made by enumsol.fem, or with mesh=")
+    mesh = _mesh_of(problem)
     points, motion = mesh.points, mesh.motion
     offset = np.zeros_like(points) if mesh.offset is None else mesh.offset
     by_node = sp.csr_array(abs(problem.Bn) @ abs(motion).T)
@@ -114,6 +116,12 @@ def body_shape(problem: Any) -> BodyShape:
     weights = sp.csr_array(by_node @ gather)
     scale = 1.0 / np.asarray(weights.sum(axis=1)).ravel()
     return BodyShape(points, mesh.cells, motion, offset, sp.csr_array(sp.diags_array(scale) @ weights))
+
+
+def _mesh_of(problem: AnyProblem) -> BodyMesh:
+    if problem.mesh is None:
+        raise InvalidArgumentError("the problem has no mesh; expected one made by enumsol.fem, or with mesh=")
+    return problem.mesh
 
 
 def round_scale(largest: float, size: float, share: float = _MOVED) -> float:
@@ -137,24 +145,29 @@ def own_scales(largest: Sequence[float], size: float) -> tuple[float, ...]:
     return tuple(round_scale(value, size) if value > 0 else common for value in largest)
 
 
-def row_frames(problem: Any) -> Floats:
+def _directions(problem: AnyProblem) -> Floats:
+    """The normals and the tangents of the contact rows, summed over the nodes of a row, in global axes, (p, d, d)."""
+    rows = _mesh_of(problem).directions(problem.contact_rows)
+    return rows.reshape(-1, problem.p, rows.shape[1]).swapaxes(0, 1)
+
+
+def row_frames(problem: AnyProblem) -> Floats:
     """Unit vectors of the contact rows in global axes, (p, d, d): the normals and the tangents; zero if not known."""
-    rows = [problem.Bn, *([problem.Bt] if hasattr(problem, "Bt") else [problem.Bt1, problem.Bt2])]
-    sums = np.stack([problem.mesh.directions(matrix) for matrix in rows], axis=1)
+    sums = _directions(problem)
     lengths = np.linalg.norm(sums, axis=2, keepdims=True)
     return np.asarray(np.divide(sums, lengths, out=np.zeros_like(sums), where=lengths > 0))
 
 
-def row_tangents(problem: Any) -> Floats:
+def row_tangents(problem: AnyProblem) -> Floats:
     """Both tangents of the contact rows in 3D, summed over the nodes of a row, in global axes, (p, 2, 3)."""
-    return np.stack([problem.mesh.directions(rows) for rows in (problem.Bt1, problem.Bt2)], axis=1)
+    return _directions(problem)[:, 1:]
 
 
-def slip_directions(problem: Any, root: Any) -> tuple[Integers, Floats]:
+def slip_directions(problem: AnyProblem, u_t: Floats, statuses: Sequence[ContactStatus]) -> tuple[Integers, Floats]:
     """Contact rows in 3D that slip, (k,), and the unit vectors in global axes along which they do, (k, 3)."""
-    moves = np.einsum("pk,pkc->pc", root.u_t, row_tangents(problem))
+    moves = np.einsum("pk,pkc->pc", u_t, row_tangents(problem))
     size = np.linalg.norm(moves, axis=1)
-    slips = np.array([status is ContactStatus.SLIP for status in root.statuses])
+    slips = np.array([status is ContactStatus.SLIP for status in statuses])
     slides = np.flatnonzero(slips & (size > 0))
     return slides, moves[slides] / size[slides, None]
 

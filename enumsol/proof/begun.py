@@ -13,9 +13,10 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from enumsol.errors import InvalidArgumentError
+from enumsol.proof.leaves import UndecidedRecord
 from enumsol.proof.proof_file import EXPANSION, MAGIC, SMALL, ProofFormatError, decoded, lines_of
 from enumsol.proof.reading import quoted, same
-from enumsol.proof.records import DeclaredForm, UndecidedRecord
+from enumsol.proof.records import DeclaredForm
 
 #: Bytes that are expanded at once: what is lost before a damaged place.
 _CHUNK = 512

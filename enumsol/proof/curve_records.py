@@ -5,14 +5,28 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from enumsol.proof.reading import numbers_from, quoted, rational_from
-from enumsol.proof.records import ClosingRecord, Limits, Record, RecordError, Tree, check_complete, is_code_of_leaf
+from enumsol.proof.reading import (
+    RecordError,
+    check_complete,
+    is_code_of_leaf,
+    numbers_from,
+    quoted,
+    rational_from,
+)
+from enumsol.proof.records import ClosingRecord, Limits, Record, Tree
+from enumsol.trusted.space.curve_runs import Run
 from enumsol.trusted.space.solution_curve import CurveBox
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
     from fractions import Fraction
 
-    from enumsol.support.array_types import Floats
+    from enumsol.support.array_types import Codes, Floats
+    from enumsol.trusted.space.curve_runs import KnownCurve
+    from enumsol.trusted.space.pieces import AlphaPiece
+
+    #: Boxes of curves in the order in which they are numbered: the curve, and which one of its links it is.
+    Boxes = Sequence[tuple[KnownCurve, int]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,6 +170,16 @@ class OnCurve(ClosingRecord):
         except ValueError as error:
             raise RecordError(f"a form over a piece cannot be read: {error}") from None
 
+    def holds(self, piece: AlphaPiece, codes: Codes, boxes: Boxes, errors: float = 1.0) -> bool:
+        """True if all solutions are proven to lie on the curve (theory, section 12.9)."""
+        (known, first), (other, last) = boxes[self.first], boxes[self.last]
+        if known is not other:
+            return False
+        if self.numbers is not None:
+            return piece.lies_on(known, Run(first, last), codes, self.numbers, errors)
+        curves = [link.curve for link in known.chain.links[first : last + 1]]
+        return piece.holds_all(codes, known.problem, curves, errors)
+
 
 @dataclass(frozen=True)
 class ThroughCurveBox(ClosingRecord):
@@ -194,15 +218,17 @@ class ThroughCurveBox(ClosingRecord):
             raise RecordError("a point of an arc is not over its piece")
         return cls(box, low, high, alpha, tuple(leaf))
 
-    @property
-    def piece(self) -> tuple[Fraction, Fraction]:
-        """Of the arc."""
-        return rational_from(self.low), rational_from(self.high)
-
-    @property
-    def point(self) -> tuple[Fraction, tuple[int, ...]]:
-        """Alpha and the leaf."""
-        return rational_from(self.alpha), self.leaf
+    def holds(self, piece: AlphaPiece, codes: Codes, boxes: Boxes, interval: tuple[Fraction, Fraction]) -> bool:
+        """True if all roots are proven to lie on an arc through the box, over its piece of an interval."""
+        (a, b), low, high = interval, rational_from(self.low), rational_from(self.high)
+        narrowed = piece.narrowed(codes)[0]
+        if not a <= low <= narrowed.low <= narrowed.high <= high <= b:
+            return False
+        whole, (known, number) = piece.over(low, high), boxes[self.box]
+        arc, point = whole.arc(codes), (rational_from(self.alpha), self.leaf)
+        if arc is None or not whole.meets(arc, point, known.problem, known.chain.links[number].curve):
+            return False
+        return known.chain.runs_through(low, high)
 
 
 def _boxes(entries: list[Any], limits: Limits) -> list[int]:

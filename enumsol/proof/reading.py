@@ -18,19 +18,25 @@ from enumsol.condensation.data import Data, exactly_at
 from enumsol.errors import InvalidArgumentError
 from enumsol.proof.proof_file import PLANE_ROW, PROOF_VERSION, SPACE_ROW
 from enumsol.trusted.exclusion import Terms
-from enumsol.trusted.status_rows import UNDECIDED
+from enumsol.trusted.status_rows import BACKWARD, CONTACT, FORWARD, UNDECIDED, final_codes
 
 if TYPE_CHECKING:
-    from collections.abc import Collection
+    from collections.abc import Collection, Iterable, Sequence
 
     from enumsol.model.problem import ContactProblem
-    from enumsol.support.array_types import Floats, NDArray
+    from enumsol.support.array_types import Codes, Floats, NDArray
 
+    #: A row in 3D: its kind, its node, and the number of a direction or sector.
+    Row = tuple[int, int, int]
 
 #: Most digits of the numerator and of the denominator of a fraction.
 MOST_DIGITS = 4000
 #: Least and largest binary exponent of a unit.
 LEAST_EXPONENT, LARGEST_EXPONENT = -900, 900
+
+_SLIDING = FORWARD, BACKWARD
+#: Codes that are not final.
+_PARTIAL = CONTACT, UNDECIDED, *_SLIDING
 
 _RATIONAL = re.compile(rf"-?[0-9]{{1,{MOST_DIGITS}}}(/[0-9]{{1,{MOST_DIGITS}}})?", re.ASCII)
 _BEYOND: int = 10**MOST_DIGITS
@@ -38,6 +44,10 @@ _SHORT = reprlib.Repr()
 _SHORT.maxlevel = 3
 _SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 40
 _SHORT.maxlist = _SHORT.maxdict = 5
+
+
+class RecordError(ValueError):
+    """A record makes no sense; what it says is a whole sentence about it."""
 
 
 class RefusedError(Exception):
@@ -194,6 +204,60 @@ def codes_from(texts: Any, p: int) -> NDArray[np.uint8]:
     if np.any(codes > UNDECIDED):
         raise ValueError(f"a status code is not among 0 to {UNDECIDED}")
     return codes.reshape(-1, p)
+
+
+def check_complete(codes: Codes) -> None:
+    """Raise RecordError where an assignment is not complete."""
+    if any(code in _PARTIAL for code in codes):
+        raise RecordError("a root or a solved selection is claimed where statuses are still open")
+
+
+def is_code_of_leaf(code: Any) -> bool:
+    """True for a status in 3D that is not undecided, or that of a sector."""
+    from enumsol.model.sectors import SECTORS, is_sector  # in 3D only
+
+    return type(code) is int and (0 <= code < UNDECIDED or (code > SECTORS and is_sector(code - SECTORS)))
+
+
+def checked_row(row: Any, p: int) -> Row:
+    """A row in 3D; ValueError where there is none such."""
+    from enumsol.model.sectors import DEEPEST, RUN  # in 3D only
+    from enumsol.trusted.space.sector_rows import FORCE, GAP, RIGHT
+
+    if not isinstance(row, list | tuple) or len(row) != 3 or not all(type(x) is int for x in row):
+        raise ValueError(f"{quoted(row)} is not a row")
+    kind, node, number = row
+    # numbers of directions and sectors are less; directions of tangents are less than RUN
+    known = 0 <= kind <= RIGHT and 0 <= node < p and -1 <= number < RUN << DEEPEST
+    if not known or (kind in (GAP, FORCE) and number):
+        raise ValueError(f"row {quoted(list(row))} does not exist")
+    return kind, node, number
+
+
+def selection_from(value: Any, friction: Sequence[bool], sliding: Iterable[int] = ()) -> Codes:
+    """Final codes; FORWARD and BACKWARD are allowed as well at the given nodes."""
+    if not isinstance(value, list) or len(value) != len(friction) or not all(type(code) is int for code in value):
+        raise ValueError(f"its selection is not a list of {len(friction)} codes")
+    for i, (code, positive) in enumerate(zip(value, friction, strict=True)):
+        if code in final_codes(positive) or (positive and code in _SLIDING and i in sliding):
+            continue
+        raise ValueError("a node cannot have the code that its selection gives it")
+    return tuple(value)
+
+
+def nodes_from(value: Any, p: int) -> Codes:
+    """Ascending nodes."""
+    if not isinstance(value, list) or not all(type(i) is int and 0 <= i < p for i in value):
+        raise ValueError("its free nodes are not a list of nodes")
+    if sorted(set(value)) != value:
+        raise ValueError("its free nodes are not ascending")
+    return tuple(value)
+
+
+def weights_from(value: Any, free: Codes, codes: Codes, friction: Sequence[bool]) -> Floats:
+    """The numbers of the form: one for every free or sliding node, and four more where a free node has friction."""
+    sliding = sum(code in _SLIDING for code in codes)
+    return numbers_from(value, len(free) + sliding + 4 * sum(friction[i] for i in free))
 
 
 def friction_at(problem: ContactProblem, alpha: Fraction) -> list[Fraction]:

@@ -11,8 +11,7 @@ import numpy as np
 from enumsol.branches.claims import ranges_text
 from enumsol.branches.elements import Arc, Vertex, VertexKind
 from enumsol.branches.figures.curves import QUANTITIES, Curve, curves, side_by_side
-from enumsol.branches.figures.marks import colour_of
-from enumsol.branches.figures.panels import family_states
+from enumsol.branches.figures.panels import colour_of, family_states
 from enumsol.model.problem import ContactProblem
 from enumsol.report.body import body_record
 from enumsol.report.parts import (

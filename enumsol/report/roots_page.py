@@ -237,7 +237,7 @@ def _pictures(roots: Sequence[Root], scene: Scene | None) -> tuple[dict[str, Any
     stresses = surface_stresses(problem, shape, min(count, len(roots)))
     bodies = [
         {
-            "u": short_list(shape.moves(root)[nodes].ravel()),
+            "u": short_list(shape.moves(root.problem, root.u, root.alpha)[nodes].ravel()),
             "forces": vectors(shape.contact_forces(problem, root.lambda_n, root.lambda_t), nodes),
             **({} if stresses is None else {"s": short_list(stresses(root.u))}),
         }

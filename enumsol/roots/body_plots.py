@@ -106,19 +106,20 @@ def _scale_words(scale: float) -> str:
     return f"displacements times {scale:g}"
 
 
-def _strongest(roots: Sequence[Any], problem: object, shape: BodyShape) -> float:
+def _strongest(roots: Sequence[Any], problem: AnyProblem, shape: BodyShape) -> float:
     """The largest nodal contact force of several roots [force]."""
     return max(largest_length(shape.contact_forces(problem, root.lambda_n, root.lambda_t)) for root in roots)
 
 
 def _factors(
-    roots: Sequence[Any], problem: object, shape: BodyShape, scale: float | None
+    roots: Sequence[Any], problem: AnyProblem, shape: BodyShape, scale: float | None
 ) -> tuple[tuple[float, ...], float]:
     """Factors of the displacements of each root, and one of all forces."""
     arrows = arrow_scale(_strongest(roots, problem, shape), shape.size)
     if scale is not None:
         return (positive_number(scale, "scale"),) * len(roots), arrows
-    return own_scales([largest_length(shape.moves(root)) for root in roots], shape.size), arrows
+    moved = [largest_length(shape.moves(root.problem, root.u, root.alpha)) for root in roots]
+    return own_scales(moved, shape.size), arrows
 
 
 def _axes(figure: Any, place: tuple[int, int, int], shape: BodyShape) -> Any:
@@ -126,7 +127,7 @@ def _axes(figure: Any, place: tuple[int, int, int], shape: BodyShape) -> Any:
 
 
 def _draw(ax: Any, root: Any, problem: AnyProblem, shape: BodyShape, scale: float, arrows: float) -> None:
-    moves = scale * shape.moves(root)
+    moves = scale * shape.moves(root.problem, root.u, root.alpha)
     points = shape.points + moves
     places = shape.at_rows(points)
     forces = arrows * shape.contact_forces(problem, root.lambda_n, root.lambda_t)
@@ -147,7 +148,7 @@ def _draw(ax: Any, root: Any, problem: AnyProblem, shape: BodyShape, scale: floa
         if len(pressed):
             options = {"linewidth": 1.8, "arrow_length_ratio": 0.3, "zorder": 4}
             ax.quiver(*(points - forces)[pressed].T, *forces[pressed].T, color=_FORCE, **options)
-        slides, ways = slip_directions(problem, root)
+        slides, ways = slip_directions(problem, root.u_t, root.statuses)
         if len(slides):
             length = SLIP_ARROW * shape.size
             options = {"linewidth": 1.8, "arrow_length_ratio": 0.4, "zorder": 4}

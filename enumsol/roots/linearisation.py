@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.condensation.condensed import Condensation, condensation_of
+from enumsol.condensation.condensed import CondensedProblem, condensation_of
 from enumsol.condensation.data import EXACT_DOF_LIMIT
 from enumsol.model.statuses import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, STATUSES, STICK, ContactStatus
 from enumsol.support.immutable import Sealed
@@ -39,7 +39,7 @@ class SelectionTangent(Sealed):
 
     Attributes
     ----------
-    condensed : Condensation
+    condensed : CondensedProblem
     friction : F and its derivative at the root's alpha, (p,), in 3D (p, 2)
     codes : tuple of p status codes
         In 3D a sector, or slip along one axis, stands for slip in the direction that the root has.
@@ -49,7 +49,7 @@ class SelectionTangent(Sealed):
         In 2D, solver of the system at the root's alpha, of the body on springs where nothing holds it.
     """
 
-    condensed: Condensation
+    condensed: CondensedProblem
     friction: tuple[Floats, Floats]
     codes: Codes
     force: Floats

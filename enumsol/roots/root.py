@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from fractions import Fraction
     from pathlib import Path
 
-    from enumsol.condensation.condensed import Condensation, CondensedProblem
+    from enumsol.condensation.condensed import CondensedProblem
     from enumsol.roots.linearisation import SelectionTangent, SlipSigns
     from enumsol.support.array_types import Alpha, Floats, NDArray
 
@@ -132,7 +132,7 @@ class Root(ContactState):
     regular: bool
     margin: float
     enclosure: Enclosure | None = field(repr=False, compare=False)
-    _condensed: CondensedProblem | Condensation = field(repr=False, compare=False)
+    _condensed: CondensedProblem = field(repr=False, compare=False)
     slip_angle: Floats | None = field(default=None, compare=False)
     _tangent: SelectionTangent | None = field(repr=False, compare=False, default=None)
     _slips: SlipSigns | None = field(repr=False, compare=False, default=None)

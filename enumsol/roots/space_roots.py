@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, smaller, solution, upper_norm
-from enumsol.condensation.condensed import Condensation, condensation_of
+from enumsol.condensation.condensed import CondensedProblem, condensation_of
 from enumsol.condensation.enclosure import moved_by_modes
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.sectors import SECTORS
@@ -151,10 +151,9 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         return np.array([_around(*pair) for pair in zip(*loose_angles(self.solvers.enclosed, found), strict=True)])
 
     @cached_property
-    def _condensed(self) -> Condensation:
+    def _condensed(self) -> CondensedProblem:
         """Condensation with which roots compute their displacements."""
-        found: Condensation = condensation_of(self.problem)
-        return found
+        return condensation_of(self.problem)
 
     def _in_units(self, rigid: Ball) -> Ball:
         """Coordinates of a rigid displacement, without the units of their rows, which are powers of two."""

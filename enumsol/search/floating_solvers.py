@@ -14,7 +14,7 @@ import numpy as np
 
 from enumsol.condensation.condensed import ScaledSystem
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError, RigidRows, enclosure_of
-from enumsol.proof import records
+from enumsol.proof import leaves, records
 from enumsol.search.certifiers.protocol import Bound, Certifier, UndecidedPart
 from enumsol.search.certifiers.rational_certifier import ExactCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier, proven
@@ -212,7 +212,7 @@ class Exclusions:
 
     def record(
         self, codes: Codes, bound: Bound, *, within: bool
-    ) -> tuple[records.Excluded | records.Unbalanced, bool] | None:
+    ) -> tuple[leaves.Excluded | leaves.Unbalanced, bool] | None:
         """A record that excludes a partial assignment, and whether it needs the bound; or None.
 
         Whether the bound is needed must not depend on the numbers that a relaxation arrives at. So an assignment that
@@ -234,10 +234,10 @@ class Exclusions:
             return None
         return found, True
 
-    def _excluded(self, margin: int, codes: Codes, tried: list[Terms]) -> records.Excluded | None:
+    def _excluded(self, margin: int, codes: Codes, tried: list[Terms]) -> leaves.Excluded | None:
         """The first multipliers that prove something, with bounds beyond which there are no solutions, or its own."""
         kept = ((terms, proven(self._margins[margin], codes, *terms)) for terms in tried)
-        return next((records.Excluded(terms.rows, values) for terms, values in kept if values is not None), None)
+        return next((leaves.Excluded(terms.rows, values) for terms, values in kept if values is not None), None)
 
     def reference(self, selection: Codes) -> Reference | None:
         """The form of a root, if one is proven definite."""
@@ -258,10 +258,10 @@ class Exclusions:
                 return system is self.system
         return None
 
-    def unbalanced(self, codes: Codes) -> records.Unbalanced | None:
+    def unbalanced(self, codes: Codes) -> leaves.Unbalanced | None:
         """A record that no forces below a partial assignment are in balance with the load; or None."""
         z = motion_against(self.system, codes)
-        return records.Unbalanced(z) if is_unbalanced(self.system, codes, z) else None
+        return leaves.Unbalanced(z) if is_unbalanced(self.system, codes, z) else None
 
 
 class FloatingCertifier(VerifiedCertifier):
@@ -311,14 +311,14 @@ class FloatingCertifier(VerifiedCertifier):
         self._escalations.balls += 1
         selection = reference.selection
         back = self._back(selection, lambda: exclusions.declared[selection])
-        leaf = partial(records.OnlyReference, back, proposal.rows, proposal.products)
+        leaf = partial(leaves.OnlyReference, back, proposal.rows, proposal.products)
         if reference.lies_below(codes):
             return [self._regular(selection, reference.root, leaf)]
         self._leaf(leaf())
         return []
 
     def _excluded_by_record(
-        self, record: records.Excluded | records.Unbalanced | records.NoRoot, *, bounded: bool
+        self, record: leaves.Excluded | leaves.Unbalanced | leaves.NoRoot, *, bounded: bool
     ) -> None:
         self.bounded |= bounded
         self._escalations.balls += 1
@@ -333,15 +333,15 @@ class FloatingCertifier(VerifiedCertifier):
             if ball is not None and ball.is_root:
                 self._escalations.balls += 1
                 return self._regular(codes, ball)
-            found: records.Excluded | records.Unbalanced | records.NoRoot | None = self._exclusions.unbalanced(codes)
+            found: leaves.Excluded | leaves.Unbalanced | leaves.NoRoot | None = self._exclusions.unbalanced(codes)
             if found is None and _holds_none(self._exclusions.free, codes):
-                found = records.NoRoot()
+                found = leaves.NoRoot()
             if found is not None:
                 self._excluded_by_record(found, bounded=False)
                 return None
             # with the bound as in Exclusions.record
             if holds_no_root(system, codes, ball) and (self.bounded or self._exclusions.rests_on_reach(codes)):
-                self._excluded_by_record(records.NoRoot(), bounded=True)
+                self._excluded_by_record(leaves.NoRoot(), bounded=True)
                 return None
         certifier = self._exactly()
         if certifier is None:
@@ -365,8 +365,8 @@ class FloatingCertifier(VerifiedCertifier):
                 return None
             self._verified[core] = root
         self._escalations.balls += 1
-        self._leaf(records.SharedRoot(root.slips, self._ball(root, root.det_sign)))
-        point, sign = (root.force.mid,), root.det_sign
+        self._leaf(leaves.SharedRoot(root.slips, self._ball(root, root.index)))
+        point, sign = (root.force.mid,), root.index
         return SelectionSolution(root.core, point, 0, sign, strict=False, index=sign, possible=root.possible)
 
 

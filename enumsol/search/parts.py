@@ -166,8 +166,8 @@ class Spread(ABC):
     def _examine_here(self, stack: list[TreePart]) -> None:
         """Examine one node; what was searched without that which is found there is searched again."""
         rest = self._tree.examined(stack[-1].roots, 1)
-        if self._tree.stopped is not None:
-            return
+        if rest == list(stack[-1].roots):
+            return  # for a limit, or for what is to be found first
         parts = self._parts(stack[-1].place, rest)
         stack[-1:] = parts[::-1]
         if self._is_current(afresh=False):

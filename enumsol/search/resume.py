@@ -10,8 +10,7 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from enumsol.proof import records
-from enumsol.proof.leaves import kind_of
+from enumsol.proof import leaves, records
 from enumsol.search.certifiers.protocol import NO_BOUND, RecordedBound
 from enumsol.search.fathoming_in_contact import LoneProposal
 from enumsol.search.nodes import TreeNode
@@ -20,6 +19,7 @@ from enumsol.search.tree import TreeSearch
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.proof.begun import BegunProof
     from enumsol.search.certifiers.protocol import Bound
     from enumsol.support.array_types import Codes
@@ -35,11 +35,11 @@ class Reader:
     ----------
     limits : Limits
         Of the root of its tree, without the forms that are declared.
-    made : callable giving the form of a declaration, or None; ValueError where it makes no sense
+    system : balls for the data, of which forms are made; None where there are none
     """
 
-    def __init__(self, limits: records.Limits, made: Callable[[records.DeclaredForm], Any]) -> None:
-        self._limits, self._made = limits, made
+    def __init__(self, limits: records.Limits, system: EnclosedSystem | None) -> None:
+        self._limits, self._system = limits, system
         self._declared: list[records.DeclaredForm] = []
         #: Forms that were used, the last one last.
         self._used: dict[records.DeclaredForm, Any] = {}
@@ -52,7 +52,7 @@ class Reader:
 
     def read(self, codes: Codes, record: list[Any]) -> Any:
         """A leaf; None or ValueError where the record makes no sense."""
-        kind = kind_of(record, self._limits.tree)
+        kind = leaves.kind_of(record, self._limits.tree)
         return kind and kind.read(record, replace(self._limits, codes=codes, declared=self._declared))
 
     def form_over(self, codes: Codes) -> Any:
@@ -62,12 +62,12 @@ class Reader:
         used = reversed(self._used.items())
         return next((form for said, form in used if said.serves(codes) and own in (None, said.codes)), None)
 
-    def bound(self, leaf: records.Excluded) -> Bound:
+    def bound(self, leaf: leaves.Excluded) -> Bound:
         """What is said to exclude a partial assignment; ValueError where that is a form which is not proven."""
         if not isinstance(leaf.by, int):
             return RecordedBound(leaf.rows, leaf.values)
         said = self._declared[-leaf.by]
-        form = self._used.pop(said) if said in self._used else self._made(said)
+        form = self._used.pop(said) if said in self._used else self._system and said.form(self._system)
         if form is None:
             raise ValueError("its form is not proven")
         self._used[said] = form
@@ -149,7 +149,7 @@ class Replay:
             return True
         try:
             split = records.Branching.covering(record, item.codes, search.splitting.covers)
-        except records.RecordError:
+        except ValueError:
             stack.append(item)
             return False
         search.certifier.branching(split.node, split.children)
@@ -164,19 +164,19 @@ class Replay:
         search = self._search
         try:
             leaf = self._reader.read(item.codes, record)
-            if isinstance(leaf, records.Unbalanced):
+            if isinstance(leaf, leaves.Unbalanced):
                 # the certifier finds a direction of its own
                 return search.excluded(item, NO_BOUND)
-            if isinstance(leaf, records.Excluded):
+            if isinstance(leaf, leaves.Excluded):
                 return search.excluded(item, self._reader.bound(leaf))
-            if isinstance(leaf, records.Alone) and leaf.strengths is not None and leaf.terms is not None:
+            if isinstance(leaf, leaves.Alone) and leaf.strengths is not None and leaf.terms is not None:
                 proposal = LoneProposal(leaf.selection, leaf.numbers, leaf.strengths)
                 return search.alone(item, proposal, RecordedBound(*leaf.terms))
         except ValueError:
             return False
-        if isinstance(leaf, records.OnlyReference):
+        if isinstance(leaf, leaves.OnlyReference):
             return search.closed(item, None, again=True)
-        boxed = isinstance(leaf, records.BoxedRoot) and leaf.by is None
+        boxed = isinstance(leaf, leaves.BoxedRoot) and leaf.by is None
         if isinstance(leaf, records.ClosingRecord) and not boxed:
             return search.closed(item, search.relaxations.energy(item.codes), again=True)
-        return (boxed or isinstance(leaf, records.Solved)) and search.settled(item)
+        return (boxed or isinstance(leaf, leaves.Solved)) and search.settled(item)

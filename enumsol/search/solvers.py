@@ -13,7 +13,6 @@ from enumsol.condensation.data import EXACT_DOF_LIMIT, exactly_at
 from enumsol.condensation.enclosure import EnclosedSystem, NotEnclosedError
 from enumsol.errors import InvalidArgumentError, MissingDependencyError
 from enumsol.model.statuses import UNDECIDED
-from enumsol.proof.declared_forms import plane_form
 from enumsol.proof.records import Limits, Tree
 from enumsol.proof.writer import Recorder
 from enumsol.relaxation.active_set import ActiveSetEngine
@@ -215,7 +214,7 @@ class Solvers(SearchSetup):
     def _index(self, codes: Codes) -> int:
         """The sign of det M of a selection where many digits show it, else 0."""
         found = self._solved_precisely(codes)
-        return 0 if found is None else found.det_sign
+        return 0 if found is None else found.index
 
     @cached_property
     def _precise(self) -> PreciseAtAlpha | None:
@@ -274,7 +273,7 @@ class Solvers(SearchSetup):
         system, F = self.enclosed, (self.scaled.F > 0).tolist()
         tree = Tree.PLANE if self.problem.held else Tree.FLOATING_PLANE
         limits = Limits((UNDECIDED,) * self.problem.p, tree, F, modes=self.problem.modes.r)
-        return Reader(limits, lambda said: None if system is None else plane_form(system, said))
+        return Reader(limits, system)
 
 
 def _positive(system: EnclosedSystem) -> bool:

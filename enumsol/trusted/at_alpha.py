@@ -28,7 +28,7 @@ from enumsol.trusted.selection import Selection, row_values
 from enumsol.trusted.status_rows import CONDITIONS
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Sequence
 
     from enumsol.condensation.enclosure import EnclosedSystem
     from enumsol.support.array_types import Floats
@@ -69,13 +69,14 @@ class VerifiedSelection(EnclosedSolution):
 
     Attributes
     ----------
-    det_sign : int
-        Of the matrix; of a body that nothing holds as on weak springs (theory, section 14.2).
+    index : int
+        Sign of the determinant of the matrix, of a body that nothing holds as on weak springs (theory, section 14.2):
+        the index of the root, if it is one.
     rigid : Ball of shape (r,), or None
         Of such a body, the coordinates q of its rigid displacement.
     """
 
-    det_sign: int
+    index: int
     rigid: Ball | None = None
 
 
@@ -94,11 +95,35 @@ def solve_selection(system: EnclosedSystem, codes: Sequence[int]) -> VerifiedSel
         return _solve_selection(system, codes)
 
 
-def holds_no_root(system: EnclosedSystem, codes: Sequence[int], ball: VerifiedSelection | None) -> bool:
-    """Whether a complete selection is proven to hold no root; ``ball`` is its verified solution, if it has one.
+@dataclass(frozen=True)
+class Unsettled:
+    """A selection of which it is not proven whether it holds a root; its verified solution, if it has one."""
 
-    The one criterion of the search, which writes such a leaf, and of the checker, which reads it.
+    near: VerifiedSelection | None
+
+
+def settled_selection(
+    system: EnclosedSystem,
+    codes: Sequence[int],
+    precisely: Callable[[Sequence[int]], VerifiedSelection | None] = lambda _: None,
+) -> VerifiedSelection | Unsettled | None:
+    """The root of a complete selection, None where it holds none, or that this is open.
+
+    The one criterion of the search, which writes such a leaf, and of the checker, which reads it. ``precisely`` gives
+    the verified solution in many digits, or None; it is asked where double arithmetic does not decide.
     """
+    ball = solve_selection(system, codes)
+    if ball is None or not ball.is_root:
+        if holds_no_root(system, codes, ball):
+            return None
+        ball = precisely(codes) or ball
+        if ball is not None and ball.is_excluded:
+            return None
+    return ball if ball is not None and ball.is_root else Unsettled(ball)
+
+
+def holds_no_root(system: EnclosedSystem, codes: Sequence[int], ball: VerifiedSelection | None) -> bool:
+    """Whether a complete selection is proven to hold no root; ``ball`` is its verified solution, if it has one."""
     return (ball is not None and ball.is_excluded) or contradicts(system, codes)
 
 

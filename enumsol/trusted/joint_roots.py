@@ -33,8 +33,7 @@ class JointRoot:
     possible : per node the codes that may hold there
     force, w : Ball of shape (2p,)
         Of all of them.
-    det_sign : int
-        Its index.
+    index : int
     rigid : Ball of shape (r,), or None
         Of a body that nothing holds, the coordinates q of its rigid displacement.
     """
@@ -43,7 +42,7 @@ class JointRoot:
     possible: tuple[frozenset[int], ...]
     force: Ball
     w: Ball
-    det_sign: int
+    index: int
     rigid: Ball | None
 
     def has(self, codes: Codes) -> bool:
@@ -71,7 +70,7 @@ def joint_root(system: EnclosedSystem, core: Codes, slips: Mapping[int, int]) ->
     balls = list[VerifiedSelection]()
     for codes in product(*possible):
         ball = solve_selection(system, codes)
-        if ball is None or (balls and ball.det_sign != balls[0].det_sign):
+        if ball is None or (balls and ball.index != balls[0].index):
             return None
         left = {i: _PAIRS[slips[i]][codes[i]] for i in slips}
         rows = [(kind, i) for i, code in enumerate(codes) for kind in CONDITIONS[code][1]]
@@ -81,4 +80,4 @@ def joint_root(system: EnclosedSystem, core: Codes, slips: Mapping[int, int]) ->
         balls.append(ball)
     force, w = (hull([getattr(ball, name) for ball in balls]) for name in ("force", "w"))
     rigid = [ball.rigid for ball in balls if ball.rigid is not None]
-    return JointRoot(core, possible, force, w, balls[0].det_sign, hull(rigid) if rigid else None)
+    return JointRoot(core, possible, force, w, balls[0].index, hull(rigid) if rigid else None)

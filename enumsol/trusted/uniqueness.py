@@ -62,7 +62,7 @@ class ClosedSolution(EnclosedSolution):
     ----------
     core : status codes, UNDECIDED at the free nodes, FORWARD or BACKWARD at those that slide
     possible : per node the final codes that may hold there; those of a fixed node that holds strictly are its own only
-    sign : int
+    index : int
         Sign of the determinant of the fixed nodes' equations: the index, if the conditions below hold strictly.
     slack : Ball
         The conditions of the fixed nodes, and of every sliding one: the sign of its slip, unless it is open.
@@ -72,7 +72,7 @@ class ClosedSolution(EnclosedSolution):
 
     core: Codes
     possible: tuple[frozenset[int], ...]
-    sign: int
+    index: int
     regular: VerifiedSelection | None = None
 
     @property

@@ -16,7 +16,7 @@ from path_problems import balanced, integer_problem
 import enumsol
 from enumsol import BranchGraph, ContactProblem, branch_graph, enumerate_roots
 from enumsol.branches.elements import VertexKind, vertex_kind
-from enumsol.branches.figures.marks import MARKERS
+from enumsol.branches.figures.panels import MARKERS
 
 #: Kinds that have no mark: curves and areas show them.
 UNMARKED = {VertexKind.FAMILY, VertexKind.SHEET, VertexKind.END}

@@ -23,7 +23,7 @@ from enumsol.branches.enclosed.joining import join
 from enumsol.branches.exact import known_selections
 from enumsol.branches.exact.gluing import glue
 from enumsol.branches.exact.known_selections import KnownSelections
-from enumsol.branches.space import cover
+from enumsol.branches.space import space_graph as cover
 from enumsol.branches.unfinished import DEFECT, named
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.errors import IncompleteGraphError

@@ -13,8 +13,7 @@ from refusals import bad_argument
 from enumsol import branch_graph, gallery
 from enumsol.branches.claims import MultiplicitySteps
 from enumsol.branches.figures.curves import QUANTITIES, Curve, curves, side_by_side
-from enumsol.branches.figures.marks import MARKERS, STATUS_STYLES, narrow_changes
-from enumsol.branches.figures.panels import _names, ranges
+from enumsol.branches.figures.panels import MARKERS, STATUS_STYLES, _names, narrow_changes, ranges
 from enumsol.model.statuses import ContactStatus
 from enumsol.support.plotting import new_figure
 

@@ -31,7 +31,7 @@ import enumsol
 from enumsol.arithmetic.balls import Ball
 from enumsol.branches.claims import uniqueness_bound
 from enumsol.branches.elements import VertexKind
-from enumsol.branches.space import chains, cover, pieces
+from enumsol.branches.space import chains, pieces, space_graph
 from enumsol.branches.space.chains import chain_through
 from enumsol.branches.space.make_curved import unordered
 from enumsol.branches.space.pieces import runs_and_turns
@@ -130,7 +130,7 @@ def test_the_only_solutions_of_pieces_lie_on_a_curve_that_passes_all_of_them():
 
 def test_without_such_a_curve_that_they_are_the_only_ones_makes_no_graph(monkeypatch):
     problem = enumsol.gallery.block3d(1, 1, 1)
-    monkeypatch.setattr(cover, "chain_through", lambda *_: None)
+    monkeypatch.setattr(space_graph, "chain_through", lambda *_: None)
     graph = enumsol.branch_graph(problem, (0.5, 1.0), max_nodes=40)
     assert not graph.complete
     assert (graph.arcs, graph.at_least(0.75)) == ((), 1)
@@ -259,7 +259,7 @@ def test_the_time_may_be_over_during_continuation(monkeypatch):
 @pytest.mark.slow
 def test_a_curve_that_is_not_proven_to_be_whole_is_kept_as_far_as_it_is(two_curves, monkeypatch):
     problem, whole = two_curves
-    follow = cover.chain_through
+    follow = space_graph.chain_through
 
     def cut_short(*arguments):
         chain = follow(*arguments)
@@ -267,7 +267,7 @@ def test_a_curve_that_is_not_proven_to_be_whole_is_kept_as_far_as_it_is(two_curv
             return chain
         return CurveChain.of(chain.links[:-1], chain.joints[:-1], (Fraction(0), Fraction(1)))
 
-    monkeypatch.setattr(cover, "chain_through", cut_short)
+    monkeypatch.setattr(space_graph, "chain_through", cut_short)
     part = enumsol.branch_graph(problem, (0, 1), max_nodes=100)
     assert not part.complete
     assert len(part.components) == 2
@@ -289,9 +289,9 @@ def broken(chain, x, interval):
 
 def test_beside_ends_of_curves_all_solutions_are_known(monkeypatch):
     """As if the curve could not be followed through its middle; the tree finds both parts."""
-    follow, interval = cover.chain_through, (Fraction(1, 2), Fraction(3, 2))
+    follow, interval = space_graph.chain_through, (Fraction(1, 2), Fraction(3, 2))
     monkeypatch.setattr(chains, "_TRUST", 0.2)
-    monkeypatch.setattr(cover, "chain_through", lambda *given: broken(follow(*given), given[2], interval))
+    monkeypatch.setattr(space_graph, "chain_through", lambda *given: broken(follow(*given), given[2], interval))
     graph = enumsol.branch_graph(SLIDING, interval, max_nodes=200)
     ((low, high),) = graph.open_ranges
     assert 0.5 < low < high < 1.5
@@ -387,7 +387,7 @@ def test_figures_and_pages_show_ranges_that_are_left_open(through_zero, graph, t
 @pytest.mark.parametrize(("p", "seed"), [(2, 2), (1, 9), (2, 3), (2, 6), (2, 9), (2, 14), (2, 27), (2, 31)])
 def test_counts_of_random_graphs_with_gaps_are_those_of_searches_elsewhere(p, seed, monkeypatch):
     """Pieces that are left open although shorter ones would decide them."""
-    monkeypatch.setattr(cover, "PieceTree", partial(cover.PieceTree, smallest=2.0**-5))
+    monkeypatch.setattr(space_graph, "PieceTree", partial(space_graph.PieceTree, smallest=2.0**-5))
     problem = random_over_alpha(p, seed) if seed % 2 else in_space(random_plane_over_alpha(p, seed))
     graph = enumsol.branch_graph(problem, (0, 1), max_nodes=250)
     assert graph.reasons[0].startswith("solutions may be missing")

@@ -25,7 +25,7 @@ def inside(room, *modules):
 CHECKERS = inside("checker", "verify", "plane_checker", "graph_checker", "history_checker", "space_graph")
 IN_SPACE = {
     *("enumsol.checker.space_checker", "enumsol.condensation.space_condensed", "enumsol.model.sectors"),
-    *inside("trusted.space", "resultants", "sector_rows", "slip_forms", "leaves", "boxed_solution"),
+    *inside("trusted.space", "resultants", "sector_rows", "leaves", "boxed_solution"),
     *inside("trusted.space", "product_forms", "natural_map", "space_uniqueness", "turning"),
     *inside("trusted.space", "leaf_conditions", "leaf_equations"),
 }
@@ -47,20 +47,19 @@ SHARED = {
     "condensation.enclosure": {
         *("CondensedEnclosure", "EnclosedSystem", "NotEnclosedError", "RigidRows", "enclosure_of", "moved_by_modes")
     },
-    "condensation.free_displacements": {"solved"},
     "condensation.space_condensed": {"AlphaSpace", "EnclosedSpace", "PieceSpace", "SpaceSystem"},
-    "condensation.unloaded": {"CondensedData", "never_loaded", "vanishing_alpha"},
+    "condensation.unloaded": {"never_loaded", "solved", "vanishing_alpha"},
     "trusted.arcs.only_branch": {"only_roots"},
     "trusted.arcs.selection_balls": None,
     "trusted.exclusion": {"Terms", "exclusion_margin"},
     "trusted.floating_bounds": {"is_unbalanced"},
     "trusted.joint_roots": {"JointRoot", "joint_root"},
     "trusted.confinement": {"motion_against", "motion_beside", "without_bound"},
-    "trusted.arcs.many_digits": {"affordable"},
+    "trusted.arcs.many_digits": {"affordable", "ball_of", "precision"},
     "trusted.arcs.over_parts": None,
     "trusted.over_interval": {"EnclosedPiece", "PieceNumbers", "as_computed"},
     "trusted.arcs.precise": None,
-    "trusted.arcs.taylor": {"ShortExpansion"},
+    "trusted.arcs.taylor": {"AlphaFunctions", "ShortExpansion"},
     "trusted.positions": {"certain_statuses", "tangential_positions"},
     "trusted.reference": {"Reference"},
     "trusted.selection": None,
@@ -99,7 +98,6 @@ SHARED = {
     "proof.reading": {"fits", "rational_text"},
     "proof.records": None,
     "proof.curve_records": None,
-    "proof.declared_forms": None,
     "proof.leaves": None,
     "proof.writer": None,
     "model.sectors": None,

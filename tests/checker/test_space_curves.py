@@ -9,7 +9,7 @@ from space_graph_proofs import closed_branch
 
 from enumsol import enumerate_roots, verify
 from enumsol.branches.space.chains import chain_through
-from enumsol.branches.space.cover import SpaceCover
+from enumsol.branches.space.space_graph import ByCurves
 from enumsol.search.space.piece_tree import OpenLeaf
 from enumsol.trusted.space.solution_curve import AlphaProblem
 
@@ -33,7 +33,7 @@ def claimed(chains, low, high):
     """What the checker says of these curves over an interval, with a tree that leaves all of it open."""
     ends = Fraction(low), Fraction(high)
     tree = [OpenLeaf(*ends, (6,) * problem().p, None)]
-    return verify(problem(), SpaceCover(problem(), ends, chains=list(chains), records=tree).proof())
+    return verify(problem(), ByCurves(problem(), ends, chains=list(chains), records=tree).proof())
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ from problems3d import random_over_alpha
 from proof_tools import of_kind, proof_of, put, records_of, replaced, why_refused
 
 from enumsol import verify
-from enumsol.branches.space.cover import SpaceCover
+from enumsol.branches.space.space_graph import ByCurves
 from enumsol.gallery import wedge3d
 from enumsol.search.space.piece_certificates import PieceProposals
 
@@ -24,7 +24,7 @@ def leaf_by_leaf(p, seed):
 
     With no node of a random problem it is that of a wedge.
     """
-    cover = SpaceCover(random_over_alpha(p, seed), INTERVAL) if p else SpaceCover(wedge3d(2, 1, 2), WEDGED)
+    cover = ByCurves(random_over_alpha(p, seed), INTERVAL) if p else ByCurves(wedge3d(2, 1, 2), WEDGED)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(PieceProposals, "numbers", lambda *_: None)
         patch.setattr(PieceProposals, "is_hopeful", lambda *_: False)

@@ -13,7 +13,7 @@ from proof_tools import copied, proof_of, records_of
 from space_graph_proofs import Parts, closed_branch, mutant
 from space_judge_mutants import checked, judged
 
-from enumsol.branches.space.cover import SpaceCover
+from enumsol.branches.space.space_graph import ByCurves
 
 
 def orthotropic(p, seed):
@@ -39,7 +39,7 @@ CASES = {
 def proven(name):
     """Problem, proof and records of a graph that leaves nothing open."""
     build, low, high = CASES[name]
-    cover = SpaceCover(build(), (Fraction(low), Fraction(high)))
+    cover = ByCurves(build(), (Fraction(low), Fraction(high)))
     cover.search(max_nodes=700)
     proof = cover.proof()
     return cover.problem, proof, records_of(proof)

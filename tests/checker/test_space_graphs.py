@@ -12,7 +12,7 @@ from proof_tools import of_kind, proof_of, put, records_of, replaced
 import enumsol
 from enumsol import enumerate_roots, gallery, verify
 from enumsol.arithmetic.balls import Ball
-from enumsol.branches.space.cover import SpaceCover
+from enumsol.branches.space.space_graph import ByCurves
 from enumsol.trusted.space.solution_curve import AlphaProblem, lies_in
 
 INTERVAL = Fraction(0), Fraction(1)
@@ -20,7 +20,7 @@ INTERVAL = Fraction(0), Fraction(1)
 
 @functools.cache
 def covered(p, seed):
-    cover = SpaceCover(random_over_alpha(p, seed), INTERVAL)
+    cover = ByCurves(random_over_alpha(p, seed), INTERVAL)
     cover.search(max_nodes=600)
     return cover
 
@@ -50,7 +50,7 @@ def test_a_proof_says_that_all_solutions_lie_on_its_curves(p, seed):
 
 @functools.cache
 def block_by_certificates():
-    cover = SpaceCover(gallery.block3d(1, 1, 1), (Fraction(1, 2), Fraction(1)))
+    cover = ByCurves(gallery.block3d(1, 1, 1), (Fraction(1, 2), Fraction(1)))
     cover.search(max_nodes=100)
     return cover
 
@@ -102,7 +102,7 @@ def test_a_certificate_below_an_assignment_speaks_of_its_statuses_only():
 def test_a_block_has_one_curve_by_a_few_certificates(cells):
     """Statuses change dozens of times; the form holds through all of them."""
     problem = gallery.block3d(*cells)
-    cover = SpaceCover(problem, (Fraction(0), Fraction(2)))
+    cover = ByCurves(problem, (Fraction(0), Fraction(2)))
     cover.search(max_nodes=20)
     assert (len(cover.chains), cover.gaps, cover.stopped) == (1, [], None)
     assert {record.kind for record in cover.records} <= {"p", "k"}
@@ -114,7 +114,7 @@ def test_a_block_has_one_curve_by_a_few_certificates(cells):
 def test_a_flat_block_takes_one_node():
     """3, and with 5 x 5 cells 282, where mu and kappa of open nodes are the same."""
     problem = gallery.block3d(4, 2, 1)
-    cover = SpaceCover(problem, (Fraction(0), Fraction(2)))
+    cover = ByCurves(problem, (Fraction(0), Fraction(2)))
     cover.search(max_nodes=1)
     assert (len(cover.chains), cover.gaps, cover.stopped) == (1, [], None)
     complete_report(problem, cover.proof())

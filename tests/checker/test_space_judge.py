@@ -19,7 +19,7 @@ from space_judge_mutants import checked, judged, mutant, mutant_of_graph
 from space_proofs import RANDOM, case, random_problem, values_of, with_values
 
 from enumsol import Proof, branch_graph, enumerate_roots, gallery
-from enumsol.branches.space.cover import SpaceCover
+from enumsol.branches.space.space_graph import ByCurves
 from enumsol.search.space import space_references
 
 #: What the checker says of a claim that is true and that its own bounds do not reach.
@@ -100,7 +100,7 @@ def roots_of(kind, *rest):
 def graph_of(kind, *rest):
     interval = 0, 1
     if kind == "curves cut short":
-        cover = SpaceCover(random_over_alpha(*rest), (Fraction(0), Fraction(1, 64)))
+        cover = ByCurves(random_over_alpha(*rest), (Fraction(0), Fraction(1, 64)))
         cover.search(max_nodes=5)
         return cover.problem, cover.proof()
     if kind == "one node":

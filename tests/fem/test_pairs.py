@@ -14,7 +14,7 @@ from two_bodies import blocks, boxes, shifted, stacked, together
 
 import enumsol
 from enumsol import fem
-from enumsol.fem.pairs import faced
+from enumsol.fem.contacts import faced
 
 E, NU = 2.0, 0.3
 STEEL = {"young": E, "poisson": NU}

@@ -7,7 +7,7 @@ from parted_solids import NORMALS, rotation
 from refusals import bad_argument
 
 from enumsol import fem
-from enumsol.fem.solid_geometry import facet_vectors, solid_mesh
+from enumsol.fem.solid_problems import facet_vectors, solid_mesh
 from enumsol.model.cells import boundary_facets
 
 KINDS = ("hexahedra", "tetrahedra")

@@ -9,6 +9,7 @@ from flint import arb, arb_mat, fmpq, fmpq_mat
 from enumsol.arithmetic.algebraic import CriticalAlpha, merge, rational_between, real_roots
 from enumsol.arithmetic.balls import Ball
 from enumsol.arithmetic.rationals import rational
+from enumsol.branches.enclosed.zeros import zeros_of
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.model.statuses import RowKind
 from enumsol.selections.functions import SelectionFunctions
@@ -247,6 +248,6 @@ def check_slopes(truth, expansion, known, a, b, made):
         assert truth.only_zero(k, int(slopes[k]), a, b)
         if a < b and [int(end[k]) for end in known.ends] == [-slopes[k], slopes[k]]:
             made["zeros"] += 1
-            first, last = expansion.zero_bounds(k, int(slopes[k]), a, b)
+            first, last = zeros_of(expansion).zero_bounds(k, int(slopes[k]), a, b)
             assert a <= first < last <= b
             assert truth.signs(truth.conditions[k], first, last) == {-1, 0, 1}

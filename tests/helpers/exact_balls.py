@@ -21,7 +21,7 @@ def holds(mid, rad, exact):
 
 def agrees_with_exact(ball, S, g, F, codes):
     """A verified selection against its exact solution; its verdict."""
-    assert ball.det_sign == det_sign(S, F, codes) != 0
+    assert ball.index == det_sign(S, F, codes) != 0
     equations, inequalities = _conditions(S, g, F, codes)
     point, free = _affine(equations)
     assert not free

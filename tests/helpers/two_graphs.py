@@ -5,9 +5,8 @@ from fractions import Fraction
 from itertools import pairwise
 
 from enumsol.arithmetic.rationals import rational
-from enumsol.branches.enclosed.following import TracedProblem, follow_selections
+from enumsol.branches.enclosed.following import TracedProblem, follow_selections, make_traced
 from enumsol.branches.enclosed.joining import EventPlaceKind
-from enumsol.branches.enclosed.make_traced import make_traced
 from enumsol.branches.exact.gluing import glue, make_vertices
 from enumsol.branches.exact.known_selections import KnownSelections
 from enumsol.branches.ways import ByAlgebra

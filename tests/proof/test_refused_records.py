@@ -10,7 +10,7 @@ import pytest
 from refusals import bad_argument
 
 from enumsol.model.statuses import CONTACT, FORWARD, OPEN, SLIP_PLUS, STICK, UNDECIDED
-from enumsol.proof import curve_records, reading, records
+from enumsol.proof import curve_records, leaves, reading, records
 from enumsol.proof.leaves import leaves_of
 from enumsol.proof.records import Limits
 
@@ -33,11 +33,11 @@ WEIGHTS = [1.0] * 5
 @pytest.mark.parametrize(
     ("kind", "entries", "why"),
     [
-        (records.Excluded, [1, ""], "its multipliers are not two texts"),
-        (records.Excluded, texts([0, 1], [1.0]), "2 rows and 1 multipliers"),
-        (records.Excluded, texts([0] * 15, [1.0] * 15), "it has 15 multipliers, and there are 14 rows"),
-        (records.Excluded, texts([14], [1.0]), "row 14 does not exist; there are 14"),
-        (records.Excluded, texts([0], [np.inf]), "a multiplier is not finite"),
+        (leaves.Excluded, [1, ""], "its multipliers are not two texts"),
+        (leaves.Excluded, texts([0, 1], [1.0]), "2 rows and 1 multipliers"),
+        (leaves.Excluded, texts([0] * 15, [1.0] * 15), "it has 15 multipliers, and there are 14 rows"),
+        (leaves.Excluded, texts([14], [1.0]), "row 14 does not exist; there are 14"),
+        (leaves.Excluded, texts([0], [np.inf]), "a multiplier is not finite"),
         (records.DeclaredForm, [[6], *FORM[2:]], "a form cannot be read: its codes are not a list of 2 codes"),
         (records.DeclaredForm, [[6, "6"], *FORM[2:]], "a form cannot be read: its codes are not a list of 2 codes"),
         (records.DeclaredForm, [[6, 7], *FORM[2:]], "a form cannot be read: a status code is not among 0 to 6"),
@@ -48,19 +48,19 @@ WEIGHTS = [1.0] * 5
             [FORM[1], [*FORM[2][:4], -0.5, 0.0, 0.0, 0.0], FORM[3]],
             "a multiplier of a form is negative",
         ),
-        (records.Excluded, [*texts([0], [1.0]), 3], "its form was not declared"),
-        (records.Excluded, [*texts([0], [1.0]), 0], "its form was not declared"),
-        (records.Excluded, [*texts([0], [1.0]), True], "its form was not declared"),
-        (records.Closed, [[OPEN], [0], WEIGHTS, [0.0] * 4], "its selection is not a list of 2 codes"),
-        (records.Closed, [[OPEN, 9], [0], WEIGHTS, [0.0] * 4], "a node cannot have the code"),
-        (records.Closed, [[FORWARD, STICK], [0], WEIGHTS, [0.0] * 4], "a node cannot have the code"),
-        (records.Closed, [[OPEN, STICK], [2], WEIGHTS, [0.0] * 4], "its free nodes are not a list of nodes"),
-        (records.Closed, [[OPEN, STICK], [1, 0], WEIGHTS, [0.0] * 4], "its free nodes are not ascending"),
-        (records.Closed, [[OPEN, STICK], [0], WEIGHTS[1:], [0.0] * 4], "expected 5 numbers"),
-        (records.Closed, [[OPEN, OPEN], [0], WEIGHTS, [0.0] * 4], "a node that has a status in its proof has another"),
-        (records.Closed, [[OPEN, SLIP_PLUS], [0], WEIGHTS, 1], "its selection does not lie below its assignment"),
-        (records.Closed, [[OPEN, STICK], [], WEIGHTS, 1], "its free nodes are not those of its assignment"),
-        (records.NoRoot, ["exactly"], "a root or a solved selection is claimed where statuses are still open"),
+        (leaves.Excluded, [*texts([0], [1.0]), 3], "its form was not declared"),
+        (leaves.Excluded, [*texts([0], [1.0]), 0], "its form was not declared"),
+        (leaves.Excluded, [*texts([0], [1.0]), True], "its form was not declared"),
+        (leaves.Closed, [[OPEN], [0], WEIGHTS, [0.0] * 4], "its selection is not a list of 2 codes"),
+        (leaves.Closed, [[OPEN, 9], [0], WEIGHTS, [0.0] * 4], "a node cannot have the code"),
+        (leaves.Closed, [[FORWARD, STICK], [0], WEIGHTS, [0.0] * 4], "a node cannot have the code"),
+        (leaves.Closed, [[OPEN, STICK], [2], WEIGHTS, [0.0] * 4], "its free nodes are not a list of nodes"),
+        (leaves.Closed, [[OPEN, STICK], [1, 0], WEIGHTS, [0.0] * 4], "its free nodes are not ascending"),
+        (leaves.Closed, [[OPEN, STICK], [0], WEIGHTS[1:], [0.0] * 4], "expected 5 numbers"),
+        (leaves.Closed, [[OPEN, OPEN], [0], WEIGHTS, [0.0] * 4], "a node that has a status in its proof has another"),
+        (leaves.Closed, [[OPEN, SLIP_PLUS], [0], WEIGHTS, 1], "its selection does not lie below its assignment"),
+        (leaves.Closed, [[OPEN, STICK], [], WEIGHTS, 1], "its free nodes are not those of its assignment"),
+        (leaves.NoRoot, ["exactly"], "a root or a solved selection is claimed where statuses are still open"),
     ],
 )
 def test_what_an_entry_may_not_be(kind, entries, why):
@@ -72,19 +72,19 @@ def test_what_an_entry_may_not_be(kind, entries, why):
 def test_what_a_point_may_not_be(point, why):
     final = Limits((OPEN, STICK), friction=[True, True])
     with pytest.raises(ValueError, match=why):
-        records.RootSetRecord.read(["D", [["1/1"] * 4, point], 1], final)
+        leaves.RootSetRecord.read(["D", [["1/1"] * 4, point], 1], final)
 
 
 def test_a_form_serves_what_is_below_its_assignment():
     """The second form before was declared where all is undecided, the last one where a node is in contact."""
     entries = texts([0], [1.0])
-    assert records.Excluded.read(["x", *entries, 2], LIMITS).by == 2
-    assert records.Excluded.read(["x", *entries, 1], LIMITS).by == 1
+    assert leaves.Excluded.read(["x", *entries, 2], LIMITS).by == 2
+    assert leaves.Excluded.read(["x", *entries, 1], LIMITS).by == 1
     above = Limits((UNDECIDED, UNDECIDED), friction=[True, True], declared=[DECLARED, IN_CONTACT])
     with pytest.raises(ValueError, match="its form was made for another assignment"):
-        records.Excluded.read(["x", *entries, 1], above)
+        leaves.Excluded.read(["x", *entries, 1], above)
     below = Limits((UNDECIDED, CONTACT), friction=[True, True], declared=[DECLARED, IN_CONTACT])
-    assert records.Excluded.read(["x", *entries, 1], below).terms.values.tolist() == [1.0]
+    assert leaves.Excluded.read(["x", *entries, 1], below).terms.values.tolist() == [1.0]
 
 
 def test_forms_that_say_the_same():
@@ -104,18 +104,18 @@ def test_no_two_kinds_begin_alike():
     assert len({kind.kind for kind in every}) == len(every) == 18
 
 
-@pytest.mark.parametrize("kind", [records.Closed, records.Alone, records.BoxedRoot, records.Unloaded])
+@pytest.mark.parametrize("kind", [leaves.Closed, leaves.Alone, leaves.BoxedRoot, leaves.Unloaded])
 def test_what_rests_on_a_definite_stiffness_is_no_leaf_of_other_bodies(kind):
     assert all(kind not in leaves_of(tree).values() for tree in records.Tree.FLOATING)
     assert any(kind in leaves_of(tree).values() for tree in records.Tree.HELD)
 
 
-@pytest.mark.parametrize("by", [1, records.RATIONAL])
+@pytest.mark.parametrize("by", [1, leaves.RATIONAL])
 @pytest.mark.parametrize("tree", [*records.Tree.FLOATING, records.Tree.PIECE])
 def test_only_bodies_that_are_held_have_exclusions_by_other_forms(tree, by):
     limits = Limits((UNDECIDED, STICK), tree, [True, True], [DECLARED, IN_CONTACT], modes=1)
     with pytest.raises(ValueError, match=r"its form was not declared|it cannot be tested in rational arithmetic"):
-        records.Excluded.read(["x", *texts([0], [1.0]), by], limits)
+        leaves.Excluded.read(["x", *texts([0], [1.0]), by], limits)
 
 
 def test_a_proof_holds_no_longer_fractions():

@@ -79,7 +79,7 @@ def test_bodies_and_forces_are_those_of_the_roots(found, pages, name):
         expected = shape.contact_forces(problem, root.lambda_n, root.lambda_t)
         np.testing.assert_allclose(forces, expected, rtol=1e-5, atol=1e-6 * np.max(np.abs(expected), initial=0))
         if d == 3:
-            rows, ways = slip_directions(problem, root)
+            rows, ways = slip_directions(problem, root.u_t, root.statuses)
             slip = np.reshape(record["w"], (3, -1))[1:, rows]
             drawn = np.einsum("ki,ikc->ic", slip, np.array(data["body"]["tangents"])[rows])
             drawn /= np.linalg.norm(drawn, axis=1, keepdims=True)

@@ -21,7 +21,7 @@ from enumsol.relaxation.active_set import ActiveSetEngine, IntervalSystem
 from enumsol.search.certifiers.interval_certifiers import ExactIntervalCertifier, VerifiedIntervalCertifier
 from enumsol.search.interval import subintervals as interval_search
 from enumsol.search.interval.interval_tree import EmptyLeaf
-from enumsol.search.interval.subintervals import FastIntervalCertifier, IntervalSearch, Piece
+from enumsol.search.interval.subintervals import IntervalCertifier, IntervalSearch, Piece
 
 BELOW = {UNDECIDED: (OPEN, STICK, SLIP_PLUS, SLIP_MINUS), CONTACT: (STICK, SLIP_PLUS, SLIP_MINUS)}
 
@@ -29,7 +29,7 @@ BELOW = {UNDECIDED: (OPEN, STICK, SLIP_PLUS, SLIP_MINUS), CONTACT: (STICK, SLIP_
 def searched(problem, end, certifier=None, **options):
     """A search over [0, end], which has been run."""
     ends = Fraction(0), Fraction(end)
-    search = IntervalSearch(problem.condensed, ends, None, certifier or FastIntervalCertifier(), **options)
+    search = IntervalSearch(problem.condensed, ends, None, certifier or IntervalCertifier(), **options)
     search.run()
     return search
 

@@ -11,7 +11,8 @@ from problems3d import random_over_alpha
 from proof_tools import bytes_of
 
 from enumsol import branch_graph
-from enumsol.search.space import known_curves, piece_parallel, piece_tree
+from enumsol.branches.space import space_graph as cover
+from enumsol.search.space import piece_tree
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +25,7 @@ def executors():
 def small_tasks(monkeypatch):
     """Threads search tasks of few nodes from the root of the tree on; processes would not see this."""
     monkeypatch.setattr(piece_tree, "FIRST", 1)
-    monkeypatch.setattr(piece_parallel, "NODES", 3)
+    monkeypatch.setattr(piece_tree, "NODES", 3)
     with ThreadPoolExecutor(1) as one, ThreadPoolExecutor(3) as three:
         yield one, three
 
@@ -32,15 +33,15 @@ def small_tasks(monkeypatch):
 @pytest.fixture
 def curves_met_late(monkeypatch):
     """No solutions are sampled, so that every curve but the first one is met at a leaf; gives what the tasks wanted."""
-    monkeypatch.setattr(known_curves, "_SAMPLED", ())
-    wanted, examined = [], piece_parallel.PieceWorker.examined
+    monkeypatch.setattr(cover, "_SAMPLED", ())
+    wanted, examined = [], piece_tree.PieceWorker.examined
 
     def noted(*arguments):
         answer = examined(*arguments)
         wanted.append(answer.wanted)
         return answer
 
-    monkeypatch.setattr(piece_parallel.PieceWorker, "examined", noted)
+    monkeypatch.setattr(piece_tree.PieceWorker, "examined", noted)
     return wanted
 
 

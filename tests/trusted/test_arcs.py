@@ -9,9 +9,8 @@ from effort import some
 from exact_arcs import Truth, arc_system, beside, check_slopes, exact_of, interval_at, random_cases, two_zeros, widened
 
 from enumsol.arithmetic.rationals import rational
-from enumsol.trusted.arcs.over_parts import expansions, over_parts
+from enumsol.trusted.arcs.over_parts import bernstein_values, expansions, over_parts, signs_beyond, to_bernstein
 from enumsol.trusted.arcs.selection_balls import ArcSelection
-from enumsol.trusted.arcs.series import bernstein_values, signs_beyond, to_bernstein
 
 
 def selections(count):
@@ -81,7 +80,7 @@ def test_series_and_their_slopes_lie_within_their_errors():
         expansion = expansion_of(selection, low, high)
         if expansion is None:
             continue
-        series = expansion.series
+        series = expansion
         v = series.bordered.mid[-1]
         middle, radius = Fraction(series.middle), Fraction(series.radius)
         for tau in (Fraction(-1), Fraction(1), Fraction(float(rng.uniform(-1, 1)))):
@@ -107,10 +106,10 @@ def test_a_stack_says_of_each_what_it_says_alone():
     together = expansions(asked)
     pairs = [pair for pair in zip(together, alone, strict=True) if pair != (None, None)]
     assert 100 < len(pairs) < len(asked)
-    assert {one.series.coefficients.shape[1] for one, _ in pairs} == {3, 17}
+    assert {one.coefficients.shape[1] for one, _ in pairs} == {3, 17}
     for one, other in pairs:
-        off = np.sum(np.abs(one.series.coefficients - other.series.coefficients), axis=1)
-        assert np.all(off <= one.series.error + other.series.error)
+        off = np.sum(np.abs(one.coefficients - other.coefficients), axis=1)
+        assert np.all(off <= one.error + other.error)
     parts = [(one, one.low, 0.5 * one.low + 0.5 * one.high) for one, _ in pairs]
     for part, known in zip(parts, over_parts(parts), strict=True):
         other = part[0].over(*part[1:])

@@ -60,7 +60,7 @@ def test_what_is_proven_is_so(seed):
         if ball is None:
             continue
         proven += 1
-        assert ball.sign == (1 if reduced.determinant > 0 else -1)
+        assert ball.index == (1 if reduced.determinant > 0 else -1)
         (point,) = points
         for k, value in enumerate(point):
             x = float(value) / scaled.force[k]
@@ -122,7 +122,7 @@ def test_bad_numbers_prove_nothing():
     system, *_ = system_of(problem)
     assert np.all(system.F > 0)
     near, none = np.zeros(6), np.zeros(0)
-    assert closed_solution(system, (1, 1, 1), (), none, near).sign == 1
+    assert closed_solution(system, (1, 1, 1), (), none, near).index == 1
     assert closed_solution(system, (7, 1, 8), (), np.ones(2), near) is not None
     # a free node does not slide
     assert closed_solution(system, (7, 1, 8), (0,), np.r_[np.ones(3), 0, 0, 1], near) is None

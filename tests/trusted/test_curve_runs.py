@@ -12,7 +12,7 @@ from scipy.optimize import linprog
 
 from enumsol import enumerate_roots
 from enumsol.arithmetic.balls import Ball
-from enumsol.branches.space.cover import SpaceCover
+from enumsol.branches.space.space_graph import ByCurves
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.search.space.piece_certificates import ExaminedPiece, runs_over
 from enumsol.trusted.space import curve_runs
@@ -32,7 +32,7 @@ PIECES = [INTERVAL, (Fraction(1, 3), Fraction(2, 5)), (Fraction(5, 8), Fraction(
 
 @functools.cache
 def known_curves(p, seed):
-    cover = SpaceCover(random_over_alpha(p, seed), INTERVAL)
+    cover = ByCurves(random_over_alpha(p, seed), INTERVAL)
     cover.search(max_nodes=60)
     given = AlphaProblem.of(cover.problem.enclosure)
     return cover, [KnownCurve(given, chain) for chain in cover.chains]

@@ -7,7 +7,7 @@ import pytest
 from path_problems import generic_problem
 
 from enumsol.search.certifiers._margin import Margins
-from enumsol.search.interval.subintervals import FastIntervalCertifier, IntervalSearch
+from enumsol.search.interval.subintervals import IntervalCertifier, IntervalSearch
 from enumsol.trusted.exclusion import exclusion_margin
 from enumsol.trusted.over_interval import KINDS, EnclosedPiece, interval_row_tables
 from enumsol.trusted.status_rows import FORBIDDEN, FREE
@@ -79,7 +79,7 @@ def test_positive_margins_of_a_search_agree(kind):
     positive, kinds = 0, set()
     for _ in range(20):
         problem = generic_problem(rng, 4, kind)
-        search = IntervalSearch(problem.condensed, (Fraction(0), Fraction(6)), None, FastIntervalCertifier())
+        search = IntervalSearch(problem.condensed, (Fraction(0), Fraction(6)), None, IntervalCertifier())
         search.run()
         for part in search.pieces:
             units, ends = part.system.scaled, (part.piece.a, part.piece.b)

@@ -40,7 +40,7 @@ def test_every_start_in_a_ball_has_one_root_in_it(cells, push, k):
     radius, rng = 2.0**-30, np.random.default_rng(k)
     ball = restarted(problem, SlipStart(offset, np.full(problem.p, radius)))
     found = joint_root(system_of(ball, 0), core, slips)
-    assert (found.core, found.det_sign, found.slips) == (core, 1, tuple(sorted(slips.items())))
+    assert (found.core, found.index, found.slips) == (core, 1, tuple(sorted(slips.items())))
     seen = set()
     for way in [*product((-1, 1), repeat=k), *rng.uniform(-1, 1, (4, k))]:
         start = [Fraction(x) for x in (offset + radius * rng.uniform(-1, 1, problem.p)).tolist()]

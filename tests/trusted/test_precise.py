@@ -12,11 +12,11 @@ from path_problems import generic_problem
 
 from enumsol import ContactProblem
 from enumsol.arithmetic.algebraic import real_roots
+from enumsol.branches.enclosed.zeros import zeros_of
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.gallery import wedge
 from enumsol.trusted.arcs import many_digits as refined
-from enumsol.trusted.arcs.bordered import BorderedLines
-from enumsol.trusted.arcs.many_digits import PRECISION, ball_of, precision, upper
+from enumsol.trusted.arcs.many_digits import PRECISION, ball_of, precision, upper, uppers
 from enumsol.trusted.arcs.precise import PreciseSelection, PreciseSystem
 from enumsol.trusted.arcs.taylor import Smooth
 from enumsol.trusted.status_rows import FRICTIONLESS
@@ -85,11 +85,11 @@ def check_claims_around_poles(count, start):
     for rng, selection, truth in selections(count, start):
         ends = None if truth.det.is_zero() else around_a_pole(rng, truth)
         expansion = ends and selection.expansion(*ends)
-        if not (expansion and isinstance(expansion._functions, BorderedLines)):
+        if not (expansion and expansion.functions.g[0].ncols() == 2):
             continue
         low, high = ends
         made["poles"] += 1
-        zeros = [zero for k in range(len(selection.rows.conditions) + 1) for zero in expansion.zeros(k)]
+        zeros = [zero for k in range(len(selection.rows.conditions) + 1) for zero in zeros_of(expansion).zeros(k)]
         assert all(low < zero < high for zero in zeros)
         around = [zero + sign * (high - low) / 2**k for zero in zeros for k in (5, 20, 120) for sign in (-1, 1)]
         cuts = sorted([low, high, *(alpha for alpha in around if low < alpha < high)])
@@ -123,12 +123,12 @@ def test_what_happens_beside_a_zero_of_the_determinant_is_told_apart(off):
     selection = PreciseSelection(system, codes)
     low, high = Fraction(pole) - Fraction(1, 2**12), Fraction(pole) + Fraction(1, 2**13)
     expansion = selection.expansion(low, high)
-    assert isinstance(expansion._functions, BorderedLines)
-    zeros = sorted(zero for k in range(len(selection.rows.conditions) + 1) for zero in expansion.zeros(k))
+    assert expansion.functions.g[0].ncols() == 2
+    zeros = sorted(zero for k in range(len(selection.rows.conditions) + 1) for zero in zeros_of(expansion).zeros(k))
     assert len(zeros) == 5
-    gaps = [b - a for a, b in pairwise(zeros)]
-    assert min(gaps) > expansion.apart if off else max(gaps) < expansion.apart
-    beside = (low, zeros[0] - expansion.apart), (zeros[-1] + expansion.apart, high)
+    gaps, apart = [b - a for a, b in pairwise(zeros)], zeros_of(expansion).apart
+    assert min(gaps) > apart if off else max(gaps) < apart
+    beside = (low, zeros[0] - apart), (zeros[-1] + apart, high)
     cuts = [low, *(zero + gap / 2 for zero, gap in zip(zeros, gaps, strict=False)), high]
     known = {part: expansion.over(*part) for part in [*beside, *(pairwise(cuts) if off else ())]}
     assert all(truth.is_true(said, *part) for part, said in known.items())
@@ -169,22 +169,25 @@ def test_balls_over_an_interval_hold_the_unknowns_and_their_slopes():
         low, high = short_interval(rng, truth)
         with precision():
             middle, radius = (low + high) / 2, (high - low) / 2
-            solved = selection.solve(ball_of(middle))
-            if solved is None or not solved[1].nrows():
+            functions = selection.functions
+            y, M1 = functions.solve(ball_of(middle)), functions.M[1]
+            if y is None or not y.nrows():
                 continue
-            y, M = solved
-            rise = M.solve((selection._g[1] - selection._M[1] * y) * ball_of(radius))
-            found = Smooth.solution(y, rise, M.solve(selection._M[1] * ball_of(radius)))
+            M = functions.M[0] + M1 * ball_of(middle)
+            rise = M.solve((functions.g[1] - M1 * y) * ball_of(radius))
+            P = M.solve(M1 * ball_of(radius))
+            found = Smooth.solution(y, rise, P, uppers(P))
             if found is None:
                 continue
             for tau in (Fraction(-1), Fraction(1), Fraction(int(rng.integers(-99, 100)), 100)):
                 alpha = middle + tau * radius
-                there = selection.solve(ball_of(alpha))
-                slope = there[1].solve(selection._g[1] - selection._M[1] * there[0]) * ball_of(radius)
+                there = functions.solve(ball_of(alpha))
+                M = functions.M[0] + M1 * ball_of(alpha)
+                slope = M.solve(functions.g[1] - M1 * there) * ball_of(radius)
                 compared += 1
                 t = ball_of(tau)
                 ours = value_at(found, t)
-                for about, exact in zip(ours, (there[0], slope), strict=True):
+                for about, exact in zip(ours, (there, slope), strict=True):
                     for i in range(about.nrows()):
                         # the value at one alpha is known to some ninety digits
                         assert about[i, 0].overlaps(exact[i, 0])
@@ -202,7 +205,7 @@ def test_conditions_of_a_body_that_moves_almost_freely_are_known_over_long_inter
     expansion = selection.expansion(low, high)
     assert expansion is not None
     known = expansion.over(low, high)
-    inside = [selection.signs_at(low + (high - low) * Fraction(k, 16)) for k in range(17)]
+    inside = [selection.functions.signs_at(low + (high - low) * Fraction(k, 16)) for k in range(17)]
     assert np.all(known.conditions != 0)
     assert all(np.array_equal(signs[:-1], known.conditions) for signs in inside)
 
@@ -212,7 +215,7 @@ def test_balls_around_the_smallest_and_largest_numbers():
         for exponent in (-2000, -1074, -1000, 0, 1000):
             size = arb(2) ** exponent
             for rate in (arb(1) / 4, arb(2) ** -30, arb(2) ** -300):
-                found = Smooth.solution(arb_mat([[0]]), arb_mat([[size]]), arb_mat([[rate]]))
+                found = Smooth.solution(arb_mat([[0]]), arb_mat([[size]]), arb_mat([[rate]]), uppers(arb_mat([[rate]])))
                 assert found is not None
                 for tau in (-1, 1):
                     value, slope = (part[0, 0] for part in value_at(found, arb(tau)))

@@ -59,7 +59,7 @@ def test_balls_hold_the_solution_in_rationals_and_know_its_signs(rng):
                 assert np.allclose(ball.mid, floats, rtol=1e-12, atol=1e-300)
             force = [x / rational(u) for x, u in zip(point, system.force.tolist(), strict=True)]
             assert holds(found.force.mid, found.force.rad, force)
-            assert found.det_sign == sign
+            assert found.index == sign
             signs = sorted(np.sign([float(v) for v in exact._slacks(codes, point)]))
             ours = np.where(np.abs(found.slack.mid) > found.slack.rad, np.sign(found.slack.mid), 0.0)
             assert sorted(ours) == signs

@@ -18,13 +18,11 @@ from enumsol.arithmetic.rationals import simplest
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator
 
-    from enumsol.trusted.arcs.over_parts import Expansion, Nowhere, OverInterval
+    from enumsol.branches.enclosed.zeros import SeriesZeros, ShortZeros
+    from enumsol.trusted.arcs.over_parts import OverInterval
     from enumsol.trusted.arcs.selection_balls import ArcSelection
-    from enumsol.trusted.arcs.taylor import ShortExpansion
     from enumsol.trusted.selection import Selection
 
-    #: Conditions of a selection over an interval, in double arithmetic or in many digits.
-    AlphaExpansion = Expansion | Nowhere | ShortExpansion
     Shared = frozenset[Any]
 
 
@@ -196,8 +194,8 @@ class Cutting:
     Parameters
     ----------
     rows : Selection
-    expansion : AlphaExpansion
-        That of the box.
+    zeros : SeriesZeros or ShortZeros
+        Of the box's expansion.
     whole : bool
         The box is not to be cut further: what is not decided stays open.
     flat : bool
@@ -209,44 +207,43 @@ class Cutting:
     """
 
     def __init__(
-        self, rows: Selection, expansion: AlphaExpansion, *, whole: bool, flat: bool, level: bool, sharpened: bool
+        self, rows: Selection, zeros: SeriesZeros | ShortZeros, *, whole: bool, flat: bool, level: bool, sharpened: bool
     ) -> None:
         self._narrow = _NARROW_ENOUGH if sharpened else _NARROW
         self._rows, self._whole, self._keep_flat, self._keep_level = rows, whole, flat, level
-        self._expansion: Any = expansion  # alphas are floats of the one, fractions of the other
-        self.low: Number
-        self.high: Number
-        self.low, self.high = expansion.low, expansion.high
+        self._places = zeros
+        self.low: Number = zeros.expansion.low
+        self.high: Number = zeros.expansion.high
         self._known: dict[ArcPart, OverInterval] = {}  # of parts in which nothing holds
 
     def run(self) -> Generator[list[Interval], list[OverInterval], Result]:
         """Asks for what is known of parts; the box with its parts, and the intervals behind that need their own."""
         (known,) = yield [(self.low, self.high)]
         whole = self._decided(self.low, self.high, known)
-        if whole is None and self._expansion.rough and not self._whole:
+        if whole is None and self._places.rough and not self._whole:
             return AlphaBox(self.low, self.high, ()), self._rest(self.low, self.high)
         parts, rest = (
             (yield from self._cut(known)) if whole is None or whole.kind is ArcPartKind.EVENT else ([whole], [])
         )
         parts = yield from self._tidied(parts)
-        return AlphaBox(self.low, self.high, tuple(parts), self._expansion.final), rest
+        return AlphaBox(self.low, self.high, tuple(parts), self._places.final), rest
 
     def _cut(
         self, whole: OverInterval
     ) -> Generator[list[Interval], list[OverInterval], tuple[list[ArcPart], list[Interval]]]:
         """Parts, and the intervals behind them."""
-        middle = self._expansion.split()
-        if middle is not None:
-            halves = [(self.low, middle), (middle, self.high)]
+        cut = self._places.split()
+        if cut is not None:
+            halves = [(self.low, cut), (cut, self.high)]
             known = yield halves
             decided = [self._decided(*half, found) for half, found in zip(halves, known, strict=True)]
             if all(found.none for found in known):
                 return [part for part in decided if part is not None], []
         doubtful = _in_doubt(whole)
-        self._flat = [k for k in doubtful if self._expansion.flat(k)]
+        self._flat = [k for k in doubtful if self._places.flat(k)]
         # where the others seem to vanish
         some = [k for k in doubtful if k not in self._flat]
-        self._zeros = sorted((zero, k) for k in some for zero in self._expansion.zeros(k))
+        self._zeros = sorted((zero, k) for k in some for zero in self._places.zeros(k))
         parts: list[ArcPart] = []
         ends = list(pairwise(self._ends()))
         known = [whole] if len(ends) == 1 else (yield ends)
@@ -305,8 +302,10 @@ class Cutting:
     def _questions(self, first: ArcPart, last: ArcPart) -> list[Interval]:
         """Parts that have to be examined to join neighbours, or at the presumed bounds of an event."""
         if first.kind is ArcPartKind.EVENT:
-            low, high = self._expansion.near(first.condition, first.low, first.high)
-            narrow = first.low <= low < high <= first.high and high - low <= self._narrow * max(abs(low), abs(high))
+            low, high = self._places.near(first.condition, first.low, first.high)
+            narrow = first.low <= low < high <= first.high and high - low <= self._narrow * max(
+                abs(float(low)), abs(float(high))
+            )
             return [(low, low), (high, high)] if narrow else []
         return [(first.low, last.high)] if first is not last and first.kind is not ArcPartKind.OPEN else []
 
@@ -318,7 +317,7 @@ class Cutting:
             if [int(found.ends[0][k]) for found in known] == [-slope, slope]:
                 zero = questions[0][0], questions[1][0]
             else:
-                zero = self._expansion.zero_bounds(k, slope, first.low, first.high)
+                zero = self._places.zero_bounds(k, slope, first.low, first.high)
             return [replace(first, zero=zero)]
         if first is last or (known and not (known[0].none or (known[0].holds and known[0].index == first.index))):
             return run
@@ -329,13 +328,13 @@ class Cutting:
         """Intervals left when a part cannot be decided: the part and what lies behind it, or two halves."""
         middle = between(low, self.high)
         # had the part come off the box's beginning, the rest would be as long as the box, again and again
-        if self._expansion.rough or low == self.low:
+        if self._places.rough or low == self.low:
             return [(low, middle), (middle, self.high)]
         return [(low, high), *([(high, self.high)] if high < self.high else [])]
 
     def _ends(self) -> list[Any]:
         """Ends of the parts into which the box is cut first: around groups of zeros."""
-        reach = self._expansion.apart
+        reach = self._places.apart
         groups: list[list[Any]] = []
         for zero, _ in self._zeros:
             if groups and zero - groups[-1][1] <= reach:
@@ -358,13 +357,13 @@ class Cutting:
         if self._is_flat(known):
             return True
         inside = [(zero, k) for zero, k in self._zeros if low < zero < high]
-        return len(inside) > 1 and inside[-1][0] - inside[0][0] <= self._expansion.apart
+        return len(inside) > 1 and inside[-1][0] - inside[0][0] <= self._places.apart
 
     def _stays_open(self, low: Number, high: Number, known: OverInterval) -> bool:
         """True if a box of its own would not decide a part."""
         if self._keep_level and all(k in self._flat for k in _in_doubt(known)):
             return True
-        return (self._expansion.final and self._tight(low, high, known)) or (self._keep_flat and self._is_flat(known))
+        return (self._places.final and self._tight(low, high, known)) or (self._keep_flat and self._is_flat(known))
 
     def _is_flat(self, known: OverInterval) -> bool:
         """True if a condition cannot be distinguished from zero."""

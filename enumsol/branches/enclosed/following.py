@@ -14,11 +14,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from enumsol.arithmetic.algebraic import EnclosedAlpha
+from enumsol.arithmetic.rationals import rational
+from enumsol.branches.elements import Arc, ArcValues, Sides, Vertex, make_vertex, sides_of, with_exact_zeros
 from enumsol.branches.enclosed.cutting import ArcPart, OpenCause, Trace
-from enumsol.branches.enclosed.joining import EventPlace, Joined, join
+from enumsol.branches.enclosed.joining import EventPlace, EventPlaceKind, Joined, JoinedArc, join
 from enumsol.branches.enclosed.tracing import trace
+from enumsol.branches.enclosed.zeros import enclosed
 from enumsol.branches.unfinished import END_ELSEWHERE, SHORT_INTERVAL, TOLD_APART, Effort
 from enumsol.condensation.data import EXACT_DOF_LIMIT
+from enumsol.model.statuses import FINAL, FRICTIONLESS, contact_status
+from enumsol.roots.linearisation import named_statuses
 from enumsol.search.outcome import Stop
 from enumsol.support.deadlines import TimeOverError, over
 from enumsol.support.messages import counted, listed
@@ -27,10 +33,12 @@ from enumsol.trusted.arcs.precise import PreciseSelection, PreciseSystem
 from enumsol.trusted.arcs.selection_balls import ArcSelection, ArcSystem
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence, Set
 
+    from enumsol.branches.elements import Pair
     from enumsol.model.problem import ContactProblem
     from enumsol.search.interval.subintervals import SearchedPiece
+    from enumsol.selections.solution import ActiveSets
     from enumsol.support.array_types import Codes, Floats
 
     Bounds = tuple[Fraction, Fraction]
@@ -142,7 +150,7 @@ class TracedProblem:
         if high - low <= width:
             return None
         precise = self.precise(found.selection.rows.codes, found.side)
-        return None if precise is None else precise.enclosed(part.condition, low, high, width / 4)
+        return None if precise is None else enclosed(precise.functions, part.condition, low, high, width / 4)
 
     # -- values ----------------------------------------------------------------------------------------------------
 
@@ -156,26 +164,26 @@ class TracedProblem:
             if alpha == self.origin:
                 return np.zeros(2 * self.problem.p), np.zeros(2 * self.problem.p)
             factor, side = abs(alpha - self.origin), 1.0 if alpha > self.origin else -1.0
-        enclosed = self.selection(codes, side).at(float(alpha)) if self.sparing or not precisely else None
-        close = enclosed is not None and all(_is_close(part.mid, part.rad) for part in enclosed[:2])
+        plain = self.selection(codes, side).at(float(alpha)) if self.sparing or not precisely else None
+        close = plain is not None and all(_is_close(part.mid, part.rad) for part in plain[:2])
         precise = self.precise(codes, side) if precisely and not close else None
         if precise is not None:
             found = precise.forces(alpha)
             if found is not None:
                 return tuple(np.array([float(v.mid()) for v in part]) * float(factor) for part in found)  # type: ignore[return-value]
-        enclosed = enclosed or self.selection(codes, side).at(float(alpha))
-        if enclosed is None:
+        plain = plain or self.selection(codes, side).at(float(alpha))
+        if plain is None:
             return None
-        forces, w, _ = enclosed
+        forces, w, _ = plain
         return forces.mid * self.force * float(factor), w.mid * self.length * float(factor)
 
     def slip_signs(self, codes: Codes, alpha: Fraction, nodes: Sequence[int]) -> Mapping[int, int]:
         """Signs of w_t of some nodes at a selection's solution, 0 where they are not proven."""
         side = 0.0 if self.origin is None else 1.0 if alpha > self.origin else -1.0
-        enclosed = self.selection(codes, side).at(float(alpha)) if alpha != self.origin else None
-        if enclosed is None:
+        found = self.selection(codes, side).at(float(alpha)) if alpha != self.origin else None
+        if found is None:
             return dict.fromkeys(nodes, 0)
-        w, p = enclosed[1], self.problem.p
+        w, p = found[1], self.problem.p
         return {i: int(w.mid[p + i] > 2 * w.rad[p + i]) - int(w.mid[p + i] < -2 * w.rad[p + i]) for i in nodes}
 
 
@@ -332,3 +340,102 @@ def _taken_over(traced: TracedProblem, where: dict[Codes, list[Bounds]], known: 
             taken += traces
             del where[codes]
     return taken
+
+
+@dataclass(frozen=True)
+class TracedArcValues(ArcValues):
+    """Values in double arithmetic, with the rounding errors of S.
+
+    Attributes
+    ----------
+    traced : TracedProblem
+    codes : status codes
+    sample : Fraction
+        An alpha inside the arc.
+    """
+
+    traced: TracedProblem
+    codes: Codes
+    sample: Fraction
+
+    def at(self, alpha: Fraction) -> Pair:
+        """Forces and displacements at an alpha."""
+        for value in (alpha, self.sample):
+            found = self.traced.values(self.codes, value, precisely=False)
+            if found is None:
+                found = self.traced.values(self.codes, value, precisely=True)
+            if found is not None:
+                return found
+        raise AssertionError("an arc's selection is not regular inside it")
+
+
+def make_traced(traced: TracedProblem, joined: Joined) -> tuple[list[Vertex], list[Arc]]:
+    """The vertices and arcs of joined traces."""
+    number = {place: k for k, place in enumerate(joined.places)}
+    exact = [EnclosedAlpha(rational(place.low), rational(place.high)) for place in joined.places]
+    arcs = [_arc(traced, k, arc, (number[arc.tail], number[arc.head]), exact) for k, arc in enumerate(joined.arcs)]
+    sides = sides_of(arcs, len(exact))
+    return [_vertex(traced, k, place, exact[k], sides[k]) for k, place in enumerate(joined.places)], arcs
+
+
+def _arc(
+    traced: TracedProblem, number: int, arc: JoinedArc, ends: tuple[int, int], exact: Sequence[EnclosedAlpha]
+) -> Arc:
+    sample = (arc.low + arc.high) / 2
+    # beside what was left open only inner bounds are known
+    begin, end = (
+        EnclosedAlpha(rational(known), rational(known)) if place.kind is EventPlaceKind.OPEN else exact[vertex]
+        for place, known, vertex in zip((arc.tail, arc.head), (arc.low, arc.high), ends, strict=True)
+    )
+    signs = _slip_signs(traced, [arc.codes], sample, [{code} for code in arc.codes])
+    return Arc(
+        number=number,
+        statuses=tuple(map(contact_status, arc.codes, signs)),
+        lo=float(begin),
+        hi=float(end),
+        tail=ends[0],
+        head=ends[1],
+        index=arc.index or None,
+        selections=(arc.codes,),
+        begin=begin,
+        end=end,
+        sample=sample,
+        _values=TracedArcValues(traced, arc.codes, sample),
+    )
+
+
+def _vertex(traced: TracedProblem, number: int, place: EventPlace, exact: EnclosedAlpha, sides: Sides) -> Vertex:
+    p = traced.problem.p
+    settled = place.kind is not EventPlaceKind.OPEN and place.whole
+    active = _active(traced, place)
+    middle = (place.low + place.high) / 2
+    known = traced.values(place.members[0], middle, precisely=True) if place.members else None
+    state = (np.zeros(2 * p), np.zeros(2 * p)) if known is None else known
+    return make_vertex(
+        number,
+        exact,
+        sides,
+        with_exact_zeros(state, active) if settled else state,
+        named_statuses(active, _slip_signs(traced, place.members, middle, active).__getitem__)[1],
+        place.members,
+        border=place.low == place.high and place.low in traced.interval,
+        settled=settled,
+        bounded=place.kind is EventPlaceKind.BOUND,
+    )
+
+
+def _slip_signs(
+    traced: TracedProblem, members: Sequence[Codes], alpha: Fraction, active: Sequence[Set[int]]
+) -> list[int]:
+    """Signs of u_t at the nodes without friction, by the first selection that holds; 0 elsewhere."""
+    still = [i for i, codes in enumerate(active) if FRICTIONLESS in codes]
+    signs = traced.slip_signs(members[0], alpha, still) if still and members else {}
+    return [signs.get(i, 0) for i in range(len(active))]
+
+
+def _active(traced: TracedProblem, place: EventPlace) -> ActiveSets:
+    """Codes that hold at every node, or may hold where the place was left open."""
+    if place.kind is EventPlaceKind.ORIGIN:
+        F0, F1 = traced.problem.affine_friction
+        return tuple(frozenset(FINAL[rubs]) for rubs in ((F0 != 0) | (F1 != 0)).tolist())
+    return tuple(frozenset(codes) for codes in zip(*place.members, strict=True))

@@ -13,15 +13,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.branches.enclosed.cutting import AlphaBox, ArcPart, ArcPartKind, Cutting, OpenCause, Trace, between
+from enumsol.branches.enclosed.zeros import zeros_of
 from enumsol.support.deadlines import TimeOverError, look
-from enumsol.trusted.arcs.over_parts import Expansion, Nowhere, expansions, over_parts
+from enumsol.trusted.arcs.over_parts import Expansion, OverInterval, expansions, over_parts
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Sequence
 
-    from enumsol.branches.enclosed.cutting import AlphaExpansion, Interval, Number
+    from enumsol.branches.enclosed.cutting import Interval, Number
     from enumsol.trusted.arcs.precise import PreciseSelection
     from enumsol.trusted.arcs.selection_balls import ArcSelection
+    from enumsol.trusted.arcs.taylor import ShortExpansion
 
     #: Asks for expansions (a selection and both ends) or for what is known over parts (an expansion and both ends).
     Question = tuple[Any, Any, Any]
@@ -85,10 +87,10 @@ def _answer(running: list[Asking]) -> None:
 def _answers(questions: list[Question]) -> list[Any]:
     """Expansions of selections, and what is known of expansions."""
     found: list[Any] = [None] * len(questions)
-    over = [k for k, (of, _, _) in enumerate(questions) if isinstance(of, Expansion | Nowhere)]
+    over = [k for k, (of, _, _) in enumerate(questions) if isinstance(of, Expansion)]
     for k, known in zip(over, over_parts([questions[k] for k in over]), strict=True):
         found[k] = known
-    expand = [k for k, (of, _, _) in enumerate(questions) if not isinstance(of, Expansion | Nowhere)]
+    expand = [k for k, (of, _, _) in enumerate(questions) if not isinstance(of, Expansion)]
     for k, expansion in zip(expand, expansions([questions[k] for k in expand], ERRORS), strict=True):
         found[k] = expansion
     return found
@@ -145,7 +147,10 @@ class _Tracing:
         tried: list[tuple[AlphaBox, list[Interval]]] = []
         if not exhausted and isinstance(first, float) and isinstance(last, float):
             (expansion,) = yield [(self._selection, first, last)]
-            if expansion is not None:
+            if isinstance(expansion, OverInterval):
+                nowhere = ArcPart(ArcPartKind.NONE, first, last)
+                tried.append((AlphaBox(first, last, (nowhere,)), []))
+            elif expansion is not None:
                 # boxes shorter than this share of the interval are not cut because of a condition that cannot be told
                 # from zero
                 flat = short and share < 2.0**-12 and precise is None
@@ -179,17 +184,17 @@ class _Tracing:
         return [(first, middle), (middle, last)]
 
     def _cut(
-        self, expansion: AlphaExpansion, *, whole: bool, flat: bool
+        self, expansion: Expansion | ShortExpansion, *, whole: bool, flat: bool
     ) -> Generator[list[Question], list[Any], tuple[AlphaBox, list[Interval]]]:
         """The box of an expansion, and what is left of it."""
         # after so many boxes in a row of which nothing else was left open, a flat condition vanishes everywhere
         level, sharpened = self._level >= 8, self._sharpened
         cutting = Cutting(
-            self._selection.rows, expansion, whole=whole, flat=flat, level=level, sharpened=sharpened
+            self._selection.rows, zeros_of(expansion), whole=whole, flat=flat, level=level, sharpened=sharpened
         ).run()
         parts = next(cutting)
         while True:
-            if isinstance(expansion, Expansion | Nowhere):
+            if isinstance(expansion, Expansion):
                 known = yield [(expansion, *part) for part in parts]
             else:
                 known = [expansion.over(*part) for part in parts]

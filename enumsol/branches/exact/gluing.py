@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
     from enumsol.branches.elements import Pair
-    from enumsol.branches.exact.selection_arcs import SelectionArcs, SelectionEvent
+    from enumsol.branches.exact.known_selections import SelectionArcs, SelectionEvent
     from enumsol.condensation.exact import ExactCondensed
     from enumsol.selections.solution import ActiveSets, SelectionSolution
     from enumsol.support.array_types import Codes
@@ -76,7 +76,7 @@ class ExactArcValues(ArcValues):
         return _as_floats(self.exact, rational(alpha), point)
 
 
-def _as_floats(exact: ExactCondensed, alpha: fmpq, point: Any) -> Pair:
+def _as_floats(exact: ExactCondensed, alpha: fmpq, point: Sequence[fmpq]) -> Pair:
     """Contact forces and displacements at a point."""
     size = 2 * exact.p
     moves = [as_float(g - dot(row, point)) for g, row in zip(exact.at(alpha)[0][:size], exact.rows, strict=False)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from enumsol.branches.elements import Arc
+    from enumsol.roots.root import ContactState
     from enumsol.support.array_types import Floats, Indices
 
 
@@ -135,11 +136,6 @@ class CurvePlace(NamedTuple):
     group: int
 
 
-#: Relative to the height of a picture, about the width of a line; and to its width, how long what coincides must be.
-_SAME, _LONG = 4e-3, 0.015
-_EVENLY = 64
-
-
 def side_by_side(
     drawn: Mapping[int, Curve], branch_of: Mapping[int, int], column: int, height: float | None = None
 ) -> dict[int, CurvePlace]:
@@ -160,7 +156,7 @@ def side_by_side(
         return {}
     alphas = [drawn[arc].alphas for arc in numbers]
     ends = [(a[0], a[-1]) for a in alphas]
-    grid = np.linspace(min(lo for lo, _ in ends), max(hi for _, hi in ends), _EVENLY)
+    grid = np.linspace(min(lo for lo, _ in ends), max(hi for _, hi in ends), 64)
     grid = np.unique(np.concatenate([grid, [0.5 * (lo + hi) for lo, hi in ends]]))
     table = np.array(
         [
@@ -168,9 +164,11 @@ def side_by_side(
             for arc, a in zip(numbers, alphas, strict=True)
         ]
     )
-    near = _SAME * (max(float(np.nanmax(table) - np.nanmin(table)), 1e-300) if height is None else height)
+    # about the width of a line
+    near = 4e-3 * (max(float(np.nanmax(table) - np.nanmin(table)), 1e-300) if height is None else height)
     first, last = np.array(ends).T
-    least = _LONG * (grid[-1] - grid[0])
+    # what coincides over less is not seen
+    least = 0.015 * (grid[-1] - grid[0])
     ranks, groups = [0] * len(numbers), list(range(len(numbers)))
     usual: dict[int, int] = {}
     for i, arc in enumerate(numbers):
@@ -241,7 +239,7 @@ def columns(quantity: Quantity, forces: Floats, moves: Floats, p: int) -> Floats
     return along[..., 0, :] if part.shape[-1] == 2 * p else np.asarray(np.linalg.norm(along, axis=-2))
 
 
-def state_columns(quantity: Quantity, state: Any) -> Floats:
+def state_columns(quantity: Quantity, state: ContactState) -> Floats:
     """Values of a quantity at a vertex, or at another state with lambda_n, lambda_t, u_n and u_t; as `columns`."""
     pairs = (state.lambda_n, state.lambda_t), (state.u_n, state.u_t)
     forces, moves = (np.concatenate([normal, along.ravel(order="F")]) for normal, along in pairs)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
@@ -17,14 +16,20 @@ from enumsol.branches.figures.curves import (
     side_by_side,
     state_columns,
 )
-from enumsol.branches.figures.marks import GREY, MARKERS, STATUS_STYLES, colour_of, handles, index_style, narrow_changes
 from enumsol.branches.figures.panels import (
+    GREY,
+    MARKERS,
+    STATUS_STYLES,
     Panel,
+    colour_of,
     draw_numbers,
     draw_open_ranges,
     draw_steps,
     drawn_range,
     family_range,
+    handles,
+    index_style,
+    narrow_changes,
     sheet_range,
 )
 from enumsol.branches.roots_at import roots_at
@@ -35,25 +40,16 @@ from enumsol.support.plotting import axes_or_none, checked_units, figure_of, in_
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from pathlib import Path
+
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
     from enumsol.branches.graph_data import GraphData
 
 
-#: Panels drawn when no nodes are named.
-_MAX_PANELS = 3
-#: A third of a pixel of a large panel; and the smallest tolerance of use, below what can be seen.
-_TOLERANCE, _LEAST_TOLERANCE = 5e-4, 1e-6
-#: Arcs that coincide are drawn so far apart, and all of them no wider than that [points].
-_BESIDE, _WIDEST = 2.6, 6.0
-
-
-@dataclass(frozen=True)
-class _Style:
-    """Quantity, units and tolerance of all panels of a figure."""
-
-    quantity: Quantity
-    units: tuple[str, str] | None
-    tolerance: float
+#: A third of a pixel of a large panel: with more of it corners are seen, with less drawing takes longer.
+_TOLERANCE = 5e-4
 
 
 def plot_graph(
@@ -66,8 +62,8 @@ def plot_graph(
     units: tuple[str, str] | None = None,
     title: str | None = None,
     tolerance: float = _TOLERANCE,
-    ax: Any = None,
-    file: Any = None,
+    ax: Axes | None = None,
+    file: str | Path | None = None,
     figsize: tuple[float, float] | None = None,
 ) -> Any:
     """A matplotlib figure of the branches: one panel of an overview, or one panel per node.
@@ -114,7 +110,9 @@ def plot_graph(
         matplotlib is not installed.
     """
     chosen = quantity_of(("norm" if nodes is None else "lambda_n") if quantity is None else quantity)
-    style = _Style(chosen, checked_units(units), max(positive_number(tolerance, "tolerance"), _LEAST_TOLERANCE))
+    units = checked_units(units)
+    # smaller ones cannot be seen
+    tolerance = max(positive_number(tolerance, "tolerance"), 1e-6)
     rows = _rows(graph, chosen, nodes, one=axes_or_none(ax) is not None)
     windows = [] if ax is not None else _windows(graph, zoom)
     if ax is None:
@@ -124,8 +122,10 @@ def plot_graph(
     columns = [graph.interval, *windows]
     panels, others = [], set[str]()
     for column, window in zip(axes, columns, strict=True):
-        drawn = _drawn(graph, style, None if column is axes[0] else window)
-        panels += [_panel(axis, graph, style, row, drawn, window) for axis, row in zip(column, rows, strict=False)]
+        drawn = _drawn(graph, chosen, tolerance, None if column is axes[0] else window)
+        for axis, row in zip(column, rows, strict=False):
+            panels.append(_panel(axis, graph, chosen, row, drawn, window))
+            _dress(axis, graph.problem.node_ids[row], chosen, units, window)
         if multiplicity and ax is None and draw_steps(column[-1], graph.claims.steps(), window):
             others.add("dots")
         for axis in column:
@@ -156,7 +156,7 @@ def _rows(graph: GraphData, quantity: Quantity, nodes: Sequence[Any] | None, *, 
         return chosen
     if not quantity.by_node:
         return [0]
-    most = 1 if one else _MAX_PANELS
+    most = 1 if one else 3
     if len(ids) <= most or not graph.arcs:
         return list(range(min(len(ids), most)))
     spread = drawn_range(graph.vertices, quantity)
@@ -193,7 +193,9 @@ def _grid(
     return figure, axes
 
 
-def _drawn(graph: GraphData, style: _Style, window: tuple[float, float] | None) -> dict[int, Curve]:
+def _drawn(
+    graph: GraphData, quantity: Quantity, tolerance: float, window: tuple[float, float] | None
+) -> dict[int, Curve]:
     lo, hi = window or graph.interval
     arcs = [arc for arc in graph.arcs if not arc.dimension]
     changing = [arc for arc in arcs if window is not None and (lo < arc.lo < hi or lo < arc.hi < hi)]
@@ -202,17 +204,17 @@ def _drawn(graph: GraphData, style: _Style, window: tuple[float, float] | None) 
     return {
         number: curve
         for part in parts
-        for number, curve in curves(part, style.quantity.name, hi - lo, style.tolerance, window).items()
+        for number, curve in curves(part, quantity.name, hi - lo, tolerance, window).items()
     }
 
 
 def _panel(
-    axis: Any, graph: GraphData, style: _Style, row: int, drawn: dict[int, Curve], window: tuple[float, float]
+    axis: Axes, graph: GraphData, quantity: Quantity, row: int, drawn: dict[int, Curve], window: tuple[float, float]
 ) -> Panel:
     """Draw one panel."""
     from matplotlib.transforms import ScaledTranslation
 
-    quantity, height = style.quantity, None if window == graph.interval else _ending(graph, drawn, row, window)
+    height = None if window == graph.interval else _ending(graph, drawn, row, window)
     places = side_by_side(drawn, graph.branch_of, row, None if height is None else height[1] - height[0])
     for arc in graph.arcs:
         if arc.dimension:
@@ -226,7 +228,8 @@ def _panel(
             colour = colour_of(graph.branch_of[arc.number])
             (artist,) = axis.plot(curve.alphas, curve.values[:, row], linestyle=line, color=colour, linewidth=1.6)
             if place.among > 1:
-                step = min(_BESIDE, _WIDEST / (place.among - 1))
+                # points between two, and no more for all of them
+                step = min(2.6, 6.0 / (place.among - 1))
                 away = (place.rank - (place.among - 1) / 2) * step / 72.0
                 artist.set_transform(axis.transData + ScaledTranslation(-0.4 * away, away, axis.figure.dpi_scale_trans))
                 artist.set_linewidth(min(1.6, max(0.5, 0.8 * step)))
@@ -239,7 +242,7 @@ def _panel(
         if (mark := MARKERS.get(v.kind)) is not None:
             value = float(state_columns(quantity, v)[row])
             axis.plot([v.alpha], [value], marker=mark[0], ms=4.5, color=GREY, markerfacecolor=mark[1], zorder=4)
-    _dress(axis, graph, style, row, window)
+    axis.margins(y=0.12)
     if height is not None:
         axis.set_ylim(*height)
     return Panel(axis, drawn, places, graph.branch_of, row)
@@ -259,13 +262,14 @@ def _ending(
     return (low - room, high + room) if room > 1e-12 * max(abs(low), abs(high)) else None
 
 
-def _dress(axis: Any, graph: GraphData, style: _Style, row: int, window: tuple[float, float]) -> None:
-    quantity = style.quantity
-    name = f"{quantity.name} of node {graph.problem.node_ids[row]}" if quantity.by_node else quantity.words
-    axis.set_ylabel(in_units(name, quantity.dimension, style.units))
+def _dress(
+    axis: Axes, node: object, quantity: Quantity, units: tuple[str, str] | None, window: tuple[float, float]
+) -> None:
+    """Name the axes of a panel."""
+    name = f"{quantity.name} of node {node}" if quantity.by_node else quantity.words
+    axis.set_ylabel(in_units(name, quantity.dimension, units))
     axis.ticklabel_format(axis="y", style="sci", scilimits=(-3, 4))
     plain_axes(axis)
-    axis.margins(y=0.12)
     axis.set_xlim(*window)
 
 
@@ -284,21 +288,24 @@ def _mark_windows(axes: list[list[Any]], windows: list[tuple[float, float]]) -> 
             axis.xaxis.get_major_locator().set_params(nbins=4)
 
 
-#: Letters of a title an inch, and at least in a line.
-_LETTERS, _FEWEST = 13, 20
-
-
 def _words(
-    figure: Any, first: Any, graph: GraphData, quantity: Quantity, title: str | None, others: set[str], *, alone: bool
+    figure: Figure,
+    first: Axes,
+    graph: GraphData,
+    quantity: Quantity,
+    title: str | None,
+    others: set[str],
+    *,
+    alone: bool,
 ) -> None:
     """The title and the legend."""
     problem, (a, b) = graph.problem, graph.interval
     name = counted(problem.p, "contact node") if title is None else title
     words = f"{name}, alpha in [{a:g}, {b:g}]; {graph.closing_line}"
-    if not alone:
+    if (grid := first.get_gridspec()) is not None and not alone:
         # no wider than the panel below, beside which others have titles of their own
-        widths = first.get_gridspec().get_width_ratios()
-        words = fill(words, max(int(_LETTERS * figure.get_figwidth() * widths[0] / sum(widths)), _FEWEST))
+        widths = np.array(grid.get_width_ratios(), dtype=float)
+        words = fill(words, max(int(13 * figure.get_figwidth() * widths[0] / np.sum(widths)), 20))  # letters an inch
     first.set_title(words, fontsize=9, loc="left", wrap=True)
     arcs = [arc for arc in graph.arcs if not arc.dimension]
     others |= {"continuum"} if any(v.family is not None for v in graph.vertices) else set()

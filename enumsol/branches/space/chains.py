@@ -33,27 +33,14 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: How much longer than the way between its joints a box is; the shortest way between two joints, relative to the
-#: length of a path's step.
-_LONGER, _SHORTEST = 1.05, 1e-7
-#: By how much the way grows at most and shrinks at least, and how it shrinks where it was too long; which share of what
-#: seems possible is taken, and how that changes where a box fails and where it does not.
-_GROWTH, _SHRINK, _FAILED = 8.0, 0.5, 0.7
-_TRUST, _LESS, _MORE = 0.95, 0.85, 1.05
-#: The longest way from a corner to the ends of its box, likewise, and by how much it shrinks.
-_WIDEST, _NARROWER = 0.4, 0.3
-#: Joints this near to a point of the skeleton are put by this share of the way before it.
-_BESIDE, _ASIDE = 1e-3, 0.1
-#: Edges beside a corner are at least this long relative to each other.
-_EVEN = 0.125
-#: Where directions at the ends of an edge of the skeleton are taken, relative to the edge: not at a corner itself.
-_INSIDE = 2.0**-10
-#: How far a skeleton is prolonged beyond the interval, or beyond the bounds of the rigid displacement, relative to its
-#: last step.
-_BEYOND, _BEYOND_REACH = 0.05, 2.0**-10
-#: How near to a bound of the rigid displacement the joints beside it are put at best, relative to the way between two
-#: joints; by what factor farther others are, and how many.
-_CLOSE, _FARTHER, _TRIALS = 2.0**-36, 16.0, 6
+#: How much longer than the way between its joints a box is: with more of it boxes fail, with less joints are outside.
+_LONGER = 1.05
+#: The shortest way between two joints, relative to the length of a path's step: where boxes need to be shorter the
+#: curve is left open.
+_SHORTEST = 1e-7
+#: Which share of what seems possible is taken at first as the way between two joints, and how the way shrinks at least:
+#: with more of the first boxes fail more often, with less they are many.
+_TRUST, _SHRINK = 0.95, 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +123,8 @@ def skeleton_through(problem: ContactProblem3D, x: Array, span: tuple[float, flo
         return Skeleton(lines[0], corners[0], closed=True)
     for k, (line, path) in enumerate(zip(lines, paths, strict=True)):
         if path.status in (PathStatus.INTERVAL_LEFT, PathStatus.RIGID_BOUND):
-            beyond = _BEYOND if path.status == PathStatus.INTERVAL_LEFT else _BEYOND_REACH
+            # relative to the last step
+            beyond = 0.05 if path.status == PathStatus.INTERVAL_LEFT else 2.0**-10
             lines[k] = np.vstack([line, line[-1] + beyond * (line[-1] - line[-2])])
     back, last = lines[0][::-1], len(lines[0]) - 1
     places = {last - k for k in corners[0]} | {last + k for k in corners[1]}
@@ -255,7 +243,7 @@ class ChainBuilder:
             at = kept.index(corner)
             while 0 < at < len(kept) - 1:
                 before, after = (float(np.linalg.norm(line[kept[k]] - line[corner])) for k in (at - 1, at + 1))
-                k, near = (at - 1, before < _EVEN * after) if before < after else (at + 1, after < _EVEN * before)
+                k, near = (at - 1, before < 0.125 * after) if before < after else (at + 1, after < 0.125 * before)
                 if not near or kept[k] in places or k in (0, len(kept) - 1):
                     break
                 del kept[k]
@@ -269,7 +257,8 @@ class ChainBuilder:
         for corner in skeleton.corners:
             if not 0 < corner < last:
                 continue
-            share, start, proven = _WIDEST, None, None
+            # the longest way from a corner to the ends of its box, which then shrinks
+            share, start, proven = 0.4, None, None
             steps: dict[tuple[int, ...], tuple[Array, float]] = {}
             while share > _SHORTEST:
                 look()
@@ -278,7 +267,7 @@ class ChainBuilder:
                     proven = self._link(line, corner - share, corner + share, start, None, steps=steps)
                 if proven is not None:
                     break
-                share *= _NARROWER
+                share *= 0.3
             yield _Corner(corner - share, corner + share, start, *(proven or (None, None)))
 
     def _filled(
@@ -302,15 +291,15 @@ class ChainBuilder:
             tell("steps along a curve", int(place), len(line) - 1)
             # no link is left that is too short
             further = place + way if last - place - way > _SHORTEST else last
-            if further != last and abs(further - round(further)) < _BESIDE:
+            if further != last and abs(further - round(further)) < 1e-3:
                 # points of the skeleton are perhaps folds, at which no side of a joint is that of a rising alpha
-                further -= _ASIDE * (further - place)
+                further -= 0.1 * (further - place)
             end = known if further == last else None
             found = self._link(line, place, further, joints[-1], links[-1] if links else None, end)
             # that what a box at an end holds is beyond the interval is seen where alpha goes one way
             outer = not closed and (not links or further == len(line) - 1.0)
             if found is None or (outer and not (found[0].curve.rises or found[0].leaves)):
-                way = (_SHRINK if failed else _FAILED) * (further - place)
+                way = (_SHRINK if failed else 0.7) * (further - place)
                 failed = True
                 if way < _SHORTEST:
                     return place
@@ -324,8 +313,8 @@ class ChainBuilder:
             else:
                 links.append(found[0])
                 joints.append(found[1])
-            trust = _LESS * trust if failed else min(_MORE * trust, _TRUST)
-            way = (further - place) * min(max(trust * found[0].curve.stretch, _SHRINK), _GROWTH)
+            trust = 0.85 * trust if failed else min(1.05 * trust, _TRUST)
+            way = (further - place) * min(max(trust * found[0].curve.stretch, _SHRINK), 8.0)
             place, failed = further, False
         return place
 
@@ -343,8 +332,9 @@ class ChainBuilder:
             point = near(t)
             return np.nan if point is None else float(np.max(np.abs(point.x[rigid]) / reach)) - 1.0
 
-        for k in range(_TRIALS):
-            away = _CLOSE * _FARTHER**k * (outer - inner)
+        # how near to the bound the joints beside it are put at best, then farther away
+        for k in range(6):
+            away = 2.0**-36 * 16.0**k * (outer - inner)
             try:
                 middle = float(brentq(beyond, inner, outer, xtol=0.1 * abs(away)))
             except ValueError:
@@ -385,7 +375,9 @@ class ChainBuilder:
         edge, t = line[k + 1] - line[k], place - k
         if k not in self._ends:
             border = self.across(edge)
-            near = [curve_point(self.problem, line[k] + share * edge, border) for share in (_INSIDE, 1.0 - _INSIDE)]
+            # not at a corner itself
+            inside = 2.0**-10, 1.0 - 2.0**-10
+            near = [curve_point(self.problem, line[k] + share * edge, border) for share in inside]
             self._ends[k] = tuple(edge if one is None else one.direction for one in near)
         # beside the chord; both directions have the product 1 with the border, as the edge has
         begin, end = (direction - edge for direction in self._ends[k])

@@ -26,9 +26,6 @@ if TYPE_CHECKING:
 
     Bounds = tuple[Fraction, Fraction]
 
-#: Steps to the parameter of an alpha, and how near that comes, relative to the larger of 1 and alpha.
-_STEPS, _NEAR = 60, 2.0**-50
-
 
 @dataclass(frozen=True, eq=False)
 class CurvedArcValues(ArcValues):
@@ -61,12 +58,12 @@ class CurvedArcValues(ArcValues):
         row = self.given.border_of_zeta(border)
         low, high, share = 0.0, 1.0, float((alpha - start[-1]) / (end[-1] - start[-1]))
         x: Floats = start + share * (end - start)
-        for _ in range(_STEPS):
+        for _ in range(60):
             found = curve_point(self.given, self.given.placed(start + share * (end - start)), row)
             if found is None:
                 break
             x, off = self.given.unplaced(found.x), float(found.x[-1] - alpha)
-            if abs(off) <= _NEAR * max(1.0, abs(alpha)):
+            if abs(off) <= 2.0**-50 * max(1.0, abs(alpha)):
                 break
             low, high = (share, high) if off < 0 else (low, share)
             # by the curve's direction, which has the product one with the border

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from enumsol.proof.records import Branching, Record, UndecidedRecord, Unloaded
+from enumsol.proof.leaves import UndecidedRecord, Unloaded
+from enumsol.proof.records import Branching, Record
 from enumsol.trusted.exclusion import exclusion_margin
 from enumsol.trusted.over_interval import EnclosedPiece
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.model.statuses import CONDITIONS, RowKind
-from enumsol.proof import records
+from enumsol.proof import leaves, records
 from enumsol.proof.proof_file import coarse, fraction_text
 from enumsol.search.certifiers import protocol
 from enumsol.search.fathoming import Proposal, propose, without_load
@@ -100,13 +100,13 @@ class VerifiedCertifier(protocol.RecordingCertifier):
         if self._margin is not None:
             if (kept := proven(self._margin, codes, rows, values)) is not None:
                 self._escalations.balls += 1
-                self._leaf(records.Excluded(rows, kept))
+                self._leaf(leaves.Excluded(rows, kept))
                 return True
         elif (certifier := self._exact()) is not None and certifier.excluded(codes, relaxation):
             # no balls for an S that is positive definite only within rounding
             self._escalations.rationals += 1
             # the certifier passes over multipliers that prove nothing, a checker refuses them
-            self._leaf(records.Excluded(*self._allowed(codes, rows, values), records.RATIONAL))
+            self._leaf(leaves.Excluded(*self._allowed(codes, rows, values), leaves.RATIONAL))
             return True
         self._escalations.refined += 1
         return False
@@ -123,7 +123,7 @@ class VerifiedCertifier(protocol.RecordingCertifier):
         numbers, weight = np.asarray(form.multipliers).ravel(), np.array([form.weight])
         back = self._back(form, lambda: records.DeclaredForm(form.codes, numbers, weight))
         self._escalations.balls += 1
-        self._leaf(records.Excluded(rows, kept, back))
+        self._leaf(leaves.Excluded(rows, kept, back))
         return True
 
     def _allowed(self, codes: Codes, rows: Indices, values: Floats) -> Terms:
@@ -139,7 +139,7 @@ class VerifiedCertifier(protocol.RecordingCertifier):
         if self._enclosed is not None and not (ball is not None and ball.is_root):
             if holds_no_root(self._enclosed, codes, ball):
                 self._escalations.balls += 1
-                self._leaf(records.NoRoot())
+                self._leaf(leaves.NoRoot())
                 return None
             ball = self._precisely(codes) or ball
         if ball is not None and ball.is_root:
@@ -147,7 +147,7 @@ class VerifiedCertifier(protocol.RecordingCertifier):
             return self._regular(codes, ball)
         if ball is not None and ball.is_excluded:
             self._escalations.balls += 1
-            self._leaf(records.NoRoot())
+            self._leaf(leaves.NoRoot())
             return None
         self.hard = True
         certifier = self._exact()
@@ -174,10 +174,10 @@ class VerifiedCertifier(protocol.RecordingCertifier):
             return self._undecided(codes, solution.reason, solution.hint)
         self._escalations.rationals += 1
         if solution is None:
-            self._leaf(records.NoRoot(records.RATIONAL))
+            self._leaf(leaves.NoRoot(leaves.RATIONAL))
         else:
             points = [[_fraction(v) for v in vertex] for vertex in solution.vertices]
-            self._leaf(records.RootSetRecord(points, solution.dimension))
+            self._leaf(leaves.RootSetRecord(points, solution.dimension))
         return solution
 
     # -- subtrees closed by their only possible solution (theory, section 6.11) ---------------------------------------
@@ -198,7 +198,7 @@ class VerifiedCertifier(protocol.RecordingCertifier):
             closing, solutions = exact
             self._known += [solution.codes for solution in solutions]
             self._escalations.rationals += 1
-            self._leaf(records.Closed(closing.selection, closing.free, closing.numbers, len(solutions)))
+            self._leaf(leaves.Closed(closing.selection, closing.free, closing.numbers, len(solutions)))
             return solutions
         found = None if proposal is None or ball is None or ball.is_wide else self._closed_by(proposal, ball)
         if found and proposal is not None and certifier is not None:
@@ -219,7 +219,7 @@ class VerifiedCertifier(protocol.RecordingCertifier):
             return None
         self._escalations.balls += 1
         chosen, weights, strengths = given
-        return [self._regular(chosen, root, lambda ball: records.Alone(chosen, weights, ball, strengths, terms))]
+        return [self._regular(chosen, root, lambda ball: leaves.Alone(chosen, weights, ball, strengths, terms))]
 
     def _take_note(self, force: Floats, w: Floats) -> None:
         """Take note of nodes that slide without load at a solution."""
@@ -251,7 +251,7 @@ class VerifiedCertifier(protocol.RecordingCertifier):
         record = proposal.named, proposal.free, proposal.numbers, ball.force.mid * self._scaled.force
         if ball.is_excluded:
             self._escalations.balls += 1
-            self._leaf(records.Closed(*record))
+            self._leaf(leaves.Closed(*record))
             return []
         solution = self._regular_one(ball)
         if solution is None:
@@ -261,10 +261,10 @@ class VerifiedCertifier(protocol.RecordingCertifier):
                 return None
             self._verified[ball.core] = ball
             solution = SelectionSolution(
-                ball.core, (ball.force.mid,), 0, 0, strict=False, index=ball.sign, possible=ball.possible
+                ball.core, (ball.force.mid,), 0, 0, strict=False, index=ball.index, possible=ball.possible
             )
         self._escalations.balls += 1
-        self._leaf(records.Closed(*record, self._ball(ball, ball.sign)))
+        self._leaf(leaves.Closed(*record, self._ball(ball, ball.index)))
         return [solution]
 
     def _regular_one(self, ball: ClosedSolution) -> SelectionSolution | None:
@@ -278,7 +278,7 @@ class VerifiedCertifier(protocol.RecordingCertifier):
         if regular is None or not regular.is_root:
             return None
         self._verified[codes] = regular
-        return SelectionSolution(codes, (regular.force.mid,), 0, regular.det_sign, strict=True)
+        return SelectionSolution(codes, (regular.force.mid,), 0, regular.index, strict=True)
 
     def add(self, part: protocol.Certified) -> None:
         """Take over what the certifier of a subtree has proven."""
@@ -293,16 +293,16 @@ class VerifiedCertifier(protocol.RecordingCertifier):
         self._known.clear()
 
     def _regular(
-        self, codes: Codes, ball: VerifiedSelection, leaf: Callable[[EnclosureRecord], Record] = records.RegularRoot
+        self, codes: Codes, ball: VerifiedSelection, leaf: Callable[[EnclosureRecord], Record] = leaves.RegularRoot
     ) -> SelectionSolution:
         """Write a leaf with a regular root, made of its enclosure."""
         self._verified[codes] = ball
-        self._leaf(leaf(self._ball(ball, ball.det_sign)))
-        return SelectionSolution(codes, (ball.force.mid,), 0, ball.det_sign, strict=True)
+        self._leaf(leaf(self._ball(ball, ball.index)))
+        return SelectionSolution(codes, (ball.force.mid,), 0, ball.index, strict=True)
 
     def _undecided(self, codes: Codes, reason: str, hint: str) -> protocol.UndecidedPart:
         self._escalations.undecided += 1
-        self._leaf(records.UndecidedRecord(reason))
+        self._leaf(leaves.UndecidedRecord(reason))
         return protocol.UndecidedPart(codes, reason, hint, examined=True)
 
     def _ball(self, found: VerifiedSelection | ClosedSolution | JointRoot, index: int | None) -> EnclosureRecord:

@@ -11,7 +11,6 @@ import itertools
 import pickle
 import threading
 import time
-from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import partial
@@ -86,8 +85,11 @@ class SearchedPiece:
     numbers: PieceNumbers | None = None
 
 
-class IntervalCertifier(ABC):
-    """Base of certifiers, which decide in one arithmetic whether multipliers prove a leaf empty on the whole piece."""
+class IntervalCertifier:
+    """Decides whether multipliers prove a leaf empty on the whole piece; here in floats, which accept all prunings.
+
+    Those of other arithmetics are derived from it.
+    """
 
     #: Whether leaves may be excluded by forms other than the energy.
     forms: bool = False
@@ -96,21 +98,13 @@ class IntervalCertifier(ABC):
     #: Whether a checker can repeat what was accepted so far, so that it makes a proof.
     checkable: bool = False
 
-    @abstractmethod
     def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
         """True if the dual bounds at both ends of the piece are positive."""
+        return True
 
     def convex(self, piece: Piece, system: IntervalSystem, form: Floats) -> bool:
         """True if the form of these multipliers is proven convex on the piece."""
         return False
-
-
-class FastIntervalCertifier(IntervalCertifier):
-    """Floats: the result of the engine is trusted."""
-
-    def excluded(self, piece: Piece, system: IntervalSystem, leaf: EmptyLeaf) -> bool:
-        """Accept the pruning."""
-        return True
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from enumsol.search.space.space_newton import Isotropic
 from enumsol.trusted.space.boxed_solution import BoxedSolution, box_around, is_inside, solution_in_box
 from enumsol.trusted.space.leaf_equations import with_free_bounds
 from enumsol.trusted.space.leaves import Open, settle
+from enumsol.trusted.space.solution_curve import ERRORS
 from enumsol.trusted.space.turning import turned_by
 
 if TYPE_CHECKING:
@@ -132,10 +133,6 @@ def _changes_along_piece(last: LastBox) -> bool:
     return bool(swept > turned)
 
 
-#: What a writer of proofs asks for (see ``solution_in_box``).
-_ERRORS = 2.0
-
-
 class KnownBoxes:
     """Looks for the solution near a leaf that is left open, and for a box in which it is the only one.
 
@@ -163,7 +160,7 @@ class KnownBoxes:
         if y is None or w is None:
             return None
         for known in self._found:
-            if is_inside(y, w, known.box, _ERRORS):
+            if is_inside(y, w, known.box, ERRORS):
                 return known
         if halved:
             # forces known no better than this, relative to the largest, tell no solution near which to look
@@ -175,7 +172,7 @@ class KnownBoxes:
         found = self._sought(y.mid, halved=halved)
         self._pause = 2 * self._pause + 1 if found is None else 0
         self._wait = self._pause
-        return found if found is not None and is_inside(y, w, found.box, _ERRORS) else None
+        return found if found is not None and is_inside(y, w, found.box, ERRORS) else None
 
     def _sought(self, y: Floats, *, halved: bool) -> BoxedSolution | None:
         """A new solution near a point, in a box of its own; near a leaf to be ``halved``, one that no leaf settles."""
@@ -193,7 +190,7 @@ class KnownBoxes:
             if halved and point.slack > NEAR and not isinstance(settle(self._enclosed, point.codes), Open):
                 return None
             box = box_around(self._enclosed, near)
-        found = None if box is None else solution_in_box(self._enclosed, box, _ERRORS)
+        found = None if box is None else solution_in_box(self._enclosed, box, ERRORS)
         if found is not None:
             self._found.append(found)
         return found

@@ -14,7 +14,7 @@ from scipy.linalg import solve_triangular
 from scipy.optimize import nnls
 
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
-from enumsol.proof.records import Excluded, Unbalanced
+from enumsol.proof.leaves import Excluded, Unbalanced
 from enumsol.relaxation.space_relaxation import SpaceEngine
 from enumsol.search.floating_solvers import weakly_held
 from enumsol.search.space.space_newton import Isotropic

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache, partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,34 +15,35 @@ from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.model.sectors import DEEPEST, SECTORS, level_of, width_level
 from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.proof.curve_records import CutPiece, OnCurve
-from enumsol.proof.records import Branching, Excluded
+from enumsol.proof.leaves import Excluded
+from enumsol.proof.records import Branching
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.outcome import StopReason
-from enumsol.search.space.known_curves import Curves, middle_of
+from enumsol.search.parts import Answer, Spread
+from enumsol.search.space.known_curves import Curves, CurveWantedError, around_curves, middle_of, settled, through
 from enumsol.search.space.open_leaves import is_swept
 from enumsol.search.space.piece_certificates import ERRORS, ExaminedPiece, Passage, runs_over
-from enumsol.search.space.piece_leaves import PieceLeaves, around_curves
 from enumsol.search.space.piece_multipliers import COUNTED, AlphaPoint, exclusion, unbalanced
 from enumsol.search.space.space_fathoming import without_sectors
 from enumsol.search.tree import depth_first
-from enumsol.support.deadlines import TimeOverError, look
+from enumsol.support.deadlines import TimeOverError, look, remaining
 from enumsol.trusted.space.leaves import Open, SpaceRoot
 from enumsol.trusted.space.pieces import AlphaPiece
 from enumsol.trusted.space.sector_rows import sector_children
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-
-    from numpy.typing import NDArray
+    from concurrent.futures import Executor
 
     from enumsol.condensation.enclosure import CondensedEnclosure
+    from enumsol.proof.records import Record
     from enumsol.relaxation.space_relaxation import SpaceRelaxation
-    from enumsol.search.parts import Answer
-    from enumsol.selections.solution import Codes
+    from enumsol.search.parts import TreePart
+    from enumsol.support.array_types import Codes, Floats
+    from enumsol.trusted.space.curve_chains import CurveChain
 
-    Array = NDArray[np.float64]
     #: The record of a node, and its children.
-    Done = tuple[Any, list["PieceNode"]]
+    Done = tuple[Record | "OpenLeaf", list["PieceNode"]]
 
 #: Pieces, and points with their relaxations, that are kept.
 _KEPT = 256
@@ -52,8 +53,8 @@ _ALONE = 2.0**-5
 _CUTS = 2
 #: Longer pieces are cut where statuses occur along one curve over a part of them.
 _SHORT = 2.0**-6
-#: Nodes that are examined before others than this process help.
-FIRST = 16
+#: Nodes that are examined before workers help, and those of a task of a worker.
+FIRST, NODES = 16, 16
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ class OpenLeaf:
     low: Fraction
     high: Fraction
     codes: Codes
-    forces: Array | None
+    forces: Floats | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +122,7 @@ class PieceTree:
     interval : (a, b), Fractions
     units : force and length, (p,) arrays of powers of two
     curves : Curves
-        Those that are known, and where others are looked for.
+        Those that are known. Where the search would go on with another one it comes back, and says so in ``wanted``.
     max_nodes : int, optional
     tick : callable, optional
         Called with the share of the tree that is done, every child of a node being as large as the others.
@@ -134,54 +135,48 @@ class PieceTree:
     nodes : int
     covered : float
         The share of the tree that is done.
+    settled : bool
+        The records are those of the whole tree.
     stopped : StopReason or None
+        Why the search ended early, if it did.
+    waiting : list of PieceNode
+        What is not examined yet, the first one last.
+    wanted : CurveWantedError or None
+        The curve with which the first node that waits is to be examined, if there is one.
     """
 
     def __init__(
         self,
         enclosure: CondensedEnclosure,
         interval: tuple[Fraction, Fraction],
-        units: tuple[Array, Array],
+        units: tuple[Floats, Floats],
         curves: Curves,
         max_nodes: int | None = None,
         tick: Callable[[float], object] | None = None,
         smallest: float = 2.0**-30,
     ) -> None:
-        self.interval, self.curves = interval, curves
-        self._leaves = PieceLeaves(curves, interval)
-        self._space = AlphaSpace(enclosure, sum(interval, Fraction(0)) / 2, units)
-        self.problem = enclosure, interval, units, smallest
+        self.interval, self.curves, self.units, self.smallest = interval, curves, units, smallest
+        self.space = AlphaSpace(enclosure, sum(interval, Fraction(0)) / 2, units)
         self._most, self._tick = max_nodes, tick
         self._least = Fraction(smallest) * (interval[1] - interval[0])
-        self._examined = lru_cache(_KEPT)(lambda low, high: ExaminedPiece(AlphaPiece(self._space, low, high)))
-        self._point = lru_cache(_KEPT)(partial(AlphaPoint, self._space))
-        self.records: list[Any] = []
-        self.nodes, self.covered = 0, 0.0
-        #: True if parts of the tree are neither examined nor left open nor waiting here.
-        self.away = False
-        #: True if the records are those of the whole tree.
-        self.settled = False
-        #: Why the search ended early, if it did.
+        self._examined = lru_cache(_KEPT)(lambda low, high: ExaminedPiece(AlphaPiece(self.space, low, high)))
+        self._point = lru_cache(_KEPT)(partial(AlphaPoint, self.space))
+        self.records: list[Record | OpenLeaf] = []
+        self.nodes, self.covered, self.settled = 0, 0.0, False
         self.stopped: StopReason | None = None
+        self.waiting = [PieceNode(*interval, (UNDECIDED,) * enclosure.problem.p)]
+        self.wanted: CurveWantedError | None = None
 
-    def run(self, spread: Callable[[PieceTree, list[PieceNode]], object] | None = None) -> None:
-        """Search the tree; ``spread`` examines what waits after some nodes.
+    def run(self) -> None:
+        """Search the tree, until a limit is reached or a curve is wanted."""
+        self.examine(self.waiting, None)
 
-        Raises
-        ------
-        KeyboardInterrupt, MemoryError
-            The records then say that what was not examined is open.
-        """
-        waiting = [PieceNode(*self.interval, (UNDECIDED,) * self._space.enclosure.problem.p)]
-        try:
-            self.examine(waiting, None if spread is None else FIRST)
-            if spread is not None and waiting:
-                spread(self, waiting)
-        finally:
-            self.leave(waiting)
-            self.settled = not self.away
+    def end(self) -> None:
+        """Leave open what waits."""
+        self.leave(self.waiting)
+        self.waiting, self.settled = [], True
 
-    def examined(self, items: Sequence[PieceNode], nodes: int | None = None) -> list[PieceNode]:
+    def examined(self, items: Sequence[PieceNode], nodes: int) -> list[PieceNode]:
         """Examine so many nodes of subtrees, the last first, or until a limit is reached; the rest still waits."""
         waiting = list(items)
         self.examine(waiting, nodes)
@@ -189,11 +184,14 @@ class PieceTree:
 
     def examine(self, waiting: list[PieceNode], most: int | None) -> None:
         """Examine so many nodes of what waits, in place: where a step raises an error, its node waits as before."""
-        last = None if most is None else self.nodes + most
+        last, self.wanted = None if most is None else self.nodes + most, None
         try:
             depth_first(waiting, self._taken, lambda: self.nodes == last or self.must_stop())
         except TimeOverError:
             self.stop_for_time()
+        except CurveWantedError as wanted:
+            # it may have taken over its parent's state
+            waiting[-1], self.wanted = waiting[-1].sent(), wanted
 
     def _taken(self, node: PieceNode) -> list[PieceNode]:
         """Examine one node and take note of it; gives its children, the first one last."""
@@ -227,7 +225,7 @@ class PieceTree:
         self.nodes += answer.nodes
 
     def leave(self, items: Sequence[PieceNode]) -> None:
-        """Leave open what still waits."""
+        """Leave subtrees open."""
         self.records += [OpenLeaf(item.low, item.high, item.codes, None) for item in reversed(items)]
 
     def report(self, share: float) -> None:
@@ -253,11 +251,9 @@ class PieceTree:
                 relaxation = relaxation.child(*rows, last=node.last)
         if _is_excluded(relaxation):
             return self._excluded(at, codes, (point, relaxation), cuts)
-        done = self._certified(at, codes)
-        if done is None and not self.curves.sampled and self.curves.sample():
-            done = self._beside_ends(at, codes) or self._certified(at, codes)
-        if done is not None:
+        if (done := self._certified(at, codes)) is not None:
             return done
+        self.curves.sample()
         if self._is_due(codes):
             done = self._leaf(at, codes)
             if done is not None:
@@ -296,7 +292,7 @@ class PieceTree:
             if found is not None:
                 return found, []
         if self._is_due(codes):
-            record = self._leaves.settled(at, codes, *at.piece.narrowed(codes))
+            record = settled(self.curves, at, codes, *at.piece.narrowed(codes))
             if record is not None:
                 return record, []
         if cuts < _CUTS:
@@ -311,7 +307,7 @@ class PieceTree:
     def _ends(self, at: ExaminedPiece, codes: Codes) -> list[tuple[AlphaPoint, SpaceRelaxation]]:
         """The relaxations of an assignment at the ends of a piece; not at one where friction vanishes."""
         ends = [self._point(alpha) for alpha in (at.piece.low, at.piece.high)]
-        return [(end, end.root(codes)) for end in ends if np.array_equal(end.system.tau, self._space.fixed.tau)]
+        return [(end, end.root(codes)) for end in ends if np.array_equal(end.system.tau, self.space.fixed.tau)]
 
     def _promising(self, codes: Codes, relaxation: SpaceRelaxation) -> int:
         """The node that is to be split by a relaxation that is possible; -1 if there is none."""
@@ -343,7 +339,7 @@ class PieceTree:
         if children is None and parent is not None:
             children = parent[0].splitting.children(codes, node, parent[1])
         elif children is None:
-            children = sector_children(codes[node], int(np.sum(self._space.fixed.tau[node] >= 0)))
+            children = sector_children(codes[node], int(np.sum(self.space.fixed.tau[node] >= 0)))
         below = []
         for k, child in enumerate(children):
             there = (*codes[:node], child, *codes[node + 1 :])
@@ -374,7 +370,7 @@ class PieceTree:
         return None
 
     @staticmethod
-    def _open(at: ExaminedPiece, codes: Codes, forces: Array | None = None) -> OpenLeaf:
+    def _open(at: ExaminedPiece, codes: Codes, forces: Floats | None = None) -> OpenLeaf:
         return OpenLeaf(at.piece.low, at.piece.high, codes, forces)
 
     def _certified(self, at: ExaminedPiece, codes: Codes) -> Done | None:
@@ -382,7 +378,7 @@ class PieceTree:
 
         None of a body that nothing holds: the form says nothing about its rigid displacement.
         """
-        if not self._space.fixed.held:
+        if not self.space.fixed.held:
             return None
         piece, statuses = at.piece, without_sectors(codes)
         passages = [passage for passage in self._passages(at, statuses) if passage.parts.allowed(statuses)]
@@ -411,36 +407,123 @@ class PieceTree:
         return piece.high - piece.low > Fraction(share) * (self.interval[1] - self.interval[0])
 
     def _passages(self, at: ExaminedPiece, statuses: tuple[int, ...]) -> list[Passage]:
-        """Runs of known curves that pass a piece; the first ones are sought where no status is assigned."""
+        """Runs of known curves that pass a piece; where no status is assigned and there are none, one is asked for."""
         low, high = at.piece.low, at.piece.high
         curves = self.curves.known
         for number in range(at.curves, len(curves)):
             known = curves[number]
             at.passages += [Passage(number, run, known.over(run, low, high)) for run in runs_over(known, low, high)]
         at.curves = len(curves)
-        if at.passages or self.curves.sought_enough or set(statuses) != {UNDECIDED}:
-            return at.passages
-        found = self.curves.seek(lambda: self._point(at.piece.middle))
-        return self._passages(at, statuses) if found else []
+        if not at.passages and set(statuses) == {UNDECIDED} and not self.curves.sought_enough:
+            self.curves.seek(at.piece, self._point(at.piece.middle))
+        return at.passages
 
     def _leaf(self, at: ExaminedPiece, codes: Codes) -> Done | None:
         """A leaf that is decided, or halved; None where statuses are to be split further."""
         piece = at.piece
         narrowed, found = piece.narrowed(codes)
-        if (record := self._leaves.settled(at, codes, narrowed, found)) is not None:
+        if (record := settled(self.curves, at, codes, narrowed, found)) is not None:
             return record, []
         if isinstance(found, Open) and not is_swept(found) and self._widest(codes) >= 0:
             return None
         there = piece.point.held(codes)
         if isinstance(there, SpaceRoot):
-            number = self.curves.met(piece.point, there)
+            number = self.curves.met(piece.point, codes, there)
             if number is None and not self.curves.is_known(middle_of(piece, there)):
                 return self._open(at, codes, piece.forces(there.y).mid), []
             passed = found if narrowed.low <= piece.middle <= narrowed.high else None
             if number is not None and passed is not None and narrowed.arc(codes, 2.0, passed) is not None:
-                through = self._leaves.through(narrowed, codes, passed, number, (piece.middle, codes, there))
-                if through is not None:
-                    return through, []
+                passing = through(self.curves, narrowed, codes, passed, number, (piece.middle, codes, there))
+                if passing is not None:
+                    return passing, []
         elif self._is_wide(piece, codes) and (there is None or self.curves.box(piece.point, there) is None):
             return None
         return self._halved(at, codes)
+
+
+@dataclass(frozen=True)
+class PieceWorker:
+    """All that the search of a subtree depends on where the curves are given.
+
+    A task is a part of the tree. Where another curve is wanted it ends: the calling process looks for that when the
+    walk through the tree comes to it, and what lies behind is searched again if a curve is found. So curves and proof
+    depend neither on timing nor on the number of workers.
+
+    Attributes
+    ----------
+    enclosure, interval, units, smallest : as PieceTree takes them
+    chains, sampled, final, tried : as Curves takes them
+    """
+
+    enclosure: CondensedEnclosure
+    interval: tuple[Fraction, Fraction]
+    units: tuple[Floats, Floats]
+    smallest: float
+    chains: tuple[CurveChain, ...]
+    sampled: bool
+    final: bool
+    tried: frozenset[tuple[Fraction, Fraction, Codes]]
+
+    @classmethod
+    def of(cls, tree: PieceTree) -> PieceWorker:
+        """Worker for parts of a tree as it is now."""
+        curves = tree.curves
+        chains, tried = tuple(known.chain for known in curves.known), frozenset(curves.tried)
+        given = tree.space.enclosure, tree.interval, tree.units, tree.smallest
+        return cls(*given, chains, curves.sampled, curves.final, tried)
+
+    def examined(self, roots: Sequence[PieceNode], nodes: int) -> Answer:
+        """Examine so many nodes, until the time is over or a curve is wanted."""
+        enclosure, interval = self.enclosure, self.interval
+        curves = Curves(enclosure, interval, self.chains, sampled=self.sampled, final=self.final, tried=self.tried)
+        tree = PieceTree(enclosure, interval, self.units, curves, smallest=self.smallest)
+        waiting = tree.examined(roots, nodes)
+        rest = [item.sent() for item in waiting]
+        return Answer(tree.records, tree.nodes, tree.covered, rest, tree.wanted is not None)
+
+
+class SpreadPieces(Spread):
+    """Searches a tree over alpha with the help of an executor.
+
+    Parameters
+    ----------
+    executor : Executor
+    tree : PieceTree
+    """
+
+    def __init__(self, executor: Executor, tree: PieceTree) -> None:
+        super().__init__(executor, tree, NODES, remaining)
+        self._pieces = tree
+        self._stack: list[TreePart] | None = None
+
+    def run(self) -> None:
+        """Search the tree, until a limit is reached or a curve is wanted."""
+        tree = self._pieces
+        if self._stack is None:
+            tree.examine(tree.waiting, max(FIRST - tree.nodes, 0))
+            if tree.wanted is not None or tree.stopped is not None or not tree.waiting:
+                return
+            self._renew()
+            self._stack, tree.waiting = self._begin(tree.waiting), []
+        tree.wanted = None
+        self._examine(self._stack, lambda: tree.wanted is not None)
+
+    def end(self) -> None:
+        """Leave open what no worker has examined."""
+        if self._stack is not None:
+            self._leave(self._stack)
+        self._pieces.end()
+
+    def _worker(self) -> PieceWorker:
+        self._sent = self._state
+        return PieceWorker.of(self._pieces)
+
+    def _is_current(self, *, afresh: bool) -> bool:
+        del afresh
+        return self._sent == self._state
+
+    @property
+    def _state(self) -> tuple[object, ...]:
+        """Facts about the curves that workers are to know, and that change during a search."""
+        curves = self._pieces.curves
+        return len(curves.known), curves.sampled, curves.sought_enough, curves.final

@@ -13,7 +13,8 @@ import numpy as np
 
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.statuses import CONTACT, UNDECIDED
-from enumsol.proof.records import DeclaredForm, Excluded, NoRoot, OnlyReference, Unbalanced
+from enumsol.proof.leaves import Excluded, NoRoot, OnlyReference, Unbalanced
+from enumsol.proof.records import DeclaredForm
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.certifiers.protocol import Bound, Certifier, Refine, UndecidedPart, Unrecorded
 from enumsol.search.closing import TreeCloser

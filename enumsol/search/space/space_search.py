@@ -21,16 +21,8 @@ from enumsol.model.sectors import (
     span,
 )
 from enumsol.model.statuses import CONTACT, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
-from enumsol.proof.records import (
-    Alone,
-    BoxedRoot,
-    DeclaredForm,
-    EnclosureRecord,
-    Excluded,
-    NoRoot,
-    RegularRoot,
-    UndecidedRecord,
-)
+from enumsol.proof.leaves import Alone, BoxedRoot, Excluded, NoRoot, RegularRoot, UndecidedRecord
+from enumsol.proof.records import DeclaredForm, EnclosureRecord
 from enumsol.relaxation.engine import PRUNE_MARGIN, Relaxation
 from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
 from enumsol.search.certifiers.protocol import (

@@ -12,7 +12,6 @@ import numpy as np
 from enumsol.condensation.enclosure import NotEnclosedError, enclosure_of
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.model.statuses import UNDECIDED
-from enumsol.proof.declared_forms import space_form
 from enumsol.proof.records import Limits, Tree
 from enumsol.proof.writer import Recorder
 from enumsol.relaxation.convex_forms import SlipFormAscent
@@ -139,4 +138,4 @@ class SpaceSolvers(SearchSetup):
         system, tree = self.system, Tree.SPACE if self.problem.held else Tree.FLOATING_SPACE
         codes, modes = (UNDECIDED,) * system.p, self.problem.modes.r
         limits = Limits(codes, tree, components=len(system.g), modes=modes)
-        return Reader(limits, partial(space_form, self.enclosed))
+        return Reader(limits, self.enclosed)

@@ -7,10 +7,9 @@ the matrix A is touched only where it has entries.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -22,6 +21,7 @@ from enumsol.support.deadlines import look, tell
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+    from contextlib import AbstractContextManager
 
     from enumsol.model.problem import ContactProblem
     from enumsol.support.array_types import Floats, NDArray
@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
 #: Bits of the arithmetic.
 PRECISION = 320
-#: Zeros are enclosed to 2^-ZERO_BITS relative to the interval, and closer ones are one.
-ZERO_BITS = 200
 
 
 def upper(value: arb) -> float:
@@ -47,20 +45,10 @@ def uppers(values: arb_mat) -> Floats:
     return bounds
 
 
-class precision:  # noqa: N801 (a context manager, used like a function)
+def precision() -> AbstractContextManager[object]:
     """The precision of flint's balls, for a while."""
-
-    def __enter__(self) -> None:
-        self._before = ctx.prec
-        ctx.prec = PRECISION
-
-    def __exit__(self, *error: object) -> None:
-        ctx.prec = self._before
-
-
-def rounded(alpha: Fraction, low: Fraction, high: Fraction, unit: Fraction) -> Fraction:
-    """An alpha within bounds at a multiple of a unit from the first: ends of enclosures keep few digits."""
-    return min(max(low + round((alpha - low) / unit) * unit, low), high)
+    context: AbstractContextManager[object] = ctx.workprec(PRECISION)
+    return context
 
 
 def matrix(rows: list[list[Any]]) -> Any:
@@ -73,7 +61,7 @@ def column(values: Sequence[Any]) -> Any:
     return arb_mat(len(values), 1, list(values))
 
 
-def products(left: Any, right: Floats) -> NDArray[Any]:
+def products(left: Floats | sp.sparray, right: Floats) -> NDArray[Any]:
     """The product of two matrices of floats, the first of which may be sparse, in balls."""
     rows, factors = sp.csr_array(left), np.array([[arb(x) for x in row] for row in right.tolist()], dtype=object)
     found = np.full((rows.shape[0], right.shape[1]), arb(0), dtype=object)
@@ -96,12 +84,6 @@ def sign_of(value: arb) -> int:
 def signs_of(values: arb_mat) -> Signs:
     """Signs of the balls in a column."""
     return np.array([sign_of(values[k, 0]) for k in range(values.nrows())], dtype=np.int8)
-
-
-def fraction_of(value: arb) -> Fraction:
-    """The exact value of an arb without radius."""
-    mantissa, exponent = (int(part) for part in value.man_exp())
-    return Fraction(mantissa) * Fraction(2) ** exponent
 
 
 #: Residuals are refined to this many bits, beside columns of size one; the error of S has twice as many.
@@ -139,8 +121,8 @@ def refined_table(problem: ContactProblem) -> list[list[Any]] | None:
     scale = problem.products.scale
     A, _ = scaled(sp.csr_array(problem.A), scale, scale)
     slope = np.zeros(problem.n) if problem.load_slope is None else problem.load_slope
-    K = _Columns.of(np.column_stack([problem.contact_rows.toarray().T, problem.f, slope]), scale)
-    entries = _Integers.of(A.data)
+    K = _columns(np.column_stack([problem.contact_rows.toarray().T, problem.f, slope]), scale)
+    entries = _Integers.of(*_parts(A.data))
     X, E, bits = _refined(problem, A, entries, K, scale)
     size = problem.contact_rows.shape[0]
     first = fmpz_mat(K.values.T[:size].tolist()) * fmpz_mat(X.tolist())
@@ -157,45 +139,30 @@ def refined_table(problem: ContactProblem) -> list[list[Any]] | None:
     return table
 
 
-@dataclass(frozen=True)
-class _Integers:
-    """Floats as integers: value * 2^-bits, of any shape."""
-
-    values: NDArray[Any]
-    bits: int
-
-    @classmethod
-    def of(cls, floats: Floats) -> _Integers:
-        whole, exponent = _parts(floats)
-        bits = -int(np.min(exponent, where=whole != 0, initial=0))
-        return cls(whole.astype(object) << np.where(whole != 0, exponent + bits, 0).astype(object), bits)
-
-
-@dataclass(frozen=True)
-class _Columns:
-    """The columns of K, A's scaling applied, each divided by 2^unit so that its largest entry is near one.
-
-    Attributes
-    ----------
-    values : (n, m) array of int, the entries times 2^bits
-    bits : int
-    units : list of m int
-    """
+class _Integers(NamedTuple):
+    """Numbers as integers, values * 2^-bits; the columns of a matrix may have units, 2^unit, beside that."""
 
     values: NDArray[Any]
     bits: int
     units: list[int]
 
     @classmethod
-    def of(cls, columns: Floats, scale: Floats) -> _Columns:
-        whole, exponent = _parts(columns)
-        # a product by a power of two, without the underflow that floats may have
-        exponent = exponent + np.frexp(scale)[1][:, None] - 1
-        largest = np.max(np.where(whole != 0, exponent + 53, -(2**30)), axis=0)
-        units = np.where(np.any(whole, axis=0), largest, 0)
-        exponent = np.where(whole != 0, exponent - units, 0)
+    def of(cls, whole: NDArray[Any], exponent: NDArray[Any], units: NDArray[Any] | None = None) -> _Integers:
+        """The numbers whole * 2^exponent."""
+        exponent = np.where(whole != 0, exponent if units is None else exponent - units, 0)
         bits = -int(np.min(exponent, initial=0))
-        return cls(whole.astype(object) << (exponent + bits).astype(object), bits, units.tolist())
+        return cls(
+            whole.astype(object) << (exponent + bits).astype(object), bits, [] if units is None else units.tolist()
+        )
+
+
+def _columns(floats: Floats, scale: Floats) -> _Integers:
+    """The columns of K, A's scaling applied, in units in which their largest entries are near one."""
+    whole, exponent = _parts(floats)
+    # a product by a power of two, without the underflow that floats may have
+    exponent = exponent + np.frexp(scale)[1][:, None] - 1
+    largest = np.max(np.where(whole != 0, exponent + 53, -(2**30)), axis=0)
+    return _Integers.of(whole, exponent, np.where(np.any(whole, axis=0), largest, 0))
 
 
 def _parts(floats: Floats) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -205,7 +172,7 @@ def _parts(floats: Floats) -> tuple[NDArray[Any], NDArray[Any]]:
 
 
 def _refined(
-    problem: ContactProblem, A: sp.csr_array, entries: _Integers, K: _Columns, scale: Floats
+    problem: ContactProblem, A: sp.csr_array, entries: _Integers, K: _Integers, scale: Floats
 ) -> tuple[NDArray[Any], NDArray[Any], int]:
     """X times 2^_SOLUTION_BITS, the exact residual K - A X times 2^bits, and bits."""
     bits = entries.bits + _SOLUTION_BITS + K.bits

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma, upper_sum
-from enumsol.trusted.arcs.over_parts import Expansion, expansions
-from enumsol.trusted.arcs.series import bernstein_values
+from enumsol.trusted.arcs.over_parts import Expansion, bernstein_values, expansions
 from enumsol.trusted.over_interval import PieceNumbers, definite
 from enumsol.trusted.selection import signed
 from enumsol.trusted.status_rows import OPEN
@@ -71,7 +70,7 @@ class _Along:
 
     def __init__(self, expansion: Expansion, numbers: PieceNumbers) -> None:
         self._rows, self._system = expansion.selection.rows, expansion.selection.system
-        self._series, self._numbers = expansion.series, numbers
+        self._series, self._numbers = expansion, numbers
         self._ends = expansion.tau(expansion.low, expansion.high)
         system, series = self._system, self._series
         self._rubbing = (system.F0 != 0) | (system.F1 != 0)

@@ -5,34 +5,30 @@ g_R(alpha), both affine in alpha. Here it is written with one unknown more: N(al
 the rows [M, -g_R] and one row v', and e is the last unit vector. Where N is regular and t is not zero, y / t is the
 selection's only solution; where t = 0 there is none. So zeros of det M need no care, as long as N is regular there.
 
-Many selections and many parts are examined at once, in stacks of matrices.
+Many selections and many parts are examined at once, in stacks of matrices: conditions are polynomials in tau with
+bounds of their errors. Selections of about the same size are expanded together; smaller ones are filled up with
+equations x = 0.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from functools import cache, cached_property
+from math import comb
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from enumsol.arithmetic.balls import SAFE, TINY, UNIT, determinant_sign, gamma, upper_sum
-from enumsol.trusted.arcs.series import Series, bernstein_values, expand, signs_beyond
+from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, determinant_sign, gamma, upper_sum
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from enumsol.support.array_types import Floats, Indices, NDArray
     from enumsol.trusted.arcs.selection_balls import ArcSelection
 
+    Asked = tuple[ArcSelection, float, float]
     Signs = NDArray[np.int8]
-
-#: Imaginary parts (tau) of what counts as a zero; coefficients that do not matter for it, by the polynomial's size and
-#: by its error; sizes by errors of what counts as flat, and errors of what counts as rough; for guesses.
-_NEAR_REAL, _NOISE, _SHARE, _FLAT, _ROUGH = 1e-2, 2.0**-48, 0.01, 32.0, 1e-9
-#: Zeros closer than this, relative to their interval, are not told apart; a zero's first enclosure by its radius, and
-#: enlargements of it; steps of Newton's method to it.
-_APART, _MARGIN, _WIDENINGS, _STEPS = 1e-5, 4.0, 60, 4
 
 
 @dataclass(frozen=True)
@@ -76,175 +72,116 @@ class OverInterval:
         return np.flatnonzero(self.conditions == 0)
 
 
+@dataclass(frozen=True, eq=False)
 class Expansion:
     """Conditions of a selection over [low, high] as polynomials in tau with bounds of their errors; t is the last.
 
-    tau runs from -1 to 1. At every alpha they are the conditions of z, that is t times those of y.
+    alpha is middle + tau radius, |tau| <= 1. At every alpha they are the conditions of z, that is t times those of y.
 
     Attributes
     ----------
-    low, high : float
-    apart : float
-        Zeros closer than this are not told apart.
-    final : bool
-        False: they may be in a shorter interval.
-    series : Series
+    selection : ArcSelection
+    low, high, middle, radius : float
+    coefficients : (m + 1, terms + 1) array
+    error, slope_error : (m + 1,) arrays
+        Bounds of the errors of values and of derivatives by tau.
+    truncated : bool
+        What the series leaves out is the largest part of its error.
+    bordered : Ball
+        N at the middle.
     """
 
-    final = False
+    selection: ArcSelection
+    low: float
+    high: float
+    middle: float
+    radius: float
+    coefficients: Floats
+    error: Floats
+    slope_error: Floats
+    truncated: bool
+    bordered: Ball
 
-    def __init__(self, selection: ArcSelection, low: float, high: float, series: Series) -> None:
-        self.low, self.high, self.series = low, high, series
-        self.apart = _APART * (high - low)
-        self.selection = selection
-        coefficients = series.coefficients
-        # the sums below have coefficients of Bernstein polynomials that add up to at most these sizes
-        k = gamma(8 * coefficients.shape[1])
-        size, self.slope = (
-            upper_sum(np.abs(coefficients), axis=1),
-            coefficients[:, 1:] * np.arange(1, coefficients.shape[1]),
-        )
-        self.steepest = upper_sum(np.abs(self.slope), axis=1)
-        self.rounded = (series.error + k * size) * SAFE
-        self.slope_rounded = (series.slope_error + k * self.steepest) * SAFE
-        self._size = size
+    @cached_property
+    def slope(self) -> Floats:
+        """Coefficients of the derivatives by tau."""
+        return np.asarray(self.coefficients[:, 1:] * np.arange(1, self.coefficients.shape[1]))
+
+    @cached_property
+    def size(self) -> Floats:
+        """Bounds of the polynomials."""
+        return np.asarray(upper_sum(np.abs(self.coefficients), axis=1))
+
+    @cached_property
+    def steepest(self) -> Floats:
+        """Bounds of the derivatives."""
+        return np.asarray(upper_sum(np.abs(self.slope), axis=1))
+
+    @cached_property
+    def _rounding(self) -> float:
+        # Bernstein polynomials have coefficients that add up to at most these sizes
+        return gamma(8 * self.coefficients.shape[1])
+
+    @cached_property
+    def rounded(self) -> Floats:
+        """Bounds of the errors of values from Bernstein coefficients."""
+        return np.asarray((self.error + self._rounding * self.size) * SAFE)
+
+    @cached_property
+    def slope_rounded(self) -> Floats:
+        """Bounds of the errors of derivatives, likewise."""
+        return np.asarray((self.slope_error + self._rounding * self.steepest) * SAFE)
 
     @cached_property
     def orientation(self) -> int:
         """Sign of det N."""
-        return determinant_sign(self.series.bordered)
+        return determinant_sign(self.bordered)
 
     @cached_property
     def unbalanced(self) -> bool:
         """True if no forces of the selection are in balance with the load anywhere in the interval."""
         return self.selection.unbalanced(self.low, self.high)
 
-    @property
-    def rough(self) -> bool:
-        """True if the series was truncated too early for bounds near those of rounding: the interval is long."""
-        return self.series.truncated and bool(np.median(self.series.error / (self._size + TINY)) > _ROUGH)
-
     def over(self, low: float, high: float) -> OverInterval:
         """Knowledge of a part of the interval."""
         return over_parts([(self, low, high)])[0]
 
-    def zeros(self, condition: int) -> list[float]:
-        """Alphas inside the interval at which a condition seems to vanish; no claim rests on them."""
-        polynomial = self.series.coefficients[condition]
-        # trailing noise would only give roots far away
-        noise = max(_NOISE * float(self._size[condition]), _SHARE * float(self.rounded[condition]))
-        kept = np.flatnonzero(np.abs(polynomial) > noise)
-        last = int(kept[-1]) if len(kept) else 0
-        if last < 2:
-            real = -polynomial[:1] / polynomial[1] if last else np.empty(0)
-        else:
-            roots = np.linalg.eigvals(_companion(polynomial[: last + 1]))
-            real = np.sort(roots.real[np.abs(roots.imag) < _NEAR_REAL])
-        found = [self.series.middle + self.series.radius * float(x) for x in real]
-        return [alpha for alpha in found if self.low < alpha < self.high]
-
-    def flat(self, condition: int) -> bool:
-        """True if a condition is nowhere larger than the bound of its error allows to tell."""
-        return bool(self._size[condition] <= _FLAT * self.rounded[condition])
-
-    def zero_bounds(self, condition: int, slope: int, low: float, high: float) -> tuple[float, float]:
-        """Bounds of the only zero of a condition in a part, at whose ends it has opposite signs.
-
-        ``slope`` is the sign of its slope there.
-        """
-        zero = next((alpha for alpha in self.zeros(condition) if low < alpha < high), 0.5 * (low + high))
-        found, rise = self.selection.at(zero), self._rise(condition, zero)
-        if found is None or not np.isfinite(rise) or rise * slope <= 0.0:
-            return low, high
-        zero -= float(found[2].mid[condition]) / rise
-        width = _MARGIN * float(found[2].rad[condition]) / abs(rise) + 2.0 * float(np.spacing(abs(zero)))
-        for _ in range(_WIDENINGS):
-            first, last = zero - width, zero + width
-            if not low <= first < last <= high:
-                break
-            if [self.selection.sign_at(alpha, condition) for alpha in (first, last)] == [-slope, slope]:
-                return first, last
-            width *= 2.0
-        return low, high
-
-    def split(self) -> None:
-        """Cuts are made around zeros; see ``taylor.ShortExpansion``."""
-
-    def near(self, condition: int, low: float, high: float) -> tuple[float, float]:
-        """Presumed bounds of the only zero of a condition in a part; no claim rests on them."""
-        value, slope = self.series.coefficients[condition].tolist(), self.slope[condition].tolist()
-        first, last = self.tau(low, high)
-        tau, rise = 0.5 * (first + last), 0.0
-        for _ in range(_STEPS):
-            rise = _horner(slope, tau)
-            step = _horner(value, tau) / rise if rise else np.inf
-            tau = min(max(tau - step, first), last)
-        zero = self.series.middle + self.series.radius * tau
-        reach = 1.01 * float(self.rounded[condition]) / abs(rise) * self.series.radius if rise else np.inf
-        reach += 32.0 * float(np.spacing(max(abs(self.low), abs(self.high))))
-        return zero - reach, zero + reach
-
-    def _rise(self, condition: int, alpha: float) -> float:
-        """Slope of a condition over t at an alpha at which it vanishes, nearly."""
-        tau = (alpha - self.series.middle) / self.series.radius
-        t = _horner(self.series.coefficients[-1].tolist(), tau)
-        return _horner(self.slope[condition].tolist(), tau) / t / self.series.radius if t else np.inf
-
     def slack(self) -> float:
         """Bound of the error of tau of an alpha."""
-        return 8.0 * UNIT * (1.0 + max(abs(self.low), abs(self.high)) / self.series.radius)
+        return 8.0 * UNIT * (1.0 + max(abs(self.low), abs(self.high)) / self.radius)
 
     def tau(self, low: float, high: float) -> tuple[float, float]:
         """The part in terms of tau, rounded outward."""
-        slack, middle, radius = self.slack(), self.series.middle, self.series.radius
+        slack, middle, radius = self.slack(), self.middle, self.radius
         ends = (low - middle) / radius - slack, (high - middle) / radius + slack
         return max(ends[0], -1.0), min(ends[1], 1.0)
 
 
-@dataclass(frozen=True)
-class Nowhere:
-    """An interval in which no forces of a selection are in balance with the load (theory, (14.7)).
-
-    Attributes
-    ----------
-    selection : ArcSelection
-    low, high : float
-    """
-
-    selection: ArcSelection
-    low: float
-    high: float
-    final: ClassVar = False
-
-    @property
-    def known(self) -> OverInterval:
-        """Knowledge of every part of it."""
-        unknown = np.zeros(len(self.selection.rows.conditions), dtype=np.int8)
-        return OverInterval(unknown, False, True, 0, (unknown, unknown), unknown)
-
-
-def expansions(
-    asked: Sequence[tuple[ArcSelection, float, float]], errors: float = 1.0
-) -> list[Expansion | Nowhere | None]:
-    """The conditions of selections over intervals as polynomials, or that there are no forces; None where neither is.
+def expansions(asked: Sequence[Asked], errors: float = 1.0) -> list[Expansion | OverInterval | None]:
+    """The conditions of selections over intervals as polynomials, or that nothing holds there; None where neither is.
 
     Bounds of errors are multiplied by ``errors``: a search asks for more than its checker, which may round otherwise.
     """
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        found = expand(asked, errors)
-        return [
-            Expansion(*what, series) if series else Nowhere(*what) if what[0].unbalanced(*what[1:]) else None
-            for what, series in zip(asked, found, strict=True)
-        ]
+        found = _expanded(asked, errors)
+        return [one or _nowhere(*what) for what, one in zip(asked, found, strict=True)]
 
 
-def over_parts(asked: Sequence[tuple[Expansion | Nowhere, float, float]]) -> list[OverInterval]:
-    """Knowledge of expansions over parts of their intervals."""
-    found = [one.known if isinstance(one, Nowhere) else None for one, _, _ in asked]
+def _nowhere(selection: ArcSelection, low: float, high: float) -> OverInterval | None:
+    """Knowledge of an interval in which no forces of a selection are in balance with the load (theory, (14.7))."""
+    if not selection.unbalanced(low, high):
+        return None
+    unknown = np.zeros(len(selection.rows.conditions), dtype=np.int8)
+    return OverInterval(unknown, False, True, 0, (unknown, unknown), unknown)
+
+
+def over_parts(asked: Sequence[tuple[Expansion | OverInterval, float, float]]) -> list[OverInterval]:
+    """Knowledge of expansions over parts of their intervals; what is known of a whole interval is so of its parts."""
+    found = [one if isinstance(one, OverInterval) else None for one, _, _ in asked]
     groups: dict[int, list[tuple[int, tuple[Expansion, float, float]]]] = {}
     for k, (one, *part) in enumerate(asked):
         if isinstance(one, Expansion):
-            groups.setdefault(one.series.coefficients.shape[1], []).append((k, (one, part[0], part[1])))
+            groups.setdefault(one.coefficients.shape[1], []).append((k, (one, part[0], part[1])))
     for group in groups.values():
         for (k, _), known in zip(group, _over([one for _, one in group]), strict=True):
             found[k] = known
@@ -257,7 +194,7 @@ def _over(asked: Sequence[tuple[Expansion, float, float]]) -> list[OverInterval]
     places, counts = np.arange(len(asked)), np.array([len(e.rounded) - 1 for e in expansions])
     low, high = np.array([e.tau(*part) for e, *part in asked]).T
     rounded = _stacked([e.rounded for e in expansions], np.inf)
-    values = bernstein_values(_stacked([e.series.coefficients for e in expansions]), low, high)
+    values = bernstein_values(_stacked([e.coefficients for e in expansions]), low, high)
     signs = signs_beyond(values, rounded)
     t = signs[places, counts][:, None]
     # a root has all conditions >= 0 where t > 0, or all <= 0 where t < 0
@@ -294,16 +231,259 @@ def _stacked(parts: Sequence[Floats], fill: float = 0.0) -> Floats:
     return found
 
 
-def _companion(polynomial: Floats) -> Floats:
-    """A matrix whose eigenvalues are the zeros."""
-    degree = len(polynomial) - 1
-    found = np.eye(degree, k=-1)
-    found[:, -1] = -polynomial[:-1] / polynomial[-1]
+# -- series -----------------------------------------------------------------------------------------------------------
+
+#: Terms of the series of z: with more of them boxes are longer and cost more. Sizes are rounded up to multiples of the
+#: second: larger stacks, and more filling.
+_TERMS, _STEP = 16, 4
+
+
+def _expanded(asked: Sequence[Asked], errors: float) -> list[Expansion | None]:
+    """The series of selections over intervals; None where none is proven. Errors are multiplied by ``errors``."""
+    found: list[Expansion | None] = [None] * len(asked)
+    plain = [selection.affine for selection, _, _ in asked]
+    for first in (True, False):
+        # where M is constant, z is affine with t = 1, unless M is singular
+        waiting = [k for k in range(len(asked)) if plain[k] or not first]
+        if not first:
+            waiting = [k for k in waiting if found[k] is None]
+        for group in _groups(asked, waiting):
+            stack = _Stack([asked[k] for k in group], 2 if first else _TERMS, errors, plain=first)
+            for k, series in zip(group, stack.series(), strict=True):
+                found[k] = series
     return found
 
 
-def _horner(polynomial: Sequence[float], tau: float) -> float:
-    value = 0.0
-    for coefficient in reversed(polynomial):
-        value = value * tau + coefficient
-    return value
+def _groups(asked: Sequence[Asked], waiting: Sequence[int]) -> Iterator[list[int]]:
+    """Numbers of those that are expanded together."""
+    sizes: dict[int, list[int]] = {}
+    for k in waiting:
+        sizes.setdefault(-(-len(asked[k][0].rows.unknown) // _STEP) * _STEP, []).append(k)
+    for size, group in sizes.items():
+        # entries of a stack
+        most = max(1, 2**20 // ((size + 1) * (size + 1 + 3 * asked[group[0]][0].system.p)))
+        for first in range(0, len(group), most):
+            yield group[first : first + most]
+
+
+class _Stack:
+    """Selections expanded together: b matrices H + tau H1 of k columns, z = (y, filling, t).
+
+    Their rows are the k of N, the conditions and t. Norms are max |x_i| / u_i, by b.
+    """
+
+    def __init__(self, asked: Sequence[Asked], terms: int, errors: float, *, plain: bool) -> None:
+        self._asked, self._terms, self._errors, self._plain = asked, terms, errors, plain
+        self._sizes = [(len(s.rows.unknown), len(s.rows.conditions)) for s, _, _ in asked]
+        self._k = -(-max(size for size, _ in self._sizes) // _STEP) * _STEP + 1
+        low, high = np.array([part for _, *part in asked]).T
+        self._middle = 0.5 * (low + high)
+        # so much more that tau stays within [-1, 1] where it is rounded
+        self._radius = np.maximum(high - self._middle, self._middle - low) * (1.0 + 2.0**-20) + TINY
+        self._H, self._H1, self._H_rad, self._H1_rad = self._forms()
+        self._H[:, self._k - 1] = _last_row(self._k) if plain else self._directions()
+        # bounds of rounding errors below are themselves rounded, in two products and a few operations
+        self._safe = (1.0 + gamma(2 * self._k + 8)) * SAFE
+
+    def _forms(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """H and H1 with radii; the last row of N is left empty."""
+        k, most = self._k, max(m for _, m in self._sizes)
+        found = np.zeros((4, len(self._asked), k + most + 1, k))
+        found[0, :, -1, -1] = 1.0
+        for b, ((selection, _, _), (size, m)) in enumerate(zip(self._asked, self._sizes, strict=True)):
+            for part, form in zip(found[:, b], selection.forms, strict=True):
+                part[:size, :size], part[:size, -1] = form[:size, :-1], form[:size, -1]
+                part[k : k + m, :size], part[k : k + m, -1] = form[size:, :-1], form[size:, -1]
+            filling = np.arange(size, k - 1)
+            found[0, b, filling, filling] = 1.0
+        H0, H1, H0_rad, H1_rad = found
+        middle, radius = self._middle[:, None, None], self._radius[:, None, None]
+        moved = middle * H1
+        H0_rad += np.abs(middle) * H1_rad + gamma(4) * (np.abs(H0) + np.abs(moved))
+        H1_rad = radius * H1_rad + gamma(4) * np.abs(radius * H1)
+        return H0 + moved, radius * H1, H0_rad * SAFE + TINY, H1_rad * SAFE + TINY
+
+    def _directions(self) -> Floats:
+        """The last rows of N: z at the middle, of length one, so that N is regular even where det M vanishes."""
+        M, g = self._H[:, : self._k - 1, :-1], -self._H[:, : self._k - 1, -1:]
+        # with infinite entries lapack may not come back
+        usable = np.all(np.isfinite(self._H), axis=(1, 2))
+        self._H[~usable] = np.nan
+        y = _each(np.linalg.solve, M, g)[:, :, 0]
+        v = np.concatenate([y, np.ones((len(y), 1))], axis=1)
+        for b in np.flatnonzero(usable & ~np.all(np.isfinite(v), axis=1)).tolist():
+            try:
+                v[b] = np.linalg.svd(self._H[b, : self._k - 1])[2][-1]
+            except np.linalg.LinAlgError:
+                v[b] = np.nan
+        return np.asarray(v / np.linalg.norm(v, axis=1, keepdims=True))
+
+    def series(self) -> list[Expansion | None]:
+        """The series, None where there is none."""
+        k, H, H1 = self._k, self._H, self._H1
+        H_rad, H1_rad = self._H_rad, self._H1_rad
+        H_rad[:, k - 1], H1_rad[:, k - 1] = 0.0, 0.0
+        N, N1 = H[:, :k], H1[:, :k]
+        R = _each(np.linalg.inv, N)
+        Q = R @ N1
+        Z, powers = self._guess(R[:, :, -1:], Q)
+        sizes = np.sum(np.abs(Z), axis=2)
+        # weights are at least this share of the largest
+        u = sizes + 1e-3 * np.max(sizes, axis=1, keepdims=True)
+        # far above underflow
+        u[~np.all(np.isfinite(u) & (u > 2.0**-480), axis=1)] = np.nan
+        u = u[:, :, None]
+        # by how much products with these matrices may be off
+        off, off1 = gamma(k + 6) * np.abs(H) + H_rad, gamma(k + 6) * np.abs(H1) + H1_rad
+        R_abs = np.abs(R)
+        wrong1 = self._norm(R_abs @ (off1[:, :k] @ u), u)
+        wrong = self._norm(np.abs(R @ N - np.eye(k)) @ u + R_abs @ (off[:, :k] @ u), u) + wrong1
+        growth = self._growth(powers, wrong * SAFE, u)
+        # residuals of the truncated series, conditions and t, by powers of tau
+        sums = _shifted(H @ Z, H1 @ Z)
+        sums[:, k - 1, 0] -= 1.0
+        radius = _shifted(off @ np.abs(Z), off1 @ np.abs(Z)) * self._safe + TINY
+        rest = sums[:, :k]
+        left = np.abs(R @ rest) + R_abs @ (radius[:, :k] + gamma(k + 6) * np.abs(rest))
+        share = np.max((left * self._safe + TINY) / u, axis=1) * SAFE + TINY
+        degrees = np.arange(self._terms + 1)
+        error = growth * upper_sum(share, axis=1) * SAFE
+        turning = (self._norm(np.abs(Q) @ u, u) + wrong1) * error
+        slope_error = growth * (upper_sum(share * degrees, axis=1) + turning) * SAFE * SAFE
+        # |c1| u and |c0| u + |c1| u for the conditions c0 + tau c1
+        turn = ((np.abs(H1[:, k:]) + off1[:, k:]) @ u)[:, :, 0] * self._safe + TINY
+        reach = ((np.abs(H[:, k:]) + off[:, k:]) @ u)[:, :, 0] * self._safe + TINY + turn
+        values, slopes = upper_sum(radius[:, k:], axis=2), upper_sum(radius[:, k:] * degrees, axis=2)
+        values = (values + reach * error[:, None]) * SAFE * self._errors
+        slopes = (slopes + reach * slope_error[:, None] + turn * error[:, None]) * SAFE * self._errors
+        truncated = share[:, -1] > 0.5 * np.sum(share, axis=1)
+        return [
+            self._one(b, sums[b, k:], values[b], slopes[b], truncated=bool(truncated[b])) if good else None
+            for b, good in enumerate(np.isfinite(growth).tolist())
+        ]
+
+    def _one(self, b: int, sums: Floats, values: Floats, slopes: Floats, *, truncated: bool) -> Expansion | None:
+        """A series, without what was filled up."""
+        size, m = self._sizes[b]
+        rows, kept = [*range(m), -1], [*range(size), self._k - 1]
+        # sums of smaller ones do not overflow
+        if not np.max(np.abs(sums)) < 2.0**1000:
+            return None
+        inner = np.ix_(kept, kept)
+        return Expansion(
+            *self._asked[b],
+            middle=float(self._middle[b]),
+            radius=float(self._radius[b]),
+            coefficients=sums[rows],
+            error=values[rows],
+            slope_error=slopes[rows],
+            truncated=truncated,
+            bordered=Ball(self._H[b][inner], self._H_rad[b][inner]),
+        )
+
+    def _guess(self, z: Floats, Q: Floats) -> tuple[Floats, list[Floats]]:
+        """The series of z, z_k = -Q z_(k-1), and powers Q, Q^2, Q^4, ...; no claim rests on its accuracy."""
+        Z, powers = np.concatenate([z, -Q @ z], axis=2), [Q]
+        while Z.shape[2] < self._terms:
+            last = powers[-1]
+            powers.append(last @ last)
+            Z = np.concatenate([Z, powers[-1] @ Z], axis=2)
+        return Z, powers
+
+    def _norm(self, product: Floats, u: Floats) -> Floats:
+        """Bound of a matrix, from the product of its absolute values and u."""
+        return np.asarray(np.max((product[:, :, 0] * self._safe + TINY) / u[:, :, 0], axis=1) * SAFE)
+
+    def _growth(self, powers: list[Floats], wrong: Floats, u: Floats) -> Floats:
+        """Bounds of (R N)^{-1} for |tau| <= 1, where R N = I + tau Q - E and |E| <= wrong; nan where none is found.
+
+        With X = -tau Q it is (I - X)^{-1} = (I + X)(I + X^2)(I + X^4) ... (I - X^q)^{-1}, q a power of two.
+        """
+        # a search stays off the borders at which its checker may find nothing
+        largest = 0.5 if self._errors == 1.0 else 0.499
+        bound, off = np.ones(len(u)), np.zeros(len(u))
+        found = np.full(len(u), np.nan)
+        for j in range(6):
+            if j == len(powers):
+                powers.append(powers[-1] @ powers[-1])
+            size = self._norm(np.abs(powers[j]) @ u, u)
+            norm = (size + off) * SAFE
+            ready = np.isnan(found) & (norm < largest)
+            found[ready] = bound[ready] / (1.0 - norm[ready]) * SAFE
+            if not np.any(np.isnan(found)):
+                break
+            bound = bound * (1.0 + norm) * SAFE
+            off = (gamma(self._k + 4) * size * size + 2.0 * size * off + off * off) * SAFE + TINY
+        share = wrong * found * SAFE
+        # where a constant M is so far from singular, t = 1 is as good as any other last row: search and checker, which
+        # may choose differently close to this, both find good series there
+        most = 2.0**-10 if self._plain else 0.5 / self._errors
+        found = np.where(share < most, found / (1.0 - share) * SAFE, np.nan)
+        return np.asarray(np.where(found * self._errors < 1e6, found, np.nan))
+
+
+def _last_row(k: int) -> Floats:
+    """The last row of N with which t = 1."""
+    found = np.zeros(k)
+    found[-1] = 1.0
+    return found
+
+
+def _each(function: Callable[..., Floats], *stacks: Floats) -> Floats:
+    """A function of numpy.linalg of stacks of matrices; nan for those that are singular."""
+    try:
+        return np.asarray(function(*stacks))
+    except np.linalg.LinAlgError:
+        if len(stacks[0]) == 1:
+            return np.full_like(stacks[-1], np.nan)
+        return np.concatenate([_each(function, *(s[b : b + 1] for s in stacks)) for b in range(len(stacks[0]))])
+
+
+def _shifted(constant: Floats, slope: Floats) -> Floats:
+    """Coefficients of a + tau b, given those of a and b by powers of tau."""
+    found = np.zeros((*constant.shape[:2], constant.shape[2] + 1))
+    found[:, :, :-1] = constant
+    found[:, :, 1:] += slope
+    return found
+
+
+def bernstein_values(coefficients: Floats, low: Floats, high: Floats) -> Floats:
+    """Bernstein coefficients (c, m, d + 1) of polynomials (c, m, d + 1), of every c over its own part.
+
+    The first and the last are the values at ``low`` and ``high``. Rounding errors are at most gamma_(8d+8) times the
+    sum of the sizes of a polynomial's coefficients.
+    """
+    return np.asarray(coefficients @ to_bernstein(coefficients.shape[2] - 1, low, high))
+
+
+def signs_beyond(values: Floats, error: Floats) -> Signs:
+    """1 or -1 where all values along the last axis are larger than an error, or smaller than minus it; else 0."""
+    positive, negative = np.min(values, axis=-1) > error, np.max(values, axis=-1) < -error
+    return np.asarray(positive.astype(np.int8) - negative.astype(np.int8))
+
+
+def to_bernstein(degree: int, low: Floats, high: Floats) -> Floats:
+    """Bernstein coefficients over parts [low, high] of 1, tau, ..., a row each: (c, d + 1, d + 1).
+
+    That of number j of tau^k is the mean of the products of k of the numbers low, .., low, high, .., high, of which j
+    are high: a sum of terms whose sizes add up to at most one, for |low|, |high| <= 1.
+    """
+    if degree == 0:
+        return np.ones((len(low), 1, 1))
+    # powers by products, whose rounding is known
+    factors = np.ones((degree + 1, 2, len(low)))
+    factors[1:, 0], factors[1:, 1] = low, high
+    of_low, of_high = np.multiply.accumulate(factors, axis=0).transpose(1, 0, 2)
+    powers = np.arange(degree + 1)
+    # by k, i and part: low^(k - i) high^i
+    products = np.where((powers[:, None] >= powers)[..., None], of_low[powers[:, None] - powers] * of_high, 0.0)
+    return np.asarray((_weights(degree) @ products).transpose(2, 0, 1))
+
+
+@cache
+def _weights(degree: int) -> Floats:
+    """Shares of high^i low^(k - i) in Bernstein coefficient j of tau^k, by [k, j, i]."""
+    n = range(degree + 1)
+    return np.array(
+        [[[comb(j, i) * comb(degree - j, k - i) / comb(degree, k) if i <= k else 0.0 for i in n] for j in n] for k in n]
+    )

@@ -17,7 +17,6 @@ from flint import arb, arb_mat
 
 from enumsol.arithmetic.balls import SAFE, Ball, upper_sum
 from enumsol.arithmetic.rationals import as_objects
-from enumsol.trusted.arcs.bordered import BorderedLines
 from enumsol.trusted.arcs.many_digits import (
     ball_of,
     column,
@@ -25,12 +24,10 @@ from enumsol.trusted.arcs.many_digits import (
     precision,
     products,
     refined_table,
-    sign_of,
-    signs_of,
     upper,
     uppers,
 )
-from enumsol.trusted.arcs.taylor import AlphaFunctions, ShortExpansion, Smooth, columns_of, joined
+from enumsol.trusted.arcs.taylor import AlphaFunctions
 from enumsol.trusted.selection import Selection
 
 if TYPE_CHECKING:
@@ -39,6 +36,7 @@ if TYPE_CHECKING:
     from enumsol.model.problem import ContactProblem
     from enumsol.model.rigid_modes import RigidModes
     from enumsol.support.array_types import NDArray
+    from enumsol.trusted.arcs.taylor import ShortExpansion
 
     Signs = NDArray[np.int8]
     Number = float | Fraction
@@ -118,7 +116,7 @@ class PreciseSystem:
         return PreciseSystem(self.S, [arb(side) * x for x in self.g1], [arb(0)] * len(self.g1), self.F0, self.F1)
 
 
-class PreciseSelection(AlphaFunctions):
+class PreciseSelection:
     """A selection as a function of alpha, in balls of many digits.
 
     Parameters
@@ -129,137 +127,50 @@ class PreciseSelection(AlphaFunctions):
     Attributes
     ----------
     rows : Selection
+    functions : AlphaFunctions
     """
 
     def __init__(self, system: PreciseSystem, codes: Sequence[int]) -> None:
         self.system = system
         self.rows = rows = Selection(codes, len(system.reach))
         with precision():
-            parts: tuple[list[Any], ...] = ([], [], [], [])
+            parts = []
             for load, F, unit in ((system.g0, system.F0, 1), (system.g1, system.F1, 0)):
                 at, friction = as_objects(load), as_objects(F)
                 W = rows.columns(system.rows, friction, unit)
-                held, free = rows.inequalities(W, at, friction, arb(0), unit, as_objects(system.reach))
-                for part, value in zip(parts, (W[rows.unknown], at[rows.unknown], held, free), strict=True):
-                    part.append(matrix(value.tolist()) if value.ndim == 2 else column(value.tolist()))
-            self._M, self._g, self._C, self._c = (tuple(part) for part in parts)
-
-    @cached_property
-    def _lines(self) -> tuple[Any, Any] | None:
-        """Conditions c0 + a c1, where neither M nor what they are made of depends on alpha; else None."""
-        rows, F1 = self.rows, self.system.F1
-        if any(F1[i] != 0 for i in (*rows.slip.tolist(), *rows.stick.tolist())):
-            return None
-        if not len(rows.unknown):
-            return self._c
-        try:
-            y0, y1 = (self._M[0].solve(g) for g in self._g)
-        except ZeroDivisionError:
-            return None
-        return self._c[0] + self._C[0] * y0, self._c[1] + self._C[0] * y1
-
-    @cached_property
-    def _constant_index(self) -> int:
-        """Sign of det M where M does not depend on alpha."""
-        return sign_of(self._M[0].det()) if self._M[0].nrows() else 1
-
-    def solve(self, a: arb, algorithm: str | None = None) -> tuple[Any, Any] | None:
-        """Unknowns for every alpha in a ball, and the matrix; None where that is not proven regular."""
-        M = self._M[0] + self._M[1] * a
-        if not M.nrows():
-            return arb_mat(0, 1), M
-        try:
-            return M.solve(self._g[0] + self._g[1] * a, algorithm=algorithm), M
-        except ZeroDivisionError:
-            return None
-
-    def signs_by(self, a: arb, algorithm: str | None) -> Signs | None:
-        """Signs of the conditions over a ball, and 1; None where M is not proven regular."""
-        if self._lines is not None:
-            values = self._lines[0] + self._lines[1] * a
-        elif (solved := self.solve(a, algorithm)) is not None:
-            values = self._c[0] + self._c[1] * a + (self._C[0] + self._C[1] * a) * solved[0]
-        else:
-            return None
-        return np.append(signs_of(values), np.int8(1))
-
-    def rise(self, a: arb, k: int) -> tuple[Any, Any] | None:
-        """About the value of a condition and its slope; no claim rests on them."""
-        if self._lines is not None:
-            constant, slope = (part[k, 0] for part in self._lines)
-            return constant + slope * a, slope
-        solved = self.solve(a, "approx")
-        if solved is None:
-            return None
-        (y, M), C, slopes = solved, self._C[0] + self._C[1] * a, self._c[1]
-        value = self._c[0] + self._c[1] * a + C * y
-        slopes = slopes + self._C[1] * y
-        if M.nrows():
-            slopes = slopes + C * M.solve(self._g[1] - self._M[1] * y, algorithm="approx")
-        return value[k, 0], slopes[k, 0]
+                C, c = rows.inequalities(W, at, friction, arb(0), unit, as_objects(system.reach))
+                # the last function is one
+                table = matrix([*C.tolist(), [arb(0)] * len(rows.unknown)])
+                M, g = matrix(W[rows.unknown].tolist()), column(at[rows.unknown].tolist())
+                parts.append((M, g, table, column([*c.tolist(), arb(unit)])))
+        constant = not any(system.F1[i] != 0 for i in (*rows.slip.tolist(), *rows.stick.tolist()))
+        M, g, C, c = zip(*parts, strict=True)
+        self.functions = AlphaFunctions(M, g, C, c, constant)
 
     def expansion(self, low: Number, high: Number) -> ShortExpansion | None:
         """The conditions over [low, high], also where the matrix may be singular; None where that is too long."""
         first, last = Fraction(low), Fraction(high)
         with precision():
-            middle, radius = ball_of((first + last) / 2), ball_of((last - first) / 2)
-            if self._lines is not None:
-                constant, slope = self._lines
-                values = constant + slope * ball_of(first).union(ball_of(last))
-                near = constant + slope * middle
-                return self._short((first, last), values, slope * radius, self._constant_index, near)
-            found = self._expansion(first, last, middle, radius)
+            found = self.functions.expansion(first, last)
             # where a matrix changes by no more than this over an interval, no zero of its determinant is near
             if found is not None and found.shift <= 2.0**-4:
                 return found
             # a zero of det M is near, or lies between them
-            off = middle + radius / 16 if found is None else middle
-            lines = BorderedLines.near((self._M, self._g, self._C, self._c), off, radius)
+            middle, radius = ball_of((first + last) / 2), ball_of((last - first) / 2)
+            lines = self.functions.bordered(middle + radius / 16 if found is None else middle, radius)
             bordered = None if lines is None else lines.expansion(first, last)
             return bordered if found is None or (bordered is not None and bordered.shift < found.shift / 2) else found
-
-    def _expansion(self, first: Fraction, last: Fraction, middle: arb, radius: arb) -> ShortExpansion | None:
-        """The conditions by the powers of tau, with what is left of the unknowns (theory, (7.17))."""
-        M, M1 = self._M[0] + self._M[1] * middle, self._M[1] * radius
-        C, C1 = self._C[0] + self._C[1] * middle, self._C[1] * radius
-        if not M.nrows():
-            near, steep = self._c[0] + self._c[1] * middle, self._c[1] * radius
-            return self._short((first, last), near + steep * arb(0, 1), steep, 1, near)
-        g, g1 = self._g[0] + self._g[1] * middle, self._g[1] * radius
-        try:
-            X = M.solve(joined(g, g1, M1))
-        except ZeroDivisionError:
-            return None
-        y, rise, P = columns_of(X, 1, 1, M.ncols())
-        unknowns = Smooth.solution(y, rise - P * y, P)
-        if unknowns is None:
-            return None
-        found = unknowns.mapped(C, C1, self._c[0] + self._c[1] * middle, self._c[1] * radius)
-        return self._short((first, last), found.values, found.slopes, sign_of(M.det()), found.terms[0], found.shift)
-
-    def _short(
-        self,
-        ends: tuple[Fraction, Fraction],
-        values: arb_mat,
-        slopes: arb_mat,
-        index: int,
-        near: arb_mat,
-        shift: float = 0.0,
-    ) -> ShortExpansion:
-        """Expansion where M is regular throughout; the last function is then 1."""
-        values, slopes = (column([*part.entries(), arb(one)]) for part, one in ((values, 1), (slopes, 0)))
-        return ShortExpansion(self, ends, values, slopes, index, shift=shift, near=near)
 
     def forces(self, alpha: Fraction) -> tuple[list[Any], list[Any]] | None:
         """lambda and w as 2p arb each."""
         system, rows, contact = self.system, self.rows, 2 * self.rows.p
         with precision():
             a = ball_of(alpha)
-            solved = self.solve(a)
+            solved = self.functions.solve(a)
             if solved is None:
                 return None
             F = as_objects([F0 + a * F1 for F0, F1 in zip(system.F0, system.F1, strict=True)])
-            forces = rows.forces(as_objects(solved[0].entries()), F, arb(0)).tolist()
+            forces = rows.forces(as_objects(solved.entries()), F, arb(0)).tolist()
             moved = system.S * column(forces)
             w = [system.g0[r] + a * system.g1[r] - moved[r, 0] for r in range(contact)]
             return forces[:contact], w
@@ -280,14 +191,14 @@ class PreciseSelection(AlphaFunctions):
             moved = [found[1][p + i] + arb(float(offset.mid[i])) for i in range(p)]
             spread = np.zeros(p)
             if any(offset.rad[i] for i in stick):
-                parts = ((system.F0, 1), (system.F1, 0))
+                parts, (M0, M1) = ((system.F0, 1), (system.F1, 0)), self.functions.M
                 W0, W1 = (matrix(rows.columns(system.rows[p:], as_objects(F), unit).tolist()) for F, unit in parts)
                 place = {row: k for k, row in enumerate(rows.unknown.tolist())}
                 units = arb_mat(len(place), len(stick))
                 for j, i in enumerate(stick):
                     units[place[p + i], j] = arb(1)
                 try:
-                    slopes = (W0 + W1 * a) * (self._M[0] + self._M[1] * a).solve(units)
+                    slopes = (W0 + W1 * a) * (M0 + M1 * a).solve(units)
                 except ZeroDivisionError:
                     return None
                 sizes = [[upper(slopes[k, j]) for j in range(len(stick))] for k in range(p)]

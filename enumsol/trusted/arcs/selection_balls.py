@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, Ball, solution
 from enumsol.condensation.enclosure import CondensedEnclosure, EnclosedSystem, NotEnclosedError, RigidRows
-from enumsol.support.array_types import Floats
 from enumsol.trusted.confinement import motion_against
 from enumsol.trusted.floating_bounds import is_unbalanced
 from enumsol.trusted.selection import Selection
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from enumsol.model.problem import ContactProblem
+    from enumsol.support.array_types import Floats
 
 
 @dataclass(frozen=True)
@@ -42,7 +46,7 @@ class ArcSystem:
 
     @classmethod
     def of(
-        cls, problem: Any, enclosure: CondensedEnclosure, force: Floats, length: Floats, side: float = 0.0
+        cls, problem: ContactProblem, enclosure: CondensedEnclosure, force: Floats, length: Floats, side: float = 0.0
     ) -> ArcSystem:
         """A problem, and what encloses it, or the body on springs if nothing holds it.
 

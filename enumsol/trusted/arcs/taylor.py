@@ -2,7 +2,9 @@
 
 Alpha is given by tau in [-1, 1]; the unknowns of linear equations are polynomials in tau, with balls around zero for
 what is left of them and of their slopes. Conditions whose slopes have one sign are known from their values at both
-ends.
+ends. With one more column and one more row a matrix M is regular where det M has a simple zero: functions that have the
+signs of the conditions and of det M are then smooth, and known over a whole box around the zero (under Zeros of the
+determinant).
 """
 
 from __future__ import annotations
@@ -16,17 +18,7 @@ import numpy as np
 from flint import arb, arb_mat
 
 from enumsol.arithmetic.balls import SAFE, UNIT, upper_sum
-from enumsol.trusted.arcs.many_digits import (
-    ZERO_BITS,
-    ball_of,
-    column,
-    fraction_of,
-    matrix,
-    precision,
-    rounded,
-    signs_of,
-    uppers,
-)
+from enumsol.trusted.arcs.many_digits import ball_of, column, matrix, precision, sign_of, signs_of, uppers
 from enumsol.trusted.arcs.over_parts import OverInterval
 
 if TYPE_CHECKING:
@@ -34,15 +26,13 @@ if TYPE_CHECKING:
 
     Signs = NDArray[np.int8]
     Number = float | Fraction
-    Bounds = tuple[Fraction, Fraction]
+    Pair = tuple[Any, ...]
 
-#: Powers of tau in the unknowns.
+#: Powers of tau in the unknowns: more of them allow longer intervals, and cost a product each.
 _TERMS = 12
 #: Bound of how much M may change over an interval; of this the norm is chosen where that is small enough; and steps
 #: to such a norm.
 _LARGEST_SHIFT, _SMALL_SHIFT, _STEPS = 0.5, 0.25, 20
-#: Steps of Newton's method to a zero, and enlargements of its bounds.
-_NEWTON_STEPS, _WIDENINGS = 10, 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,17 +55,17 @@ class Smooth:
     shift: float = 0.0
 
     @classmethod
-    def solution(cls, y: arb_mat, rise: arb_mat, P: arb_mat, sizes: Floats | None = None) -> Smooth | None:
+    def solution(cls, y: arb_mat, rise: arb_mat, P: arb_mat, sizes: Floats) -> Smooth | None:
         """The unknowns of M y = g, with y and their slopes ``rise`` at tau = 0 and P = M(0)^{-1} M'.
 
         They are y + tau (I + tau P)^{-1} rise (theory, (7.16)). None where P is too large. ``sizes`` are at least those
-        of the entries of P, if they are known.
+        of the entries of P.
         """
         terms = [y, rise]
         while len(terms) <= _TERMS:
             terms.append(-(P * terms[-1]))
         rest = P * terms[-1]
-        found = _norm(uppers(rise)[:, 0], uppers(P) if sizes is None else sizes)
+        found = _norm(uppers(rise)[:, 0], sizes)
         if found is None:
             return None
         u, k = found
@@ -181,20 +171,71 @@ def columns_of(X: arb_mat, *counts: int) -> list[Any]:
     return found
 
 
+@dataclass(frozen=True, eq=False)
 class AlphaFunctions:
-    """Functions of alpha with the signs of a selection's conditions; the last has that of det M times a constant."""
+    """Functions of alpha with the signs of a selection's conditions; the last has that of det M times a constant.
+
+    The equations are M X = g. Without a border X has one column y, and the functions are c + C y, the last of them 1.
+    With one, M has the column b and the row d more, and X the columns (v, mu) and (x, rho), where M v + mu b = 0,
+    d v = 1, and M x + rho b = g, d x = 0: the functions are mu (c + C x) - rho C v, and mu.
+
+    Attributes
+    ----------
+    M, g, C, c : pairs of arb_mat
+        At alpha = 0, and by how much they grow with alpha.
+    constant : bool
+        Neither M nor C depends on alpha.
+    """
+
+    M: Pair
+    g: Pair
+    C: Pair
+    c: Pair
+    constant: bool = False
+
+    @cached_property
+    def lines(self) -> Pair | None:
+        """The functions as c0 + alpha c1, where neither M nor C depends on alpha; else None."""
+        if not self.constant:
+            return None
+        if not self.M[0].nrows():
+            return self.c
+        try:
+            y0, y1 = (self.M[0].solve(g) for g in self.g)
+        except ZeroDivisionError:
+            return None
+        return self.c[0] + self.C[0] * y0, self.c[1] + self.C[0] * y1
+
+    @cached_property
+    def _constant_index(self) -> int:
+        """Sign of det M where M does not depend on alpha."""
+        return sign_of(self.M[0].det()) if self.M[0].nrows() else 1
+
+    def solve(self, a: arb, algorithm: str | None = None) -> arb_mat | None:
+        """Unknowns for every alpha in a ball; None where M is not proven regular."""
+        M, g = (part[0] + part[1] * a for part in (self.M, self.g))
+        try:
+            X: arb_mat = M.solve(g, algorithm=algorithm) if M.nrows() else g
+        except ZeroDivisionError:
+            return None
+        return X
+
+    def signs_by(self, a: arb, algorithm: str | None) -> Signs | None:
+        """Signs of the functions over a ball; None where M is not proven regular."""
+        if self.lines is not None:
+            return signs_of(self.lines[0] + self.lines[1] * a)
+        X = self.solve(a, algorithm)
+        if X is None:
+            return None
+        C, c = (part[0] + part[1] * a for part in (self.C, self.c))
+        if X.ncols() == 1:
+            return signs_of(c + C * X)
+        (v, x), last = columns_of(X, 1, 1), X.nrows() - 1
+        return signs_of((c + C * x) * v[last, 0] - (C * v) * x[last, 0])
 
     @cached_property
     def _signs(self) -> dict[Fraction, Signs | None]:
         return {}
-
-    def signs_by(self, a: arb, algorithm: str | None) -> Signs | None:
-        """Signs of the functions over a ball; None where the equations are not proven regular."""
-        raise NotImplementedError
-
-    def rise(self, a: arb, k: int) -> tuple[Any, Any] | None:
-        """About the value of a function and its slope; no claim rests on them."""
-        raise NotImplementedError
 
     def signs_at(self, alpha: Fraction) -> Signs | None:
         """1 or -1 where a function is positive or negative at an alpha, else 0; None where it is not regular."""
@@ -207,53 +248,72 @@ class AlphaFunctions:
                 )
         return self._signs[alpha]
 
-    def newton(
-        self, k: int, low: Fraction, high: Fraction, width: Fraction, steps: int = _NEWTON_STEPS
-    ) -> Fraction | None:
-        """Alpha between two at which a function seems to vanish, to a part of ``width``; no claim rests on it."""
-        with precision():
-            alpha, unit = (low + high) / 2, width / 2**8
-            for _ in range(steps):
-                found = self.rise(ball_of(alpha), k)
-                if found is None:
-                    return None
-                value, slope = (x.mid() for x in found)
-                if not value.is_finite() or not slope.is_finite() or slope == 0:
-                    return None
-                step = fraction_of((value / slope).mid())
-                alpha = rounded(alpha - step, low, high, unit)
-                # the next step is about the square of this one
-                if step * step <= unit * (high - low):
-                    break
-            return alpha
+    def expansion(self, low: Fraction, high: Fraction) -> ShortExpansion | None:
+        """The functions over an interval (theory, (7.17)); None where it is too long. In the precision of many digits.
 
-    def enclosed(self, k: int, low: Fraction, high: Fraction, width: Fraction | None = None) -> Bounds | None:
-        """Bounds of the only zero of a function between two alphas: its signs there are proven to be opposite.
-
-        They are about ``width`` apart, by default as close as zeros are told apart.
+        By the powers of tau, with what is left of the unknowns.
         """
-        width = Fraction(1, 2**ZERO_BITS) * (high - low) if width is None else width
-        # bounds that are narrow already are so near that one step is enough
-        # intervals shorter than this share of alpha are narrow beside the distances at which conditions bend
-        near = high - low <= Fraction(1, 2**30) * max(abs(low), abs(high))
-        for steps, widenings in ((1, 1), (_NEWTON_STEPS, _WIDENINGS))[not near :]:
-            alpha = self.newton(k, low, high, width, steps)
-            if alpha is None:
-                return None
-            reach = width
-            for _ in range(widenings):
-                ends = max(alpha - reach, low), min(alpha + reach, high)
-                below, above = (self.signs_at(end) for end in ends)
-                if below is not None and above is not None and int(below[k]) * int(above[k]) < 0:
-                    return ends
-                reach *= 2**20
-        return None
+        middle, radius = ball_of((low + high) / 2), ball_of((high - low) / 2)
+        if self.lines is not None:
+            constant, slope = self.lines
+            values, near = constant + slope * ball_of(low).union(ball_of(high)), constant + slope * middle
+            return ShortExpansion(self, low, high, values, slope * radius, self._constant_index, near=near)
+        (M, M1), (g, g1), (C, C1), (c, c1) = (
+            (part[0] + part[1] * middle, part[1] * radius) for part in (self.M, self.g, self.C, self.c)
+        )
+        size, count = M.nrows(), g.ncols()
+        if not size:
+            return ShortExpansion(self, low, high, c + c1 * arb(0, 1), c1, 1, near=c)
+        try:
+            solved = M.solve(joined(g, g1, M1))
+        except ZeroDivisionError:
+            return None
+        *parts, P = columns_of(solved, *(1,) * (2 * count), size)
+        sizes = uppers(P)
+        pairs = zip(parts[:count], parts[count:], strict=True)
+        found = [one for x, x1 in pairs if (one := Smooth.solution(x, x1 - P * x, P, sizes)) is not None]
+        if len(found) < count:
+            return None
+        *turning, y = found
+        free, sign, shift = y.mapped(C, C1, c, c1), sign_of(M.det()), max(one.shift for one in found)
+        if not turning:
+            return ShortExpansion(self, low, high, free.values, free.slopes, sign, shift=shift, near=free.terms[0])
+        (v,), nothing = turning, c * 0
+        turn = v.mapped(C, C1, nothing, nothing)
+        whole = free.times(v.entry(size - 1)).minus(turn.times(y.entry(size - 1)))
+        # all solutions of the equations are x + s v; the last row is that of mu
+        lines = list(zip(free.values.entries(), turn.values.entries(), strict=True))[:-1]
+        nowhere = all(_none_above([(a.upper(), (side * b).upper()) for a, b in lines]) for side in (1, -1))
+        return ShortExpansion(self, low, high, whole.values, whole.slopes, sign, shift=shift, nowhere=nowhere)
+
+    def bordered(self, alpha: arb, radius: arb) -> AlphaFunctions | None:
+        """With a border that takes away the zero of det M closest to an alpha; None where none is found.
+
+        What is proven with it holds for any border.
+        """
+        border = _nearest_pole(self.M[0] + self.M[1] * alpha, self.M[1] * radius)
+        if border is None:
+            return None
+        size = self.M[0].nrows()
+        nothing = [0.0] * size
+        M, M1 = (
+            matrix([*([*row, arb(x)] for row, x in zip(M.tolist(), b, strict=True)), [*map(arb, d), arb(0)]])
+            for M, (b, d) in zip(self.M, (border, (nothing, nothing)), strict=True)
+        )
+        g, g1 = (
+            matrix([*([arb(0), x] for (x,) in g.tolist()), [arb(one), arb(0)]])
+            for g, one in zip(self.g, (1, 0), strict=True)
+        )
+        # the last function is mu
+        C, C1 = (matrix([[*row, arb(0)] for row in part.tolist()]) for part in self.C)
+        return AlphaFunctions((M, M1), (g, g1), (C, C1), self.c)
 
 
+@dataclass(frozen=True, eq=False)
 class ShortExpansion:
     """Conditions of a selection over a short interval, like ``over_parts.Expansion``.
 
-    Parameters
+    Attributes
     ----------
     functions : AlphaFunctions
     low, high : Fraction
@@ -266,84 +326,74 @@ class ShortExpansion:
     nowhere : bool
         The selection has no root, whatever the signs of the functions are.
     near : column, optional
-        Values of the conditions in the middle, where M is regular throughout.
-
-    Attributes
-    ----------
-    apart : Fraction
-        Zeros closer than this are not told apart.
-    rough, final : bool
-        A shorter interval gives neither smaller errors, nor does it tell more zeros apart.
+        Values of the functions in the middle, where M is regular throughout.
     """
 
-    rough, final = False, True
+    functions: AlphaFunctions
+    low: Fraction
+    high: Fraction
+    values: Any
+    slopes: Any
+    orientation: int
+    shift: float = 0.0
+    nowhere: bool = False
+    near: Any = None
 
-    def __init__(
-        self,
-        functions: AlphaFunctions,
-        ends: Bounds,
-        values: arb_mat,
-        slopes: arb_mat,
-        orientation: int,
-        *,
-        shift: float = 0.0,
-        nowhere: bool = False,
-        near: arb_mat | None = None,
-    ) -> None:
-        (self.low, self.high), self.shift = ends, shift
-        self.apart = (self.high - self.low) * Fraction(4, 2**ZERO_BITS)
-        self._functions, self._orientation, self._nowhere = functions, orientation, nowhere
-        self._whole, self._rises = signs_of(values), signs_of(slopes)
-        self._small = [bool(abs(values[k, 0]) < arb(2) ** -ZERO_BITS) for k in range(values.nrows())]
-        #: about where conditions vanish, by tau in [-1, 1], with the signs of their slopes
-        self._crossings: list[tuple[int, float]] = []
-        if near is not None:
-            rises = enumerate(self._rises[: near.nrows()].tolist())
-            self._crossings = [(rise, -float((near[k, 0] / slopes[k, 0]).mid())) for k, rise in rises if rise]
+    @cached_property
+    def _whole(self) -> Signs:
+        return signs_of(self.values)
 
-    def split(self) -> Fraction | None:
-        """An alpha below which one condition seems to be negative, and above which another; None where there is none.
-
-        No claim rests on it.
-        """
-        rising, falling = ([tau for rise, tau in self._crossings if rise == sign] for sign in (1, -1))
-        # zeros are farther apart (tau), or the rounding of floats hides it
-        if not rising or not falling or max(rising) - min(falling) < 1e-12:
-            return None
-        tau = 0.5 * (max(rising) + min(falling))
-        return self.low + Fraction(1 + tau) * (self.high - self.low) / 2 if abs(tau) < 1.0 else None
+    @cached_property
+    def rises(self) -> Signs:
+        """Signs of the slopes."""
+        return signs_of(self.slopes)
 
     def over(self, low: Number, high: Number) -> OverInterval:
         """Knowledge of a part of the interval."""
         signs, unknown = self._whole.copy(), np.zeros_like(self._whole)
-        found = [self._functions.signs_at(Fraction(alpha)) for alpha in (low, high)]
+        found = [self.functions.signs_at(Fraction(alpha)) for alpha in (low, high)]
         first, last = (unknown if end is None else end for end in found)
         # without a change of the slope's sign, values lie between those at the ends
-        same = (signs == 0) & (first == last) & ((self._rises != 0) | (low == high))
+        same = (signs == 0) & (first == last) & ((self.rises != 0) | (low == high))
         signs[same] = first[same]
         # a root has functions that are all positive or zero, or all negative or zero
-        none = self._nowhere or bool(np.any(signs < 0) and np.any(signs > 0))
+        none = self.nowhere or bool(np.any(signs < 0) and np.any(signs > 0))
         sign = int(signs[-1])
-        index = sign * self._orientation
-        signs, first, last, rises = (part[:-1] * (sign or 1) for part in (signs, first, last, self._rises))
+        index = sign * self.orientation
+        signs, first, last, rises = (part[:-1] * (sign or 1) for part in (signs, first, last, self.rises))
         return OverInterval(signs, bool(index), none, index, (first, last), rises * abs(sign))
 
-    def near(self, condition: int, low: Number, high: Number) -> tuple[Number, Number]:
-        """Nothing yet: bounds are found at once, by ``zero_bounds``; see ``over_parts.Expansion``."""
-        return low, low
 
-    def zeros(self, condition: int) -> list[Fraction]:
-        """Alphas inside the interval at which a condition, or last det M, seems to vanish; no claim rests on them."""
-        if not self._rises[condition]:
-            return []
-        found = self._functions.newton(condition, self.low, self.high, self.apart / 4)
-        return [] if found is None or not self.low < found < self.high else [found]
+def _none_above(lines: list[tuple[Any, Any]]) -> bool:
+    """True if a + s b is negative for some of these (a, b), at every s >= 0."""
+    if any(a < 0 and b <= 0 for a, b in lines):
+        return True
+    least = [-a / b for a, b in lines if a < 0]
+    return any(-a / b < s for a, b in lines if a >= 0 and b < 0 for s in least)
 
-    def flat(self, condition: int) -> bool:
-        """True if a condition, or last det M, cannot be distinguished from zero."""
-        return self._small[condition]
 
-    def zero_bounds(self, condition: int, slope: int, low: Number, high: Number) -> Bounds:
-        """Bounds of the only zero of a condition in a part, at whose ends it has opposite signs."""
-        part = Fraction(low), Fraction(high)
-        return self._functions.enclosed(condition, *part) or part
+def _nearest_pole(M: arb_mat, M1: arb_mat) -> tuple[list[float], list[float]] | None:
+    """A column b = M1 w and a row d, with (M + tau M1) w = 0 and d M^-1 (M + tau M1) = 0 for the tau closest to zero.
+
+    The matrix with this border changes with tau as if this zero of det (M + tau M1) were not there.
+    """
+    size = M.nrows()
+    try:
+        P = M.solve(M1, algorithm="approx")
+    except ZeroDivisionError:
+        return None
+    table = np.array([[float(x.mid()) for x in row] for row in P.tolist()])
+    if not np.all(np.isfinite(table)):
+        return None
+    rates, right = np.linalg.eig(table)
+    others, left = np.linalg.eig(table.T)
+    real = np.flatnonzero((rates.imag == 0.0) & (rates.real != 0.0))
+    if not len(real):
+        return None
+    k = real[np.argmax(np.abs(rates[real]))]
+    w, d = right[:, k].real, left[:, np.argmin(np.abs(others - rates[k]))].real
+    w = w / np.max(np.abs(w))
+    along = float(d @ w)
+    b = M1 * column([arb(float(value)) for value in w])
+    border = [float(b[i, 0].mid()) for i in range(size)], (d / along).tolist() if along else []
+    return border if border[1] and np.all(np.isfinite([*border[0], *border[1]])) else None

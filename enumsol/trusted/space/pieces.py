@@ -70,7 +70,7 @@ class AlphaPiece:
         return self.space.at(self.low), self.space.at(self.high)
 
     def margin(
-        self, codes: Sequence[int], rows: Sequence[Row], values: tuple[Array, Array], errors: float = 1.0
+        self, codes: Sequence[int], rows: Sequence[Row], values: Array | tuple[Array, Array], errors: float = 1.0
     ) -> float:
         """Proven lower bound on the energy over a partial assignment and the piece; positive: there is no solution.
 
@@ -78,8 +78,8 @@ class AlphaPiece:
         """
         (low, high), middle = self.ends, self.space.at(self.middle)
         if not middle.held:
-            return swept_floating_margin((low, high), middle, codes, rows, values, errors)
-        return swept_margin(self.ends, middle, codes, rows, values, errors)
+            return swept_floating_margin((low, high), middle, codes, rows, (values[0], values[1]), errors)
+        return swept_margin(self.ends, middle, codes, rows, (values[0], values[1]), errors)
 
     def is_unbalanced(self, codes: Sequence[int], z: Array) -> bool:
         """True if at no alpha of the piece any forces below a partial assignment are in balance with the load, by z.
@@ -178,6 +178,10 @@ class AlphaPiece:
         more = factor * (self.high - self.low)
         low, high = max(self.low - more, interval[0]), min(self.high + more, interval[1])
         return AlphaPiece(self.space, low, high) if factor else self
+
+    def over(self, low: Fraction, high: Fraction) -> AlphaPiece:
+        """Another piece."""
+        return AlphaPiece(self.space, low, high)
 
     def point_at(self, alpha: Fraction) -> AlphaPiece:
         """Piece of one alpha alone."""

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.space_condensed import EnclosedSpace
     from enumsol.support.array_types import Floats
+    from enumsol.trusted.space.sector_rows import Row
 
 
 #: Kinds of multipliers of products: of a sign, of any sign, and triples whose first is at least the length of the rest.
@@ -267,6 +268,11 @@ class Ellipsoid:
             return True
         pairs = enumerate(zip(self.codes, codes, strict=True))
         return any(one != other and self.node_misses(i, other) for i, (one, other) in pairs)
+
+    def margin(self, codes: Sequence[int], rows: Sequence[Row], values: Floats, errors: float = 1.0) -> float:
+        """Infinite where no solution has the statuses of an assignment, otherwise -inf; of no multipliers."""
+        del values, errors
+        return np.inf if not len(rows) and self.misses(codes) else -np.inf
 
     def node_misses(self, i: int, code: int) -> bool:
         """True if node i has this status at no solution of the assignment."""

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball, gamma
+from enumsol.condensation.space_condensed import EnclosedSpace
 from enumsol.model.sectors import SECTORS, direction, end_number
 from enumsol.trusted.floating_bounds import balanced, balancing, bounds_within
-from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, Multiplied, Row
+from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, SLIP_MINUS, SLIP_PLUS, Multiplied, Row, sector_margin
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from enumsol.condensation.enclosure import EnclosedSystem
-    from enumsol.condensation.space_condensed import EnclosedSpace, PieceSpace
+    from enumsol.condensation.space_condensed import PieceSpace
     from enumsol.support.array_types import Floats
 
 #: A disc of forces lies in a polygon of so many corners.
@@ -23,6 +24,22 @@ _CORNERS = 16
 #: Binary digits of multipliers of the rows of balance over a piece.
 _DIGITS = 40
 _HALF = Ball.exact(np.array(0.5))
+
+
+class Bounding(Protocol):
+    """A form, or a piece of alpha, that has bounds of its own: SlipForm, Ellipsoid and AlphaPiece."""
+
+    def margin(self, codes: Sequence[int], rows: Sequence[Row], values: Floats, errors: float = 1.0) -> float:
+        """See ``space_margin``."""
+
+
+def space_margin(
+    within: EnclosedSpace | Bounding, codes: Sequence[int], rows: Sequence[Row], values: Floats, errors: float = 1.0
+) -> float:
+    """Lower bound over a partial assignment in 3D; positive means that it holds no solution."""
+    if not isinstance(within, EnclosedSpace):
+        return within.margin(codes, rows, values, errors)
+    return (sector_margin if within.held else floating_margin)(within, codes, rows, values, errors)
 
 
 @np.errstate(over="ignore", invalid="ignore")

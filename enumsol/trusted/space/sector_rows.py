@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from enumsol.condensation.space_condensed import EnclosedSpace
     from enumsol.support.array_types import Floats, Indices
-    from enumsol.trusted.space.slip_forms import SlipForm
+    from enumsol.trusted.quadratic_forms import QuadraticForm
 
 
 OPEN, STICK, SLIP_PLUS, SLIP_MINUS, FRICTIONLESS, CONTACT, UNDECIDED = range(7)
@@ -187,7 +187,7 @@ def sector_margin(
     rows: Sequence[Row],
     values: Floats,
     errors: float = 1.0,
-    form: SlipForm | None = None,
+    form: QuadraticForm | None = None,
 ) -> float:
     """Proven lower bound on the energy over a partial assignment; positive means that it holds no solution.
 

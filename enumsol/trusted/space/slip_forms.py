@@ -7,16 +7,20 @@ longer than one, node by node.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from enumsol.arithmetic.balls import SAFE, TINY, UNIT, Ball
 from enumsol.trusted.quadratic_forms import QuadraticForm
+from enumsol.trusted.space.sector_rows import sector_margin
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from enumsol.condensation.space_condensed import EnclosedSpace
     from enumsol.support.array_types import Floats
+    from enumsol.trusted.space.sector_rows import Row
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,3 +70,7 @@ class SlipForm(QuadraticForm):
             mid = 0.5 * (H.mid + H.mid.T)
             rad = 0.5 * (H.rad + H.rad.T) * (1 + 4 * UNIT) + 4 * UNIT * np.abs(mid) + TINY
         return cls(system, mid, rad, h.mid, h.rad, 0.0, 0.0, numbers)
+
+    def margin(self, codes: Sequence[int], rows: Sequence[Row], values: Floats, errors: float = 1.0) -> float:
+        """See ``sector_margin``."""
+        return sector_margin(cast("EnclosedSpace", self.system), codes, rows, values, errors, self)
