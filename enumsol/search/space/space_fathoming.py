@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import scipy.linalg
@@ -23,9 +23,9 @@ from enumsol.trusted.space.space_uniqueness import LARGEST_UNIT, equations
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from enumsol.condensation.space_condensed import SpaceSystem
+    from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
     from enumsol.relaxation.engine import Relaxation
-    from enumsol.search.space.space_search import SpaceCertifier
+    from enumsol.search.space.product_search import Branched, Enclosed, Missed
     from enumsol.support.array_types import Codes, Floats, Mask
 
 
@@ -47,18 +47,40 @@ def without_sectors(codes: Codes) -> tuple[int, ...]:
     return tuple(CONTACT if code > SECTORS else code for code in codes)
 
 
+class SpaceClosing(Protocol):
+    """A certifier that can close the whole tree, or parts of it."""
+
+    enclosed: EnclosedSpace
+
+    def close(self, numbers: Floats, codes: Codes | None, normal: Floats) -> list[Any] | None:
+        """The only solution, as a list; None if not proven.
+
+        Parameters
+        ----------
+        numbers : of the form, as ``trusted.space.space_uniqueness.Numbers.of`` takes them
+        codes : of a leaf that holds the solution, if it is regular
+        normal : (p,) array, lambda_n near the solution
+        """
+
+    def alone(self, codes: Codes, numbers: Floats, leaf: Codes) -> list[Any] | None:
+        """The root of a leaf, as a list, if no other solution has the statuses of an assignment; None if not proven."""
+
+    def fathom(self, codes: Codes, tree: Sequence[Branched | Missed | Enclosed]) -> list[Any]:
+        """The solutions of boxes in a tree below an assignment that is proven already, which is written."""
+
+
 class SpaceCloser(TreeCloser):
     """Tries once before the tree, and then at every assignment that allows the statuses of a regular solution.
 
     Parameters
     ----------
     system : SpaceSystem
-    certifier : SpaceCertifier
+    certifier : SpaceClosing
     regular : bool
         Plain numbers and regular solutions only.
     """
 
-    def __init__(self, system: SpaceSystem, certifier: SpaceCertifier, *, regular: bool = False) -> None:
+    def __init__(self, system: SpaceSystem, certifier: SpaceClosing, *, regular: bool = False) -> None:
         super().__init__()
         self._system, self._certifier, self._regular = system, certifier, regular
         #: Smallest eigenvalue of Q relative to S, and slack of a solution, that are asked for.

@@ -21,7 +21,7 @@ from enumsol.search.closing import TreeCloser
 from enumsol.search.form_policy import Forms
 from enumsol.search.resume import Reader
 from enumsol.search.setup import SearchSetup
-from enumsol.search.space.space_fathoming import SpaceCloser, solved
+from enumsol.search.space.space_fathoming import SpaceCloser, SpaceClosing, solved
 from enumsol.search.space.space_search import SpaceCertifier, SpaceSplitting
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ class SpaceSolvers(SearchSetup):
         return SpaceSplitting(self._engine)
 
     def _closer(self, certifier: Certifier) -> TreeCloser | None:
-        return SpaceCloser(self.system, cast("SpaceCertifier", certifier), regular=self.arithmetic == "fast")
+        return SpaceCloser(self.system, cast("SpaceClosing", certifier), regular=self.arithmetic == "fast")
 
     @property
     def _forms(self) -> Forms | None:
