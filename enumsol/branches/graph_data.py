@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from enumsol.branches.elements import Arc, Branch, Component, Vertex
     from enumsol.condensation.exact import ExactCondensed
     from enumsol.proof.proof_file import Proof
-    from enumsol.search.interval.subintervals import SearchedPiece
+    from enumsol.search.subintervals import SearchedPiece
     from enumsol.support.array_types import AlphaLike
 
 

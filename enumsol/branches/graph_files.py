@@ -18,7 +18,7 @@ from flint import fmpq, fmpz, fmpz_poly
 from enumsol.arithmetic.algebraic import CriticalAlpha, EnclosedAlpha
 from enumsol.branches.elements import Arc, ArcValues, Vertex, VertexKind
 from enumsol.branches.enclosed.following import TracedArcValues, TracedProblem
-from enumsol.branches.exact.gluing import ExactArcValues
+from enumsol.branches.gluing import ExactArcValues
 from enumsol.branches.graph_data import GraphData, GraphStats
 from enumsol.condensation.enclosure import enclosure_of
 from enumsol.condensation.exact import ExactCondensed

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from enumsol.branches.enclosed.following import Followed
     from enumsol.model.problem import ContactProblem
     from enumsol.model.problem3d import AnyProblem
-    from enumsol.search.interval.subintervals import SearchedPiece
+    from enumsol.search.subintervals import SearchedPiece
     from enumsol.support.array_types import Codes
 
 
@@ -101,7 +101,7 @@ def _ends(followed: Followed) -> Iterator[float | Fraction]:
 
 def _write_arcs(writer: ProofWriter, followed: Followed) -> dict[str, int]:
     """Write the traces of all selections, box by box; gives the counts for the footer."""
-    writer.write({"traces": len(followed.traces), **unit_exponents(followed.force, followed.length)})
+    writer.write({"traces": len(followed.traces), **unit_exponents(followed.traced.force, followed.traced.length)})
     for trace in followed.traces:
         ends = [_number(end) for end in (trace.low, trace.high)]
         writer.write(["t", _text(trace.selection.rows.codes), *ends, int(trace.side)])

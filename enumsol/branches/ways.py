@@ -16,9 +16,9 @@ from flint import fmpq_mat
 from enumsol.arithmetic.rationals import rational
 from enumsol.branches.enclosed.following import Followed, TracedProblem, follow_selections, make_traced
 from enumsol.branches.enclosed.single_branches import ClosedPieces
-from enumsol.branches.exact.gluing import glue, make_vertices
-from enumsol.branches.exact.known_selections import KnownSelections
+from enumsol.branches.gluing import glue
 from enumsol.branches.graph_data import GraphStats
+from enumsol.branches.known_selections import KnownSelections
 from enumsol.branches.proof_records import write_graph_proof
 from enumsol.branches.unfinished import Effort
 from enumsol.condensation.data import EXACT_DOF_LIMIT
@@ -28,13 +28,13 @@ from enumsol.condensation.unloaded import never_loaded, vanishing_alpha
 from enumsol.errors import TooLargeError
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.search.certifiers.interval_certifiers import ExactIntervalCertifier, VerifiedIntervalCertifier
-from enumsol.search.interval.subintervals import (
+from enumsol.search.outcome import Stop, StopReason
+from enumsol.search.subintervals import (
     IntervalCertifier,
     IntervalSearch,
     on_weak_springs,
     run_parallel,
 )
-from enumsol.search.outcome import Stop, StopReason
 from enumsol.support.deadlines import Deadline, Limited, TimeOverError, over, within
 
 if TYPE_CHECKING:
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from enumsol.branches.unfinished import Tick
     from enumsol.model.problem import ContactProblem
     from enumsol.proof.proof_file import Proof
-    from enumsol.search.interval.subintervals import SearchedPiece
+    from enumsol.search.subintervals import SearchedPiece
     from enumsol.support.array_types import Codes
 
 Arithmetic = Literal["fast", "verified", "exact"]
@@ -266,8 +266,8 @@ class ByAlgebra(PlaneWay):
             a, b = (rational(end) for end in search.interval)
             self.known = KnownSelections(self.exact, a, b, cut_short=search.stopped is not None)
         few = max(8, _SELECTIONS_AFTER_INTERRUPT // self.problem.p**2)
-        gluing = glue(self.known, candidates, self._bounded(effort, few))
-        return self._made((make_vertices(gluing), gluing.edges), gluing.reasons, gluing.stopped, self.followed)
+        vertices, arcs, stopped = glue(self.known, candidates, self._bounded(effort, few))
+        return self._made((vertices, arcs), self.known.reasons, stopped, self.followed)
 
 
 class ByBalls(PlaneWay):

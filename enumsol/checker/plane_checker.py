@@ -195,7 +195,7 @@ class Checker(TreeChecker[EnclosedSystem, "VerifiedSelection | ClosedSolution | 
     def _settled(self, system: EnclosedSystem, codes: Codes) -> VerifiedSelection | Unsettled | None:
         return settled_selection(system, codes, self._in_many_digits)
 
-    def _in_many_digits(self, codes: Sequence[int]) -> VerifiedSelection | None:
+    def _in_many_digits(self, codes: Codes) -> VerifiedSelection | None:
         return None if self._precise is None else self._precise.solve(codes)
 
     def _is_root(self, found: object) -> bool:

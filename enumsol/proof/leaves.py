@@ -364,10 +364,11 @@ class Alone(ClosingRecord):
         strengths = numbers_from(more[0], 2 * limits.p).reshape(2, -1)
         return cls(chosen, weights, enclosure, strengths, multipliers_from(more[1:], ROW_KINDS * limits.p))
 
-    def holds(self, system: EnclosedSystem, codes: Codes, errors: float = 1.0) -> Any:
+    def holds(self, system: EnclosedSystem, codes: Codes, errors: float = 1.0, near: Floats | None = None) -> Any:
         """The only solution below the assignment, None where that is not proven (theory, sections 6.13 and 12.6).
 
-        A VerifiedSelection; in 3D a SpaceRoot, or an OnlySolution where no leaf is named. ``errors`` as of Excluded.
+        A VerifiedSelection; in 3D a SpaceRoot, or an OnlySolution where no leaf is named, near these normal forces, by
+        default those of the enclosure. ``errors`` as of Excluded.
         """
         if self.strengths is not None and self.terms is not None:
             return lone_root(system, codes, self.selection, self.numbers, self.strengths, *self.terms)
@@ -378,8 +379,9 @@ class Alone(ClosingRecord):
             return space.lone_root(given, codes, self.numbers, self.selection, errors)
         if self.selection:
             return space.only_root(given, self.numbers, self.selection, errors)
-        force, _ = self.enclosure.numbers(len(system.g))
-        return space.only_solution_in_space(given, self.numbers, force[: len(codes)], errors)
+        if near is None:
+            near = self.enclosure.numbers(len(system.g))[0][: len(codes)]
+        return space.only_solution_in_space(given, self.numbers, near, errors)
 
     def entries(self) -> Iterable[Any]:
         """Multipliers as two texts."""

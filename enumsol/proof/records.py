@@ -201,6 +201,10 @@ class EnclosureRecord:
         return iter((self.mid, self.rad, self.index))
 
 
+#: Of a leaf that is tested before its root is known; it is written with another one.
+NOWHERE = EnclosureRecord(None, None, None)
+
+
 @dataclass(frozen=True, eq=False)
 class DeclaredForm(Record):
     """A form to which later leaves refer: of an assignment, or of a root of a body that nothing holds.

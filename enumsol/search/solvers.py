@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from fractions import Fraction
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -18,10 +18,11 @@ from enumsol.proof.writer import Recorder
 from enumsol.relaxation.active_set import ActiveSetEngine
 from enumsol.relaxation.engine import Engine, not_compiled
 from enumsol.relaxation.interior_point import InteriorPointEngine
+from enumsol.search.certifiers.exclusions import Exclusions
 from enumsol.search.certifiers.float_certifier import FastCertifier
 from enumsol.search.certifiers.verified import VerifiedCertifier
 from enumsol.search.closing import TreeCloser
-from enumsol.search.fathoming import Closer, Closing, propose
+from enumsol.search.fathoming import Closer, propose
 from enumsol.search.form_policy import Forms, plane_forms
 from enumsol.search.nodes import Relaxations
 from enumsol.search.reduction import WeightSource
@@ -38,8 +39,8 @@ if TYPE_CHECKING:
     from enumsol.model.problem import ContactProblem
     from enumsol.search.certifiers.protocol import Certifier
     from enumsol.search.certifiers.rational_certifier import ExactCertifier
-    from enumsol.search.fathoming import Point
     from enumsol.search.outcome import SearchLimits
+    from enumsol.search.reduction import Point
     from enumsol.selections.rational_selections import ExactSelections
     from enumsol.support.array_types import Alpha, Codes, Floats
     from enumsol.trusted.at_alpha import VerifiedSelection
@@ -160,9 +161,18 @@ class Solvers(SearchSetup):
         """The certifier in rationals; None when the problem is too large, or only condensed data are certified."""
         if self.data == "condensed" or self.exact is None:
             return None
+        return self._in_exact_arithmetic(self.exact)
+
+    def _in_exact_arithmetic(self, exact: ExactSelections) -> ExactCertifier:
         from enumsol.search.certifiers.rational_certifier import ExactCertifier  # python-flint
 
-        return ExactCertifier(self.exact, self.scaled, self.enclosed, self._solved_precisely)
+        precisely = None if self.arithmetic == "exact" else self._solved_precisely
+        return ExactCertifier(exact, self.scaled, self.exclusions, precisely)
+
+    @cached_property
+    def exclusions(self) -> Exclusions | None:
+        """What excludes assignments; None without balls."""
+        return None if self.enclosed is None else Exclusions(self.enclosed)
 
     @cached_property
     def _enclosed(self) -> tuple[EnclosedSystem | None, str]:
@@ -200,12 +210,13 @@ class Solvers(SearchSetup):
         if self.arithmetic == "fast":
             return FastCertifier(self.floats)
         if self.arithmetic == "exact":
-            from enumsol.search.certifiers.rational_certifier import ExactCertifier  # python-flint
-
-            return ExactCertifier(_present(self.exact), self.scaled, self.enclosed)
+            # of a body that nothing holds it is known once whether a conclusion rests on the bound
+            return (
+                self._in_exact_arithmetic(_present(self.exact)) if self.problem.held else _present(self.exact_certifier)
+            )
         ids = self.problem.node_ids
         exact = lambda: self.exact_certifier  # noqa: E731
-        return VerifiedCertifier(self.scaled, self.enclosed, exact, _present(recorder), ids, self._solved_precisely)
+        return VerifiedCertifier(self.scaled, self.exclusions, exact, _present(recorder), ids, self._solved_precisely)
 
     def _solved_precisely(self, codes: Codes) -> VerifiedSelection | None:
         """The verified solution of a complete selection in many digits; None where that is not to be had."""
@@ -222,7 +233,7 @@ class Solvers(SearchSetup):
         from enumsol.condensation.exact import FAST_EXACT_DOF
         from enumsol.trusted.precise_at_alpha import PreciseAtAlpha  # python-flint
 
-        if self.problem.n <= FAST_EXACT_DOF or self.data == "condensed":
+        if self.problem.n <= FAST_EXACT_DOF or self.data == "condensed" or not self.problem.held:
             return None
         return PreciseAtAlpha.of(self.problem, Fraction(self.alpha), self.scaled.force, self.scaled.length)
 
@@ -246,7 +257,7 @@ class Solvers(SearchSetup):
         return PlaneSplitting(self.scaled.F, sliding=certifier.sliding)
 
     def _closer(self, certifier: Certifier) -> TreeCloser | None:
-        return Closer(self.scaled, cast("Closing", certifier))
+        return Closer(self.scaled, certifier)
 
     @cached_property
     def _forms(self) -> Forms | None:

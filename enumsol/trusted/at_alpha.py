@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from enumsol.condensation.enclosure import EnclosedSystem
-    from enumsol.support.array_types import Floats
+    from enumsol.support.array_types import Codes, Floats
 
 
 @dataclass(frozen=True)
@@ -104,8 +104,8 @@ class Unsettled:
 
 def settled_selection(
     system: EnclosedSystem,
-    codes: Sequence[int],
-    precisely: Callable[[Sequence[int]], VerifiedSelection | None] = lambda _: None,
+    codes: Codes,
+    precisely: Callable[[Codes], VerifiedSelection | None] = lambda _: None,
 ) -> VerifiedSelection | Unsettled | None:
     """The root of a complete selection, None where it holds none, or that this is open.
 

@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING
 
 import enumsol
 from enumsol.condensation.exact import ExactCondensed
+from enumsol.search import interval_tree, subintervals as interval
 from enumsol.search.certifiers.interval_certifiers import VerifiedIntervalCertifier
-from enumsol.search.interval import interval_tree, subintervals as interval
 
 if TYPE_CHECKING:
     from shared.results import Run

@@ -32,8 +32,8 @@ from trees import by_the_tree
 from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery
 from enumsol.arithmetic.rationals import rational
 from enumsol.branches.claims import Claims, Standing
-from enumsol.branches.exact.gluing import glue
-from enumsol.branches.exact.known_selections import KnownSelections
+from enumsol.branches.gluing import glue
+from enumsol.branches.known_selections import KnownSelections
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.errors import IncompleteGraphError, Interrupted
 
@@ -240,8 +240,9 @@ def test_a_body_that_the_load_leaves_at_rest_has_one_solution(n, p):
 
 def test_gluing_takes_one_selection_for_all_that_a_body_at_rest_has():
     exact = ExactCondensed.from_problem(at_rest(4))
-    gluing = glue(KnownSelections(exact, rational(0), rational(1), cut_short=False), product(range(4)))
-    assert (len(gluing.vertices), len(gluing.edges), gluing.reasons) == (2, 1, [])
+    known = KnownSelections(exact, rational(0), rational(1), cut_short=False)
+    vertices, arcs, _ = glue(known, product(range(4)))
+    assert (len(vertices), len(arcs), known.reasons) == (2, 1, [])
 
 
 def test_a_place_left_open_is_no_solution(capsys):

@@ -16,13 +16,12 @@ from refusals import refusal
 
 from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery
 from enumsol.arithmetic.rationals import rational
-from enumsol.branches import ways
+from enumsol.branches import known_selections, ways
 from enumsol.branches.enclosed import following, tracing
 from enumsol.branches.enclosed.cutting import AlphaBox, ArcPart, ArcPartKind, Trace
 from enumsol.branches.enclosed.joining import join
-from enumsol.branches.exact import known_selections
-from enumsol.branches.exact.gluing import glue
-from enumsol.branches.exact.known_selections import KnownSelections
+from enumsol.branches.gluing import glue
+from enumsol.branches.known_selections import KnownSelections
 from enumsol.branches.space import space_graph as cover
 from enumsol.branches.unfinished import DEFECT, named
 from enumsol.condensation.exact import ExactCondensed
@@ -137,9 +136,10 @@ def test_what_contradicts_a_search_is_told_as_a_defect():
     }
     assert joined
     for left_out in sorted(joined):
-        gluing = glue(KnownSelections(exact, rational(0), rational(10), cut_short=False), held - {left_out})
+        known = KnownSelections(exact, rational(0), rational(10), cut_short=False)
+        glue(known, held - {left_out})
         text = named(left_out)
-        assert any(text in reason and reason.endswith("please report it") for reason in gluing.reasons), left_out
+        assert any(text in reason and reason.endswith("please report it") for reason in known.reasons), left_out
     assert named((0, 1)) == "the selection 1 open, 1 stick"
 
 

@@ -52,8 +52,7 @@ SHARED = {
     "trusted.arcs.only_branch": {"only_roots"},
     "trusted.arcs.selection_balls": None,
     "trusted.exclusion": {"Terms", "exclusion_margin"},
-    "trusted.floating_bounds": {"is_unbalanced"},
-    "trusted.joint_roots": {"JointRoot", "joint_root"},
+    "trusted.joint_roots": {"JointRoot"},
     "trusted.confinement": {"motion_against", "motion_beside", "without_bound"},
     "trusted.arcs.many_digits": {"affordable", "ball_of", "precision"},
     "trusted.arcs.over_parts": None,
@@ -63,10 +62,8 @@ SHARED = {
     "trusted.positions": {"certain_statuses", "tangential_positions"},
     "trusted.reference": {"Reference"},
     "trusted.selection": None,
-    "trusted.uniqueness": {
-        *("ClosedSolution", "closed_solution", "lone_root", "numbers_of", "only_solution", "same_solution")
-    },
-    "trusted.at_alpha": {"VerifiedSelection", "holds_no_root", "solve_selection"},
+    "trusted.uniqueness": {*("ClosedSolution", "closed_solution", "numbers_of", "only_solution", "same_solution")},
+    "trusted.at_alpha": {"VerifiedSelection", "settled_selection", "solve_selection"},
     "trusted.precise_at_alpha": {"PreciseAtAlpha"},
     "trusted.quadratic_forms": {"EnclosedForm", "Equations"},
     "trusted.status_rows": None,
@@ -91,7 +88,7 @@ SHARED = {
     "trusted.space.pieces": {"AlphaPiece", "lie_along"},
     "trusted.space.space_uniqueness": {
         *("LARGEST_UNIT", "LooseSolution", "OnlySolution"),
-        *("equations", "lone_root", "only_root", "only_solution_in_space"),
+        "equations",
     },
     "proof.begun": None,
     "proof.proof_file": {"PROOF_VERSION", "Proof", "fraction_text", "packed", "coarse"},

@@ -7,7 +7,7 @@ import pytest
 from command_line import assert_one_line, printed, run
 from interruptions import CtrlC
 
-from enumsol.branches import ways
+from enumsol.branches import gluing
 from enumsol.search.tree import TreeSearch
 
 #: What the installed command does, with Ctrl-C pressed where a module begins to be loaded.
@@ -70,6 +70,6 @@ def test_a_lack_of_memory_is_told_in_one_sentence(capsys, monkeypatch, command):
 
 
 def test_what_was_found_is_printed_on_ctrl_c_where_the_result_is_put_together(capsys, monkeypatch):
-    monkeypatch.setattr(ways, "make_vertices", CtrlC(then=ways.make_vertices))
+    monkeypatch.setattr(gluing, "make_vertices", CtrlC(then=gluing.make_vertices))
     out = printed(capsys, "graph", "gallery:one-node-6.3", "--from", "0", "--to", "5", status=130)
     assert "complete: no (interrupted after the arcs of 3 of 3 selections)" in out

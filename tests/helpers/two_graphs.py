@@ -7,8 +7,8 @@ from itertools import pairwise
 from enumsol.arithmetic.rationals import rational
 from enumsol.branches.enclosed.following import TracedProblem, follow_selections, make_traced
 from enumsol.branches.enclosed.joining import EventPlaceKind
-from enumsol.branches.exact.gluing import glue, make_vertices
-from enumsol.branches.exact.known_selections import KnownSelections
+from enumsol.branches.gluing import glue
+from enumsol.branches.known_selections import KnownSelections
 from enumsol.branches.ways import ByAlgebra
 from enumsol.condensation.exact import ExactCondensed
 
@@ -43,10 +43,10 @@ def two_graphs(problem, interval):
     search = way.begin()
     search.run()
     followed = follow_selections(traced, search.pieces, cut_short=search.stopped is not None)
-    gluing = glue(KnownSelections(exact, rational(a), rational(b), cut_short=False), search.selections)
+    known = KnownSelections(exact, rational(a), rational(b), cut_short=False)
+    theirs = glue(known, search.selections)[:2]
     ours = make_traced(traced, followed.joined)
-    theirs = make_vertices(gluing), gluing.edges
-    return TwoGraphs(theirs, ours, followed.joined, followed.reasons, gluing.reasons)
+    return TwoGraphs(theirs, ours, followed.joined, followed.reasons, known.reasons)
 
 
 def differences(graphs):

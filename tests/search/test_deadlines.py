@@ -16,16 +16,16 @@ from graph_proofs import triangle
 from interruptions import CtrlC
 
 from enumsol import ContactProblem, branch_graph, enumerate_roots, gallery, verify
+from enumsol.branches import gluing
 from enumsol.branches.enclosed.tracing import _Tracing
-from enumsol.branches.exact import gluing
-from enumsol.branches.exact.known_selections import KnownSelections
+from enumsol.branches.known_selections import KnownSelections
 from enumsol.condensation import products
 from enumsol.condensation.factorization import Factorization
 from enumsol.relaxation.convex_forms import FormAscent
 from enumsol.search import form_policy as forms
-from enumsol.search.interval.subintervals import IntervalSearch
 from enumsol.search.solvers import Solvers
 from enumsol.search.space.space_fathoming import DefiniteForm
+from enumsol.search.subintervals import IntervalSearch
 from enumsol.selections.rational_selections import ExactSelections
 from enumsol.support.conic import conic_answer
 from enumsol.support.deadlines import Deadline, TimeOverError, attended, current, look, over, within

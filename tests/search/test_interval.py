@@ -12,16 +12,16 @@ from refusals import bad_argument, refusal
 
 from enumsol import ContactProblem, gallery
 from enumsol.branches import branch_graph, ways
-from enumsol.branches.exact.gluing import glue
-from enumsol.branches.exact.known_selections import KnownSelections
+from enumsol.branches.gluing import glue
+from enumsol.branches.known_selections import KnownSelections
 from enumsol.condensation.exact import ExactCondensed
 from enumsol.errors import IncompleteGraphError, TooLargeError
 from enumsol.model.statuses import CONTACT, OPEN, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.relaxation.active_set import ActiveSetEngine, IntervalSystem
+from enumsol.search import subintervals as interval_search
 from enumsol.search.certifiers.interval_certifiers import ExactIntervalCertifier, VerifiedIntervalCertifier
-from enumsol.search.interval import subintervals as interval_search
-from enumsol.search.interval.interval_tree import EmptyLeaf
-from enumsol.search.interval.subintervals import IntervalCertifier, IntervalSearch, Piece
+from enumsol.search.interval_tree import EmptyLeaf
+from enumsol.search.subintervals import IntervalCertifier, IntervalSearch, Piece
 
 BELOW = {UNDECIDED: (OPEN, STICK, SLIP_PLUS, SLIP_MINUS), CONTACT: (STICK, SLIP_PLUS, SLIP_MINUS)}
 
@@ -150,9 +150,10 @@ def test_a_selection_left_out_by_the_search_is_noticed(seed):
     graph = branch_graph(problem, (0.0, 6.0), "exact")
     present = {codes for arc in graph.arcs for codes in arc.selections}
     for codes in present:
-        gluing = glue(KnownSelections(graph.exact, fmpq(0), fmpq(6), cut_short=False), present - {codes})
+        known = KnownSelections(graph.exact, fmpq(0), fmpq(6), cut_short=False)
+        glue(known, present - {codes})
         neighbours = any(codes in v.selections and len(v.selections) > 1 for v in graph.vertices)
-        assert bool(gluing.reasons) == neighbours
+        assert bool(known.reasons) == neighbours
 
 
 def test_an_interrupted_search_keeps_its_arcs():
@@ -197,11 +198,11 @@ def test_a_selection_that_the_search_left_out_is_taken_in_and_told(name):
     whole = branch_graph(problem, (0.0, 5.0), "exact")
     selections = {codes for arc in whole.arcs for codes in arc.selections}
     for missing in sorted(selections)[:: max(1, len(selections) // 6)]:
-        gluing, short = (
-            glue(KnownSelections(whole.exact, fmpq(0), fmpq(5), cut_short=cut_short), selections - {missing})
-            for cut_short in (False, True)
+        known, short = (
+            KnownSelections(whole.exact, fmpq(0), fmpq(5), cut_short=cut_short) for cut_short in (False, True)
         )
-        assert any("left out" in reason for reason in gluing.reasons) or missing not in gluing.arcs
-        assert all(edge.tail >= 0 and edge.head >= 0 for edge in (*gluing.edges, *short.edges))
-        assert missing not in gluing.arcs or len(gluing.edges) == len(whole.arcs)
+        (_, arcs, _), (_, few, _) = (glue(given, selections - {missing}) for given in (known, short))
+        assert any("left out" in reason for reason in known.reasons) or missing not in known.arcs
+        assert all(arc.tail >= 0 and arc.head >= 0 for arc in (*arcs, *few))
+        assert missing not in known.arcs or len(arcs) == len(whole.arcs)
         assert missing not in short.arcs

@@ -12,7 +12,7 @@ from refusals import bad_argument
 
 import enumsol
 from enumsol import branch_graph, gallery, verify
-from enumsol.search.interval import subintervals as interval_search
+from enumsol.search import subintervals as interval_search
 
 
 def through_zero():

@@ -7,7 +7,7 @@ import pytest
 from path_problems import generic_problem
 
 from enumsol.search.certifiers._margin import Margins
-from enumsol.search.interval.subintervals import IntervalCertifier, IntervalSearch
+from enumsol.search.subintervals import IntervalCertifier, IntervalSearch
 from enumsol.trusted.exclusion import exclusion_margin
 from enumsol.trusted.over_interval import KINDS, EnclosedPiece, interval_row_tables
 from enumsol.trusted.status_rows import FORBIDDEN, FREE

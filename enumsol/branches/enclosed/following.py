@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
     from enumsol.branches.elements import Pair
     from enumsol.model.problem import ContactProblem
-    from enumsol.search.interval.subintervals import SearchedPiece
+    from enumsol.search.subintervals import SearchedPiece
     from enumsol.selections.solution import ActiveSets
     from enumsol.support.array_types import Codes, Floats
 
@@ -210,20 +210,16 @@ class Followed:
 
     Attributes
     ----------
-    traces : list of Trace
-    joined : Joined
-    force, length : (2p,) arrays
-        Units in which they were followed.
-    stopped : Stop or None
-        How far it got, if Ctrl-C was pressed or the time was over.
+    traced : TracedProblem
     cut_short : bool
         The search was stopped before, so that selections may be missing.
-    problem : ContactProblem
+    traces : list of Trace
+    joined : Joined
+    stopped : Stop or None
+        How far it got, if Ctrl-C was pressed or the time was over.
     """
 
-    problem: ContactProblem
-    force: Floats
-    length: Floats
+    traced: TracedProblem
     cut_short: bool = False
     traces: list[Trace] = field(default_factory=list)
     joined: Joined = field(default_factory=Joined)
@@ -232,7 +228,8 @@ class Followed:
     @property
     def reasons(self) -> list[str]:
         """Reasons against completeness: what was left open or contradicts it."""
-        found = [(place.low, _undecided(place, self.problem), place.cause) for place in self.joined.open]
+        problem = self.traced.problem
+        found = [(place.low, _undecided(place, problem), place.cause) for place in self.joined.open]
         ends = [(place.low, place.high) for place in self.joined.open if place.cause is OpenCause.END]
         for alpha in self.joined.unordered:
             line = f"the order of two critical alphas near {float(alpha):.17g} is not known"
@@ -241,7 +238,7 @@ class Followed:
         found.sort(key=lambda entry: entry[:2])
         # a search that was cut short has a remedy of its own
         missing = self.cut_short or self.stopped is not None
-        lines = [line if missing else f"{line}; {_remedy(cause, self.problem)}" for _, line, cause in found]
+        lines = [line if missing else f"{line}; {_remedy(cause, problem)}" for _, line, cause in found]
         return list(dict.fromkeys([*self.joined.reasons, *lines]))
 
 
@@ -305,7 +302,7 @@ def follow_selections(
     for found in pieces:
         for codes in found.selections:
             where.setdefault(codes, []).append((found.piece.a, found.piece.b))
-    followed = Followed(traced.problem, traced.force, traced.length, cut_short=cut_short)
+    followed = Followed(traced, cut_short=cut_short)
     traces, count = [] if done is None else done, len(where)
     if not cut_short and not traces:
         traces += _taken_over(traced, where, known)

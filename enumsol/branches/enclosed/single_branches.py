@@ -14,8 +14,8 @@ import numpy as np
 
 from enumsol.branches.enclosed.joining import EventPlaceKind, Joined, join
 from enumsol.search.chains import Chains, Link, LoadedSystem, SelectionCurve
-from enumsol.search.interval.subintervals import Piece, whole_pieces
 from enumsol.search.reduction import WeightSource
+from enumsol.search.subintervals import Piece, whole_pieces
 from enumsol.support.deadlines import look
 from enumsol.trusted.arcs.only_branch import only_roots
 from enumsol.trusted.over_interval import PieceNumbers

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from enumsol.arithmetic.rationals import rational
@@ -13,7 +12,7 @@ from enumsol.relaxation.active_set import IntervalRowKind, IntervalSystem, inter
 from enumsol.relaxation.imposed_rows import with_implied
 from enumsol.search.certifiers.protocol import FORM_ERRORS, energy_margin
 from enumsol.search.certifiers.rational_certifier import accepted, energy_bound_positive
-from enumsol.search.interval.subintervals import IntervalCertifier, Piece
+from enumsol.search.subintervals import IntervalCertifier, Piece
 from enumsol.selections.rational_selections import ExactSelections
 from enumsol.trusted.exclusion import exclusion_margin
 from enumsol.trusted.over_interval import EnclosedPiece, as_computed
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
 
     from enumsol.model.problem import ContactProblem
     from enumsol.search.certifiers.protocol import Margin
-    from enumsol.search.interval.interval_tree import EmptyLeaf
+    from enumsol.search.interval_tree import EmptyLeaf
     from enumsol.support.array_types import Floats
 
 #: Bounds must be this large [energy unit of the piece], so that a checker that sums in another order agrees.
@@ -55,7 +54,7 @@ class VerifiedIntervalCertifier(IntervalCertifier):
         exactly = exact is None or exact.condensed_exactly
         self._enclosure = certified_enclosure(problem, exactly=exactly)
         self._rationals = ExactIntervalCertifier(exact) if exact is not None and exactly else None
-        self._zero, self._held = zero if exact is None else exact.zero, problem.held
+        self._zero = zero if exact is None else exact.zero
         self._piece: tuple[Piece, EnclosedPiece | None, Margin | None] | None = None
         self._form: tuple[Floats, EnclosedPiece] | None = None
         #: Rationals decide where there are no balls; the checker repeats what balls accepted.
@@ -89,12 +88,8 @@ class VerifiedIntervalCertifier(IntervalCertifier):
     def _on(self, piece: Piece, system: IntervalSystem) -> tuple[EnclosedPiece | None, Margin | None]:
         if self._piece is None or self._piece[0] != piece:
             enclosed = self._make(piece, system)
-            self._piece = (piece, enclosed, None if enclosed is None else self._margin(enclosed))
+            self._piece = (piece, enclosed, None if enclosed is None else energy_margin(enclosed))
         return self._piece[1:]
-
-    def _margin(self, enclosed: EnclosedPiece) -> Margin:
-        # the compiled margins know no rows of a body as a whole
-        return energy_margin(enclosed) if self._held else partial(exclusion_margin, enclosed, errors=2.0)
 
     def _make(self, piece: Piece, system: IntervalSystem) -> EnclosedPiece | None:
         if self._enclosure is None:

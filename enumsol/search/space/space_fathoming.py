@@ -62,7 +62,7 @@ class SpaceClosing(Protocol):
         normal : (p,) array, lambda_n near the solution
         """
 
-    def alone(self, codes: Codes, numbers: Floats, leaf: Codes) -> list[Any] | None:
+    def alone_in(self, codes: Codes, numbers: Floats, leaf: Codes) -> list[Any] | None:
         """The root of a leaf, as a list, if no other solution has the statuses of an assignment; None if not proven."""
 
     def fathom(self, codes: Codes, tree: Sequence[Branched | Missed | Enclosed]) -> list[Any]:
@@ -147,7 +147,7 @@ class SpaceCloser(TreeCloser):
             held = equations(self._certifier.enclosed, statuses, 1024.0).mid  # times the largest entry of S
             numbers = point.numbers(self._enough, better=False, held=held)
             if numbers is not None:
-                found = self._certifier.alone(statuses, numbers, point.codes)
+                found = self._certifier.alone_in(statuses, numbers, point.codes)
         if found is None:
             self._tried.add(statuses)
         return found

@@ -24,7 +24,7 @@ from enumsol.search.space.space_search import SpaceCertifier
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.confinement import motion_beside
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
-from enumsol.trusted.space.resultants import floating_margin, is_unbalanced_in_space, resultants, unbounded
+from enumsol.trusted.space.resultants import resultants, unbounded
 from enumsol.trusted.space.space_reference import SpaceReference
 
 if TYPE_CHECKING:
@@ -105,21 +105,22 @@ class SpaceExclusions:
         ``within``: the bound is known to be needed. Otherwise it is used only where all statuses are determined
         (theory, section 14.4).
         """
-        if len(rows) and floating_margin(self.free, codes, rows, values, errors=2.0) > 0:
-            return Excluded(list(rows), values), False
+        excluded = Excluded(list(rows), values)
+        if len(rows) and excluded.holds(self.free, codes, 2.0):
+            return excluded, False
         if (unbalanced := self.unbalanced(codes)) is not None:
             return unbalanced, False
         told = not any(code in (UNDECIDED, CONTACT) for code in codes)
-        if (within or told) and len(rows) and floating_margin(self.system, codes, rows, values, errors=2.0) > 0:
+        if (within or told) and len(rows) and excluded.holds(self.system, codes, 2.0):
             if told and settle(self.free, codes) is None:
                 return NoRoot(), False
-            return Excluded(list(rows), values), True
+            return excluded, True
         return None
 
     def unbalanced(self, codes: Codes) -> Unbalanced | None:
         """A record that no forces below a partial assignment are in balance with the load; or None."""
-        z = motion_beside(self.system, resultants(self.system, codes))
-        return Unbalanced(z) if is_unbalanced_in_space(self.system, codes, z) else None
+        record = Unbalanced(motion_beside(self.system, resultants(self.system, codes)))
+        return record if record.holds(self.system, codes) else None
 
 
 class FloatingSpaceCertifier(SpaceCertifier):
@@ -147,8 +148,9 @@ class FloatingSpaceCertifier(SpaceCertifier):
         exclusions, leaf, found = self._exclusions, reference.leaf, list[SpaceRoot]()
         if exclusions is None:
             return None
-        if not reference.is_only_root(codes, *proposal, exclusions.free.reach):
-            if not reference.is_only_root(codes, *proposal, exclusions.system.reach):
+        record = OnlyReference(0, *proposal)
+        if not record.holds(reference, codes, exclusions.free.reach):
+            if not record.holds(reference, codes, exclusions.system.reach):
                 return None
             self.bounded = True
         if leaf not in self._declared:
@@ -156,7 +158,7 @@ class FloatingSpaceCertifier(SpaceCertifier):
             found = [self._placed(leaf, reference.root)]
             self._verified[leaf] = found[0]
         declared = DeclaredForm(leaf, *exclusions.numbers[leaf], self._ball(reference.root))
-        self._leaf(OnlyReference(self._back(leaf, lambda: declared), *proposal))
+        self._leaf(replace(record, back=self._back(leaf, lambda: declared)))
         return found
 
     def excluded(self, codes: Codes, relaxation: Bound) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,13 +23,13 @@ from enumsol.model.sectors import (
 )
 from enumsol.model.statuses import CONTACT, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
 from enumsol.proof.leaves import Alone, BoxedRoot, Excluded, NoRoot, RegularRoot, UndecidedRecord
-from enumsol.proof.records import DeclaredForm, EnclosureRecord
+from enumsol.proof.records import NOWHERE, DeclaredForm, EnclosureRecord
 from enumsol.relaxation.engine import PRUNE_MARGIN, Relaxation
 from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
 from enumsol.search.certifiers.protocol import (
     WIDEN,
     Bound,
-    RecordingCertifier,
+    Certifier,
     Refine,
     UndecidedPart,
 )
@@ -37,8 +38,8 @@ from enumsol.search.space.open_leaves import Cause, KnownBoxes, obstacle, sector
 from enumsol.search.space.product_search import Branched, Enclosed, Missed
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
 from enumsol.trusted.space.product_forms import Ellipsoid, refines
-from enumsol.trusted.space.sector_rows import is_sector_covering, sector_margin
-from enumsol.trusted.space.space_uniqueness import OnlySolution, lone_root, only_root, only_solution_in_space
+from enumsol.trusted.space.sector_rows import is_sector_covering
+from enumsol.trusted.space.space_uniqueness import OnlySolution
 from enumsol.trusted.space.turning import turned_by
 
 if TYPE_CHECKING:
@@ -115,7 +116,7 @@ def _towards(code: int, vector: np.ndarray) -> float:
     return float(middle @ vector / np.linalg.norm(middle))
 
 
-class SpaceCertifier(RecordingCertifier):
+class SpaceCertifier(Certifier):
     """Proves prunings and leaves with the trusted core, and writes the proof.
 
     Parameters
@@ -138,11 +139,11 @@ class SpaceCertifier(RecordingCertifier):
         if isinstance(relaxation.form, Ellipsoid):
             return self._missed(codes, relaxation.form)
         rows, values = self._multipliers(relaxation)
-        form = relaxation.form
-        if not sector_margin(self.enclosed, codes, rows, values, 2.0, form) > 0:
+        form, leaf = relaxation.form, Excluded(rows, values)
+        if not leaf.holds(self.enclosed if form is None else form, codes, 2.0):
             return False
         by = None if form is None else self._back(form, lambda: DeclaredForm(self._whole, form.numbers, np.zeros(0)))
-        self._leaf(Excluded(rows, values, by))
+        self._leaf(replace(leaf, by=by))
         return True
 
     def _multipliers(self, bound: Bound) -> tuple[list[Row], Floats]:
@@ -247,21 +248,19 @@ class SpaceCertifier(RecordingCertifier):
         normal : (p,) array, lambda_n near the solution
         """
         found: SpaceRoot | OnlySolution | None
+        record = Alone(codes or (), numbers, NOWHERE)
         try:
-            if codes is None:
-                found = only_solution_in_space(self.enclosed, numbers, normal, errors=2.0)
-            else:
-                found = only_root(self.enclosed, numbers, codes, errors=2.0)
+            found = record.holds(self.enclosed, self._whole, errors=2.0, near=normal)
         except NotEnclosedError:
             return None
         # forces that are known no better, relative to the largest one, are left to the tree
         if found is None or not np.max(found.y.rad) <= 1e-3 * np.max(np.abs(found.y.mid), initial=1e-6):
             return None
         self._verified[codes or (UNDECIDED,) * len(normal)] = found
-        self._leaf(Alone(codes or (), numbers, self._ball(found)))
+        self._leaf(replace(record, enclosure=self._ball(found)))
         return [found]
 
-    def alone(self, codes: Codes, numbers: Floats, leaf: Codes) -> list[SpaceRoot] | None:
+    def alone_in(self, codes: Codes, numbers: Floats, leaf: Codes) -> list[SpaceRoot] | None:
         """The root of a leaf, if no other solution has the statuses of an assignment, and that record written; or None.
 
         Parameters
@@ -270,14 +269,14 @@ class SpaceCertifier(RecordingCertifier):
         numbers : of the form, as for ``close``
         leaf : codes of the leaf
         """
-        found = lone_root(self.enclosed, codes, numbers, leaf, errors=2.0)
+        record = Alone(leaf, numbers, NOWHERE)
+        found = record.holds(self.enclosed, codes, errors=2.0)
         if found is None:
             return None
-        self._leaf(Alone(leaf, numbers, self._ball(found)))
+        self._leaf(replace(record, enclosure=self._ball(found)))
         found = self._verified[leaf] = self._placed(leaf, found)
         return [found]
 
     def _ball(self, found: SpaceRoot | LooseSolution, wider: float = WIDEN) -> EnclosureRecord:
         """Ball of a root, in the problem's units."""
-        unit = self.enclosed.unit
-        return EnclosureRecord(found.y.mid * unit, wider * found.y.rad * unit, found.index)
+        return EnclosureRecord.around(found.y, self.enclosed.unit, found.index, wider)

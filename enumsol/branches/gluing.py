@@ -19,7 +19,7 @@ from networkx.utils import UnionFind
 from enumsol.arithmetic.algebraic import CriticalAlpha, merge
 from enumsol.arithmetic.rationals import rational, to_fraction
 from enumsol.branches.elements import Arc, ArcValues, Sides, Vertex, degree_of, make_vertex, sides_of, with_exact_zeros
-from enumsol.branches.exact.known_selections import KnownSelections
+from enumsol.branches.known_selections import KnownSelections
 from enumsol.branches.unfinished import TOLD_APART, Effort, named
 from enumsol.model.statuses import FINAL, OPEN, RowKind, contact_status
 from enumsol.roots.builder import polytope
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from fractions import Fraction
 
     from enumsol.branches.elements import Pair
-    from enumsol.branches.exact.known_selections import SelectionArcs, SelectionEvent
+    from enumsol.branches.known_selections import SelectionEvent
     from enumsol.condensation.exact import ExactCondensed
     from enumsol.selections.solution import ActiveSets, SelectionSolution
     from enumsol.support.array_types import Codes
@@ -112,35 +112,14 @@ class GluedVertex:
         return max((s.dimension for s in self.solutions), default=0)
 
 
-@dataclass(frozen=True)
-class Gluing:
-    """Vertices and arcs of the graph over [a, b].
+def glue(
+    known: KnownSelections,
+    candidates: Iterable[Codes],
+    effort: Effort = Effort(),  # noqa: B008 (frozen)
+) -> tuple[list[Vertex], list[Arc], Stop | None]:
+    """Vertices and arcs over [a, b] of the selections that the search found, and how far it got if not to the end.
 
-    Attributes
-    ----------
-    exact : ExactCondensed
-    a, b : fmpq
-    arcs : dict of SelectionArcs by codes, those that hold somewhere
-    vertices : list of GluedVertex in the order of alpha
-    edges : list of Arc
-    stopped : Stop or None
-        How far it got, if Ctrl-C was pressed while arcs were computed, or the time was over.
-    reasons : list of str
-        What stayed undecided or contradicts completeness; empty when nothing does.
-    """
-
-    exact: ExactCondensed
-    a: Any
-    b: Any
-    arcs: dict[Codes, SelectionArcs]
-    vertices: list[GluedVertex]
-    edges: list[Arc]
-    stopped: Stop | None
-    reasons: list[str]
-
-
-def glue(known: KnownSelections, candidates: Iterable[Codes], effort: Effort = Effort()) -> Gluing:  # noqa: B008 (frozen)
-    """Vertices and arcs of the graph, from the selections that the search found.
+    What stayed undecided or contradicts completeness is in ``known.reasons``.
 
     Parameters
     ----------
@@ -164,11 +143,11 @@ def glue(known: KnownSelections, candidates: Iterable[Codes], effort: Effort = E
         except TimeOverError:
             del known.arcs[codes]
             known.late = known.cut_short = True
-    vertices = _vertices(_joined(known))
-    edges = _edges(known, vertices)  # may unsettle vertices and add reasons
+    glued = _glued(_joined(known))
+    arcs = _arcs(known, glued)  # may unsettle vertices and add reasons
     if known.late and stopped is None:
         stopped = Stop(StopReason.TIME_LIMIT)
-    return Gluing(exact, known.a, known.b, known.arcs, vertices, edges, stopped, known.reasons)
+    return make_vertices(known, glued, arcs), arcs, stopped
 
 
 # -- joining events ----------------------------------------------------------------------------------------------------
@@ -253,7 +232,7 @@ def _join_polytopes(known: KnownSelections, events: Iterable[SelectionEvent], un
 # -- the graph ---------------------------------------------------------------------------------------------------------
 
 
-def _vertices(groups: Sequence[list[SelectionEvent]]) -> list[GluedVertex]:
+def _glued(groups: Sequence[list[SelectionEvent]]) -> list[GluedVertex]:
     """Vertices, one for each group of events, in the order of alpha."""
     by_alpha: dict[CriticalAlpha, list[list[SelectionEvent]]] = {}
     for events in groups:
@@ -275,7 +254,7 @@ def _vertices(groups: Sequence[list[SelectionEvent]]) -> list[GluedVertex]:
     return vertices
 
 
-def _edges(known: KnownSelections, vertices: list[GluedVertex]) -> list[Arc]:
+def _arcs(known: KnownSelections, vertices: list[GluedVertex]) -> list[Arc]:
     """Arcs, one for each cell in which a selection holds; of selections that coincide there, one for all."""
     found: dict[_About, _More] = {}
     for number, (codes, arcs) in enumerate(known.arcs.items()):
@@ -361,47 +340,47 @@ def _component(known: KnownSelections, codes: Codes, sample: fmpq) -> RootCompon
 # -- vertices in the user's terms (theory, section 7.11) ---------------------------------------------------------------
 
 
-def make_vertices(gluing: Gluing) -> list[Vertex]:
-    """The vertices of a gluing, with their kinds and degrees."""
-    sides = sides_of(gluing.edges, len(gluing.vertices))
-    return [_vertex(gluing, k, glued, sides[k]) for k, glued in enumerate(gluing.vertices)]
+def make_vertices(known: KnownSelections, vertices: Sequence[GluedVertex], arcs: Sequence[Arc]) -> list[Vertex]:
+    """Vertices with their kinds and degrees."""
+    sides = sides_of(arcs, len(vertices))
+    return [_vertex(known, k, glued, sides[k]) for k, glued in enumerate(vertices)]
 
 
-def _vertex(gluing: Gluing, number: int, glued: GluedVertex, sides: Sides) -> Vertex:
-    border = glued.alpha.is_rational and glued.alpha.lo in (gluing.a, gluing.b)
+def _vertex(known: KnownSelections, number: int, glued: GluedVertex, sides: Sides) -> Vertex:
+    border = glued.alpha.is_rational and glued.alpha.lo in (known.a, known.b)
     # at the last alpha there are arcs from the left only
-    beside = sides[0 if border and glued.alpha.lo == gluing.b else 1]
+    beside = sides[0 if border and glued.alpha.lo == known.b else 1]
     degree = degree_of(beside) if glued.settled else None
     return make_vertex(
         number,
         glued.alpha,
         sides,
-        _values(gluing, glued),
-        named_statuses(glued.active, partial(_slip_sign, gluing, glued))[1],
+        _values(known, glued),
+        named_statuses(glued.active, partial(_slip_sign, known, glued))[1],
         glued.members,
         border=border,
         settled=glued.settled,
         bounded=glued.bounded,
-        family=_family(glued, degree, proven=gluing.exact.condensed_exactly),
+        family=_family(glued, degree, proven=known.exact.condensed_exactly),
     )
 
 
-def _slip_sign(gluing: Gluing, glued: GluedVertex, node: int) -> int:
+def _slip_sign(known: KnownSelections, glued: GluedVertex, node: int) -> int:
     """Sign of u_t of a node at a vertex, exactly; 0 on a continuum over which it changes."""
     if glued.solver is not None:
         signs = (glued.solver.slip_signs(v)[node] for s in glued.solutions for v in s.vertices)
         return sign_over(signs)
     for codes in glued.members:
-        functions = gluing.arcs[codes].functions
+        functions = known.arcs[codes].functions
         if not functions.singular and (det := glued.alpha.sign_of(functions.det)) != 0:
             slip = functions.row(RowKind.SLIP_FORWARD, node)
             return 0 if slip.is_zero() else int(det * glued.alpha.sign_of(slip))
     return 0  # the unloaded body at rest
 
 
-def _values(gluing: Gluing, glued: GluedVertex) -> Pair:
+def _values(known: KnownSelections, glued: GluedVertex) -> Pair:
     """Forces and displacements at a vertex as floats, with exact zeros where the statuses say so."""
-    exact = gluing.exact
+    exact = known.exact
     if glued.solutions and glued.solver is not None:
         point = glued.solutions[0].vertices[0]
         return glued.solver.forces(point) + 0.0, glued.solver.displacements(point) + 0.0
@@ -412,8 +391,7 @@ def _values(gluing: Gluing, glued: GluedVertex) -> Pair:
         (
             found
             for c in glued.members
-            if not gluing.arcs[c].functions.singular
-            and (found := gluing.arcs[c].functions.forces_at(alpha)) is not None
+            if not known.arcs[c].functions.singular and (found := known.arcs[c].functions.forces_at(alpha)) is not None
         ),
         (fmpq(0),) * len(exact.rows),
     )

@@ -1,1 +1,0 @@
-"""The graph from exact algebra in alpha."""

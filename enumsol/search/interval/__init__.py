@@ -1,1 +1,0 @@
-"""The search over an interval of alpha."""
