@@ -190,7 +190,8 @@ def enumerate_roots(
     seconds, tolerance = arguments.optional_seconds(time_limit), arguments.share(tolerance)
     if _is_in_space(problem):
         # not for problems in 2D
-        from enumsol.roots.space_roots import SpaceEnumeration, check_supported, solvers_in_space
+        from enumsol.roots.space_roots import SpaceEnumeration, check_supported
+        from enumsol.search.space.space_setup import SpaceSolvers
 
         check_supported(arithmetic, method, engine)
     _check_proof(arithmetic, method, proof_path, resume)
@@ -204,7 +205,7 @@ def enumerate_roots(
         try:
             with within(Deadline.after(started, seconds)):
                 if _is_in_space(problem):
-                    in_space = solvers_in_space(problem, value, arithmetic)
+                    in_space = SpaceSolvers(problem, value, arithmetic)
                     _ = in_space.enclosed  # before a file is begun
                     search = SpaceEnumeration(in_space, progress, proof_path, resumed=resume, started=started)
                 else:
