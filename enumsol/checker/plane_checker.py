@@ -22,11 +22,10 @@ from enumsol.proof.proof_file import fraction_text
 from enumsol.proof.reading import RefusedError, data_of, friction_at, rational_from, same, units_from
 from enumsol.proof.records import DeclaredForm, Limits, Tree
 from enumsol.trusted.at_alpha import VerifiedSelection, settled_selection
-from enumsol.trusted.confinement import without_bound
 from enumsol.trusted.exclusion import Leaves, Terms, exclusion_margins
-from enumsol.trusted.joint_roots import JointRoot
+from enumsol.trusted.floating_bounds import without_bound
+from enumsol.trusted.joint_roots import JointRoot, told_apart
 from enumsol.trusted.positions import certain_statuses
-from enumsol.trusted.same_roots import told_apart
 from enumsol.trusted.status_rows import (
     ROW_KINDS,
     is_covering,

@@ -144,9 +144,9 @@ class OnCurve(ClosingRecord):
     first, last : int
         Boxes of the curve.
     numbers : array or None
-        Of a form, as ``trusted.space.piece_forms.PieceWeights.of`` takes them, by which a run of the curve from the
-        first to the last box has all solutions with the statuses of the assignment. Without it the assignment is
-        complete, and its solutions lie in the boxes.
+        Of a form (see ``trusted.space.space_uniqueness.PieceWeights.of``) by which a run of the curve from the first to
+        the last box has all solutions with the statuses of the assignment. Without it the assignment is complete, and
+        its solutions lie in the boxes.
     """
 
     kind, sizes, trees = "k", (3, 4), Tree.PIECES

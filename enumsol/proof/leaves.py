@@ -42,8 +42,8 @@ if TYPE_CHECKING:
     from enumsol.trusted.reference import Reference
     from enumsol.trusted.space.pieces import AlphaPiece
     from enumsol.trusted.space.product_forms import Ellipsoid
-    from enumsol.trusted.space.slip_forms import SlipForm
-    from enumsol.trusted.space.space_reference import SpaceReference
+    from enumsol.trusted.space.sector_rows import SlipForm
+    from enumsol.trusted.space.space_uniqueness import LeafReference
     from enumsol.trusted.uniqueness import ClosedSolution
 
     #: What multipliers bound.
@@ -472,8 +472,8 @@ class OnlyReference(ClosingRecord):
             raise RecordError("its rows are not numbers of rows")
         return row
 
-    def holds(self, known: Reference | SpaceReference, codes: Codes, reach: Floats) -> bool:
-        """True if no other root lies below the assignment than that of a form, a Reference or SpaceReference.
+    def holds(self, known: Reference | LeafReference, codes: Codes, reach: Floats) -> bool:
+        """True if no other root lies below the assignment than that of a form, a Reference or LeafReference.
 
         ``reach``: within these bounds of the rigid displacement (theory, section 14.11).
         """

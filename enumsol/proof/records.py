@@ -214,8 +214,8 @@ class DeclaredForm(Record):
     codes : of the assignment for which it is made, or of the leaf that holds the root
     numbers : array
         For a body that is held, in 2D the four rows of its multipliers one after the other; in 3D those of
-        ``trusted.space.slip_forms.SlipForm`` over the whole tree, else those of ``product_forms.Ellipsoid``. For
-        other bodies those of ``trusted.reference.Reference`` or ``trusted.space.space_reference.SpaceReference``.
+        ``trusted.quadratic_forms.SlipForm`` over the whole tree, else those of ``product_forms.Ellipsoid``. For
+        other bodies those of ``trusted.reference.Reference`` or ``trusted.space.space_uniqueness.LeafReference``.
     more : array
         In 2D the weight of the equations; of an ellipsoid a point near its centre; of a root balance and share.
     enclosure : EnclosureRecord or None
@@ -281,7 +281,7 @@ class DeclaredForm(Record):
     def form(self, system: EnclosedSystem) -> Any:
         """The form of an assignment, its ellipsoid, or the form of a root; None where it is not proven to be definite.
 
-        An EnclosedForm or Reference, in 3D a SlipForm (of the whole tree), Ellipsoid or SpaceReference.
+        An EnclosedForm or Reference, in 3D a SlipForm (of the whole tree), Ellipsoid or LeafReference.
 
         Raises
         ------
@@ -293,12 +293,12 @@ class DeclaredForm(Record):
                 return Reference.of(system, self.codes, self.numbers, *self.more.tolist())
             return EnclosedForm.of(system, self.codes, self.numbers.reshape(4, -1), float(self.more[0]))
         from enumsol.trusted.space.product_forms import Ellipsoid  # in 3D only
-        from enumsol.trusted.space.slip_forms import SlipForm
-        from enumsol.trusted.space.space_reference import SpaceReference
+        from enumsol.trusted.space.sector_rows import SlipForm
+        from enumsol.trusted.space.space_uniqueness import LeafReference
 
         given = cast("EnclosedSpace", system)
         if not system.held:
-            return SpaceReference.of(given, self.codes, self.numbers, *self.more.tolist())
+            return LeafReference.of(given, self.codes, self.numbers, *self.more.tolist())
         if all(code == UNDECIDED for code in self.codes):
             return SlipForm.of(given, self.numbers)
         return Ellipsoid.of(given, self.codes, self.more / given.unit, self.numbers)

@@ -26,7 +26,7 @@ CHECKERS = inside("checker", "verify", "plane_checker", "graph_checker", "histor
 IN_SPACE = {
     *("enumsol.checker.space_checker", "enumsol.condensation.space_condensed", "enumsol.model.sectors"),
     *inside("trusted.space", "resultants", "sector_rows", "leaves", "boxed_solution"),
-    *inside("trusted.space", "product_forms", "natural_map", "space_uniqueness", "turning"),
+    *inside("trusted.space", "product_forms", "natural_map", "krawczyk", "space_uniqueness", "turning"),
     *inside("trusted.space", "leaf_conditions", "leaf_equations"),
 }
 #: The search: its rooms, and what it alone uses of rooms that it shares with the checkers.
@@ -53,7 +53,7 @@ SHARED = {
     "trusted.arcs.selection_balls": None,
     "trusted.exclusion": {"Terms", "exclusion_margin"},
     "trusted.joint_roots": {"JointRoot"},
-    "trusted.confinement": {"motion_against", "motion_beside", "without_bound"},
+    "trusted.floating_bounds": {"is_unbalanced", "motion_against", "motion_beside", "without_bound"},
     "trusted.arcs.many_digits": {"affordable", "ball_of", "precision"},
     "trusted.arcs.over_parts": None,
     "trusted.over_interval": {"EnclosedPiece", "PieceNumbers", "as_computed"},
@@ -68,27 +68,24 @@ SHARED = {
     "trusted.quadratic_forms": {"EnclosedForm", "Equations"},
     "trusted.status_rows": None,
     "trusted.space.sector_rows": None,
-    "trusted.space.slip_forms": {"SlipForm"},
-    "trusted.space.leaf_arcs": {"LeafArc"},
     "trusted.space.leaf_equations": {"with_free_bounds"},
     "trusted.space.leaves": None,
     "trusted.space.resultants": None,
-    "trusted.space.space_reference": {"SpaceProduct", "SpaceReference"},
     "trusted.space.turning": {"turned_by"},
     "trusted.space.boxed_solution": {
-        *("Box", "BoxedSolution", "apart_in_boxes", "box_around", "is_inside", "proposed_rho", "solution_in_box")
+        *("Box", "BoxedSolution", "BoxProblem", "apart_in_boxes", "is_inside", "solution_in_box")
     },
     "trusted.space.product_forms": {"CONE", "SIGNED", "Ellipsoid", "Frame", "refines"},
+    "trusted.space.krawczyk": {"Contraction", "NaturalMap", "Step"},
     "trusted.space.solution_curve": None,
     "trusted.space.curve_chains": None,
     "trusted.space.curve_events": None,
     "trusted.space.curve_parts": None,
     "trusted.space.curve_runs": {"CurveParts", "KnownCurve", "Run"},
-    "trusted.space.piece_forms": {"PieceWeights", "how_far_off"},
-    "trusted.space.pieces": {"AlphaPiece", "lie_along"},
+    "trusted.space.pieces": {"AlphaPiece", "LeafArc", "lie_along"},
     "trusted.space.space_uniqueness": {
-        *("LARGEST_UNIT", "LooseSolution", "OnlySolution"),
-        "equations",
+        *("LeafReference", "LooseSolution", "OnlySolution", "PieceWeights"),
+        *("equations", "how_far_off", "moderate_units"),
     },
     "proof.begun": None,
     "proof.proof_file": {"PROOF_VERSION", "Proof", "fraction_text", "packed", "coarse"},

@@ -14,8 +14,8 @@ from enumsol.arithmetic.balls import Ball
 from enumsol.search.floating_solvers import FloatingSolvers
 from enumsol.search.reference_closer import proposed, rows_of
 from enumsol.trusted.reference import Reference
-from enumsol.trusted.root_forms import Body, Multipliers, RootForm
 from enumsol.trusted.status_rows import FORBIDDEN, refines, row_signs
+from enumsol.trusted.uniqueness_forms import Body, Multipliers, RootForm
 
 #: Bodies with several solutions, some of which have a definite form, and some with one.
 SEVERAL = (69, 635, 832, 897, 1053, 1164, 1321, 1799, 1903, 2550, 2777, 3086)

@@ -11,15 +11,14 @@ from space_proofs import RANDOM, random_problem
 
 from enumsol import enumerate_roots
 from enumsol.arithmetic.balls import Ball
+from enumsol.search.space.product_search import box_around, proposed_rho
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space.boxed_solution import (
     Box,
     BoxedSolution,
-    _NaturalMap,
+    BoxProblem,
     apart_in_boxes,
-    box_around,
     is_inside,
-    proposed_rho,
     solution_in_box,
 )
 
@@ -63,7 +62,7 @@ def natural(problem, y):
     S, g, rho = problem.S.mid, problem.g.mid, problem.rho
     z = y + rho * (g - S @ y)
     out = z.copy()
-    for i, places in enumerate(problem.discs.tau):
+    for i, places in enumerate(problem.system.tau):
         t = places[places >= 0]
         out[i] = max(z[i], 0.0)
         length = np.linalg.norm(z[t])
@@ -78,17 +77,19 @@ def test_steps_stay_within_their_bounds():
     rng, tried = np.random.default_rng(0), 0
     for seed in range(some(12, of=60)):
         solvers, y, _, _, _ = boxed(seed)
-        problem = _NaturalMap.of(solvers.enclosed, proposed_rho(solvers.enclosed)[seed % 2])
+        problem = BoxProblem.of(solvers.enclosed, proposed_rho(solvers.enclosed)[seed % 2])
         assert problem.T.mid @ (np.eye(len(y)) + problem.rho[:, None] * problem.S.mid) == pytest.approx(np.eye(len(y)))
         centre = y * problem.system.unit + rng.normal(size=len(y)) * rng.choice([0.0, 1e-3, 0.1])
         reach = np.full(len(y), 10.0 ** rng.uniform(-4, 0))
-        step = problem._step(centre, reach)
+        near = problem.around(centre)
+        step = near.step(near.extent(reach))
         if step is None:
             continue
         tried += 1
         for _ in range(40):
             zeta = reach * rng.uniform(-1, 1, len(y)) * rng.choice([1.0, 0.3])
             moved = zeta - step.Y @ natural(problem, centre + problem.T.mid @ zeta) - step.move.mid
+            moved -= step.G.mid @ step.first
             bound = step.E @ np.abs(zeta) + 0.5 * np.abs(step.G.mid) @ np.abs(step.V.mid @ zeta)
             assert np.all(np.abs(moved) <= bound * (1 + 1e-9) + 1e-10 * (1 + np.abs(step.Y).max()))
     assert tried > some(7, of=40)

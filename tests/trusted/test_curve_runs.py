@@ -17,10 +17,10 @@ from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.search.space.piece_certificates import ExaminedPiece, runs_over
 from enumsol.trusted.space import curve_runs
 from enumsol.trusted.space.curve_runs import KnownCurve, Run
-from enumsol.trusted.space.piece_forms import PieceWeights, how_far_off
 from enumsol.trusted.space.pieces import AlphaPiece
 from enumsol.trusted.space.sector_rows import CONTACT, OPEN, STICK, UNDECIDED
 from enumsol.trusted.space.solution_curve import AlphaProblem, CurveBox, SolutionCurve
+from enumsol.trusted.space.space_uniqueness import PieceWeights, how_far_off
 
 INTERVAL = Fraction(0), Fraction(1)
 #: Nodes and seeds: at some of the many a fold, two curves, or changes of status.
@@ -197,10 +197,11 @@ def test_a_curve_holds_a_ball_if_all_its_corners_are_held():
         d, G = d / (e @ d), rng.standard_normal((size, count))
         radius, shares = 0.2 + rng.exponential(size=size), 2 * rng.exponential(size=count)
         half = 2 * float(rng.exponential())
-        near = SimpleNamespace(unit=np.ones(size), c=c, d=d, e=e)
+        near = SimpleNamespace(d=d, border=e[None])
         step = SimpleNamespace(G=Ball.exact(G))
         found = SimpleNamespace(near=near, step=step, radius=radius, shares=shares)
-        curve = SolutionCurve(CurveBox(c, d, e, half, radius, np.ones(size - 1)), 1, found)
+        box, problem = CurveBox(c, d, e, half, radius, np.ones(size - 1)), SimpleNamespace(unit=np.ones(size))
+        curve = SolutionCurve(box, 1, problem, found)
         middle = c + rng.uniform(-half, half) * d + G @ (rng.uniform(-0.9, 0.9, count) * shares)
         x = Ball(middle, 0.05 * rng.exponential(size=size))
         held = curve.holds(x)

@@ -12,6 +12,7 @@ from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space.chains import chain_through
 from enumsol.condensation.space_condensed import AlphaSpace, EnclosedSpace, PieceSpace, PieceTurn
 from enumsol.model.sectors import SECTORS, nearest, start_of
+from enumsol.search.space.curve_proposals import placed
 from enumsol.search.space.piece_multipliers import PieceBounds
 from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space.leaf_equations import Leaf, slopes_by_second
@@ -306,7 +307,7 @@ def test_no_root_over_a_piece_is_missed(p, seed):
                     moved = problem.condensed.free_displacements(float(alpha)) - problem.condensed.S @ near
                     assert np.all(np.abs(w.mid - moved) <= w.rad + 1e-9 * np.max(np.abs(moved)) + 1e-13)
                 for low, high in (ends for ends in piece.places(found, given) if len(ends) == 2):
-                    assert lies_between(low, high, given.placed(np.append(near, float(alpha))))
+                    assert lies_between(low, high, placed(given, np.append(near, float(alpha))))
                     drifts += 1
                 settled += isinstance(found, SpaceRoot)
     assert settled

@@ -10,12 +10,18 @@ from problems3d import SLIDING, forces, from_compliance, random_compliance, slid
 import enumsol
 from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space.pieces import status_margin
+from enumsol.search.space.curve_proposals import (
+    border_of_forces,
+    border_of_zeta,
+    curve_around,
+    curve_point,
+    placed,
+    unplaced,
+)
 from enumsol.trusted.space.sector_rows import OPEN, STICK
 from enumsol.trusted.space.solution_curve import (
     SLIP,
     AlphaProblem,
-    curve_around,
-    curve_point,
     lies_in,
     only_curve,
     parameter_in,
@@ -25,7 +31,7 @@ GIVEN = AlphaProblem.of(SLIDING.enclosure)
 
 
 def box_of(given, x, half):
-    x = given.placed(x)
+    x = placed(given, x)
     point = curve_point(given, x, np.eye(len(x))[-1])
     border = point.direction / (point.direction @ point.direction)
     curve = curve_around(given, point.x, point.direction, border, half, roomy=True)
@@ -34,7 +40,7 @@ def box_of(given, x, half):
 
 def sliding(alpha):
     """The point of the curve of the sliding node."""
-    return GIVEN.placed(np.append(sliding_node(alpha), alpha))
+    return placed(GIVEN, np.append(sliding_node(alpha), alpha))
 
 
 @pytest.fixture(scope="module")
@@ -54,14 +60,14 @@ def test_coordinates_are_those_of_forces_and_displacements(seed):
     w = problem.condensed.free_displacements(alpha) - problem.condensed.S @ y
     expected = y / q - given.rho * (q * w / given.length) * given.force
     x = np.append(y, alpha)
-    assert given.placed(x) == pytest.approx(np.append(expected, alpha), rel=1e-12)
-    assert given.unplaced(given.placed(x)) == pytest.approx(x, rel=1e-11)
+    assert placed(given, x) == pytest.approx(np.append(expected, alpha), rel=1e-12)
+    assert unplaced(given, placed(given, x)) == pytest.approx(x, rel=1e-11)
     ball = given.coordinates(Ball.exact(y), Ball.exact(w))
     assert np.all(np.abs(ball.mid - expected) <= 1e-12 * np.max(np.abs(expected)))
     border, step = rng.normal(size=7), rng.normal(size=7)
-    change = given.placed(x + step) - given.placed(x)
-    assert given.border_of_forces(border) @ step == pytest.approx(border @ change, rel=1e-10)
-    assert given.border_of_zeta(given.border_of_forces(border)) == pytest.approx(border, rel=1e-10)
+    change = placed(given, x + step) - placed(given, x)
+    assert border_of_forces(given, border) @ step == pytest.approx(border @ change, rel=1e-10)
+    assert border_of_zeta(given, border_of_forces(given, border)) == pytest.approx(border, rel=1e-10)
 
 
 def test_what_is_past_the_limit_of_stick_is_bounded_along_a_direction():
@@ -117,7 +123,7 @@ def test_friction_may_be_negative_beside_the_interval():
     curve = only_curve(GIVEN, box_of(GIVEN, start, 0.01))
     assert curve.alphas[0] < 0 < curve.alphas[1]
     at = curve.at(0.0)
-    assert np.all(np.abs(at.mid - GIVEN.placed(start)) <= at.rad + 1e-14)
+    assert np.all(np.abs(at.mid - placed(GIVEN, start)) <= at.rad + 1e-14)
 
 
 @pytest.mark.slow
@@ -136,7 +142,7 @@ def test_solutions_in_a_box_are_those_of_its_curve(seed):
     seen = 0
     for alpha in np.linspace(low, high, 9):
         for other in enumsol.enumerate_roots(problem, Fraction(float(alpha))):
-            x = Ball(given.placed(np.append(forces(other), alpha)), np.full(7, 1e-12))
+            x = Ball(placed(given, np.append(forces(other), alpha)), np.full(7, 1e-12))
             if lies_in(box, x):
                 at = curve.at(parameter_in(box, x))
                 assert np.all(np.abs(at.mid - x.mid) <= at.rad + x.rad)
@@ -165,7 +171,7 @@ def test_a_fold_lies_in_a_box():
     path = enumsol.follow(problem, jammed, -jammed.index, (0.5, 6))
     (fold,) = path.folds
     k = fold.point
-    line = given.placed(np.column_stack([path.lambda_n, *np.moveaxis(path.lambda_t, 2, 0), path.alpha]))
+    line = placed(given, np.column_stack([path.lambda_n, *np.moveaxis(path.lambda_t, 2, 0), path.alpha]))
     before, after = (line[k] + 1e-3 * (line[n] - line[k]) for n in (k - 1, k + 1))
     ahead, behind = (one / np.linalg.norm(one) for one in (line[k] - before, after - line[k]))
     border = (ahead + behind) / np.linalg.norm(ahead + behind)
@@ -178,7 +184,7 @@ def test_a_fold_lies_in_a_box():
     counts = []
     for alpha in (fold.alpha + side, fold.alpha - side):
         roots = enumsol.enumerate_roots(problem, Fraction(alpha))
-        inside = [root for root in roots if lies_in(box, Ball.exact(given.placed(np.append(forces(root), alpha))))]
+        inside = [root for root in roots if lies_in(box, Ball.exact(placed(given, np.append(forces(root), alpha))))]
         counts.append(len(inside))
     assert counts == [2, 0]
 

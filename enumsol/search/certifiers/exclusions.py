@@ -13,8 +13,8 @@ from enumsol.proof.records import DeclaredForm
 from enumsol.search.certifiers.protocol import energy_margin
 from enumsol.search.reference_closer import reference_numbers
 from enumsol.trusted.at_alpha import settled_selection
-from enumsol.trusted.confinement import motion_against, without_bound
 from enumsol.trusted.exclusion import Terms
+from enumsol.trusted.floating_bounds import motion_against, without_bound
 from enumsol.trusted.reference import Reference
 from enumsol.trusted.selection import PENETRATION, SLIP_BACKWARD, SLIP_FORWARD
 from enumsol.trusted.status_rows import CONDITIONS, FORBIDDEN, FREE, row_signs

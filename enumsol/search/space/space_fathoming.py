@@ -18,7 +18,7 @@ from enumsol.search.closing import TreeCloser
 from enumsol.search.space.product_search import ProductSearch
 from enumsol.search.space.space_newton import Isotropic
 from enumsol.support.deadlines import look
-from enumsol.trusted.space.space_uniqueness import LARGEST_UNIT, equations
+from enumsol.trusted.space.space_uniqueness import equations, moderate_units
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -175,7 +175,7 @@ class SpaceCloser(TreeCloser):
 
 def solved(system: SpaceSystem, near: Floats | None = None) -> tuple[Point, Floats] | None:
     """A solution in floats, and its forces (p, 3) in isotropic variables, near those of another one; or None."""
-    if np.max(np.maximum(system.unit, 1.0 / system.unit)) > LARGEST_UNIT:
+    if not moderate_units(system.unit):
         return None
     problem = Isotropic.of(system)
     y = problem.solution(near)

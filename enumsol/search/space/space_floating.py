@@ -18,10 +18,10 @@ from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.certifiers.protocol import Bound, Refine, UndecidedPart
 from enumsol.search.space.space_references import reference_numbers
 from enumsol.search.space.space_search import SpaceCertifier
-from enumsol.trusted.confinement import motion_beside
+from enumsol.trusted.floating_bounds import motion_beside
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
 from enumsol.trusted.space.resultants import resultants, unbounded
-from enumsol.trusted.space.space_reference import SpaceReference
+from enumsol.trusted.space.space_uniqueness import LeafReference
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -49,18 +49,18 @@ class SpaceExclusions:
 
     def __init__(self, enclosed: EnclosedSpace) -> None:
         self.system, self.free = enclosed, unbounded(enclosed)
-        self._references: dict[Codes, SpaceReference | None] = {}
+        self._references: dict[Codes, LeafReference | None] = {}
         #: How the forms of roots are declared, but for enclosures, by their leaves.
         self.numbers: dict[Codes, tuple[Floats, Floats]] = {}
 
-    def reference(self, system: SpaceSystem, leaf: Codes) -> SpaceReference | None:
+    def reference(self, system: SpaceSystem, leaf: Codes) -> LeafReference | None:
         """The form of the root of a leaf, if one is proven definite."""
         if leaf not in self._references:
             self._references[leaf], root = None, settle(self.system, leaf)
             with np.errstate(all="ignore"):
                 tried = reference_numbers(system, self.system, root, leaf) if isinstance(root, SpaceRoot) else ()
                 for numbers, *more in tried:
-                    found = SpaceReference.of(self.system, leaf, numbers, *more)
+                    found = LeafReference.of(self.system, leaf, numbers, *more)
                     if found is not None:
                         self.numbers[leaf], self._references[leaf] = (numbers, np.array(more)), found
                         break
@@ -108,13 +108,13 @@ class FloatingSpaceCertifier(SpaceCertifier):
         super().__init__(engine, enclosed, recorder)
         self._exclusions = exclusions
 
-    def reference(self, leaf: Codes) -> SpaceReference | None:
+    def reference(self, leaf: Codes) -> LeafReference | None:
         """The form of the root of a leaf, if one is proven definite."""
         return None if self._exclusions is None else self._exclusions.reference(self._engine.system, leaf)
 
-    def only_root(self, codes: Codes, reference: SpaceReference, proposal: OnlyRoot) -> list[SpaceRoot] | None:
+    def only_root(self, codes: Codes, reference: LeafReference, proposal: OnlyRoot) -> list[SpaceRoot] | None:
         """The root, as a list, unless it was declared before; None if it is not proven that no other one lies below."""
-        exclusions, leaf, found = self._exclusions, reference.leaf, list[SpaceRoot]()
+        exclusions, leaf, found = self._exclusions, reference.selection, list[SpaceRoot]()
         if exclusions is None:
             return None
         record = OnlyReference(0, *proposal)

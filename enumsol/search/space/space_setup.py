@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.search.space.space_floating import SpaceExclusions
     from enumsol.support.array_types import Alpha, Codes, Floats
-    from enumsol.trusted.space.slip_forms import SlipForm
+    from enumsol.trusted.space.sector_rows import SlipForm
 
 #: A form is used where it leaves no more than this share of the gap to the pruning bound at the root of the tree.
 _SHARE = 0.25
