@@ -252,7 +252,7 @@ def _scene(mesh: str, options: dict[str, Any]) -> Scene:
     """Scene that the mesh and the options, or a TOML file, describe."""
     from enumsol import fem  # numpy: not for --help
     from enumsol.fem.conditions import refuse_old_friction
-    from enumsol.fem.scenes import check_keys
+    from enumsol.fem.mesh_problems import check_keys
     from enumsol.io import SUFFIXES
     from enumsol.support.arguments import file_path
     from enumsol.support.files import unreadable

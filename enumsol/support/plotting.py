@@ -90,7 +90,7 @@ def in_units(name: str, dimension: str | None, units: tuple[str, str] | None) ->
     return f"{name} [{ {'force': force, 'length': length, 'work': f'{force} {length}'}[dimension] }]"
 
 
-def axes_of(ax: Axes | None, figsize: tuple[float, float]) -> Any:
+def axes_of(ax: object, figsize: tuple[float, float]) -> Any:
     """The axes that a picture is drawn into: those given, or those of a new figure [inches].
 
     Raises

@@ -21,7 +21,7 @@ from enumsol.search.certifiers.protocol import Certifier, Unrecorded
 from enumsol.search.closing import TreeCloser
 from enumsol.search.form_policy import Forms
 from enumsol.search.resume import Reader
-from enumsol.search.setup import SearchSetup
+from enumsol.search.setup import WEAK, SearchSetup, weakly_held
 from enumsol.search.space.space_fathoming import SpaceCloser, SpaceClosing, solved
 from enumsol.search.space.space_search import SpaceCertifier, SpaceSplitting
 
@@ -96,24 +96,18 @@ class SpaceSolvers(SearchSetup):
     @cached_property
     def relaxed(self) -> SpaceSystem:
         """The system that the relaxations are about: a body that nothing holds is on weak springs (section 14.5)."""
-        if self.problem.held:
-            return self.system
-        from enumsol.search.floating_solvers import WEAK  # for such bodies only
-
         return self._on_springs(WEAK)
 
     def _on_springs(self, stiffness: float) -> SpaceSystem:
         if self.problem.held or self.enclosed.held:
             return self.system
-        from enumsol.search.floating_solvers import weakly_held  # as above
-
         S, g = weakly_held(self.system.S, self.system.g, self.enclosed.rows, stiffness)
         return replace(self.system, S=S, g=g)
 
     @cached_property
     def _exclusions(self) -> SpaceExclusions | None:
         """Proofs that assignments of a body that nothing holds have no solution; None without balls."""
-        from enumsol.search.space.space_floating import SpaceExclusions  # as above
+        from enumsol.search.space.space_floating import SpaceExclusions  # for such bodies only
 
         return None if self.enclosed.held else SpaceExclusions(self.enclosed)
 
