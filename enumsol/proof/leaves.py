@@ -141,7 +141,7 @@ class Excluded(Record):
 
 @dataclass(frozen=True, eq=False)
 class Unbalanced(Record):
-    """Of a body that nothing holds: no forces below the assignment are in balance with its load."""
+    """No forces below the assignment are in balance with the load, of a body that nothing holds."""
 
     kind, sizes, trees = "i", (2,), Tree.FLOATING
 
@@ -171,7 +171,7 @@ class Solved(Record):
 
     @classmethod
     def read(cls, record: list[Any], limits: Limits) -> Any:
-        """As of any record, once the assignment is complete."""
+        """A leaf of this kind, once the assignment is complete."""
         check_complete(limits.codes)
         return super().read(record, limits)
 
@@ -465,7 +465,7 @@ class OnlyReference(ClosingRecord):
         return cls(back, equations, said, EnclosureRecord(*enclosure) if enclosure else None)
 
     @staticmethod
-    def _row(row: Any, limits: Limits) -> Any:
+    def _row(row: object, limits: Limits) -> Any:
         if limits.in_space:
             return checked_row(row, limits.p)
         if type(row) is not int or not 0 <= row < ROW_KINDS * limits.p:

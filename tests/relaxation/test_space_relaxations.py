@@ -147,8 +147,7 @@ def test_derivatives_are_those_of_what_is_maximised(seed):
 
     def derivatives(numbers):
         found = ascent._candidate(numbers)
-        normals, forces = ascent._normals(found.relaxation), found.relaxation.forces
-        one, two = ascent._products.derivatives(found.form.H, found.factor, forces, scale, normals, np.eye(size))
+        one, two = ascent._of_products(found, scale, ascent._normals(found.relaxation))
         return shares @ one, shares @ two @ shares.T
 
     gradient, hessian = derivatives(numbers)
