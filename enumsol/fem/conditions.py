@@ -23,7 +23,6 @@ from enumsol.support.arguments import finite_number, one_of, shown
 from enumsol.support.array_arguments import real_array, short_vector
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
     from typing import Literal
 
     from skfem import DiscreteField

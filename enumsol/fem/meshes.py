@@ -24,8 +24,6 @@ from enumsol.support.array_types import ArrayLike, Floats, Integers, Mask
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from enumsol.support.array_types import ArrayLike, Floats, Integers
-
     Cells = Literal["hexahedra", "tetrahedra"]
 
 

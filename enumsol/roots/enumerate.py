@@ -24,8 +24,7 @@ from enumsol.search.solvers import Arithmetic, Solvers
 from enumsol.selections.float_selections import SIGN_TOLERANCE
 from enumsol.selections.solution import PointValues, SelectionSolution, SelectionSolver
 from enumsol.support import arguments
-from enumsol.support.deadlines import Deadline, TimeOverError, within
-from enumsol.support.keeping import keeping
+from enumsol.support.deadlines import Deadline, TimeOverError, keeping, within
 from enumsol.support.messages import counted
 from enumsol.support.workers import workers_of
 
@@ -39,7 +38,7 @@ if TYPE_CHECKING:
     from enumsol.model.problem3d import AnyProblem, ContactProblem3D
     from enumsol.roots.root import Root, RootFamily
     from enumsol.support.array_types import Alpha, AlphaLike, Codes, Floats
-    from enumsol.support.keeping import Ending
+    from enumsol.support.deadlines import Ending
 
 
 class AtRest:
@@ -88,8 +87,6 @@ class AtRest:
 
 
 Method = Literal["tree", "exhaustive"]
-#: The exhaustive method reports progress this often [seconds].
-_REPORT_SECONDS = 0.1
 
 
 def enumerate_roots(
@@ -191,7 +188,8 @@ def enumerate_roots(
     seconds, tolerance = arguments.optional_seconds(time_limit), arguments.share(tolerance)
     if _is_in_space(problem):
         # not for problems in 2D
-        from enumsol.roots.space_roots import SpaceEnumeration, check_supported, solvers_in_space
+        from enumsol.roots.space_roots import SpaceEnumeration, check_supported
+        from enumsol.search.space.space_setup import SpaceSolvers
 
         check_supported(arithmetic, method, engine)
     _check_proof(arithmetic, method, proof_path, resume)
@@ -205,12 +203,11 @@ def enumerate_roots(
         try:
             with within(Deadline.after(started, seconds)):
                 if _is_in_space(problem):
-                    in_space = solvers_in_space(problem, value, arithmetic)
+                    in_space = SpaceSolvers(problem, value, arithmetic)
                     _ = in_space.enclosed  # before a file is begun
                     search = SpaceEnumeration(in_space, progress, proof_path, resumed=resume, started=started)
                 else:
-                    kind = Solvers if problem.held else _floating_solvers()
-                    solvers = kind(problem, value, arithmetic, tolerance, engine)
+                    solvers = Solvers(problem, value, arithmetic, tolerance, engine)
                     _ = solvers.enclosed  # as above
                     search = _Enumeration(solvers, progress, proof_path, method=method, resumed=resume, started=started)
         except TimeOverError:
@@ -262,12 +259,6 @@ def is_unique(problem: AnyProblem, alpha: AlphaLike, **options: Any) -> bool | N
 def _is_in_space(problem: object) -> TypeIs[ContactProblem3D]:
     """True if it is a problem in 3D, whose class is not loaded for others."""
     return isinstance(problem, ContactBody) and not isinstance(problem, ContactProblem)
-
-
-def _floating_solvers() -> type[Solvers]:
-    from enumsol.search.floating_solvers import FloatingSolvers  # for bodies that nothing holds only
-
-    return FloatingSolvers
 
 
 def _in_doubt(core: Codes) -> UndecidedPart:
@@ -326,7 +317,7 @@ class _Enumeration(Enumeration[Solvers]):
             if solution is not None:
                 outcome.solutions.append(solution)
             now = time.perf_counter()
-            due = now - reported > _REPORT_SECONDS or (solution is None and outcome.selections % BLOCK == 0)
+            due = now - reported > 0.1 or (solution is None and outcome.selections % BLOCK == 0)
             if self.progress is not None and (due or outcome.selections == total):
                 reported = now
                 share = outcome.selections / total
@@ -411,8 +402,7 @@ def roots_of_selections(problem: ContactProblem, alpha: Alpha, selections: Seque
     selections : codes of complete selections
     whole : no others hold
     """
-    kind = Solvers if problem.held else _floating_solvers()
-    solvers = kind(problem, alpha, "verified", SIGN_TOLERANCE)
+    solvers = Solvers(problem, alpha, "verified", SIGN_TOLERANCE)
     return _Selected(solvers, None, None, method="graph").select(selections, whole=whole)
 
 
