@@ -14,7 +14,8 @@ import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK, ContactStatus
-from enumsol.roots.root import ContactState, RootFamily
+from enumsol.roots.local_branch import ContactState
+from enumsol.roots.root import RootFamily
 from enumsol.support.arguments import alpha_value
 from enumsol.support.messages import TextEnum
 

@@ -88,8 +88,6 @@ class AtRest:
 
 
 Method = Literal["tree", "exhaustive"]
-#: The exhaustive method reports progress this often [seconds].
-_REPORT_SECONDS = 0.1
 
 
 def enumerate_roots(
@@ -209,8 +207,7 @@ def enumerate_roots(
                     _ = in_space.enclosed  # before a file is begun
                     search = SpaceEnumeration(in_space, progress, proof_path, resumed=resume, started=started)
                 else:
-                    kind = Solvers if problem.held else _floating_solvers()
-                    solvers = kind(problem, value, arithmetic, tolerance, engine)
+                    solvers = Solvers(problem, value, arithmetic, tolerance, engine)
                     _ = solvers.enclosed  # as above
                     search = _Enumeration(solvers, progress, proof_path, method=method, resumed=resume, started=started)
         except TimeOverError:
@@ -262,12 +259,6 @@ def is_unique(problem: AnyProblem, alpha: AlphaLike, **options: Any) -> bool | N
 def _is_in_space(problem: object) -> TypeIs[ContactProblem3D]:
     """True if it is a problem in 3D, whose class is not loaded for others."""
     return isinstance(problem, ContactBody) and not isinstance(problem, ContactProblem)
-
-
-def _floating_solvers() -> type[Solvers]:
-    from enumsol.search.floating_solvers import FloatingSolvers  # for bodies that nothing holds only
-
-    return FloatingSolvers
 
 
 def _in_doubt(core: Codes) -> UndecidedPart:
@@ -326,7 +317,7 @@ class _Enumeration(Enumeration[Solvers]):
             if solution is not None:
                 outcome.solutions.append(solution)
             now = time.perf_counter()
-            due = now - reported > _REPORT_SECONDS or (solution is None and outcome.selections % BLOCK == 0)
+            due = now - reported > 0.1 or (solution is None and outcome.selections % BLOCK == 0)
             if self.progress is not None and (due or outcome.selections == total):
                 reported = now
                 share = outcome.selections / total
@@ -411,8 +402,7 @@ def roots_of_selections(problem: ContactProblem, alpha: Alpha, selections: Seque
     selections : codes of complete selections
     whole : no others hold
     """
-    kind = Solvers if problem.held else _floating_solvers()
-    solvers = kind(problem, alpha, "verified", SIGN_TOLERANCE)
+    solvers = Solvers(problem, alpha, "verified", SIGN_TOLERANCE)
     return _Selected(solvers, None, None, method="graph").select(selections, whole=whole)
 
 

@@ -258,10 +258,10 @@ def test_no_multipliers_exclude_a_solution():
 
 def _proposals(problem):
     """Multipliers that the relaxation of a selection ends with, times some factors."""
-    from enumsol.search.floating_solvers import FloatingSolvers
+    from enumsol.search.solvers import Solvers
     from enumsol.search.splitting import ImposedRows, PlaneSplitting
 
-    solvers = FloatingSolvers(problem, 0, "verified", 1e-9)
+    solvers = Solvers(problem, 0, "verified", 1e-9)
     rows = ImposedRows(PlaneSplitting(solvers.scaled.F), problem.p)
 
     def best(codes):

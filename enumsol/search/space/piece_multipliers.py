@@ -16,7 +16,7 @@ from scipy.optimize import nnls
 from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
 from enumsol.proof.leaves import Excluded, Unbalanced
 from enumsol.relaxation.space_relaxation import SpaceEngine
-from enumsol.search.floating_solvers import weakly_held
+from enumsol.search.setup import weakly_held
 from enumsol.search.space.space_newton import Isotropic
 from enumsol.search.space.space_search import SpaceSplitting
 from enumsol.search.splitting import ImposedRows

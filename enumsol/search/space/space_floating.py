@@ -18,7 +18,7 @@ from enumsol.proof.records import DeclaredForm
 from enumsol.relaxation.engine import PRUNE_MARGIN
 from enumsol.search.certifiers.protocol import Bound, Certifier, Refine, UndecidedPart, Unrecorded
 from enumsol.search.closing import TreeCloser
-from enumsol.search.floating_solvers import WEAK, weakly_held
+from enumsol.search.setup import WEAK, weakly_held
 from enumsol.search.space.space_references import reference_numbers, space_closer
 from enumsol.search.space.space_search import SpaceCertifier
 from enumsol.search.space.space_setup import SpaceSolvers
