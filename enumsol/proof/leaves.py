@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from enumsol.trusted.reference import Reference
     from enumsol.trusted.space.pieces import AlphaPiece
     from enumsol.trusted.space.product_forms import Ellipsoid
-    from enumsol.trusted.space.sector_rows import SlipForm
+    from enumsol.trusted.space.sector_margins import SlipForm
     from enumsol.trusted.space.space_uniqueness import LeafReference
     from enumsol.trusted.uniqueness import ClosedSolution
 
@@ -120,7 +120,7 @@ class Excluded(Record):
         """
         if not isinstance(self.rows, list):
             return exclusion_margin(cast("Any", within), codes, self.rows, self.values, errors) > 0
-        from enumsol.trusted.space.resultants import space_margin  # in 3D only
+        from enumsol.trusted.space.sector_margins import space_margin  # in 3D only
 
         return space_margin(cast("Any", within), codes, self.rows, self.values, errors) > 0
 

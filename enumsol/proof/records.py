@@ -214,7 +214,7 @@ class DeclaredForm(Record):
     codes : of the assignment for which it is made, or of the leaf that holds the root
     numbers : array
         For a body that is held, in 2D the four rows of its multipliers one after the other; in 3D those of
-        ``trusted.quadratic_forms.SlipForm`` over the whole tree, else those of ``product_forms.Ellipsoid``. For
+        ``sector_margins.SlipForm`` over the whole tree, else those of ``product_forms.Ellipsoid``. For
         other bodies those of ``trusted.reference.Reference`` or ``trusted.space.space_uniqueness.LeafReference``.
     more : array
         In 2D the weight of the equations; of an ellipsoid a point near its centre; of a root balance and share.
@@ -293,7 +293,7 @@ class DeclaredForm(Record):
                 return Reference.of(system, self.codes, self.numbers, *self.more.tolist())
             return EnclosedForm.of(system, self.codes, self.numbers.reshape(4, -1), float(self.more[0]))
         from enumsol.trusted.space.product_forms import Ellipsoid  # in 3D only
-        from enumsol.trusted.space.sector_rows import SlipForm
+        from enumsol.trusted.space.sector_margins import SlipForm
         from enumsol.trusted.space.space_uniqueness import LeafReference
 
         given = cast("EnclosedSpace", system)

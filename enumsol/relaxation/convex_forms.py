@@ -24,7 +24,8 @@ from enumsol.relaxation.imposed_rows import row_normals
 from enumsol.relaxation.space_relaxation import SpaceRelaxation
 from enumsol.support.deadlines import look
 from enumsol.trusted.quadratic_forms import EnclosedForm, Equations
-from enumsol.trusted.space.sector_rows import SlipForm, sector_row_terms
+from enumsol.trusted.space.sector_margins import SlipForm
+from enumsol.trusted.space.sector_rows import sector_row_terms
 from enumsol.trusted.status_rows import CONTACT, UNDECIDED
 
 if TYPE_CHECKING:

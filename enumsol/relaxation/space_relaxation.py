@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from enumsol.condensation.space_condensed import SpaceSystem
     from enumsol.relaxation._active_set import QPData, QPState
     from enumsol.support.array_types import Codes, Floats, Indices
-    from enumsol.trusted.space.sector_rows import SlipForm
+    from enumsol.trusted.space.sector_margins import SlipForm
 
     Children = dict[tuple[int, ...], "SpaceRelaxation"]
 

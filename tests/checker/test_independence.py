@@ -25,7 +25,7 @@ def inside(room, *modules):
 CHECKERS = inside("checker", "verify", "plane_checker", "graph_checker", "history_checker", "space_graph")
 IN_SPACE = {
     *("enumsol.checker.space_checker", "enumsol.condensation.space_condensed", "enumsol.model.sectors"),
-    *inside("trusted.space", "resultants", "sector_rows", "leaves", "boxed_solution"),
+    *inside("trusted.space", "resultants", "sector_margins", "sector_rows", "leaves", "boxed_solution"),
     *inside("trusted.space", "product_forms", "natural_map", "krawczyk", "space_uniqueness", "turning"),
     *inside("trusted.space", "leaf_conditions", "leaf_equations"),
 }
@@ -67,6 +67,7 @@ SHARED = {
     "trusted.precise_at_alpha": {"PreciseAtAlpha"},
     "trusted.quadratic_forms": {"EnclosedForm", "Equations", "QuadraticForm"},
     "trusted.status_rows": None,
+    "trusted.space.sector_margins": {"SlipForm"},
     "trusted.space.sector_rows": None,
     "trusted.space.leaf_equations": {"with_free_bounds"},
     "trusted.space.leaves": None,

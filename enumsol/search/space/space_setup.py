@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.support.array_types import Alpha, Codes, Floats
-    from enumsol.trusted.space.sector_rows import SlipForm
+    from enumsol.trusted.space.sector_margins import SlipForm
 
 #: A form is used where it leaves no more than this share of the gap to the pruning bound at the root of the tree.
 _SHARE = 0.25
