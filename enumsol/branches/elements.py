@@ -289,12 +289,12 @@ class Branch:
         """True if it is a sheet."""
         return any(arc.dimension for arc in self.arcs)
 
-    @property
-    def shape(self) -> str:
-        """Shape in a word: sheet, loop, path, or unfinished where something at it was left open."""
-        if self.sheet or self.closed:
-            return "sheet" if self.sheet else "loop"
-        return "unfinished" if any(v.kind is VertexKind.UNSETTLED for v in self.vertices) else "path"
+
+def shape_of(branch: Branch) -> str:
+    """Shape of a branch in a word: sheet, loop, path, or unfinished where something at it was left open."""
+    if branch.sheet or branch.closed:
+        return "sheet" if branch.sheet else "loop"
+    return "unfinished" if any(v.kind is VertexKind.UNSETTLED for v in branch.vertices) else "path"
 
 
 #: What networkx's graph shows of vertices and arcs.

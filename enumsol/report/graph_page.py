@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from enumsol.branches.claims import ranges_text
-from enumsol.branches.elements import Arc, Vertex, VertexKind
+from enumsol.branches.elements import Arc, Vertex, VertexKind, shape_of
 from enumsol.branches.figures.curves import QUANTITIES, Curve, curves, side_by_side
 from enumsol.branches.figures.panels import colour_of, family_states
 from enumsol.model.problem import ContactProblem
@@ -102,7 +102,7 @@ def _branches(graph: BranchGraph) -> str:
         lo, hi = branch.interval
         folds = ", ".join(f"{v.alpha:.8g}" for v in branch.folds)
         indices = ", ".join(sorted({"?" if arc.index is None else f"{arc.index:+d}" for arc in branch.arcs}))
-        shape = "sheet (a continuum over an interval)" if branch.sheet else branch.shape
+        shape = "sheet (a continuum over an interval)" if branch.sheet else shape_of(branch)
         cells = (str(branch.number), f"{lo:.8g}", f"{hi:.8g}", shape, str(len(branch.arcs)), indices, folds)
         rows.append((f' data-branch="{branch.number}" tabindex="0"', cells))
     if not rows:
