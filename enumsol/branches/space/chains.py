@@ -43,7 +43,7 @@ _SHORTEST = 1e-7
 #: Which share of what seems possible is taken at first as the way between two joints, and how the way shrinks at least:
 #: with more of the first boxes fail more often, with less they are many.
 _TRUST, _SHRINK = 0.95, 0.5
-#: How far a skeleton is prolonged beyond the interval, relative to its last step: with more, boxes there are for nothing.
+#: How far a skeleton is prolonged beyond the interval, relative to its last step: more only takes time.
 _BEYOND = 0.05
 
 
