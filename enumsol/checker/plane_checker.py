@@ -150,7 +150,7 @@ class Checker(TreeChecker[EnclosedSystem, "VerifiedSelection | ClosedSolution | 
                 self.fail(f"leaf {number}: its {form}multipliers do not exclude it")
 
     def _excludes(self, leaves: Leaves) -> Mask:
-        """Which assignments hold no solution, if possible without the bound of the rigid displacement."""
+        """Mask of assignments without a solution, if possible without the bound of the rigid displacement."""
         proven = exclusion_margins(self.free, leaves) > 0
         if not self.problem.held and not np.all(proven):
             self.bounded = True
@@ -305,7 +305,7 @@ class Checker(TreeChecker[EnclosedSystem, "VerifiedSelection | ClosedSolution | 
         return [sum((a * x for a, x in zip(form, numbers, strict=True)), constant) for form, constant in rows]
 
     def _rests_on_reach(self, codes: Codes, points: Sequence[Sequence[Fraction]]) -> bool:
-        """Whether what a selection holds may be other without the bounds of the rigid displacement."""
+        """True if a selection may hold more without the bounds of the rigid displacement."""
         return not self.problem.held and self.rational.rests_on_reach(codes, points)  # type: ignore[attr-defined]
 
     def _excluded_in_rationals(self, codes: Codes, said: kinds.Excluded) -> str | None:

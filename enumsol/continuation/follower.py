@@ -26,8 +26,7 @@ from enumsol.continuation.transitions import (
 )
 from enumsol.errors import InvalidArgumentError, TooLargeError
 from enumsol.search.outcome import Stop, StopReason
-from enumsol.support.deadlines import look
-from enumsol.support.keeping import keeping
+from enumsol.support.deadlines import keeping, look
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:
@@ -35,7 +34,7 @@ if TYPE_CHECKING:
 
     from enumsol.continuation.start import Start
     from enumsol.support.array_types import Floats
-    from enumsol.support.keeping import Ending
+    from enumsol.support.deadlines import Ending
 
 _Path = TypeVar("_Path", bound=PathData)
 #: How a path ended, and why in a sentence.

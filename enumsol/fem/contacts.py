@@ -11,9 +11,9 @@ import scipy.sparse as sp
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.fem.assembly import outward_normal, pressed
-from enumsol.fem.conditions import Held, Obstacle, names_of
+from enumsol.fem.conditions import Obstacle, names_of
 from enumsol.fem.meshes import unit_vectors
-from enumsol.fem.restrained import ContactRows, means_of_nodes, movable
+from enumsol.fem.restrained import ContactRows, Supports, means_of_nodes, movable
 from enumsol.model.cells import KINDS, boundary_facets, contact_nodes, facet_rows
 from enumsol.support.arguments import finite_number, shown
 
@@ -156,7 +156,7 @@ class Contacts:
     groups: list[Group]
 
 
-def contacts_of(body: NodalBasis, mesh: PartedMesh, options: Options, held: Held) -> Contacts:
+def contacts_of(body: NodalBasis, mesh: PartedMesh, options: Options, held: Supports) -> Contacts:
     """Contact nodes on the facets of parts, and of the first part of every pair.
 
     A node that several of them share belongs to the contact parts, or to the first pair.
@@ -222,7 +222,7 @@ def _group(
     mesh: PartedMesh,
     parts: list[str],
     facets: Integers,
-    held: Held,
+    held: Supports,
     obstacle: object,
     pair: Pair | None,
     taken: Integers,
@@ -232,7 +232,7 @@ def _group(
     touching = along(facets) if dimension == 2 else np.unique(contact_nodes(dimension, facets))
     shared = int(np.sum(np.isin(touching, taken)))
     touching = touching[~np.isin(touching, taken)]
-    if pair is None and np.all(held.supports.fixed[touching]):
+    if pair is None and np.all(held.fixed[touching]):
         raise InvalidArgumentError("contact has no node that clamp or displacement leave free; expected some")
     if not len(touching):
         raise InvalidArgumentError(
@@ -255,14 +255,14 @@ def _group(
                 f"expected {given.expected}"
             )
     if pair is None:
-        nodes = movable(touching, normals, held.supports)
+        nodes = movable(touching, normals, held)
         return nodes, gaps[nodes.kept], Group(parts, None, own[nodes.kept], len(nodes.nodes))
     rows, gaps, group = _paired(body, mesh, touching, normals, held, pair)
     return rows, gaps, replace(group, shared=shared)
 
 
 def _paired(
-    body: NodalBasis, mesh: PartedMesh, touching: Integers, normals: Floats, held: Held, pair: Pair
+    body: NodalBasis, mesh: PartedMesh, touching: Integers, normals: Floats, held: Supports, pair: Pair
 ) -> tuple[ContactRows, Floats, Group]:
     """Nodes that face the other part of a pair, relative to it."""
     facets = _facets(body, mesh, [pair.master])
@@ -280,7 +280,7 @@ def _paired(
     missed = int(np.sum(~found))
     touching, normals = touching[found], normals[found]
     means = sp.csr_array(means_of_nodes(touching, len(mesh.points)) - weights)
-    nodes = movable(touching, normals, held.supports, means)
+    nodes = movable(touching, normals, held, means)
     gaps = distances if pair.gap is None else np.full(len(touching), pair.gap)
     return nodes, gaps[nodes.kept], Group([pair.slave], pair, normals[nodes.kept], len(nodes.nodes), missed)
 

@@ -56,7 +56,7 @@ def scene_of(source: PartedMesh | str | os.PathLike[str] | Any, options: Options
     coefficients = lame_of(mesh, options)
     thickness = thickness_of(mesh, options.thickness)
     body = replace(nodal_basis(mesh.points, mesh.cells, labels=mesh.labels), thickness=thickness)
-    held = conditions.Held.of(mesh, options)
+    held = conditions.supports_of(mesh, options)
     contacts = contacts_of(body, mesh, options, held)
     forces = conditions.part_forces(body, mesh, options.load, options.pressure)
     if options.body_force is not None:

@@ -42,10 +42,13 @@ class Supports:
     fixed : (N, dimension) bool array
     values : (N, dimension) array
         Displacements of the fixed components, 0 elsewhere [length].
+    mirrored : (N, dimension) bool array
+        Components across a plane of symmetry, where that is known.
     """
 
     fixed: Mask
     values: Floats
+    mirrored: Mask
 
 
 @dataclass(frozen=True)
@@ -163,7 +166,7 @@ class Body:
             A = sp.csc_array(A + sp.diags_array(spring_stiffnesses(springs, held.shape).ravel()))
         f = nodal_vectors(forces, "forces", held.shape)
         load_slope = None if slope is None else nodal_vectors(slope, "forces_slope", held.shape)
-        return cls(A, f, load_slope, Supports(held, np.zeros(held.shape)))
+        return cls(A, f, load_slope, Supports(held, np.zeros(held.shape), np.zeros_like(held)))
 
 
 def displacements_along(means: sp.csr_array, directions: Floats, dofs: Integers, left: Integers) -> sp.csr_array:

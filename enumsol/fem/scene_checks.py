@@ -230,7 +230,7 @@ def _nodes_of(mesh: PartedMesh, group: Group) -> Mask:
 def _turning(scene: Scene) -> list[str]:
     """Notes on pairs of a body that could roll, whose normals turn along the contact more than what they face does."""
     mesh, notes, first = scene.mesh, [], 0
-    hold = holding(scene.held.supports, sp.csc_array(scene.springs.shape))
+    hold = holding(scene.held, sp.csc_array(scene.springs.shape))
     loose = np.any([piece.nodes for piece in scene.pieces if piece.free_motions(mesh.points, hold)], axis=0)
     for group in scene.contacts.groups:
         rows, first = scene.contacts.rows.means[first : first + group.count], first + group.count
@@ -284,7 +284,7 @@ def _alone(scene: Scene) -> list[str]:
 
 def _rest(scene: Scene) -> list[str]:
     """Nothing that acts on the bodies."""
-    acting = np.any(scene.forces) or np.any(scene.slope) or np.any(scene.held.supports.values)
+    acting = np.any(scene.forces) or np.any(scene.slope) or np.any(scene.held.values)
     if acting or np.any(scene.gaps < 0):
         return []
     return ["nothing acts on the body: it has no load, press fit or given displacement, and rests"]
@@ -364,7 +364,7 @@ def _units(scene: Scene) -> list[str]:
                 f"the {name} would strain the body by about {strain:.2g}, which is next to nothing; are young and the "
                 f"{name} in the same units?"
             )
-    moved = float(np.max(np.abs(scene.held.supports.values)))
+    moved = float(np.max(np.abs(scene.held.values)))
     if moved > 0.25 * extent:
         notes.append(
             f"a displacement of {moved:.3g} is given, which is not small beside the extent {extent:.3g} of the body"

@@ -16,7 +16,7 @@ from enumsol.fem.bases import NodalBasis
 from enumsol.fem.conditions import FRICTION, Options
 from enumsol.fem.contacts import Contacts, Group
 from enumsol.fem.meshes import PartedMesh, unit_vectors
-from enumsol.fem.restrained import Body, axes_of, problem_of
+from enumsol.fem.restrained import Body, Supports, axes_of, problem_of
 from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines
 from enumsol.model.mesh import BodyMesh
 from enumsol.model.problem import given_friction
@@ -52,7 +52,7 @@ class Scene:
     mesh : PartedMesh
     options : Options
     body : NodalBasis
-    held : Held
+    held : Supports
     contacts : Contacts
     forces, slope : (N, d) arrays
         On all nodes, and their derivatives with respect to alpha [force].
@@ -67,7 +67,7 @@ class Scene:
     mesh: PartedMesh
     options: Options
     body: NodalBasis
-    held: conditions.Held
+    held: Supports
     contacts: Contacts
     forces: Floats
     slope: Floats
@@ -119,7 +119,7 @@ class Scene:
     @cached_property
     def hold(self) -> sp.csc_array:
         """A stiffness of supports and springs, (d N, d N)."""
-        return conditions.holding(self.held.supports, self.springs)
+        return conditions.holding(self.held, self.springs)
 
     def uses(self, part: str) -> list[str]:
         """Uses of a part of the boundary, as the options name it."""
@@ -150,7 +150,7 @@ class Scene:
         InvalidArgumentError, InvalidProblemError
             As `mesh_problem`.
         """
-        mesh, contacts, supports = self.mesh, self.contacts, self.held.supports
+        mesh, contacts, supports = self.mesh, self.contacts, self.held
         nodes = contacts.rows
         surface = contacts.facets if any(group.pair is not None for group in contacts.groups) else None
         more: dict[str, Any] = {}

@@ -21,7 +21,7 @@ from enumsol.fixed_points.tresca_newton import TrescaData, TrescaNotFeasible, Tr
 from enumsol.model.problem3d import ContactProblem3D, warn_of_jumps
 from enumsol.support.arguments import optional_callable, positive_integer, positive_number
 from enumsol.support.array_arguments import real_array
-from enumsol.support.keeping import keeping
+from enumsol.support.deadlines import keeping
 from enumsol.support.messages import counted
 
 if TYPE_CHECKING:

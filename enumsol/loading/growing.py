@@ -35,7 +35,7 @@ from enumsol.roots.enumerate import enumerate_roots
 from enumsol.roots.root import Root
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.support import arguments
-from enumsol.support.keeping import keeping
+from enumsol.support.deadlines import keeping
 from enumsol.support.messages import counted
 from enumsol.support.workers import workers_of
 
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from enumsol.model.problem3d import AnyProblem
     from enumsol.roots.root_set import RootSet
     from enumsol.support.array_types import Alpha
-    from enumsol.support.keeping import Ending
+    from enumsol.support.deadlines import Ending
 
     #: Of a parent's root (None in the first step) and the roots of the next step, those that are followed.
     Choice = Callable[[Root | None, RootSet], Any]

@@ -19,8 +19,8 @@ from enumsol.model.problem import ContactProblem
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.support import arguments
 from enumsol.support.array_arguments import vector_of
+from enumsol.support.deadlines import keeping
 from enumsol.support.immutable import Immutable, Listed
-from enumsol.support.keeping import keeping
 from enumsol.support.messages import counted
 from enumsol.support.plotting import area_entry, axes_of, checked_units, figure_of, in_units, kept, line_entry
 from enumsol.support.workers import spread, workers_of

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from enumsol.trusted.reference import Reference
     from enumsol.trusted.space.pieces import AlphaPiece
     from enumsol.trusted.space.product_forms import Ellipsoid
-    from enumsol.trusted.space.sector_rows import SlipForm
+    from enumsol.trusted.space.sector_margins import SlipForm
     from enumsol.trusted.space.space_uniqueness import LeafReference
     from enumsol.trusted.uniqueness import ClosedSolution
 
@@ -120,7 +120,7 @@ class Excluded(Record):
         """
         if not isinstance(self.rows, list):
             return exclusion_margin(cast("Any", within), codes, self.rows, self.values, errors) > 0
-        from enumsol.trusted.space.resultants import space_margin  # in 3D only
+        from enumsol.trusted.space.sector_margins import space_margin  # in 3D only
 
         return space_margin(cast("Any", within), codes, self.rows, self.values, errors) > 0
 
@@ -141,7 +141,7 @@ class Excluded(Record):
 
 @dataclass(frozen=True, eq=False)
 class Unbalanced(Record):
-    """Of a body that nothing holds: no forces below the assignment are in balance with its load."""
+    """No forces below the assignment are in balance with the load, of a body that nothing holds."""
 
     kind, sizes, trees = "i", (2,), Tree.FLOATING
 
@@ -171,7 +171,7 @@ class Solved(Record):
 
     @classmethod
     def read(cls, record: list[Any], limits: Limits) -> Any:
-        """As of any record, once the assignment is complete."""
+        """A leaf of this kind, once the assignment is complete."""
         check_complete(limits.codes)
         return super().read(record, limits)
 
@@ -465,7 +465,7 @@ class OnlyReference(ClosingRecord):
         return cls(back, equations, said, EnclosureRecord(*enclosure) if enclosure else None)
 
     @staticmethod
-    def _row(row: Any, limits: Limits) -> Any:
+    def _row(row: object, limits: Limits) -> Any:
         if limits.in_space:
             return checked_row(row, limits.p)
         if type(row) is not int or not 0 <= row < ROW_KINDS * limits.p:

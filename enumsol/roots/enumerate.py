@@ -20,8 +20,7 @@ from enumsol.search.solvers import Arithmetic, Solvers
 from enumsol.selections.float_selections import SIGN_TOLERANCE
 from enumsol.selections.solution import SelectionSolution, SelectionSolver
 from enumsol.support import arguments
-from enumsol.support.deadlines import Deadline, TimeOverError, within
-from enumsol.support.keeping import keeping
+from enumsol.support.deadlines import Deadline, TimeOverError, keeping, within
 from enumsol.support.messages import counted
 from enumsol.support.workers import workers_of
 
@@ -35,7 +34,7 @@ if TYPE_CHECKING:
     from enumsol.model.problem3d import AnyProblem, ContactProblem3D
     from enumsol.roots.root import Root, RootFamily
     from enumsol.support.array_types import Alpha, AlphaLike, Codes
-    from enumsol.support.keeping import Ending
+    from enumsol.support.deadlines import Ending
 
 
 Method = Literal["tree", "exhaustive"]
@@ -140,7 +139,8 @@ def enumerate_roots(
     seconds, tolerance = arguments.optional_seconds(time_limit), arguments.share(tolerance)
     if _is_in_space(problem):
         # not for problems in 2D
-        from enumsol.roots.space_roots import SpaceEnumeration, check_supported, solvers_in_space
+        from enumsol.roots.space_roots import SpaceEnumeration, check_supported
+        from enumsol.search.space.space_setup import SpaceSolvers
 
         check_supported(arithmetic, method, engine)
     _check_proof(arithmetic, method, proof_path, resume)
@@ -154,7 +154,7 @@ def enumerate_roots(
         try:
             with within(Deadline.after(started, seconds)):
                 if _is_in_space(problem):
-                    in_space = solvers_in_space(problem, value, arithmetic)
+                    in_space = SpaceSolvers(problem, value, arithmetic)
                     _ = in_space.enclosed  # before a file is begun
                     search = SpaceEnumeration(in_space, progress, proof_path, resumed=resume, started=started)
                 else:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from enumsol.roots.root import RootFamily
     from enumsol.search.tree import TreeSearch
     from enumsol.support.array_types import Alpha, Codes
-    from enumsol.support.keeping import Ending
+    from enumsol.support.deadlines import Ending
 
 _Solvers = TypeVar("_Solvers", bound=SearchSetup)
 

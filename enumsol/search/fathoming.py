@@ -40,7 +40,7 @@ _FEW, _LONG = 48, 512
 
 
 class Closer(TreeCloser):
-    """Which nodes of the tree are worth a try: all where tries succeed, fewer and fewer where they fail.
+    """Tries to close nodes of the tree: all where tries succeed, fewer and fewer where they fail.
 
     The whole problem comes first, before there is a tree. Where plain numbers fail and nodes are few, numbers are
     sought only when the tree has turned out to be long: that costs as much as many of its nodes.

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from enumsol.condensation.condensed import ScaledSystem
+    from enumsol.relaxation.active_set import IntervalSystem
     from enumsol.relaxation.engine import Engine
-    from enumsol.relaxation.interval_relaxation import IntervalSystem
     from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.quadratic_forms import EnclosedForm, QuadraticForm
 
@@ -90,7 +90,7 @@ def plane_forms(scaled: ScaledSystem, enclosed: EnclosedSystem) -> Forms:
         return ascended(scaled, enclosed, engine, codes, rows) if isinstance(engine, ActiveSetEngine) else None
 
     def bounding(engine: Engine, form: EnclosedForm) -> Engine | None:
-        return engine.bounding(scaled, form) if isinstance(engine, ActiveSetEngine) else None
+        return engine.bounding(form) if isinstance(engine, ActiveSetEngine) else None
 
     return Forms(better, bounding, NODES)
 

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from enumsol.model.statuses import UNDECIDED
-from enumsol.relaxation.interval_relaxation import IntervalSystem
+from enumsol.relaxation.active_set import IntervalSystem
 from enumsol.search.interval_tree import LARGEST_TREE, EmptyLeaf, SubintervalTree, Subtree, TreeResult
 from enumsol.search.outcome import Stop, StopReason
 from enumsol.search.setup import WEAK

@@ -1,4 +1,4 @@
-"""What exclusions over an interval of alpha are proven with (theory, section 7.9).
+"""Data and forms of exclusions over an interval of alpha (theory, section 7.9).
 
 With fixed multipliers the dual bound is concave in alpha: constraint normals are constant (friction enters by its
 extreme values) and right-hand sides affine. Positive at both ends, it is positive in between, and a partial assignment

@@ -231,13 +231,31 @@ class RootForm:
         if not np.all(np.isfinite(lost)):
             return None
         cost[: len(off)] = np.where(closed, np.maximum(numbers.price(force).low / SAFE, 0.0), 0.0)
+        return cls.factored((S, G), numbers.form(S), numbers.cross(G, share), lost, cost, balance)
+
+    @classmethod
+    def factored(
+        cls, body: tuple[Ball, Ball], form: Ball, C: Ball, lost: Floats, cost: Floats, balance: float
+    ) -> Self | None:
+        """By D'S and C = -G (D - c) as matrices.
+
+        Parameters
+        ----------
+        body : S and G
+        form, C : Balls of shapes (m, m) and (r, m), with exact zeros
+        lost : (m,) array
+            Where theta is not known exactly, for each of its components kappa times how far it may be off, otherwise 0.
+        cost : (m,) array
+        balance : not negative
+        """
+        S, G = body
         weighted = G * Ball.exact(np.array(np.sqrt(balance)))
-        Q = (numbers.form(S) + weighted.T @ weighted).symmetric
+        Q = (form + weighted.T @ weighted).symmetric
         smallest = _least(Q)
         if not smallest > 0:
             return None
         # m |d|^2 is left out of what is factorized
-        m, C = 0.5 * smallest, numbers.cross(G, share)
+        m = 0.5 * smallest
         table = _table(Ball.joined(S, C), Q - Ball.exact(m * np.eye(len(Q.mid))), m / SAFE)
         along, turned = (float(upper_norm(lost * _sizes(rows))) for rows in (S, G.T))
         if table is None or not along <= 0.25 * m / SAFE:

@@ -25,7 +25,7 @@ def inside(room, *modules):
 CHECKERS = inside("checker", "verify", "plane_checker", "graph_checker", "history_checker", "space_graph")
 IN_SPACE = {
     *("enumsol.checker.space_checker", "enumsol.condensation.space_condensed", "enumsol.model.sectors"),
-    *inside("trusted.space", "resultants", "sector_rows", "leaves", "boxed_solution"),
+    *inside("trusted.space", "resultants", "sector_margins", "sector_rows", "leaves", "boxed_solution"),
     *inside("trusted.space", "product_forms", "natural_map", "krawczyk", "space_uniqueness", "turning"),
     *inside("trusted.space", "leaf_conditions", "leaf_equations"),
 }
@@ -65,8 +65,9 @@ SHARED = {
     "trusted.uniqueness": {*("ClosedSolution", "closed_solution", "numbers_of", "only_solution", "same_solution")},
     "trusted.at_alpha": {"VerifiedSelection", "settled_selection", "solve_selection"},
     "trusted.precise_at_alpha": {"PreciseAtAlpha"},
-    "trusted.quadratic_forms": {"EnclosedForm", "Equations"},
+    "trusted.quadratic_forms": {"EnclosedForm", "Equations", "QuadraticForm"},
     "trusted.status_rows": None,
+    "trusted.space.sector_margins": {"SlipForm"},
     "trusted.space.sector_rows": None,
     "trusted.space.leaf_equations": {"with_free_bounds"},
     "trusted.space.leaves": None,
@@ -161,7 +162,7 @@ def test_no_module_of_the_search_is_imported_however_indirectly():
 
 
 def test_the_guard_sees_the_search_where_it_is():
-    users = (["enumsol.branches.construction"], ["enumsol.gallery", "enumsol.cli.verify", "enumsol.roots.root_set"])
+    users = (["enumsol.branches.construction"], ["enumsol.gallery", "enumsol.cli.audit", "enumsol.roots.root_set"])
     assert all(any(map(is_search, closure_of(modules))) for modules in users)
     assert all(map(path_of, SEARCH))
 
@@ -247,9 +248,9 @@ def test_a_proof_in_space_loads_no_more_than_the_checker(tmp_path):
 
 
 def test_the_claims_point_at_the_one_place():
-    from enumsol.cli import verify
+    from enumsol.cli import audit
 
     readme = ROOT.parent / "README.md"
-    for text in (verify.verify.__doc__, *([readme.read_text()] if readme.is_file() else [])):
+    for text in (audit.verify.__doc__, *([readme.read_text()] if readme.is_file() else [])):
         assert "shares no code" not in text
         assert "enumsol.checker" in text

@@ -6,7 +6,16 @@ import numpy as np
 import oracles3d
 import pytest
 from effort import some
-from problems3d import degenerate_integers, exactly, forces, from_compliance, random_coupled, scaled
+from problems3d import (
+    SLIDING,
+    degenerate_integers,
+    exactly,
+    forces,
+    from_compliance,
+    random_coupled,
+    scaled,
+    sliding_node,
+)
 from space_proofs import RANDOM, random_problem
 
 from enumsol import enumerate_roots
@@ -188,6 +197,33 @@ def test_boxes_that_are_none():
         with np.errstate(all="ignore"):
             assert solution_in_box(system, Box.of(system, *numbers)) is None
     assert box_around(system, np.full(len(c), np.nan)) is None
+
+
+@pytest.mark.parametrize(("alpha", "size"), [(0.5, 1.5), (1.0, 0.1875)])
+def test_both_components_of_tau_have_one_rho(alpha, size):
+    """With two the natural map has another zero, which is no solution (theory, (12.10))."""
+    solvers = SpaceSolvers(SLIDING, alpha, "verified")
+    (rho, _), radius = proposed_rho(solvers.enclosed), np.full(3, size)
+    y, zero = (scaled(solvers.system, sliding_node(alpha, ratio)) for ratio in (1.0, 8.0))
+    one = solution_in_box(solvers.enclosed, Box.of(solvers.enclosed, y, radius, rho))
+    assert np.all(np.abs(one.y.mid - y) <= one.y.rad + 1e-12)
+    assert np.max(np.abs(zero - y)) > 0.1
+    for centre in (y, zero):
+        for factors in ([1, 1, 8], [1, 0.125, 1], [1, 1, 1 + 2.0**-52]):
+            assert solution_in_box(solvers.enclosed, Box.of(solvers.enclosed, centre, radius, rho * factors)) is None
+
+
+def test_components_in_other_units_have_one_rho_in_the_problems_own():
+    """A small coefficient along one axis, so that the units of both components differ."""
+    problem = from_compliance(np.diag([1.0, 2.0, 4.0]), np.array([1.0, 3.0, 4.0]), ([0.5], [2.0**-12]))
+    solvers = SpaceSolvers(problem, 0.0, "verified")
+    assert len(set(solvers.system.unit)) == 2
+    box = box_around(solvers.enclosed, scaled(solvers.system, forces(enumerate_roots(problem, 0)[0])))
+    rho = box.rho * solvers.system.unit**2
+    assert (rho[1] == rho[2], box.rho[1] == box.rho[2]) == (True, False)
+    assert solution_in_box(solvers.enclosed, box) is not None
+    same = Box.of(solvers.enclosed, box.centre, box.radius, box.rho[[0, 1, 1]])
+    assert solution_in_box(solvers.enclosed, same) is None
 
 
 def test_which_solutions_are_the_same():

@@ -18,7 +18,8 @@ from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.space.leaf_equations import Leaf, slopes_by_second
 from enumsol.trusted.space.leaves import Open, SpaceRoot
 from enumsol.trusted.space.pieces import AlphaPiece, lie_along
-from enumsol.trusted.space.sector_rows import CONTACT, OPEN, STICK, UNDECIDED, row_sign, sector_margin, sector_row_terms
+from enumsol.trusted.space.sector_margins import space_margin
+from enumsol.trusted.space.sector_rows import CONTACT, OPEN, STICK, UNDECIDED, row_sign, sector_row_terms
 from enumsol.trusted.space.solution_curve import AlphaProblem
 
 LOW, HIGH = Fraction(1, 4), Fraction(1, 2)
@@ -105,7 +106,7 @@ def test_the_same_multipliers_at_both_ends_prove_the_least_minimum_over_a_piece(
         size = 1.0 + abs(min(ends))
         assert min(inside) >= min(ends) - 1e-9 * size
         for end, bound in zip(piece.ends, ends, strict=True):
-            assert bound - 1e-6 * size <= sector_margin(end, codes, rows, values) <= bound + 1e-9 * size
+            assert bound - 1e-6 * size <= space_margin(end, codes, rows, values) <= bound + 1e-9 * size
         assert (piece.margin(codes, rows, (values, values)) > 0) == (min(ends) > 0)
 
 

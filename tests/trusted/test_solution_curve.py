@@ -10,6 +10,7 @@ from problems3d import SLIDING, forces, from_compliance, random_compliance, slid
 import enumsol
 from enumsol.arithmetic.balls import Ball
 from enumsol.branches.space.pieces import status_margin
+from enumsol.condensation.enclosure import NotEnclosedError
 from enumsol.search.space.curve_proposals import (
     border_of_forces,
     border_of_zeta,
@@ -22,6 +23,7 @@ from enumsol.trusted.space.sector_rows import OPEN, STICK
 from enumsol.trusted.space.solution_curve import (
     SLIP,
     AlphaProblem,
+    CurveBox,
     lies_in,
     only_curve,
     parameter_in,
@@ -161,6 +163,29 @@ def test_what_is_no_box_is_refused(box):
     others = {"half": -1.0}, {"half": np.nan}, {"radius": 0 * box.radius}, {"rho": -box.rho}, {"centre": box.centre[1:]}
     for wrong in others:
         assert only_curve(GIVEN, replace(box, **wrong)) is None
+
+
+def test_both_components_of_a_tangential_force_have_one_step():
+    """With two the natural map has another curve of zeros, which are no solutions (theory, (12.16))."""
+
+    def found(ratio, steps):
+        low, x, high = (placed(GIVEN, np.append(sliding_node(alpha, ratio), alpha)) for alpha in (0.49, 0.5, 0.51))
+        box = CurveBox(x, (high - low) / 0.02, np.eye(4)[3], 0.01, np.full(4, 0.05), np.array(steps))
+        return only_curve(GIVEN, box)
+
+    for steps in ([1.0, 1.0, 1.0], [2.0, 1.5, 1.5]):
+        at = found(1.0, steps).at(0.0)
+        assert np.all(np.abs(at.mid - sliding(0.5)) <= at.rad + 1e-12)
+    for ratio in (1.0, 8.0):
+        for steps in ([1.0, 1.0, 8.0], [1.0, 0.125, 1.0], [1.0, 1.0, 1.0 + 2.0**-52]):
+            assert found(ratio, steps) is None
+
+
+def test_steps_of_the_coordinates_that_are_none():
+    for factors in ([1, 1, 8], [1, 0.125, 1], [0, 1, 1], [1, -1, -1], [np.nan, 1, 1], [np.inf, 1, 1]):
+        with pytest.raises(NotEnclosedError, match=r"steps|told apart"):
+            AlphaProblem.of(SLIDING.enclosure, GIVEN.steps * factors)
+    assert AlphaProblem.of(SLIDING.enclosure, GIVEN.steps * [3, 2, 2]).steps == pytest.approx(GIVEN.steps * [3, 2, 2])
 
 
 def test_a_fold_lies_in_a_box():

@@ -1,4 +1,4 @@
-"""What excludes assignments in balls, with records of a proof (theory, sections 6.2 and 14.4)."""
+"""Exclusions of assignments in balls, as records of a proof (theory, sections 6.2 and 14.4)."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def proven(margin: Margin, codes: Codes, rows: Indices, values: Floats) -> Float
 
 
 class Exclusions:
-    """What excludes assignments; of a body that nothing holds if possible without a bound of its rigid displacement.
+    """Exclusions of assignments; of a body that nothing holds if possible without a bound of its rigid displacement.
 
     Parameters
     ----------

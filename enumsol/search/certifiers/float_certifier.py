@@ -1,4 +1,4 @@
-"""What each arithmetic lets the tree conclude: prunings accepted, complete selections decided."""
+"""The certifier of arithmetic "fast": prunings accepted, complete selections decided in floats."""
 
 from __future__ import annotations
 

@@ -66,7 +66,7 @@ class Refine:
 
 @dataclass
 class Escalations:
-    """How many selections and prunings needed which arithmetic.
+    """Counts of the selections and prunings that needed each arithmetic.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class Escalations:
 
 @dataclass(frozen=True)
 class Certified:
-    """What a certifier has proven; of one that writes no proof, nothing.
+    """Conclusions of a certifier; of one that writes no proof, nothing.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ class Certified:
 
 
 class Bound(Protocol):
-    """What a relaxation, or a record of an earlier proof, says of a partial assignment without a solution."""
+    """Multipliers of a relaxation, or of a record of an earlier proof, for an assignment without a solution."""
 
     @property
     def bound(self) -> float:
@@ -224,7 +224,7 @@ class Certifier(ABC):
 
     @property
     def certified(self) -> Certified:
-        """What was proven so far."""
+        """Conclusions so far."""
         return Certified(self._verified, self._escalations, self._leaves, self.sliding, self.bounded)
 
     def branching(self, node: int, children: Sequence[int]) -> None:
@@ -258,7 +258,7 @@ class Certifier(ABC):
         self._declared.clear()
 
     def _back(self, form: Any, declaration: Callable[[], DeclaredForm]) -> int:
-        """How many forms ago one was declared, 1 for the last; one that was not is declared."""
+        """Number of forms since one was declared, 1 for the last; one that was not is declared."""
         if form not in self._declared:
             self._declared[form] = len(self._declared)
             self.recorder.write(declaration().write())

@@ -51,7 +51,7 @@ def accepted(
 
 
 def energy_bound_positive(g: tuple[Any, ...], inverse: Any, terms: Iterable[tuple[Any, Form]]) -> bool:
-    """Whether -1/4 v' S^-1 v - sum u * constant > 0 with v = g + sum u * form, for multipliers u of affine forms."""
+    """True if -1/4 v' S^-1 v - sum u * constant > 0 with v = g + sum u * form, for multipliers u of affine forms."""
     v, total = list(g), fmpq(0)
     for u, (form, constant) in terms:
         v = [a + u * b for a, b in zip(v, form, strict=True)]
@@ -119,7 +119,7 @@ class ExactCertifier(Certifier):
         return None if found is None else found[1]
 
     def closing(self, codes: Codes, near: Point) -> tuple[Proposal, list[SelectionSolution]] | None:
-        """What closes a subtree, and the solutions in it, sought near a point (theory, section 6.11)."""
+        """Proposal that closes a subtree, and the solutions in it, sought near a point (theory, section 6.11)."""
         return self._closing(codes, propose(self._scaled, codes, near, exactly=True))
 
     def _closing(self, codes: Codes, proposal: Proposal | None) -> tuple[Proposal, list[SelectionSolution]] | None:
@@ -148,7 +148,7 @@ class ExactCertifier(Certifier):
         return proposal, [solution]
 
     def _fails(self, proposal: Proposal) -> bool:
-        """Whether many digits show that the solution of what is proposed breaks a condition at a node that is free."""
+        """True if many digits show that the solution of a proposal breaks a condition at a node that is free."""
         found = None if self._precisely is None else self._precisely(proposal.selection)
         if found is None:
             return False

@@ -120,7 +120,7 @@ class VerifiedCertifier(protocol.Certifier):
         self._leaf(record)
 
     def _excluded_by(self, form: EnclosedForm, codes: Codes, rows: Indices, values: Floats) -> bool:
-        """The same with a form in place of the energy."""
+        """True if multipliers exclude the assignment with a form in place of the energy."""
         margin = self._form_margins.get(form)
         if margin is None:
             margin = self._form_margins[form] = protocol.margin_of_form(form, protocol.FORM_ERRORS)
@@ -135,7 +135,7 @@ class VerifiedCertifier(protocol.Certifier):
         return True
 
     def _allowed(self, codes: Codes, rows: Indices, values: Floats) -> Terms:
-        """Those rows and multipliers that may prove something."""
+        """Rows and multipliers that may prove something."""
         kind, node = np.divmod(rows, self._scaled.p)
         signs = row_signs(np.array(codes), self._scaled.F)[node, kind]
         keep = (signs == FREE) | ((signs == NONNEGATIVE) & (values > 0))
@@ -236,7 +236,7 @@ class VerifiedCertifier(protocol.Certifier):
         self.sliding |= without_load(self._scaled, force, w)
 
     def _closed_selection(self, codes: Codes, near: VerifiedSelection | None) -> list[SelectionSolution] | None:
-        """The same for a selection whose conditions are not decided, without rationals."""
+        """The solutions of a selection whose conditions are not decided, without rationals; None if not proven."""
         if near is None:
             return None
         point = near.force.mid, near.w.mid
@@ -310,7 +310,7 @@ class VerifiedCertifier(protocol.Certifier):
         return protocol.UndecidedPart(codes, reason, hint, examined=True)
 
     def _ball(self, found: VerifiedSelection | ClosedSolution | JointRoot) -> EnclosureRecord:
-        """Where a root is, in the problem's units."""
+        """Enclosure of a root, in the problem's units."""
         return records.EnclosureRecord.around(found.force, self._scaled.force, found.index, protocol.WIDEN)
 
     # -- a body that nothing holds (theory, section 14) ----------------------------------------------------------------

@@ -6,7 +6,6 @@ The tree, its relaxations and leaves are those of other bodies; what rests on a 
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,12 +15,9 @@ from enumsol.model.statuses import CONTACT, UNDECIDED
 from enumsol.proof.leaves import Excluded, NoRoot, OnlyReference, Unbalanced
 from enumsol.proof.records import DeclaredForm
 from enumsol.relaxation.engine import PRUNE_MARGIN
-from enumsol.search.certifiers.protocol import Bound, Certifier, Refine, UndecidedPart, Unrecorded
-from enumsol.search.closing import TreeCloser
-from enumsol.search.setup import WEAK, weakly_held
-from enumsol.search.space.space_references import reference_numbers, space_closer
+from enumsol.search.certifiers.protocol import Bound, Refine, UndecidedPart
+from enumsol.search.space.space_references import reference_numbers
 from enumsol.search.space.space_search import SpaceCertifier
-from enumsol.search.space.space_setup import SpaceSolvers
 from enumsol.trusted.floating_bounds import motion_beside
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
 from enumsol.trusted.space.resultants import resultants, unbounded
@@ -36,33 +32,6 @@ if TYPE_CHECKING:
     from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.space.boxed_solution import BoxedSolution
     from enumsol.trusted.space.sector_rows import Row
-
-
-class FloatingSpaceSolvers(SpaceSolvers):
-    """Solvers and certifier for a body in 3D that nothing holds, at one alpha; parameters as of SpaceSolvers."""
-
-    @cached_property
-    def relaxed(self) -> SpaceSystem:
-        """The body on weak springs (theory, section 14.5)."""
-        return self._on_springs(WEAK)
-
-    def _on_springs(self, stiffness: float) -> SpaceSystem:
-        if self.enclosed.held:
-            return self.system
-        S, g = weakly_held(self.system.S, self.system.g, self.enclosed.rows, stiffness)
-        return replace(self.system, S=S, g=g)
-
-    @cached_property
-    def exclusions(self) -> SpaceExclusions | None:
-        """What excludes assignments; None without balls."""
-        return SpaceExclusions(self.enclosed) if not self.enclosed.held else None
-
-    def certifier(self, recorder: Recorder | None) -> FloatingSpaceCertifier:
-        """The certifier of this arithmetic."""
-        return FloatingSpaceCertifier(self._engine, self.enclosed, self.exclusions, recorder or Unrecorded())
-
-    def _closer(self, certifier: Certifier) -> TreeCloser | None:
-        return None if self.exclusions is None else space_closer(certifier, self._engine, lambda: self.known_root)
 
 
 class SpaceExclusions:

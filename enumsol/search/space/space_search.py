@@ -53,14 +53,8 @@ if TYPE_CHECKING:
     from enumsol.trusted.space.space_uniqueness import LooseSolution
 
 
-#: Forces that are known no better than this, relative to the largest one, are left to the tree.
-_PLACED = 1e-3
-#: Where all are smaller than this (scaled), relative to this.
-_SMALL_FORCE = 1e-6
 #: Enclosures of solutions in boxes are made in steps of four.
 _WIDER = 4.0 * WIDEN
-#: Roots are enclosed from two sectors of this level around their directions.
-_LEVEL = 17
 _PERTURB, _HOLD = "perturb the load, by 1e-4 of its largest entry, say", "hold the body by stiffer springs"
 
 
@@ -236,7 +230,7 @@ class SpaceCertifier(Certifier):
         there = list(codes)
         turning = [i for i, code in enumerate(codes) if code > SECTORS]
         for i, (x, y) in zip(turning, turned_by(root.centre, root.angle)[0].tolist(), strict=True):
-            number = nearest(x, y, _LEVEL) - 1
+            number = nearest(x, y, 17) - 1  # of two sectors of this level around the direction
             if not is_sector(number + RUN):  # next to the end of a quarter
                 return root
             there[i] = SECTORS + number + RUN
@@ -259,7 +253,8 @@ class SpaceCertifier(Certifier):
             found = record.holds(self.enclosed, self._whole, errors=2.0, near=normal)
         except NotEnclosedError:
             return None
-        if found is None or not np.max(found.y.rad) <= _PLACED * np.max(np.abs(found.y.mid), initial=_SMALL_FORCE):
+        # forces that are known no better, relative to the largest one, are left to the tree
+        if found is None or not np.max(found.y.rad) <= 1e-3 * np.max(np.abs(found.y.mid), initial=1e-6):
             return None
         self._verified[codes or (UNDECIDED,) * len(normal)] = found
         self._leaf(replace(record, enclosure=self._ball(found)))

@@ -13,7 +13,7 @@ import numpy as np
 from enumsol.arithmetic.balls import SAFE, TINY, Ball, determinant_sign, smaller, solution
 from enumsol.trusted.joint_roots import told_apart
 from enumsol.trusted.space.krawczyk import MARGIN, NaturalMap
-from enumsol.trusted.space.natural_map import Discs, upper_product
+from enumsol.trusted.space.natural_map import Discs, are_steps, upper_product
 from enumsol.trusted.space.space_uniqueness import LooseSolution, displacements, moderate_units
 
 if TYPE_CHECKING:
@@ -73,7 +73,7 @@ def solution_in_box(system: EnclosedSpace, box: Box, errors: float = 1.0) -> Box
     system : EnclosedSpace
         S is proven positive definite.
     box : Box
-        Its radius and rho are positive.
+        Its radius and rho are positive; both components of tau of a node have the same rho but for units.
     errors : 1 proves; a writer of proofs takes more, so that a checker comes to the same answer
     """
     finite = all(np.all(np.isfinite(numbers)) for numbers in box.numbers)
@@ -114,8 +114,8 @@ def _same(one: SpaceRoot | BoxedSolution, other: SpaceRoot | BoxedSolution) -> b
 class BoxProblem:
     """A problem at one alpha in (lambda_n, tau) without units, with y = c + T zeta and T = (I + rho S)^-1.
 
-    rho is one number for lambda_n and one for tau of every node: which ones does not matter for what is proven. See
-    theory, section 12.7.
+    rho is one number for lambda_n and one for tau of every node, the same for both components: which ones does not
+    matter for what is proven. See theory, section 12.7.
 
     Attributes
     ----------
@@ -131,12 +131,14 @@ class BoxProblem:
 
     @classmethod
     def of(cls, system: EnclosedSpace, rho: Floats) -> BoxProblem | None:
-        """With these rho, scaled; None where T is not enclosed."""
+        """With these rho, scaled; None where they do not serve or T is not enclosed."""
         # powers of two: what is rounded is less than TINY
         pair = np.outer(system.unit, system.unit)
         S = Ball(system.S / pair, system.S_rad / pair * SAFE + TINY)
         g = Ball(system.g / system.unit, system.g_rad / system.unit * SAFE + TINY)
         rho = rho * system.unit**2
+        if not are_steps(rho, system.tau):
+            return None
         whole = Ball.exact(np.eye(len(rho)))
         T = solution(whole + S * Ball.exact(rho[:, None]), whole)
         return None if T is None or not T.finite else cls(system, S, g, rho, T)

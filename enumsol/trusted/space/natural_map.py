@@ -549,6 +549,22 @@ def _middle(x: Ball) -> tuple[Floats, Floats, Floats]:
     return length, e, np.column_stack([-e[:, 1], e[:, 0]])
 
 
+def are_steps(rho: Floats, tau: Indices) -> bool:
+    """True if numbers serve as rho of a natural map: positive, and one for both components of tau of every node.
+
+    Zeros of a map with two numbers there are no solutions (theory, (12.10) and (12.16)).
+
+    Parameters
+    ----------
+    rho : (m,) array
+        In the variables in which discs are round.
+    tau : (p, 2) array of int
+        See ``Discs``.
+    """
+    one, other = tau[np.all(tau >= 0, axis=1)].T
+    return bool(np.all(np.isfinite(rho)) and np.all(rho > 0) and np.array_equal(rho[one], rho[other]))
+
+
 def upper_product(matrix: Floats, vector: Floats) -> Floats:
     """Upper bound of a product without negative entries."""
     return np.asarray(upper_sum(matrix * vector, axis=1))

@@ -22,8 +22,8 @@ from enumsol.trusted.space.leaf_equations import (
     with_free_bounds,
 )
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
-from enumsol.trusted.space.resultants import is_unbalanced_in_space, swept_floating_margin
-from enumsol.trusted.space.sector_rows import swept_margin
+from enumsol.trusted.space.resultants import is_unbalanced_in_space
+from enumsol.trusted.space.sector_margins import swept_margin
 from enumsol.trusted.space.space_uniqueness import is_complete, only_on_curve
 
 if TYPE_CHECKING:
@@ -81,10 +81,7 @@ class AlphaPiece:
 
         ``values`` are the multipliers of rows at both ends, between which they are affine in alpha.
         """
-        (low, high), middle = self.ends, self.space.at(self.middle)
-        if not middle.held:
-            return swept_floating_margin((low, high), middle, codes, rows, (values[0], values[1]), errors)
-        return swept_margin(self.ends, middle, codes, rows, (values[0], values[1]), errors)
+        return swept_margin(self.ends, self.space.at(self.middle), codes, rows, (values[0], values[1]), errors)
 
     def is_unbalanced(self, codes: Sequence[int], z: Floats) -> bool:
         """True if at no alpha of the piece any forces below a partial assignment are in balance with the load, by z.

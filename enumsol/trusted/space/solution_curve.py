@@ -21,7 +21,7 @@ from enumsol.condensation.enclosure import NotEnclosedError, RigidRows
 from enumsol.condensation.space_condensed import node_friction
 from enumsol.model.sectors import SECTORS
 from enumsol.trusted.space.krawczyk import Contraction, NaturalMap
-from enumsol.trusted.space.natural_map import Directions, Discs, upper_product
+from enumsol.trusted.space.natural_map import Directions, Discs, are_steps, upper_product
 from enumsol.trusted.space.sector_rows import FRICTIONLESS, OPEN, STICK
 
 if TYPE_CHECKING:
@@ -108,12 +108,13 @@ class AlphaProblem:
     def of(cls, enclosure: CondensedEnclosure, steps: Array | None = None) -> AlphaProblem:
         """Map of a problem whose nodes have coefficients of one ratio for all alpha.
 
-        ``steps``: positive, (m,), rho in the units of the problem (force / length); by default some that serve.
+        ``steps``: positive, (m,), rho in the units of the problem (force / length), the same for both components of
+        tau of a node; by default some that serve.
 
         Raises
         ------
         NotEnclosedError
-            The ratio of a node depends on alpha, or something over- or underflows.
+            The ratio of a node depends on alpha, the steps are none, or something over- or underflows.
         """
         problem, p = enclosure.problem, enclosure.problem.p
         coefficients, slopes = np.array(problem.friction), np.array(problem.friction_slope)
@@ -150,7 +151,10 @@ class AlphaProblem:
             raise NotEnclosedError("forces and displacements of the condensed problem cannot be told apart")
         part, offset = found[:, : m + 1], found[:, m + 1]
         F0, F1, reach = coefficients[first], slopes[first], rows.reach * rows.unit
-        return cls(S, g0, g1, F0, F1, ratio, inverse, tau, force, length, rho, turned, part, offset, reach)
+        given = cls(S, g0, g1, F0, F1, ratio, inverse, tau, force, length, rho, turned, part, offset, reach)
+        if not are_steps(rho, given.places):
+            raise NotEnclosedError("expected positive steps, the same for both tangential directions of a node")
+        return given
 
     @property
     def p(self) -> int:
@@ -435,7 +439,7 @@ def only_curve(problem: AlphaProblem, box: CurveBox, errors: float = 1.0) -> Sol
     ----------
     problem : AlphaProblem
     box : CurveBox
-        With positive radii.
+        With positive radii and steps, one for both components of tau of a node.
     errors : 1 proves; a writer of proofs takes more, so that a checker comes to the same answer
     """
     arrays = (box.centre, box.direction, box.border, box.radius)
@@ -443,7 +447,8 @@ def only_curve(problem: AlphaProblem, box: CurveBox, errors: float = 1.0) -> Sol
         return None
     if not np.isfinite(box.half) or box.half < 0 or not np.all(box.radius > 0):
         return None
-    if box.rho.shape != (problem.m,) or not np.all(box.rho > 0) or not np.all(np.isfinite(box.rho)):
+    # those of the problem are steps of a natural map, and so are both together
+    if box.rho.shape != (problem.m,) or not are_steps(box.rho, problem.places):
         return None
     with np.errstate(all="ignore"):
         found = map_around(problem, box).mapped(box.radius / problem.unit, errors)
