@@ -337,8 +337,13 @@ def mesh_scene(mesh: PartedMesh | str | os.PathLike[str] | Any, **options: Any) 
     ...
     """
     check_keys(options)
+    return scene_of(mesh, Options(**(_defaults() | options)))
+
+
+def _defaults() -> dict[str, Any]:
+    """Options of `mesh_problem` with their defaults; ``inspect.Parameter.empty`` for those that have none."""
     known = inspect.signature(mesh_problem).parameters.items()
-    return scene_of(mesh, Options(**{name: options.get(name, of.default) for name, of in known if name != "mesh"}))
+    return {name: parameter.default for name, parameter in known if name != "mesh"}
 
 
 def read_mesh_problem(path: str | os.PathLike[str]) -> AnyProblem:
@@ -433,7 +438,7 @@ def check_keys(options: Mapping[str, Any], spelled: Callable[[str], str] = str, 
     InvalidArgumentError
         The closest name is given, or what is missing.
     """
-    known = {name: p.default for name, p in inspect.signature(mesh_problem).parameters.items() if name != "mesh"}
+    known = _defaults()
     for name in options:
         if name not in known:
             close = difflib.get_close_matches(name, [*known, *also], n=1)

@@ -131,9 +131,15 @@ class Scene:
     @property
     def sections(self) -> dict[str, list[str]]:
         """Lines that are printed of the scene, by their titles."""
-        texts = {"mesh": _mesh, "bodies": _bodies, "material": _material, "parts": _parts, "loads": _loads}
-        texts["contact"] = _contact
-        return {title: text(self) for title, text in texts.items()} | {"note": self.notes}
+        return {
+            "mesh": _mesh(self),
+            "bodies": _bodies(self),
+            "material": _material(self),
+            "parts": _parts(self),
+            "loads": _loads(self),
+            "contact": _contact(self),
+            "note": self.notes,
+        }
 
     def __str__(self) -> str:
         return "\n".join(

@@ -22,7 +22,16 @@ from enumsol.model.sectors import (
     span,
 )
 from enumsol.model.statuses import CONTACT, SLIP_MINUS, SLIP_PLUS, STICK, UNDECIDED
-from enumsol.proof.leaves import Alone, BoxedRoot, Excluded, NoRoot, RegularRoot, UndecidedRecord
+from enumsol.proof.leaves import (
+    Alone,
+    BoxedRoot,
+    Excluded,
+    NoRoot,
+    OnlyReference,
+    RegularRoot,
+    Unbalanced,
+    UndecidedRecord,
+)
 from enumsol.proof.records import NOWHERE, DeclaredForm, EnclosureRecord
 from enumsol.relaxation.engine import PRUNE_MARGIN, Relaxation
 from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
@@ -36,17 +45,20 @@ from enumsol.search.certifiers.protocol import (
 from enumsol.search.outcome import HOLD
 from enumsol.search.space.open_leaves import Cause, KnownBoxes, obstacle, sector_to_halve
 from enumsol.search.space.product_search import Branched, Enclosed, Missed
+from enumsol.trusted.floating_bounds import motion_beside
 from enumsol.trusted.space.leaves import Open, SpaceRoot, settle
 from enumsol.trusted.space.product_forms import Ellipsoid, refines
+from enumsol.trusted.space.resultants import resultants, unbounded
 from enumsol.trusted.space.sector_rows import is_sector_covering
-from enumsol.trusted.space.space_uniqueness import OnlySolution
+from enumsol.trusted.space.space_uniqueness import LeafReference, OnlySolution
 from enumsol.trusted.space.turning import turned_by
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from enumsol.condensation.space_condensed import EnclosedSpace
+    from enumsol.condensation.space_condensed import EnclosedSpace, SpaceSystem
     from enumsol.proof.writer import Recorder
+    from enumsol.search.reference_closer import OnlyRoot
     from enumsol.support.array_types import Codes, Floats
     from enumsol.trusted.space.boxed_solution import BoxedSolution
     from enumsol.trusted.space.sector_rows import Row
@@ -116,6 +128,70 @@ def _towards(code: int, vector: np.ndarray) -> float:
     return float(middle @ vector / np.linalg.norm(middle))
 
 
+class SpaceExclusions:
+    """Exclusions of assignments; of a body that nothing holds if possible without a bound of its rigid displacement.
+
+    Parameters
+    ----------
+    enclosed : EnclosedSpace
+
+    Attributes
+    ----------
+    system, free : EnclosedSpace
+        With its bound, and with one beyond which there are no solutions; the same of a body that is held.
+    """
+
+    def __init__(self, enclosed: EnclosedSpace) -> None:
+        self.system, self.free = enclosed, enclosed if enclosed.held else unbounded(enclosed)
+        self._references: dict[Codes, LeafReference | None] = {}
+        #: How the forms of roots are declared, but for enclosures, by their leaves.
+        self.numbers: dict[Codes, tuple[Floats, Floats]] = {}
+
+    def reference(self, system: SpaceSystem, leaf: Codes) -> LeafReference | None:
+        """The form of the root of a leaf, if one is proven definite."""
+        from enumsol.search.space.space_references import reference_numbers  # of bodies that nothing holds only
+
+        if leaf not in self._references:
+            self._references[leaf], root = None, settle(self.system, leaf)
+            with np.errstate(all="ignore"):
+                tried = reference_numbers(system, self.system, root, leaf) if isinstance(root, SpaceRoot) else ()
+                for numbers, *more in tried:
+                    found = LeafReference.of(self.system, leaf, numbers, *more)
+                    if found is not None:
+                        self.numbers[leaf], self._references[leaf] = (numbers, np.array(more)), found
+                        break
+        return self._references[leaf]
+
+    def record(
+        self, codes: Codes, rows: list[Row], values: Floats, *, within: bool
+    ) -> tuple[Excluded | Unbalanced | NoRoot, bool] | None:
+        """A record that excludes a partial assignment, and whether it needs the bound; or None.
+
+        ``within``: the bound is known to be needed. Otherwise it is used only where all statuses are determined
+        (theory, section 14.4).
+        """
+        excluded = Excluded(rows, values)
+        if len(rows) and excluded.holds(self.free, codes, 2.0):
+            return excluded, False
+        if self.system.held:
+            return None
+        if (unbalanced := self.unbalanced(codes)) is not None:
+            return unbalanced, False
+        told = not any(code in (UNDECIDED, CONTACT) for code in codes)
+        if (within or told) and len(rows) and excluded.holds(self.system, codes, 2.0):
+            if told and settle(self.free, codes) is None:
+                return NoRoot(), False
+            return excluded, True
+        return None
+
+    def unbalanced(self, codes: Codes) -> Unbalanced | None:
+        """A record that no forces below a partial assignment are in balance with the load; or None."""
+        if self.system.held:
+            return None
+        record = Unbalanced(motion_beside(self.system, resultants(self.system, codes)))
+        return record if record.holds(self.system, codes) else None
+
+
 class SpaceCertifier(Certifier):
     """Proves prunings and leaves with the trusted core, and writes the proof.
 
@@ -125,11 +201,20 @@ class SpaceCertifier(Certifier):
     enclosed : EnclosedSpace
         Balls for its system; without radii in fast arithmetic.
     recorder : Recorder
+    exclusions : SpaceExclusions, optional
+        By these balls, where they are known already.
     """
 
-    def __init__(self, engine: SpaceEngine, enclosed: EnclosedSpace, recorder: Recorder) -> None:
+    def __init__(
+        self,
+        engine: SpaceEngine,
+        enclosed: EnclosedSpace,
+        recorder: Recorder,
+        exclusions: SpaceExclusions | None = None,
+    ) -> None:
         super().__init__(recorder)
         self._engine, self.enclosed = engine, enclosed
+        self._exclusions = exclusions or SpaceExclusions(enclosed)
         self._boxes = KnownBoxes(engine.system, enclosed)
 
     def excluded(self, codes: Codes, relaxation: Bound) -> bool:
@@ -139,10 +224,16 @@ class SpaceCertifier(Certifier):
         if isinstance(relaxation.form, Ellipsoid):
             return self._missed(codes, relaxation.form)
         rows, values = self._multipliers(relaxation)
-        form, leaf = relaxation.form, Excluded(rows, values)
-        if not leaf.holds(self.enclosed if form is None else form, codes, 2.0):
+        if (form := relaxation.form) is None:
+            found = self._exclusions.record(codes, rows, values, within=self.bounded)
+            if found is not None:
+                self.bounded |= found[1]
+                self._leaf(found[0])
+            return found is not None
+        leaf = Excluded(rows, values)
+        if not leaf.holds(form, codes, 2.0):
             return False
-        by = None if form is None else self._back(form, lambda: DeclaredForm(self._whole, form.numbers, np.zeros(0)))
+        by = self._back(form, lambda: DeclaredForm(self._whole, form.numbers, np.zeros(0)))
         self._leaf(replace(leaf, by=by))
         return True
 
@@ -159,12 +250,24 @@ class SpaceCertifier(Certifier):
 
     def selection(self, codes: Codes) -> SpaceRoot | BoxedSolution | UndecidedPart | Refine | None:
         """The root of a leaf, a sector to halve, or why the leaf stays open."""
+        if (unbalanced := self._exclusions.unbalanced(codes)) is not None:
+            self._leaf(unbalanced)
+            return None
+        answer = self._settled(codes)
+        if not self.enclosed.held and (answer is None or isinstance(answer, SpaceRoot)):
+            self.bounded |= not isinstance(settle(self._exclusions.free, codes), type(answer))
+        return answer
+
+    def _settled(self, codes: Codes) -> SpaceRoot | BoxedSolution | UndecidedPart | Refine | None:
+        """The answer for a leaf, which is written."""
         answer = settle(self.enclosed, codes)
         if answer is None:
             self._leaf(NoRoot())
         elif isinstance(answer, Open):
             node = sector_to_halve(answer)
-            if (boxed := self._boxed(answer, halved=node is not None)) is not None:
+            # boxes rest on a stiffness that is positive definite
+            boxed = self._boxes.holding(answer, halved=node is not None) if self.enclosed.held else None
+            if boxed is not None:
                 return self._in_box(codes, boxed)
             if node is not None and level_of(codes[node] - SECTORS) < DEEPEST:
                 return Refine(node)
@@ -221,10 +324,6 @@ class SpaceCertifier(Certifier):
                 self._leaf(Excluded([], np.zeros(0), by))
         return found
 
-    def _boxed(self, leaf: Open, *, halved: bool) -> BoxedSolution | None:
-        """The one solution that an open leaf can have, which is ``halved`` otherwise, if that is proven."""
-        return self._boxes.holding(leaf, halved=halved)
-
     def _placed(self, codes: Codes, root: SpaceRoot) -> SpaceRoot:
         """The same root from sectors around it: its numbers then do not depend on how the search came to its leaf."""
         there = list(codes)
@@ -276,6 +375,26 @@ class SpaceCertifier(Certifier):
         self._leaf(replace(record, enclosure=self._ball(found)))
         found = self._verified[leaf] = self._placed(leaf, found)
         return [found]
+
+    def reference(self, leaf: Codes) -> LeafReference | None:
+        """The form of the root of a leaf, if one is proven definite."""
+        return self._exclusions.reference(self._engine.system, leaf)
+
+    def only_root(self, codes: Codes, reference: LeafReference, proposal: OnlyRoot) -> list[SpaceRoot] | None:
+        """The root, as a list, unless it was declared before; None if it is not proven that no other one lies below."""
+        exclusions, leaf, found = self._exclusions, reference.selection, list[SpaceRoot]()
+        record = OnlyReference(0, *proposal)
+        if not record.holds(reference, codes, exclusions.free.reach):
+            if not record.holds(reference, codes, exclusions.system.reach):
+                return None
+            self.bounded = True
+        if leaf not in self._declared:
+            self.bounded |= not isinstance(settle(exclusions.free, leaf), SpaceRoot)
+            found = [self._placed(leaf, reference.root)]
+            self._verified[leaf] = found[0]
+        declared = DeclaredForm(leaf, *exclusions.numbers[leaf], self._ball(reference.root))
+        self._leaf(replace(record, back=self._back(leaf, lambda: declared)))
+        return found
 
     def _ball(self, found: SpaceRoot | LooseSolution, wider: float = WIDEN) -> EnclosureRecord:
         """Ball of a root, in the problem's units."""

@@ -23,13 +23,12 @@ from enumsol.search.form_policy import Forms
 from enumsol.search.resume import Reader
 from enumsol.search.setup import WEAK, SearchSetup, weakly_held
 from enumsol.search.space.space_fathoming import SpaceCloser, SpaceClosing, solved
-from enumsol.search.space.space_search import SpaceCertifier, SpaceSplitting
+from enumsol.search.space.space_search import SpaceCertifier, SpaceExclusions, SpaceSplitting
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from enumsol.model.problem3d import ContactProblem3D
-    from enumsol.search.space.space_floating import SpaceExclusions
     from enumsol.support.array_types import Alpha, Codes, Floats
     from enumsol.trusted.space.sector_margins import SlipForm
 
@@ -105,21 +104,15 @@ class SpaceSolvers(SearchSetup):
         return replace(self.system, S=S, g=g)
 
     @cached_property
-    def _exclusions(self) -> SpaceExclusions | None:
-        """Proofs that assignments of a body that nothing holds have no solution; None without balls."""
-        from enumsol.search.space.space_floating import SpaceExclusions  # for such bodies only
-
-        return None if self.enclosed.held else SpaceExclusions(self.enclosed)
+    def _exclusions(self) -> SpaceExclusions:
+        """Proofs that assignments have no solution."""
+        return SpaceExclusions(self.enclosed)
 
     def certifier(self, recorder: Recorder | None) -> SpaceCertifier:
         """The certifier of this arithmetic."""
         if recorder is None or self.arithmetic == "fast":
             recorder = Unrecorded()
-        if self.problem.held:
-            return SpaceCertifier(self._engine, self.enclosed, recorder)
-        from enumsol.search.space.space_floating import FloatingSpaceCertifier  # as above
-
-        return FloatingSpaceCertifier(self._engine, self.enclosed, self._exclusions, recorder)
+        return SpaceCertifier(self._engine, self.enclosed, recorder, self._exclusions)
 
     def _solved(self, system: SpaceSystem, near: Floats | None) -> tuple[list[Codes], Floats] | None:
         with np.errstate(all="ignore"):
@@ -133,10 +126,9 @@ class SpaceSolvers(SearchSetup):
 
     def _closer(self, certifier: Certifier) -> TreeCloser | None:
         if not self.problem.held:
-            from enumsol.search.space.space_references import space_closer  # as above
+            from enumsol.search.space.space_references import space_closer  # for such bodies only
 
-            found = self._exclusions
-            return None if found is None else space_closer(certifier, self._engine, lambda: self.known_root)
+            return None if self.enclosed.held else space_closer(certifier, self._engine, lambda: self.known_root)
         return SpaceCloser(self.system, cast("SpaceClosing", certifier), regular=self.arithmetic == "fast")
 
     @property
