@@ -289,6 +289,13 @@ class Branch:
         """True if it is a sheet."""
         return any(arc.dimension for arc in self.arcs)
 
+    @property
+    def shape(self) -> str:
+        """Shape in a word: sheet, loop, path, or unfinished where something at it was left open."""
+        if self.sheet or self.closed:
+            return "sheet" if self.sheet else "loop"
+        return "unfinished" if any(v.kind is VertexKind.UNSETTLED for v in self.vertices) else "path"
+
 
 #: What networkx's graph shows of vertices and arcs.
 _NODE_DATA = ("alpha", "kind", "border", "statuses", "active", "lambda_n", "lambda_t", "index_left", "index_right")

@@ -252,7 +252,7 @@ def graph_html(data: GraphData) -> str:
     rows = [
         (
             branch.number,
-            _shape(branch),
+            branch.shape,
             len(branch.arcs),
             *(f"{end:.6g}" for end in branch.interval),
             ", ".join(f"{v.alpha:.6g}" for v in branch.folds),
@@ -286,17 +286,9 @@ def _branch_line(branch: Branch) -> str:
     folds = ", ".join(f"{v.alpha:.6g}" for v in branch.folds)
     width = f", length {hi - lo:.3g}" if f"{lo:.6g}" == f"{hi:.6g}" else ""
     arcs = counted(len(branch.arcs), "arc")
-    return f"  branch {branch.number}: {_shape(branch)}, {arcs}, alpha in [{lo:.6g}, {hi:.6g}]{width}" + (
+    return f"  branch {branch.number}: {branch.shape}, {arcs}, alpha in [{lo:.6g}, {hi:.6g}]{width}" + (
         f", folds at {folds}" if folds else ""
     )
-
-
-def _shape(branch: Branch) -> str:
-    if branch.sheet:
-        return "sheet"
-    if branch.closed:
-        return "loop"
-    return "unfinished" if any(v.kind is VertexKind.UNSETTLED for v in branch.vertices) else "path"
 
 
 def arcs_frame(data: GraphData) -> pd.DataFrame:

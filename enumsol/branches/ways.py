@@ -26,12 +26,7 @@ from enumsol.errors import TooLargeError
 from enumsol.model.statuses import OPEN, SLIP_MINUS, SLIP_PLUS, STICK
 from enumsol.search.certifiers.interval_certifiers import ExactIntervalCertifier, VerifiedIntervalCertifier
 from enumsol.search.outcome import Stop, StopReason
-from enumsol.search.subintervals import (
-    IntervalCertifier,
-    IntervalSearch,
-    on_weak_springs,
-    run_parallel,
-)
+from enumsol.search.subintervals import IntervalCertifier, IntervalSearch, on_weak_springs, run_parallel
 from enumsol.support.deadlines import Deadline, Limited, TimeOverError, over, within
 
 if TYPE_CHECKING:

@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from enumsol.branches import BranchGraph
-    from enumsol.branches.elements import Branch
     from enumsol.fem import Scene
     from enumsol.model.problem3d import ContactProblem3D
     from enumsol.support.array_types import ArrayLike
@@ -98,19 +97,13 @@ def _friction(problem: ContactProblem | ContactProblem3D) -> str:
 
 
 def _branches(graph: BranchGraph) -> str:
-    def shape(branch: Branch) -> str:
-        if branch.sheet:
-            return "sheet (a continuum over an interval)"
-        if branch.closed:
-            return "loop"
-        return "unfinished" if any(v.kind.value == "unsettled" for v in branch.vertices) else "path"
-
     rows = []
     for branch in graph.branches:
         lo, hi = branch.interval
         folds = ", ".join(f"{v.alpha:.8g}" for v in branch.folds)
         indices = ", ".join(sorted({"?" if arc.index is None else f"{arc.index:+d}" for arc in branch.arcs}))
-        cells = (str(branch.number), f"{lo:.8g}", f"{hi:.8g}", shape(branch), str(len(branch.arcs)), indices, folds)
+        shape = "sheet (a continuum over an interval)" if branch.sheet else branch.shape
+        cells = (str(branch.number), f"{lo:.8g}", f"{hi:.8g}", shape, str(len(branch.arcs)), indices, folds)
         rows.append((f' data-branch="{branch.number}" tabindex="0"', cells))
     if not rows:
         return f"<p>None{'' if graph.complete else ' was found'}.</p>"

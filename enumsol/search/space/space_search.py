@@ -35,13 +35,7 @@ from enumsol.proof.leaves import (
 from enumsol.proof.records import NOWHERE, DeclaredForm, EnclosureRecord
 from enumsol.relaxation.engine import PRUNE_MARGIN, Relaxation
 from enumsol.relaxation.space_relaxation import SpaceEngine, SpaceRelaxation
-from enumsol.search.certifiers.protocol import (
-    WIDEN,
-    Bound,
-    Certifier,
-    Refine,
-    UndecidedPart,
-)
+from enumsol.search.certifiers.protocol import WIDEN, Bound, Certifier, Refine, UndecidedPart
 from enumsol.search.outcome import HOLD
 from enumsol.search.space.open_leaves import Cause, KnownBoxes, obstacle, sector_to_halve
 from enumsol.search.space.product_search import Branched, Enclosed, Missed
