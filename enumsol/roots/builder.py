@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from enumsol.search.certifiers.protocol import UndecidedPart
     from enumsol.selections.float_selections import FloatSelections
     from enumsol.selections.rational_selections import ExactSelections
-    from enumsol.selections.solution import PointValues, SelectionSolution, SelectionSolver
+    from enumsol.selections.solution import SelectionSolution, SelectionSolver
     from enumsol.support.array_types import Alpha, Codes, Floats
     from enumsol.trusted.at_alpha import VerifiedSelection
 
@@ -52,7 +52,7 @@ class RootBuilder:
 
     problem: ContactProblem
     alpha: Alpha
-    points: PointValues
+    points: SelectionSolver
     floats: FloatSelections
     verified: Mapping[Codes, VerifiedSelection]
     rigid_unit: Floats | None = None

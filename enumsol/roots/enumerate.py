@@ -4,15 +4,11 @@ from __future__ import annotations
 
 import math
 import time
-from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Literal
-
-import numpy as np
 
 from enumsol.errors import InvalidArgumentError
 from enumsol.model.contact_body import ContactBody
 from enumsol.model.problem import ContactProblem
-from enumsol.model.statuses import FINAL, OPEN
 from enumsol.roots.builder import RootBuilder, in_order, named, root_family
 from enumsol.roots.components import RootComponent, apart, closed_component, connected_components
 from enumsol.roots.enumeration import Enumeration, not_begun
@@ -22,7 +18,7 @@ from enumsol.search.exhaustive import BLOCK, exhaustive_exact, exhaustive_float
 from enumsol.search.outcome import SearchLimits, SearchProgress, Stop, StopReason
 from enumsol.search.solvers import Arithmetic, Solvers
 from enumsol.selections.float_selections import SIGN_TOLERANCE
-from enumsol.selections.solution import PointValues, SelectionSolution, SelectionSolver
+from enumsol.selections.solution import SelectionSolution, SelectionSolver
 from enumsol.support import arguments
 from enumsol.support.deadlines import Deadline, TimeOverError, keeping, within
 from enumsol.support.messages import counted
@@ -37,53 +33,8 @@ if TYPE_CHECKING:
 
     from enumsol.model.problem3d import AnyProblem, ContactProblem3D
     from enumsol.roots.root import Root, RootFamily
-    from enumsol.support.array_types import Alpha, AlphaLike, Codes, Floats
+    from enumsol.support.array_types import Alpha, AlphaLike, Codes
     from enumsol.support.deadlines import Ending
-
-
-class AtRest:
-    """The one root of a body with g = 0, at which every selection holds, and its values (PointValues).
-
-    The energy bound is lambda' S lambda <= 0 there, so that lambda = 0; its degree is that of all roots, +1.
-
-    Parameters
-    ----------
-    F_positive : tuple of p bool
-    proven : bool
-        g = 0 holds in the data and not only as computed in floats.
-    """
-
-    def __init__(self, F_positive: tuple[bool, ...], *, proven: bool) -> None:
-        self._F_positive, self._p, self._proven = F_positive, len(F_positive), proven
-
-    @property
-    def component(self) -> RootComponent:
-        """The root."""
-        solution = SelectionSolution((OPEN,) * self._p, (np.zeros(2 * self._p),), 0, 0, strict=False)
-        active = tuple(frozenset(FINAL[positive]) for positive in self._F_positive)
-        return RootComponent((solution,), active, 0, 1, whole=True)
-
-    def forces(self, point: object) -> Floats:
-        """Zeros."""
-        del point
-        return np.zeros(2 * self._p)
-
-    displacements = forces
-
-    def slip_signs(self, point: object) -> tuple[int, ...]:
-        """Zeros."""
-        del point
-        return (0,) * self._p
-
-    def exact_slips(self, point: object) -> tuple[Fraction, ...]:
-        """Zeros."""
-        del point
-        return (Fraction(0),) * self._p
-
-    def bounds(self, point: object) -> tuple[Floats, Floats] | None:
-        """Zeros where they are proven."""
-        del point
-        return (np.zeros(4 * self._p), np.zeros(4 * self._p)) if self._proven else None
 
 
 Method = Literal["tree", "exhaustive"]
@@ -364,7 +315,7 @@ class _Enumeration(Enumeration[Solvers]):
             parts.append((connected_components(exact, self.solvers.exact, perturbed), self.solvers.exact))
         return parts
 
-    def _root(self, component: RootComponent, values: PointValues) -> Root:
+    def _root(self, component: RootComponent, values: SelectionSolver) -> Root:
         solvers, verified = self.solvers, self.certifier.certified.verified
         about = self.problem, self.alpha, values, solvers.floats, verified, solvers.rigid_unit
         return RootBuilder(*about).root(component)
@@ -375,8 +326,7 @@ class _Enumeration(Enumeration[Solvers]):
         families: list[RootFamily] = []
         separate, joinable = 0, False
         if self.unloaded:
-            at_rest = AtRest(solvers.floats.F_positive, proven=self.arithmetic != "fast")
-            roots, separate = [self._root(at_rest.component, at_rest)], 1
+            roots, separate = [self._rest()], 1
         for components, solver in self._joined():
             # what joins a component that was not examined whole is not known
             separate += sum(c.whole for c in components)

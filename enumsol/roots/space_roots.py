@@ -228,13 +228,6 @@ class SpaceEnumeration(Enumeration[SpaceSolvers]):
         y, w = with_zeros(self.solvers.enclosed, codes, found.y, found.w)
         return self._enclosure(y, w, found.rigid)
 
-    def _rest(self) -> Root:
-        """The unloaded body: nothing moves, and every status holds."""
-        p = self.problem.p
-        still, bounds = (np.zeros(p), np.zeros((p, 2))), [np.zeros(shape) for shape in ((p, 2), (p, 2, 2)) * 2]
-        every = [frozenset(_STATUSES)] * p
-        return self._root([ContactStatus.OPEN] * p, every, still, still, np.full((p, 2), np.nan), 1, Enclosure(*bounds))
-
     # -- what stayed undecided -------------------------------------------------------------------------------------
 
     def _undecided(self, parts: Sequence[UndecidedPart]) -> list[Undecided]:

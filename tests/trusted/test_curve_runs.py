@@ -16,7 +16,7 @@ from enumsol.branches.space.space_graph import ByCurves
 from enumsol.condensation.space_condensed import AlphaSpace
 from enumsol.search.space.piece_certificates import ExaminedPiece, runs_over
 from enumsol.trusted.space import curve_runs
-from enumsol.trusted.space.curve_runs import KnownCurve, Run
+from enumsol.trusted.space.curve_runs import CurveParts, KnownCurve, Run
 from enumsol.trusted.space.pieces import AlphaPiece
 from enumsol.trusted.space.sector_rows import CONTACT, OPEN, STICK, UNDECIDED
 from enumsol.trusted.space.solution_curve import AlphaProblem, CurveBox, SolutionCurve
@@ -186,6 +186,23 @@ def test_psi_is_off_by_no_less_than_at_any_sample(p, seed):
                         assert np.linalg.norm(true[i] - at[i]) <= off[i] + 1e-7
                         tested += 1
     assert tested or (p, seed) != (1, 1)
+
+
+@pytest.mark.parametrize("rho", [np.inf, 1e300, 1e-300, 0.0])
+def test_slips_are_not_known_where_steps_over_or_underflow(rho):
+    """Of a node that is open with w = z: no theta serves it by its gap then."""
+    none = np.zeros(1)
+    alpha, F = Ball.exact(none), Ball.exact(np.ones((1, 1)))
+    z, rubs = Ball.exact(np.array([[-1.0, 1.5, 0.0]])), np.ones((1, 2), dtype=bool)
+
+    def slip(steps):
+        with np.errstate(all="ignore"):
+            parts = CurveParts(alpha, F, z, np.array([steps]), rubs, none.astype(int), Ball.exact(none))
+            return parts.slips[1][0, 0]
+
+    assert slip([1.0, 1.0, 1.0])[0].size >= 1.5
+    far = slip([1.0, rho, rho])[0]
+    assert not np.isfinite(far.rad)
 
 
 def test_a_curve_holds_a_ball_if_all_its_corners_are_held():

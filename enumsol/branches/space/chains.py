@@ -43,6 +43,8 @@ _SHORTEST = 1e-7
 #: Which share of what seems possible is taken at first as the way between two joints, and how the way shrinks at least:
 #: with more of the first boxes fail more often, with less they are many.
 _TRUST, _SHRINK = 0.95, 0.5
+#: How far a skeleton is prolonged beyond the interval, relative to its last step: more only takes time.
+_BEYOND = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +128,7 @@ def skeleton_through(problem: ContactProblem3D, x: Array, span: tuple[float, flo
     for k, (line, path) in enumerate(zip(lines, paths, strict=True)):
         if path.status in (PathStatus.INTERVAL_LEFT, PathStatus.RIGID_BOUND):
             # relative to the last step
-            beyond = 0.05 if path.status == PathStatus.INTERVAL_LEFT else 2.0**-10
+            beyond = _BEYOND if path.status == PathStatus.INTERVAL_LEFT else 2.0**-10
             lines[k] = np.vstack([line, line[-1] + beyond * (line[-1] - line[-2])])
     back, last = lines[0][::-1], len(lines[0]) - 1
     places = {last - k for k in corners[0]} | {last + k for k in corners[1]}

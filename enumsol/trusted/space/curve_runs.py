@@ -99,9 +99,13 @@ class CurveParts:
 
     @cached_property
     def slips(self) -> tuple[Ball, Ball]:
-        """w_n and q w_t where a node is open, (N, p) and (N, p, 2), in the same unit: there z is rho w."""
+        """w_n and q w_t where a node is open, (N, p) and (N, p, 2), in the same unit: there z is rho w.
+
+        Without bounds where rho, a product of two numbers of a proof, may have over- or underflowed.
+        """
         p, inverse = len(self.rubs), 1.0 / self.rho
-        w = self.z * Ball(inverse, 4 * UNIT * inverse)
+        known = (self.rho > TINY) & (self.rho < 1.0 / TINY)
+        w = self.z * Ball(inverse, np.where(known, 4 * UNIT * inverse, np.inf))
         return w[:, :p], self._tangents(w)
 
     @cached_property
