@@ -120,7 +120,7 @@ class HistoryChecker(ProofChecker):
         """Read the steps; the number of searches."""
         header, problem = self.header, self.problem
         if set(header) != _HEADER or header["format"] != "enumsol-proof" or not same(header["version"], PROOF_VERSION):
-            raise RefusedError("the first record is not the header of a history in an enumsol-proof of version 1")
+            raise RefusedError("the first record is not the header of a history in a proof of this format")
         if header["problem"] != problem.fingerprint or not same(header["p"], problem.p):
             raise RefusedError("the proof belongs to another problem (its fingerprint is different)")
         if not isinstance(header["steps"], list) or not header["steps"] or type(header["stages"]) is not int:

@@ -97,12 +97,11 @@ class Follower(Generic[_Path]):
         self.equation, self.options, self.interval = start.equation, start.options, start.interval
         self.current, self.sign = first, sign
         self.h = self.options.h_init
-        self._in_place = 0
-        self._friction_ends = False
+        self._in_place, self._friction_ends = 0, False
         (low, high), margin, scale = self.interval, self.options.overshoot, self.equation.alpha_scale
         self._low, self._high = (low - margin) / scale, (high + margin) / scale
-        others = list(points_of(self.equation, visited))
-        self._landmarks = Landmarks(self.equation, first, self.options.transition_tolerance, others)
+        tolerance, others = self.options.transition_tolerance, list(points_of(self.equation, visited))
+        self._landmarks = Landmarks(self.equation, first, tolerance, others)
         self.record = PathRecorder(self.equation)
         self.record.add(first, PointKind.START)
 

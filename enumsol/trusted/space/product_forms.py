@@ -317,7 +317,7 @@ def _within(code: int, over: int) -> bool:
 def _columns(frame: Frame, sums: Floats) -> tuple[Floats, Floats] | None:
     """Columns in which the form with the squares of the equations is near the unit matrix, and their weights' roots.
 
-    No claim: what is near it is proven.
+    Nothing rests on it: what is near it is proven.
     """
     rows = frame.equations.mid
     size = np.linalg.norm(rows, axis=1)
