@@ -121,6 +121,7 @@ MESH_OPTIONS = {
     "poisson": Given(_BODY, "[NAME=]NU", _number),
     "plane": Given(_BODY, "[NAME=]strain|stress", _plane),
     "thickness": Given(_BODY, "[NAME=]LENGTH", _number),
+    "density": Given(_BODY, "[NAME=]DENSITY", _number),
     "friction": Given(_BODY, "[NAME=]F", _one_or_two),
     "friction_slope": Given(_BODY, "[NAME=]F", _one_or_two),
     "friction2": Given(_BODY, "[NAME=]F", _one_or_two),
@@ -188,6 +189,7 @@ def solve(
     poisson : Poisson's ratio, by parts of the body.
     plane : In 2D, plane strain or plane stress; default: strain, but for files of elements of plane stress.
     thickness : In 2D, thickness; by default all forces are per unit thickness.
+    density : Mass per volume, by parts of the body, for --stability; a uniform one need not be given.
     friction : Coefficient of friction, by contact parts (in 3D also F1,F2); without it and --friction-slope it is
         alpha.
     friction_slope : The same, times alpha.

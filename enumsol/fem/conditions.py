@@ -53,6 +53,7 @@ class Options:
     pairs: Sequence[Sequence[Any]]
     plane: Plane | Mapping[str, Plane] | None
     thickness: float | Mapping[str, float]
+    density: float | Mapping[str, float] | None
     friction: Coefficients
     friction_slope: Coefficients
     friction2: Coefficients

@@ -57,13 +57,14 @@ def scene_of(source: PartedMesh | str | os.PathLike[str] | Any, options: Options
     thickness = thickness_of(mesh, options.thickness)
     body = replace(nodal_basis(mesh.points, mesh.cells, labels=mesh.labels), thickness=thickness)
     held = conditions.supports_of(mesh, options)
+    masses = masses_of(mesh, options.density, thickness)
     contacts = contacts_of(body, mesh, options, held)
     forces = conditions.part_forces(body, mesh, options.load, options.pressure)
     if options.body_force is not None:
         forces = forces + body.volume_forces(body_force_of(mesh, options.body_force))
     slope = conditions.part_forces(body, mesh, options.load_slope, options.pressure_slope, "_slope")
     springs, pieces = conditions.part_springs(body, mesh, options.spring), conditions.pieces_of(mesh)
-    scene = Scene(mesh, options, body, held, contacts, forces, slope, springs, coefficients, pieces)
+    scene = Scene(mesh, options, body, held, contacts, forces, slope, springs, coefficients, pieces, masses)
     refuse_overlaps(scene)
     refuse_walls(scene)
     refuse_pairs(scene)
@@ -123,6 +124,20 @@ def thickness_of(mesh: PartedMesh, value: object) -> Floats | None:
     return np.broadcast_to(np.array(given, dtype=np.float64), len(mesh.cells))
 
 
+def masses_of(mesh: PartedMesh, density: object, thickness: Floats | None) -> Floats | None:
+    """Mass per volume, in 2D per area, of every cell, (M,); None where it is uniform and not given.
+
+    Raises
+    ------
+    InvalidArgumentError
+        As `lame_of`.
+    """
+    if density is None:
+        return None if thickness is None or np.ptp(thickness) == 0 else thickness
+    given = np.array(_of_cells(mesh, density, "density", positive_number), dtype=np.float64)
+    return np.asarray(np.broadcast_to(given, len(mesh.cells)) * (1.0 if thickness is None else thickness))
+
+
 def body_force_of(mesh: PartedMesh, value: object) -> Floats:
     """Force per volume of every cell, (M, d); parts of the body without one have none [force / length^3].
 
@@ -178,6 +193,7 @@ def mesh_problem(
     pairs: Sequence[Sequence[Any]] = (),
     plane: Plane | Mapping[str, Plane] | None = None,
     thickness: float | Mapping[str, float] = 1.0,
+    density: float | Mapping[str, float] | None = None,
     friction: float | Mapping[str, float] | None = None,
     friction_slope: float | Mapping[str, float] | None = None,
     friction2: float | Mapping[str, float] | None = None,
@@ -230,6 +246,9 @@ def mesh_problem(
     thickness : float, or mapping of names to float
         In 2D, of the whole body or of every part of it; all forces and stiffnesses are multiplied by it. By default
         they are per unit thickness [length].
+    density : float, or mapping of names to float, optional
+        Mass per volume, of the whole body or of every part of it, for `stability`; a uniform one changes no verdict and
+        need not be given [force time^2 / length^4].
     friction, friction_slope : float, in 3D also (float, float), or mapping of names to these, optional
         Coefficient friction + alpha friction_slope [-], of all contact nodes or of every contact part and of the first
         part of every pair (the slope is 0 for parts that are not named); in 3D a pair is along both axes. A node of two
@@ -293,7 +312,7 @@ def mesh_problem(
     (24, 4)
     """
     given = Options(
-        young=young, poisson=poisson, contact=contact, pairs=pairs, plane=plane, thickness=thickness,
+        young=young, poisson=poisson, contact=contact, pairs=pairs, plane=plane, thickness=thickness, density=density,
         friction=friction, friction_slope=friction_slope, friction2=friction2, friction2_slope=friction2_slope,
         axis=axis, clamp=clamp, symmetry=symmetry, displacement=displacement, spring=spring,
         load=load, load_slope=load_slope, pressure=pressure, pressure_slope=pressure_slope, body_force=body_force,

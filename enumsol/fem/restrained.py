@@ -200,6 +200,7 @@ def problem_of(
     axes: tuple[Floats, ...],
     mesh: Callable[[Integers], BodyMesh] | None = None,
     modes: Floats | None = None,
+    mass: sp.csc_array | None = None,
     **more: Any,
 ) -> AnyProblem:
     """Problem of a body with these contact rows, by the degrees of freedom that are left, in the order of its rows.
@@ -214,6 +215,8 @@ def problem_of(
         What the problem keeps of its mesh, from the degrees of freedom that are left.
     modes : (d N, r) array or None
         Rigid motions that nothing holds.
+    mass : (d N, d N) csc_array or None
+        Of all degrees of freedom.
     **more
         As in `ContactProblem` and `ContactProblem3D`.
 
@@ -242,6 +245,9 @@ def problem_of(
     if np.any(uncoupled):
         coupled = sp.diags_array(kept)
         A = sp.csc_array(coupled @ A @ coupled + sp.diags_array(np.where(kept == 0, A.diagonal(), 0.0)))
+    if mass is not None:
+        coupled, own = sp.diags_array(kept), sp.csc_array(mass[left][:, left])
+        more["mass"] = sp.csc_array(coupled @ own @ coupled + sp.diags_array(np.where(kept == 0, own.diagonal(), 0.0)))
     rows = (displacements_along(contact.means, axis, dofs, left) for axis in (contact.normals, *axes))
     arrays: tuple[Any, ...] = (A, *rows, kept * load[left])
     more["load_slope"] = None if body.load_slope is None else kept * body.load_slope[left]

@@ -18,6 +18,7 @@ from enumsol.fem.contacts import Contacts, Group
 from enumsol.fem.meshes import PartedMesh, unit_vectors
 from enumsol.fem.restrained import Body, Supports, axes_of, problem_of
 from enumsol.model.cells import KINDS, boundary_facets, by_kind, facet_outlines
+from enumsol.model.mass import consistent_mass
 from enumsol.model.mesh import BodyMesh
 from enumsol.model.problem import given_friction
 from enumsol.model.restart import afresh
@@ -60,6 +61,8 @@ class Scene:
     lame : (2,) or (M, 2) array
     pieces : list of BodyPiece
         The connected bodies.
+    masses : (M,) array or None
+        Mass per volume, in 2D per area, of the cells; None where it is uniform and not given.
     notes : list of str
         What may not have been intended, each in a sentence.
     """
@@ -74,6 +77,7 @@ class Scene:
     springs: sp.csc_array
     lame: Floats
     pieces: list[conditions.BodyPiece]
+    masses: Floats | None = None
     notes: list[str] = field(default_factory=list)
 
     @property
@@ -177,6 +181,7 @@ class Scene:
             nodes,
             axes,
             modes=modes,
+            mass=self._mass(),
             mesh=lambda left: BodyMesh.of_dofs(mesh.points, mesh.cells, left, supports.values, surface, lame=self.lame),
             gap=gaps + normal,
             slip_offset=slip_offset,
@@ -187,6 +192,13 @@ class Scene:
             **more,
         )
         return afresh(problem, notes=tuple(self.notes))
+
+    def _mass(self) -> sp.csc_array | None:
+        """Consistent mass before supports, (d N, d N), if it is not uniform or was given."""
+        if self.masses is None:
+            return None
+        of_nodes = consistent_mass(self.mesh.points, self.mesh.cells, self.masses)
+        return sp.csc_array(sp.kron(of_nodes, sp.eye_array(self.dimension)))
 
     def _rigid_modes(self) -> tuple[Floats | None, float | None]:
         """Rigid motions that nothing holds, if a bound for them is given, and the bound; None: the default."""
@@ -294,7 +306,8 @@ def _bodies(scene: Scene) -> list[str]:
 
 
 def _material(scene: Scene) -> list[str]:
-    names = ("young", "poisson", *(("plane", "thickness") if scene.dimension == 2 else ()))
+    given = () if scene.options.density is None else ("density",)
+    names = ("young", "poisson", *(("plane", "thickness") if scene.dimension == 2 else ()), *given)
     return [f"{name} {_said(getattr(scene.options, name))}" for name in names]
 
 
