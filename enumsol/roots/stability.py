@@ -21,12 +21,12 @@ from enumsol.search.stability import Proven, StabilitySearch
 from enumsol.support.arguments import shown
 from enumsol.support.immutable import Sealed
 from enumsol.support.messages import counted
-from enumsol.trusted.running_away import Motions, Touching
+from enumsol.trusted.running_away import Motions, Touching, everywhere
 
 if TYPE_CHECKING:
     from enumsol.model.problem3d import AnyProblem
     from enumsol.roots.root import Root
-    from enumsol.support.array_types import ArrayLike, Floats
+    from enumsol.support.array_types import ArrayLike, Floats, Mask
 
 Verdict = Literal["runs away", "does not run away", "undecided"]
 _OPEN, _STICK, _PLUS, _MINUS, _SLIP = (
@@ -62,7 +62,7 @@ class Stability(Sealed):
     Examples
     --------
     >>> import enumsol
-    >>> problem = enumsol.gallery.taper()
+    >>> problem = enumsol.gallery.taper(4, 7)
     >>> [found.verdict for found in enumsol.enumerate_roots(problem, alpha=0.2).stability()]
     ['does not run away', 'runs away', 'does not run away']
     """
@@ -106,7 +106,7 @@ def stability(
     Examples
     --------
     >>> import enumsol
-    >>> problem = enumsol.gallery.taper()
+    >>> problem = enumsol.gallery.taper(4, 7)
     >>> sliding = enumsol.enumerate_roots(problem, alpha=0.2)[1]
     >>> found = enumsol.stability(problem, sliding)
     >>> found.verdict, len(found.growth_rates)
@@ -158,25 +158,30 @@ class Stabilities:
 
     def of(self, root: Root) -> Stability:
         """The verdict on one root."""
-        reason = self._not_known(root)
+        F = _friction(self.problem, root.alpha)
+        rubs = np.any([f.mid > 0 for f in F], axis=0)
+        reason = self._not_known(root, rubs)
         if reason is not None:
             return Stability("undecided", (), (), (), reason)
         found: list[tuple[float, tuple[float, float], Floats]] = []
         gaps: list[tuple[float, float]] = []
-        limits, F = 0, _friction(self.problem, root.alpha)
-        rubs = np.any([f.mid > 0 for f in F], axis=0)
+        limits = 0
         for part in np.unique(self._node_part):
             nodes = np.flatnonzero(self._node_part == part)
             kinds = [_kind(root.active[i], rubs[i]) for i in nodes]
             limits += sum(kind == "limit" for kind in kinds)
             if "limit" not in kinds:
                 continue
-            key = (int(part), tuple(root.active[i] for i in nodes), None if self._tangents == 1 else id(root))
             stiffness, motions, dofs = self._setting(root, F, int(part), nodes, kinds)
+            # directions of slip in 3D are those of one root
+            slips = root.alpha if self._tangents == 1 else object()
+            key = (int(part), tuple(root.active[i] for i in nodes), motions.unsure, slips)
             if key not in self._known:
                 self._known[key] = StabilitySearch(stiffness, motions).run()
             proven = self._known[key]
             gaps += proven.gaps
+            if not (proven.growing or proven.gaps or everywhere(proven.ranges)):
+                gaps.append((0.0, np.inf))
             for _, motion in proven.growing:
                 found.append((*self._growth(motion.mu), self._shape(stiffness, motions, motion, dofs)))
         if found:
@@ -193,12 +198,14 @@ class Stabilities:
             reason = f"no motion grows with {counted(limits, 'contact node')} at the limit of friction"
         return Stability("does not run away", (), (), (), reason)
 
-    def _not_known(self, root: Root) -> str | None:
+    def _not_known(self, root: Root, rubs: Mask) -> str | None:
         """Why the statuses of a root do not tell enough."""
         if root.enclosure is None:
             return "the root was found in floats, and its statuses are not proven"
         if any(_OPEN in root.active[i] for i in self._unsure(root)):
             return "a contact node may be open or touch, which the bounds of this root do not decide"
+        if any(rubs[i] and {_PLUS, _MINUS} <= root.active[i] for i in self._unsure(root)):
+            return "a contact node may be at either limit, which the bounds of this root do not decide"
         return None
 
     @staticmethod
@@ -348,5 +355,5 @@ def _stacked(columns: list[Ball]) -> Ball:
 
 
 def _smaller(F: list[Ball], i: int) -> Ball:
-    """The smaller coefficient of a node."""
-    return F[int(np.argmin([f.mid[i] for f in F]))][i]
+    """The smaller coefficient of a node, along axes with friction."""
+    return F[int(np.argmin([f.mid[i] or np.inf for f in F]))][i]
