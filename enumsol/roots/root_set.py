@@ -278,7 +278,7 @@ class RootSet(Sequence[Root], Immutable):
         if mass is not None or "own" not in self._found:
             asked = Stabilities(self[0].problem, mass)
             found = tuple(asked.of(root) for root in self)
-            self._found |= {"verdicts": found} if mass is not None else {"own": found}
+            self._found["own" if mass is None else "verdicts"] = found
         if mass is None:
             self._found["verdicts"] = self._found["own"]
         return self._found["verdicts"]

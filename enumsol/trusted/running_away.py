@@ -119,6 +119,11 @@ class NoMotion:
 
     def holds(self, stiffness: DynamicStiffness, motions: Motions) -> bool:
         """True if it is proven that nothing grows in the range."""
+        # what overflows is not finite, and proves nothing
+        with np.errstate(all="ignore"):
+            return self._holds(stiffness, motions)
+
+    def _holds(self, stiffness: DynamicStiffness, motions: Motions) -> bool:
         if not 0 <= self.low < self.high or not self._admitted(motions):
             return False
         known = self._ends(stiffness)
@@ -246,6 +251,10 @@ class Growing:
 
     def found(self, stiffness: Stiffness, motions: Motions) -> Motion | None:
         """The motion, if it is proven to be there."""
+        with np.errstate(all="ignore"):
+            return self._found(stiffness, motions)
+
+    def _found(self, stiffness: Stiffness, motions: Motions) -> Motion | None:
         k = len(motions.signed)
         if motions.unsure or not 0 < self.low < self.high < np.inf or len(self.touching) != len(motions.touching):
             return None

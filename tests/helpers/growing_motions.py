@@ -34,7 +34,7 @@ def growing_motions(A, M, Bn, Bt, F, kinds, signs):
     found = []
     for count in range(len(limits) + 1):
         for sliding in itertools.combinations(limits, count):
-            for ways in itertools.product("open stick plus minus".split(), repeat=len(touch)):
+            for ways in itertools.product(["open", "stick", "plus", "minus"], repeat=len(touch)):
                 way = dict(zip(touch, ways, strict=True))
                 slips = {j: signs[j] for j in sliding}
                 slips |= {j: 1 if way[j] == "plus" else -1 for j in touch if way[j] in ("plus", "minus")}
@@ -80,3 +80,34 @@ def fits(pencil, Bn, Bt, F, v, contact, slips, way, limits, signs):
         return True
 
     return forward(1) or forward(-1)
+
+
+def of_a_root(problem, root, mass):
+    """All motions that grow at a root of a problem in 2D or 3D, the latter to first order and if no node touches."""
+    p, A, M, rows = problem.p, problem.A.toarray(), np.asarray(mass), problem.contact_rows.toarray()
+    F = np.array([float(x) for x in np.ravel(problem.friction_at(root.alpha))]).reshape(p, -1)
+    kinds, signs = [], []
+    for i, active in enumerate(root.active):
+        names = {status.name for status in active}
+        touches, rubs = "OPEN" in names, np.any(F[i] > 0)
+        limit = rubs and names != {"STICK"}
+        kinds.append("open" if names == {"OPEN"} else "touching" if touches else "limit" if limit else "stuck")
+        signs.append(1.0 if "SLIP_PLUS" in names else -1.0)
+    if F.shape[1] == 1:
+        return growing_motions(A, M, rows[:p], rows[p:], F[:, 0], kinds, signs)
+    along, across = np.zeros((p, problem.n)), []
+    for i in range(p):
+        assert kinds[i] != "touching"
+        W, own = F[i][:, None] * rows[p + i :: p][:2], F[i] > 0
+        if kinds[i] == "limit":
+            d = np.divide(root.lambda_t[i], F[i], out=np.zeros(2), where=own)
+            d /= np.linalg.norm(d)
+            along[i] = d @ W
+            across += [np.array([-d[1], d[0]]) @ W] if own.all() else []
+        elif kinds[i] == "stuck":
+            across += list(W[own])
+    Z = kernel(np.reshape(across, (-1, problem.n)), problem.n)
+    # nodes that stick have no tangential row left, and those at their limit one, along the force
+    share = [1.0 if kind == "limit" else 0.0 for kind in kinds]
+    found = growing_motions(Z.T @ A @ Z, Z.T @ M @ Z, rows[:p] @ Z, along @ Z, np.array(share), kinds, [1.0] * p)
+    return [(mu, Z @ v, sliding) for mu, v, sliding in found]

@@ -59,8 +59,7 @@ def setting(A, M, Bn, Bt, F, kinds, signs, unsure=()):
             touching.append(Touching(start, tuple(range(start + 1, len(columns))), Ball.exact(np.array(F[i]))))
     leaves = {node.leaves for node in touching}
     signed = np.array([k < len(limits) or k in leaves for k in range(len(columns))], dtype=bool)
-    motions = Motions(
-        Ball.exact(np.array(columns).T.copy()), Ball.exact(np.array(slopes).T.copy()), signed, tuple(touching), unsure
-    )
+    moves, leans = (Ball.exact(np.array(of).reshape(-1, len(rows)).T.copy()) for of in (columns, slopes))
+    motions = Motions(moves, leans, signed, tuple(touching), unsure)
     sparse = sp.csc_array(A), sp.csc_array(M), sp.csr_array(np.array(rows))
     return DynamicStiffness(*sparse), motions
