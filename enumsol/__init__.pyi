@@ -80,6 +80,7 @@ from .model.statuses import ContactStatus as ContactStatus, sign_array as sign_a
 from .proof.proof_file import Proof as Proof, ProofFormatError as ProofFormatError
 from .report import write_report as write_report
 from .roots.enumerate import enumerate_roots as enumerate_roots, is_unique as is_unique
+from .roots.rates import Rates as Rates, Way as Way, rates as rates
 from .roots.root import Enclosure as Enclosure, Polytope as Polytope, Root as Root, RootFamily as RootFamily
 from .roots.root_set import (
     RigidBound as RigidBound,

@@ -102,6 +102,8 @@ class DynamicStiffness:
 
     def at(self, mu: float) -> Ball | None:
         """K(mu), (m, m) [force / length]; None where it is not enclosed."""
+        if not self.rows.shape[0]:
+            return Ball.exact(np.zeros((0, 0)))
         if mu not in self._known:
             try:
                 self._known[mu] = self._inverse(self._compliance(mu)) if mu or self.held else self._slow()
@@ -168,20 +170,47 @@ class DynamicStiffness:
         rounding = (abs(self.A) + 2.0 * abs(added)) * (2.0 * UNIT)
         return Pencil(sp.csc_array(self.A + added), self.rows).compliance(rounding)
 
-    def _slow(self) -> Ball:
-        """K(0) of a body that nothing holds: stiffness against all but the rigid motions (theory, (15.5))."""
-        springs = abs(self.springs)
-        held = Pencil(sp.csc_array(self.A + self.springs), self.rows)
-        K = self._inverse(held.compliance((abs(self.A) + springs) * (2.0 * UNIT)))
-        assert self._modes is not None
-        moved = self.rows @ self._modes
-        size = abs(self.rows) @ np.abs(self._modes)
-        G = Ball(moved, size * (self.A.shape[0] + 2) * 2 * UNIT * SAFE + TINY)
-        KG = K @ G
-        inverse = Inverse.of(Ball(G.mid.T, G.rad.T) @ KG)
+    def forces(self, load: Floats) -> Ball | None:
+        """Forces y on the rows, held at w = 0, under a load at rest, (m,); None where they are not enclosed.
+
+        Of a body that nothing holds they also balance the load as a whole.
+        """
+        K, m = self.at(0.0), self.rows.shape[0]
+        size = float(np.max(np.abs(load), initial=0.0))
+        if K is None or not size or not m:
+            return None if K is None else Ball.exact(np.zeros(m))
+        # a load is one more row: B A^-1 f'
+        rows = sp.csr_array(sp.vstack([self.rows, sp.csr_array(load[None, :])]))
+        try:
+            if self.held:
+                return K @ Pencil(self.A, rows).compliance()[:m, m]
+            _, share, inverse = self._on_springs
+            h = _moved(sp.csr_array(load[None, :]), self._modes)
+            balance = inverse.solve(Ball(h.mid.T, h.rad.T))
+            return K @ self._springs_and(rows)[:m, m] + (share @ balance)[:, 0]
+        except NotEnclosedError:
+            return None
+
+    @cached_property
+    def _on_springs(self) -> tuple[Ball, Ball, Inverse]:
+        """K of the body on springs, K G', and what solves with G K G'."""
+        K = self._inverse(self._springs_and(self.rows))
+        G = _moved(self.rows, self._modes)
+        share = K @ G
+        inverse = Inverse.of(Ball(G.mid.T, G.rad.T) @ share)
         if inverse is None:
             raise NotEnclosedError("some rigid displacement moves no node in contact")
-        return (K - KG @ inverse.solve(Ball(KG.mid.T, KG.rad.T))).symmetric
+        return K, share, inverse
+
+    def _springs_and(self, rows: sp.csr_array) -> Ball:
+        """S of rows of the body on springs."""
+        held = Pencil(sp.csc_array(self.A + self.springs), rows)
+        return held.compliance((abs(self.A) + abs(self.springs)) * (2.0 * UNIT))
+
+    def _slow(self) -> Ball:
+        """K(0) of a body that nothing holds: stiffness against all but the rigid motions (theory, (15.5))."""
+        K, share, inverse = self._on_springs
+        return (K - share @ inverse.solve(Ball(share.mid.T, share.rad.T))).symmetric
 
     @staticmethod
     def _inverse(S: Ball) -> Ball:
@@ -191,3 +220,9 @@ class DynamicStiffness:
         if inverse is None:
             raise NotEnclosedError("S(mu) is not proven regular")
         return inverse.solve(Ball.exact(np.eye(len(S.mid)))).symmetric
+
+
+def _moved(rows: sp.csr_array, modes: Any) -> Ball:
+    """B N, (m, r)."""
+    size = abs(rows) @ np.abs(modes)
+    return Ball(np.asarray(rows @ modes), np.asarray(size * (modes.shape[0] + 2) * 2 * UNIT * SAFE + TINY))

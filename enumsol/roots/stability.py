@@ -21,21 +21,18 @@ from enumsol.search.stability import Proven, StabilitySearch
 from enumsol.support.arguments import shown
 from enumsol.support.immutable import Sealed
 from enumsol.support.messages import counted
-from enumsol.trusted.running_away import Motions, Touching, everywhere
+from enumsol.trusted.running_away import Motion, Motions, Touching, everywhere
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from enumsol.model.problem3d import AnyProblem
     from enumsol.roots.root import Root
-    from enumsol.support.array_types import ArrayLike, Floats, Mask
+    from enumsol.support.array_types import ArrayLike, Floats, Integers
 
 Verdict = Literal["runs away", "does not run away", "undecided"]
-_OPEN, _STICK, _PLUS, _MINUS, _SLIP = (
-    ContactStatus.OPEN,
-    ContactStatus.STICK,
-    ContactStatus.SLIP_PLUS,
-    ContactStatus.SLIP_MINUS,
-    ContactStatus.SLIP,
-)
+_OPEN, _STICK, _PLUS = ContactStatus.OPEN, ContactStatus.STICK, ContactStatus.SLIP_PLUS
+_MINUS = ContactStatus.SLIP_MINUS
 
 
 @dataclass(frozen=True)
@@ -62,7 +59,7 @@ class Stability(Sealed):
     Examples
     --------
     >>> import enumsol
-    >>> problem = enumsol.gallery.taper(4, 7)
+    >>> problem = enumsol.gallery.get("taper-8").build()
     >>> [found.verdict for found in enumsol.enumerate_roots(problem, alpha=0.2).stability()]
     ['does not run away', 'runs away', 'does not run away']
     """
@@ -106,17 +103,49 @@ def stability(
     Examples
     --------
     >>> import enumsol
-    >>> problem = enumsol.gallery.taper(4, 7)
+    >>> problem = enumsol.gallery.get("taper-8").build()
     >>> sliding = enumsol.enumerate_roots(problem, alpha=0.2)[1]
     >>> found = enumsol.stability(problem, sliding)
     >>> found.verdict, len(found.growth_rates)
     ('runs away', 1)
     """
-    if not hasattr(root, "enclosure"):
-        raise InvalidArgumentError(f"root is {shown(root)}; expected a root of enumerate_roots, not a family of them")
-    if root.problem is not problem and root.problem.fingerprint != problem.fingerprint:
-        raise InvalidArgumentError("root solves another problem; expected one of enumerate_roots(problem, alpha)")
-    return Stabilities(problem, mass).of(root)
+    asked = Stabilities(problem, mass)
+    asked.check(root)
+    return asked.of(root)
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """A part of the body that nothing connects with others, at an equilibrium.
+
+    Attributes
+    ----------
+    stiffness : DynamicStiffness
+        Of its rows in contact.
+    motions : Motions
+    dofs : (n',) int array
+        Its degrees of freedom.
+    rows : list of int
+        Those rows among all contact rows.
+    limits : list of int
+        Contact nodes at their limit, in the order of ``motions``.
+    """
+
+    stiffness: DynamicStiffness
+    motions: Motions
+    dofs: Integers
+    rows: list[int]
+    limits: list[int]
+
+    def displacement(self, mu: float, load: Floats, forces: Floats) -> Floats:
+        """Displacements (A + mu M)^-1 (load - B'y) for forces y on the rows, (n',), in floats; of a body on springs."""
+        from enumsol.condensation.factorization import Factorization  # scipy's solvers come with the first use
+
+        stiffness = self.stiffness
+        A = stiffness.A + mu * stiffness.M
+        if not mu and not stiffness.held:
+            A = A + stiffness.springs
+        return Factorization(sp.csc_array(A)).solve(load - stiffness.rows.T @ forces)
 
 
 class Stabilities:
@@ -156,34 +185,30 @@ class Stabilities:
         self._known: dict[Any, Proven] = {}
         self._stiffness: dict[Any, DynamicStiffness] = {}
 
+    def check(self, root: Root) -> None:
+        """Refuse what is no root of this problem."""
+        if not hasattr(root, "enclosure"):
+            raise InvalidArgumentError(
+                f"root is {shown(root)}; expected a root of enumerate_roots, not a family of them"
+            )
+        if root.problem is not self.problem and root.problem.fingerprint != self.problem.fingerprint:
+            raise InvalidArgumentError("root solves another problem; expected one of enumerate_roots(problem, alpha)")
+
     def of(self, root: Root) -> Stability:
         """The verdict on one root."""
-        F = _friction(self.problem, root.alpha)
-        rubs = np.any([f.mid > 0 for f in F], axis=0)
-        reason = self._not_known(root, rubs)
-        if reason is not None:
+        if (reason := self.not_known(root)) is not None:
             return Stability("undecided", (), (), (), reason)
         found: list[tuple[float, tuple[float, float], Floats]] = []
         gaps: list[tuple[float, float]] = []
         limits = 0
-        for part in np.unique(self._node_part):
-            nodes = np.flatnonzero(self._node_part == part)
-            kinds = [_kind(root.active[i], rubs[i]) for i in nodes]
-            limits += sum(kind == "limit" for kind in kinds)
-            if "limit" not in kinds:
-                continue
-            stiffness, motions, dofs = self._setting(root, F, int(part), nodes, kinds)
-            # directions of slip in 3D are those of one root
-            slips = root.alpha if self._tangents == 1 else object()
-            key = (int(part), tuple(root.active[i] for i in nodes), motions.unsure, slips)
-            if key not in self._known:
-                self._known[key] = StabilitySearch(stiffness, motions).run()
-            proven = self._known[key]
+        for setting in self.settings(root):
+            limits += len(setting.limits)
+            proven = self._proven(root, setting)
             gaps += proven.gaps
             if not (proven.growing or proven.gaps or everywhere(proven.ranges)):
                 gaps.append((0.0, np.inf))
             for _, motion in proven.growing:
-                found.append((*self._growth(motion.mu), self._shape(stiffness, motions, motion, dofs)))
+                found.append((*_growth(motion.mu), self._shape(setting, motion)))
         if found:
             found.sort(key=lambda item: -item[0])
             rates, bounds, shapes = zip(*found, strict=True)
@@ -198,15 +223,38 @@ class Stabilities:
             reason = f"no motion grows with {counted(limits, 'contact node')} at the limit of friction"
         return Stability("does not run away", (), (), (), reason)
 
-    def _not_known(self, root: Root, rubs: Mask) -> str | None:
+    def not_known(self, root: Root) -> str | None:
         """Why the statuses of a root do not tell enough."""
         if root.enclosure is None:
             return "the root was found in floats, and its statuses are not proven"
         if any(_OPEN in root.active[i] for i in self._unsure(root)):
             return "a contact node may be open or touch, which the bounds of this root do not decide"
+        rubs = np.any([F.mid > 0 for F in _friction(self.problem, root.alpha)], axis=0)
         if any(rubs[i] and {_PLUS, _MINUS} <= root.active[i] for i in self._unsure(root)):
             return "a contact node may be at either limit, which the bounds of this root do not decide"
         return None
+
+    def settings(self, root: Root, *, every: bool = False) -> Iterator[Setting]:
+        """Parts of the body with nodes at their limit, or all."""
+        F = _friction(self.problem, root.alpha)
+        rubs = np.any([f.mid > 0 for f in F], axis=0)
+        for part in np.unique(self._part):
+            nodes = np.flatnonzero(self._node_part == part).tolist()
+            kinds = {i: _kind(root.active[i], rubs[i]) for i in nodes}
+            if every or "limit" in kinds.values():
+                yield self._setting(root, F, int(part), kinds)
+
+    def _proven(self, root: Root, setting: Setting) -> Proven:
+        """What is proven of one part; in 2D the same for all roots with these nodes and friction."""
+        if self._tangents > 1:
+            return StabilitySearch(setting.stiffness, setting.motions).run()
+        F, moves = setting.motions.slopes, setting.motions.moves
+        leaning = tuple((float(node.F.mid), float(node.F.rad)) for node in setting.motions.touching)
+        arrays = (part.tobytes() for part in (F.mid, F.rad, moves.mid))
+        key = (tuple(setting.rows), setting.motions.unsure, leaning, *arrays)
+        if key not in self._known:
+            self._known[key] = StabilitySearch(setting.stiffness, setting.motions).run()
+        return self._known[key]
 
     @staticmethod
     def _unsure(root: Root) -> tuple[int, ...]:
@@ -215,87 +263,79 @@ class Stabilities:
             return ()
         return tuple(i for i, statuses in enumerate(root.active) if len(statuses) > 1)
 
-    @staticmethod
-    def _growth(mu: tuple[float, float]) -> tuple[float, tuple[float, float]]:
-        low, high = np.sqrt(mu[0]) * (1 - 2.0**-50), np.sqrt(mu[1]) * (1 + 2.0**-50)
-        return float(np.sqrt(0.5 * (mu[0] + mu[1]))), (float(low), float(high))
-
-    def _setting(
-        self, root: Root, F: list[Ball], part: int, nodes: Any, kinds: list[str]
-    ) -> tuple[DynamicStiffness, Motions, Any]:
-        """Stiffness of the rows of a part that are in contact, how they may move, and its degrees of freedom."""
-        problem, p = self.problem, self.problem.p
-        dofs = np.flatnonzero(self._part == part)
-        rows: list[int] = []
-        for k in range(self._tangents + 1):
-            for i, kind in zip(nodes.tolist(), kinds, strict=True):
-                if kind == "open" or (k and F[k - 1].mid[i] == 0):
-                    continue
-                rows.append(k * p + i)
-        key = (part, tuple(rows))
-        if key not in self._stiffness:
-            modes = springs = None
-            A, M = sp.csc_array(problem.A), self._mass
-            B = sp.csr_array(sp.csr_array(problem.contact_rows)[rows][:, dofs])
-            if not problem.held:
-                N = problem.modes.N[dofs]
-                modes = N[:, np.any(N != 0, axis=0)]
-                springs = sp.csc_array(problem.modes.springs())[dofs][:, dofs]
-            cut = [sp.csc_array(sp.csr_array(matrix)[dofs][:, dofs]) for matrix in (A, M)]
-            self._stiffness[key] = DynamicStiffness(cut[0], cut[1], B, modes, springs)
+    def _setting(self, root: Root, F: list[Ball], part: int, kinds: dict[int, str]) -> Setting:
+        """A part with nodes that are open, stuck, at their limit or touch."""
+        p = self.problem.p
+        rubbing = [(k * p, i) for k in range(self._tangents + 1) for i in kinds if not k or F[k - 1].mid[i] > 0]
+        rows = [first + i for first, i in rubbing if kinds[i] != "open"]
         place = {row: at for at, row in enumerate(rows)}
+        dofs = np.flatnonzero(self._part == part)
         columns: list[Ball] = []
         slopes: list[Ball] = []
-        signed: list[bool] = []
-        touching: list[Touching] = []
-        limits, unsure = (
-            [i for i, kind in zip(nodes.tolist(), kinds, strict=True) if kind == "limit"],
-            self._unsure(root),
-        )
+        limits = [i for i, kind in kinds.items() if kind == "limit"]
         for i in limits:
-            move, slope = _limit(root, F, i)
-            for into, column, normal in ((columns, move, 0.0), (slopes, move, slope)):
-                full = Ball.exact(np.zeros(len(rows)))
-                for k in range(self._tangents):
-                    if (row := (k + 1) * p + i) in place:
-                        full[place[row]] = column[k]
-                if isinstance(normal, Ball):
-                    full[place[i]] = -normal
-                into.append(full)
-            signed.append(True)
-        for i, kind in zip(nodes.tolist(), kinds, strict=True):
-            if kind != "touching":
-                continue
-            own = [i, *((k + 1) * p + i for k in range(self._tangents) if (k + 1) * p + i in place)]
+            move, sinking = _limit(root, F, i)
+            along = {place[(k + 1) * p + i]: x for k, x in enumerate(move) if (k + 1) * p + i in place}
+            columns.append(_column(len(rows), along))
+            slopes.append(_column(len(rows), along | {place[i]: -sinking}))
+        touching: list[Touching] = []
+        signed = [True] * len(limits)
+        for i in (i for i, kind in kinds.items() if kind == "touching"):
+            own = [(k + 1) * p + i for k in range(self._tangents) if (k + 1) * p + i in place]
             start = len(columns)
-            for row in own:
-                full = Ball.exact(np.zeros(len(rows)))
-                full[place[row]] = -1.0 if row == i else 1.0
-                columns.append(full)
-                signed.append(row == i)
-            touching.append(Touching(start, tuple(range(start + 1, start + len(own))), _smaller(F, i)))
-        empty = Ball.exact(np.zeros((len(rows), 0)))
+            columns.append(_column(len(rows), {place[i]: Ball.exact(np.array(-1.0))}))
+            columns += [_column(len(rows), {place[row]: Ball.exact(np.array(1.0))}) for row in own]
+            signed += [True, *(False for _ in own)]
+            # along axes with friction
+            smaller = min((f[i] for f in F), key=lambda f: float(f.mid) or np.inf)
+            touching.append(Touching(start, tuple(range(start + 1, start + 1 + len(own))), smaller))
+        unsure = self._unsure(root)
         motions = Motions(
-            _stacked(columns) if columns else empty,
-            _stacked(slopes) if slopes else empty,
+            _stacked(columns, len(rows)),
+            _stacked(slopes, len(rows)),
             np.array(signed, dtype=bool),
             tuple(touching),
             tuple(k for k, i in enumerate(limits) if i in unsure),
         )
-        return self._stiffness[key], motions, dofs
+        return Setting(self._stiffness_of(part, dofs, rows), motions, dofs, rows, limits)
 
-    def _shape(self, stiffness: DynamicStiffness, motions: Motions, motion: Any, dofs: Any) -> Floats:
+    def _stiffness_of(self, part: int, dofs: Integers, rows: list[int]) -> DynamicStiffness:
+        """Stiffness of some rows of a part."""
+        key, problem = (part, tuple(rows)), self.problem
+        if key not in self._stiffness:
+            modes = springs = None
+            if not problem.held:
+                N = problem.modes.N[dofs]
+                modes = N[:, np.any(N != 0, axis=0)]
+                springs = sp.csc_array(problem.modes.springs())[dofs][:, dofs]
+            A, M = (sp.csc_array(sp.csr_array(matrix)[dofs][:, dofs]) for matrix in (problem.A, self._mass))
+            B = sp.csr_array(sp.csr_array(problem.contact_rows)[rows][:, dofs])
+            self._stiffness[key] = DynamicStiffness(A, M, B, modes, springs)
+        return self._stiffness[key]
+
+    def _shape(self, setting: Setting, motion: Motion) -> Floats:
         """Displacements of a motion that grows, (n,), in floats."""
-        from enumsol.condensation.factorization import Factorization
-
-        mu = 0.5 * sum(motion.mu)
-        K = stiffness.at(motion.mu[0])
+        K = setting.stiffness.at(motion.mu[0])
         assert K is not None
-        forces = K.mid @ (motions.moves.mid @ motion.x.mid)
-        v = Factorization(sp.csc_array(stiffness.A + mu * stiffness.M)).solve(stiffness.rows.T @ forces)
+        forces = -(K.mid @ (setting.motions.moves.mid @ motion.x.mid))
+        v = setting.displacement(0.5 * sum(motion.mu), np.zeros(len(setting.dofs)), forces)
         whole = np.zeros(self.problem.n)
-        whole[dofs] = v / np.max(np.abs(v))
+        whole[setting.dofs] = v / np.max(np.abs(v))
         return whole
+
+
+def _growth(mu: tuple[float, float]) -> tuple[float, tuple[float, float]]:
+    """A growth rate, and its bounds, from bounds of its square."""
+    low, high = np.sqrt(mu[0]) * (1 - 2.0**-50), np.sqrt(mu[1]) * (1 + 2.0**-50)
+    return float(np.sqrt(0.5 * (mu[0] + mu[1]))), (float(low), float(high))
+
+
+def _column(size: int, entries: dict[int, Ball]) -> Ball:
+    """A column with some entries that are not zero."""
+    column = Ball.exact(np.zeros(size))
+    for at, value in entries.items():
+        column[at] = value
+    return column
 
 
 def _kind(active: frozenset[ContactStatus], friction: bool) -> str:
@@ -328,7 +368,7 @@ def _limit(root: Root, F: list[Ball], i: int) -> tuple[list[Ball], Ball]:
     inverse = [_inverse(f[i]) for f in F]
     force = [Ball(0.5 * (low + high), 0.5 * (high - low) * SAFE + TINY) for low, high in bounds]
     shares = [x * y for x, y in zip(force, inverse, strict=True)]
-    length = float(np.hypot(*(x.mid for x in shares)))
+    length = float(np.hypot(*(x.mid for x in shares))) or TINY
     # |v / |v| - m / |m|| <= 2 |v - m| / |m|
     off = 2.0 * float(np.hypot(*(x.rad for x in shares))) / length * SAFE + 8 * UNIT
     typical = max(float(f.mid[i]) for f in F)
@@ -349,11 +389,8 @@ def _inverse(F: Ball) -> Ball:
     )
 
 
-def _stacked(columns: list[Ball]) -> Ball:
-    """Columns beside each other."""
+def _stacked(columns: list[Ball], size: int) -> Ball:
+    """Columns beside each other, (size, k)."""
+    if not columns:
+        return Ball.exact(np.zeros((size, 0)))
     return Ball(np.stack([c.mid for c in columns], axis=1), np.stack([c.rad for c in columns], axis=1))
-
-
-def _smaller(F: list[Ball], i: int) -> Ball:
-    """The smaller coefficient of a node, along axes with friction."""
-    return F[int(np.argmin([f.mid[i] or np.inf for f in F]))][i]

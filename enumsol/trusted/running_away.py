@@ -217,6 +217,43 @@ class NoMotion:
         ), (end, None)
 
 
+def rates_in(K: Ball, motions: Motions, held: Ball, slides: Sequence[int]) -> tuple[bool | None, Ball]:
+    """How nodes go on under a rate of load if some at their limit slide and others stay (theory, section 15.5).
+
+    Parameters
+    ----------
+    K : Ball (m, m)
+        K(0).
+    motions : Motions
+        None that touch.
+    held : Ball (m,)
+        Rates of the forces y with w = 0.
+    slides : indices of the nodes at their limit that slide
+
+    Returns
+    -------
+    (answer, y)
+        Whether they do, strictly; False: no solution has them slide. None: neither is proven. y (m,) are the rates of
+        the forces.
+    """
+    own, k = list(slides), len(motions.signed)
+    # r = -T'y and y = held - K R x
+    first = -(motions.slopes.T @ Ball(held.mid[:, None], held.rad[:, None]))
+    x = Ball.exact(np.zeros(k))
+    if own:
+        moved = solution(_across(motions.slopes[:, own], K, motions.moves[:, own]), -first[own])
+        if moved is None:
+            return None, held
+        x[own] = moved[:, 0]
+    y = held - (K @ (motions.moves @ Ball(x.mid[:, None], x.rad[:, None])))[:, 0]
+    r = -(motions.slopes.T @ Ball(y.mid[:, None], y.rad[:, None]))[:, 0]
+    rest = [i for i in range(motions.limits) if i not in own]
+    signs = Ball.joined(x[own], r[rest])
+    if np.any(signs.mid + signs.rad < 0):
+        return False, y
+    return (True if np.all(signs.mid - signs.rad > 0) else None), y
+
+
 @dataclass(frozen=True, eq=False)
 class Motion:
     """A motion that grows, as it is enclosed.
