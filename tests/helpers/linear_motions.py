@@ -31,7 +31,7 @@ def random_motion(rng, touching=False, massless=False):
 
 
 def setting(A, M, Bn, Bt, F, kinds, signs, unsure=()):
-    """The dynamic stiffness and the motions that section 15.2 of theory makes of them."""
+    """The dynamic stiffness and the motions made of them (theory, section 15.2)."""
     p, rows, place = len(Bn), [], {}
     for name, B in (("n", Bn), ("t", Bt)):
         for i in range(p):

@@ -9,7 +9,7 @@ import itertools
 
 import numpy as np
 
-#: Theory, (15.2): a node that slips and sticks in turn, n and t first.
+#: A node (theory, (15.2)) that slips and sticks in turn, n and t first.
 STICK_SLIP_F = 2.8
 STICK_SLIP_A = np.array([[5.4, 1.8, 0.1, -5.2], [1.8, 4.3, -2.3, 0.4], [0.1, -2.3, 3.9, -5.9], [-5.2, 0.4, -5.9, 16.6]])
 
