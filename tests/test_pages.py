@@ -22,13 +22,16 @@ def page(name):
     return followed
 
 
-NAMES = ("branches", "collection", "command_line", "gallery", "histories", "results", "three_dimensions", "tutorial")
-branches, collection, command_line, gallery, histories, results, three_dimensions, tutorial = map(page, NAMES)
+NAMES = ("branches", "collection", "command_line", "gallery", "histories", "results", "stability", "three_dimensions")
+branches, collection, command_line, gallery, histories, results, stability, three_dimensions = map(page, NAMES)
+tutorial = page("tutorial")
 
 
 def test_no_page_is_forgotten():
     elsewhere = {ROOT / "README.md", DOCS / "index.md", DOCS / "from_a_mesh.md", DOCS / "from_other_codes.md"}
-    assert {path for path in DOCUMENTS if runs(path)} == elsewhere | {DOCS / f"{name}.md" for name in NAMES}
+    assert {path for path in DOCUMENTS if runs(path)} == elsewhere | {
+        DOCS / f"{name}.md" for name in (*NAMES, "tutorial")
+    }
 
 
 def test_blocks_that_are_run_are_found():
@@ -125,6 +128,16 @@ def test_histories(histories):
     assert {path.name for path in histories["folder"].iterdir()} >= {"loop.png", "node.html", "wedge.html", "map.png"}
     assert (histories["history"].complete, histories["found"].complete) == (True, True)
     assert histories["history"].counts == (1, 1, 3, 5)
+
+
+@pytest.mark.slow
+def test_stability(stability):
+    printed = [text for kind, text in blocks(DOCS / "stability.md") if kind == "text"]
+    # small root sets are printed with their nodes first
+    assert printed == [text[text.index("RootSet") :] for _, text in stability["outputs"]]
+    assert [found.verdict for found in stability["verdicts"]] == ["does not run away", "runs away", "does not run away"]
+    assert stability["steel"].growth_rates[0] == pytest.approx(40_000, rel=0.01)
+    assert (stability["root"].index, stability["mass"][0]) == (1, [3, 1.5])
 
 
 @pytest.mark.slow

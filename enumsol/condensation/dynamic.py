@@ -1,7 +1,7 @@
 """The dynamic stiffness of contact rows: K(mu) = (B (A + mu M)^-1 B')^-1, in balls (theory, section 15.2).
 
 K(mu) is the stiffness with which contact rows resist motions that grow like exp(rho t), mu = rho^2. It increases with
-mu and is concave (theory, Lemma 15.2), so that its values at a few mu bound it everywhere.
+mu and is concave (theory, section 15.2), so that its values at a few mu bound it everywhere.
 """
 
 from __future__ import annotations

@@ -276,9 +276,12 @@ class RootSet(Sequence[Root], Immutable):
 
         if not len(self):
             return ()
-        if mass is not None or self.verdicts is None:
+        if mass is not None or "own" not in self._found:
             asked = Stabilities(self[0].problem, mass)
-            self._found["verdicts"] = tuple(asked.of(root) for root in self)
+            found = tuple(asked.of(root) for root in self)
+            self._found["own" if mass is None else "verdicts"] = found
+        if mass is None:
+            self._found["verdicts"] = self._found["own"]
         return self._found["verdicts"]
 
     @property

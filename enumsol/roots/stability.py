@@ -21,7 +21,7 @@ from enumsol.search.stability import Proven, StabilitySearch
 from enumsol.support.arguments import alpha_value, shown
 from enumsol.support.immutable import Sealed
 from enumsol.support.messages import counted
-from enumsol.trusted.running_away import Motion, Motions, Touching
+from enumsol.trusted.running_away import Motion, Motions, Touching, everywhere
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 Verdict = Literal["runs away", "does not run away", "undecided"]
 _OPEN, _STICK, _PLUS = ContactStatus.OPEN, ContactStatus.STICK, ContactStatus.SLIP_PLUS
+_MINUS = ContactStatus.SLIP_MINUS
 
 
 @dataclass(frozen=True)
@@ -204,6 +205,8 @@ class Stabilities:
             limits += len(setting.limits)
             proven = self._proven(root, setting)
             gaps += proven.gaps
+            if not (proven.growing or proven.gaps or everywhere(proven.ranges)):
+                gaps.append((0.0, np.inf))
             for _, motion in proven.growing:
                 found.append((*_growth(motion.mu), self._shape(setting, motion)))
         if found:
@@ -226,6 +229,9 @@ class Stabilities:
             return "the root was found in floats, and its statuses are not proven"
         if any(_OPEN in root.active[i] for i in self._unsure(root)):
             return "a contact node may be open or touch, which the bounds of this root do not decide"
+        rubs = np.any([F.mid > 0 for F in _friction(self.problem, root.alpha)], axis=0)
+        if any(rubs[i] and {_PLUS, _MINUS} <= root.active[i] for i in self._unsure(root)):
+            return "a contact node may be at either limit, which the bounds of this root do not decide"
         return None
 
     def settings(self, root: Root, *, every: bool = False) -> Iterator[Setting]:
@@ -257,7 +263,9 @@ class Stabilities:
         if self._tangents > 1:
             return StabilitySearch(setting.stiffness, setting.motions).run()
         F, moves = setting.motions.slopes, setting.motions.moves
-        key = (tuple(setting.rows), setting.motions.unsure, *(part.tobytes() for part in (F.mid, F.rad, moves.mid)))
+        leaning = tuple((float(node.F.mid), float(node.F.rad)) for node in setting.motions.touching)
+        arrays = (part.tobytes() for part in (F.mid, F.rad, moves.mid))
+        key = (tuple(setting.rows), setting.motions.unsure, leaning, *arrays)
         if key not in self._known:
             self._known[key] = StabilitySearch(setting.stiffness, setting.motions).run()
         return self._known[key]
@@ -297,7 +305,8 @@ class Stabilities:
             columns.append(_column(len(rows), {place[i]: Ball.exact(np.array(-1.0))}))
             columns += [_column(len(rows), {place[row]: Ball.exact(np.array(1.0))}) for row in own]
             signed += [True, *(False for _ in own)]
-            smaller = min((f[i] for f in F), key=lambda f: float(f.mid))
+            # along axes with friction
+            smaller = min((f[i] for f in F), key=lambda f: float(f.mid) or np.inf)
             touching.append(Touching(start, tuple(range(start + 1, start + 1 + len(own))), smaller))
         motions = Motions(
             _stacked(columns, len(rows)),
@@ -378,7 +387,7 @@ def _limit(active: frozenset[ContactStatus], F: list[Ball], i: int, forces: Floa
     inverse = [_inverse(f[i]) for f in F]
     force = [Ball(0.5 * (low + high), 0.5 * (high - low) * SAFE + TINY) for low, high in forces[i]]
     shares = [x * y for x, y in zip(force, inverse, strict=True)]
-    length = float(np.hypot(*(x.mid for x in shares)))
+    length = float(np.hypot(*(x.mid for x in shares))) or TINY
     # |v / |v| - m / |m|| <= 2 |v - m| / |m|
     off = 2.0 * float(np.hypot(*(x.rad for x in shares))) / length * SAFE + 8 * UNIT
     typical = max(float(f.mid[i]) for f in F)

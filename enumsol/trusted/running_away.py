@@ -119,6 +119,11 @@ class NoMotion:
 
     def holds(self, stiffness: DynamicStiffness, motions: Motions) -> bool:
         """True if it is proven that nothing grows in the range."""
+        # what overflows is not finite, and proves nothing
+        with np.errstate(all="ignore"):
+            return self._holds(stiffness, motions)
+
+    def _holds(self, stiffness: DynamicStiffness, motions: Motions) -> bool:
         if not 0 <= self.low < self.high or not self._admitted(motions):
             return False
         known = self._ends(stiffness)
@@ -160,7 +165,9 @@ class NoMotion:
                 continue
             share = self.weights[own, own]
             lean = float(np.linalg.norm(beside[node.leaves, own])) * (1 + 2.0**-40)
-            if np.any(share != share[:1]) or (own and not lean <= share[0] * float(node.F.low) * (1 - 2.0**-40)):
+            if np.any(share != share[:1]) or np.any(share < 0):
+                return False
+            if own and not lean <= share[0] * max(0.0, float(node.F.low)) * (1 - 2.0**-40):
                 return False
             beside[node.leaves, own] = beside[own, own] = 0.0
         pairs = np.outer(signed, signed)
@@ -281,6 +288,10 @@ class Growing:
 
     def found(self, stiffness: Stiffness, motions: Motions) -> Motion | None:
         """The motion, if it is proven to be there."""
+        with np.errstate(all="ignore"):
+            return self._found(stiffness, motions)
+
+    def _found(self, stiffness: Stiffness, motions: Motions) -> Motion | None:
         k = len(motions.signed)
         if motions.unsure or not 0 < self.low < self.high < np.inf or len(self.touching) != len(motions.touching):
             return None
@@ -337,9 +348,10 @@ class Growing:
             else:
                 pressure = motions.moves[:, [node.leaves]].T @ forces
                 if code == STICK:
-                    if len(node.slides) != 1:
+                    if len(node.slides) > 1:
                         return False
-                    tests = [_slope(motions, node, slip).T @ forces for slip in (SLIP_PLUS, SLIP_MINUS)]
+                    both = (SLIP_PLUS, SLIP_MINUS) if node.slides else ()
+                    tests = [_slope(motions, node, slip).T @ forces for slip in both]
                 else:
                     own = x[list(node.slides)]
                     tests = [own if code == SLIP_PLUS else -own]
@@ -387,6 +399,18 @@ def positive(Q: Ball) -> bool:
     unit = np.exp2(-np.round(0.5 * np.log2(Q.mid.diagonal())))
     scale = unit[:, None] * unit
     return dense_eigenvalue_bound(Q.mid * scale) > float(upper_norm(Q.rad * scale + TINY)) * (1 + 2.0**-40)
+
+
+def everywhere(ranges: Sequence[tuple[float, float, Sequence[NoMotion]]]) -> bool:
+    """True if ranges (low, high, certificates that hold) leave no mu >= 0 and no way in which nodes slide or stay."""
+    reached = 0.0
+    for low, high, leaves in sorted(ranges, key=lambda item: item[0]):
+        if not low <= reached:
+            return False
+        if not covers([leaf for leaf in leaves if leaf.low <= low and high <= leaf.high]):
+            return False
+        reached = max(reached, high)
+    return reached == np.inf
 
 
 def covers(

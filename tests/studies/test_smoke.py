@@ -46,6 +46,7 @@ CONCLUSIONS = {
         "two bodies: the same roots to 1e-09, all complete: yes",
     ),
     "samples_vs_graph": ("branches of length 0.001 are missed by 50 samples", "20 of 20 root sets agree"),
+    "stability": ("12 equilibria, 8 different with nodes at their limit", "undecided: 0"),
     "workers": ("all complete and checked: yes; one proof whatever the number of workers: yes",),
     "uniqueness_vs_mesh": ("bound on F: 2D, nodes H^0.58, 0.54 between the finest (paper 0.5)",),
 }
@@ -72,6 +73,7 @@ LONG = (
     "search_in_3d",
     "search_in_3d_choices",
     "search_size",
+    "stability",
     "uniqueness_vs_mesh",
     "workers",
 )
