@@ -229,7 +229,7 @@ class Stabilities:
             return "the root was found in floats, and its statuses are not proven"
         if any(_OPEN in root.active[i] for i in self._unsure(root)):
             return "a contact node may be open or touch, which the bounds of this root do not decide"
-        rubs = np.any([F.mid > 0 for F in _friction(self.problem, root.alpha)], axis=0)
+        rubs = np.any([F.mid > 0 for F in friction_over(self.problem, root.alpha, root.alpha)], axis=0)
         if any(rubs[i] and {_PLUS, _MINUS} <= root.active[i] for i in self._unsure(root)):
             return "a contact node may be at either limit, which the bounds of this root do not decide"
         return None
