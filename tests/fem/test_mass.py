@@ -61,9 +61,7 @@ def test_a_problem_of_a_mesh_has_the_mass_of_a_uniform_density():
     M = made.inertia
     assert M.shape == (made.n, made.n)
     everywhere = made.mesh.motion.T @ np.tile([1.0, 0.0], len(made.mesh.points))
-    free = fem.mesh_problem(
-        fem.rectangle(4, 2).parted(), contact="bottom", max_rigid_displacement="auto", **MATERIAL
-    )
+    free = fem.mesh_problem(fem.rectangle(4, 2).parted(), contact="bottom", max_rigid_displacement="auto", **MATERIAL)
     assert free.inertia.sum() == pytest.approx(2.0)  # area, in both directions
     assert everywhere @ M @ everywhere < 1.0
 
@@ -103,7 +101,8 @@ def test_a_file_with_a_density(tmp_path):
     cells = [("quad", [[0, 1, 2, 3]]), ("line", [[0, 1], [2, 3]])]
     data = {"part": [[0], [1, 2]]}
     meshio.Mesh([[0, 0], [1, 0], [1, 1], [0, 1]], cells, cell_data=data).write(tmp_path / "square.vtu")
-    text = "mesh = 'square.vtu'\ngroups = 'part'\nyoung = 2.5\npoisson = 0.25\ndensity = 3.0\nclamp = '2'\ncontact = '1'"
+    lines = ["mesh = 'square.vtu'", "groups = 'part'", "young = 2.5", "poisson = 0.25", "density = 3.0"]
+    text = "\n".join([*lines, "clamp = '2'", "contact = '1'"])
     (tmp_path / "square.toml").write_text(text)
     read = fem.read_mesh_problem(tmp_path / "square.toml")
     enumsol.write_problem(read, tmp_path / "square.npz")
