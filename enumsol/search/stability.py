@@ -100,11 +100,19 @@ class StabilitySearch:
         while low < last:
             if numbers is not None and self._try(low, np.inf, *numbers):
                 return
-            yield from self._halved(low, high)
-            low, high = high, high * _STRIDE
+            far = next((mu for mu in (_STRIDE**2 * high, _STRIDE * high) if self._serve_to(low, mu)), None)
+            if far is None:
+                yield from self._halved(low, high)
+            low = high if far is None else far
+            high = low * _STRIDE
             if numbers is None and low > self._last:
                 break
         yield low, np.inf
+
+    def _serve_to(self, low: float, high: float) -> bool:
+        """Whether plain numbers serve in a long range."""
+        K = self.stiffness.at(high)
+        return K is not None and self._serves(K.mid) and self._try(low, high)
 
     def _far(self) -> tuple[Floats, Floats] | None:
         """Weights and products that may serve for large mu; plain ones if these do."""
@@ -181,7 +189,7 @@ class StabilitySearch:
             return (None,) if self.stiffness.stiffest is not None else (known[-1],) if known else ()
         if not known:
             return (None,)
-        return (known[-1] if known[-1] > 0.05 * low else 0.5 * low,)
+        return (known[-1],) if known[-1] > 0.05 * low else (known[-1], 0.5 * low)
 
     @cached_property
     def _last(self) -> float:
